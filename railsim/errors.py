@@ -1,0 +1,61 @@
+"""Errors that a user can act on.
+
+`InputError` gathers every fault of the input at once; the command line prints one line per fault
+and ends with exit status 2.  `ModelError` says that a model was asked for something outside its
+range of validity.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that is wrong in an input.
+
+    Attributes
+    ----------
+    file : str
+        File (or command line option) that holds the fault.
+    key : str
+        Dotted path of the key within the file, or ``line 12``; empty for the file as a whole.
+    found : str
+        What was found.
+    allowed : str
+        What is allowed instead, or how to mend it.
+    """
+
+    file: str
+    key: str
+    found: str
+    allowed: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}: {self.key}" if self.key else self.file
+        return f"{place}: {self.found}; {self.allowed}" if self.allowed else f"{place}: {self.found}"
+
+
+class RailsimError(Exception):
+    """Base of all errors that railsim raises on purpose."""
+
+
+class InputError(RailsimError):
+    """The input is wrong; `faults` lists everything that was found."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+class ModelError(RailsimError):
+    """A model was asked for something outside its range of validity."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """Return ``did you mean 'x'?`` or the list of valid names, for the end of a message."""
+    names = sorted(valid)
+    close = get_close_matches(name, names, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return "allowed: " + ", ".join(names)
