@@ -1,10 +1,10 @@
-"""The one table of quantities: name, symbol, unit, how it is shown, and what it means.
+"""The one table of quantities: name, symbol, unit, sign, how it is shown, and what it means.
 
 Everything that names a quantity to a user (HDF5 attributes, plot axes, printed tables) reads it
 from here; docs/notation.md is made from this table.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 SIDES = ("left", "right")
@@ -21,13 +21,16 @@ class Quantity:
     symbol : str
         Symbol in mathtext, for plots.
     unit : str
-        SI unit as stored.
+        SI unit as stored; where the components differ, that of x, y, z and that of the angles,
+        separated by a comma.
     dims : tuple of str
         Dimensions in the result file.
     shown_unit : str
         Unit in printed tables and plots, the habit of the field.
     scale : float
         Shown value = stored value times `scale`.
+    sign : str
+        What a positive value means; empty for magnitudes and where the name says it.
     """
 
     name: str
@@ -37,6 +40,44 @@ class Quantity:
     dims: tuple[str, ...]
     shown_unit: str
     scale: float
+    sign: str = ""
+
+    @property
+    def label(self) -> str:
+        """Axis label: words, symbol and shown unit."""
+        words = self.long_name[:1].upper() + self.long_name[1:]
+        unit = "" if self.shown_unit == "-" else f" ({self.shown_unit})"
+        return f"{words} ${self.symbol}${unit}"
+
+    def component(self, name: str) -> "Quantity":
+        """Return this quantity for one of `COMPONENTS`, with that component's unit.
+
+        Examples
+        --------
+        >>> QUANTITIES["body_position"].component("yaw").shown_unit
+        'mrad'
+        """
+        rotation = COMPONENTS.index(name) >= 3
+
+        def own(units: str) -> str:
+            return units.split(", ")[-1 if rotation else 0]
+
+        symbol = {
+            "x": "x",
+            "y": "y",
+            "z": "z",
+            "roll": r"\varphi",
+            "pitch": r"\theta",
+            "yaw": r"\psi",
+        }[name]
+        dots = {"body_velocity": r"\dot ", "body_acceleration": r"\ddot "}.get(self.name, "")
+        return replace(
+            self,
+            long_name=f"{name} {self.long_name}",
+            symbol=f"{dots}{symbol}",
+            unit=own(self.unit),
+            shown_unit=own(self.shown_unit),
+        )
 
 
 _WHEEL = ("time", "wheelset", "side")
@@ -50,25 +91,176 @@ def _table(*rows: Quantity) -> dict[str, Quantity]:
 
 QUANTITIES: dict[str, Quantity] = _table(
     Quantity("time", "time", "t", "s", ("time",), "s", 1.0),
-    Quantity("distance", "distance of the reference body", "s", "m", ("time",), "m", 1.0),
-    Quantity("Q", "vertical wheel force", "Q", "N", _WHEEL, "kN", 1e-3),
-    Quantity("Y", "lateral wheel force", "Y", "N", _WHEEL, "kN", 1e-3),
-    Quantity("Y_over_Q", "derailment quotient", "Y/Q", "1", _WHEEL, "-", 1.0),
-    Quantity("dQ_over_Q0", "wheel load change", r"\Delta Q/Q_0", "1", _WHEEL, "%", 100.0),
-    Quantity("sum_Y", "track shifting force", r"\Sigma Y", "N", _AXLE, "kN", 1e-3),
+    Quantity(
+        "distance",
+        "distance of the reference body",
+        "s",
+        "m",
+        ("time",),
+        "m",
+        1.0,
+        "along the track; 0 at the start of the track",
+    ),
+    Quantity(
+        "Q",
+        "vertical wheel force",
+        "Q",
+        "N",
+        _WHEEL,
+        "kN",
+        1e-3,
+        "on the rail, perpendicular to the track plane, positive pressing on the rail",
+    ),
+    Quantity(
+        "Y",
+        "lateral wheel force",
+        "Y",
+        "N",
+        _WHEEL,
+        "kN",
+        1e-3,
+        "on the rail, in the track plane, positive to the right",
+    ),
+    Quantity(
+        "Y_over_Q",
+        "derailment quotient",
+        "Y/Q",
+        "1",
+        _WHEEL,
+        "-",
+        1.0,
+        "positive when the wheel pushes its rail outwards",
+    ),
+    Quantity(
+        "dQ_over_Q0",
+        "wheel load change",
+        r"\Delta Q/Q_0",
+        "1",
+        _WHEEL,
+        "%",
+        100.0,
+        "positive when the wheel is loaded more than at rest on straight level track",
+    ),
+    Quantity(
+        "sum_Y",
+        "track shifting force",
+        r"\Sigma Y",
+        "N",
+        _AXLE,
+        "kN",
+        1e-3,
+        "on the track, positive to the right",
+    ),
     Quantity("sum_abs_Y", "lateral force of the wheelset", r"\Sigma |Y|", "N", _AXLE, "kN", 1e-3),
-    Quantity("wheelset_lateral", "wheelset lateral displacement", "y", "m", _AXLE, "mm", 1e3),
-    Quantity("wheelset_roll", "wheelset roll angle", r"\varphi", "rad", _AXLE, "mrad", 1e3),
-    Quantity("wheelset_yaw", "wheelset yaw angle", r"\psi", "rad", _AXLE, "mrad", 1e3),
-    Quantity("wheelset_distance", "distance of the wheelset", "s", "m", _AXLE, "m", 1.0),
-    Quantity("xi_x", "longitudinal creepage", r"\xi_x", "1", _WHEEL, "1e-3", 1e3),
-    Quantity("xi_y", "lateral creepage", r"\xi_y", "1", _WHEEL, "1e-3", 1e3),
-    Quantity("phi", "spin creepage", r"\phi", "1/m", _WHEEL, "1/m", 1.0),
+    Quantity(
+        "wheelset_lateral",
+        "wheelset lateral displacement",
+        "y",
+        "m",
+        _AXLE,
+        "mm",
+        1e3,
+        "of the wheelset relative to the track at its place, positive to the right",
+    ),
+    Quantity(
+        "wheelset_roll",
+        "wheelset roll angle",
+        r"\varphi",
+        "rad",
+        _AXLE,
+        "mrad",
+        1e3,
+        "relative to the track plane, positive with the right wheel down",
+    ),
+    Quantity(
+        "wheelset_yaw",
+        "wheelset yaw angle",
+        r"\psi",
+        "rad",
+        _AXLE,
+        "mrad",
+        1e3,
+        "relative to the radial position, positive with the nose to the right",
+    ),
+    Quantity(
+        "wheelset_distance",
+        "distance of the wheelset",
+        "s",
+        "m",
+        _AXLE,
+        "m",
+        1.0,
+        "along the track; 0 at the start of the track",
+    ),
+    Quantity(
+        "xi_x",
+        "longitudinal creepage",
+        r"\xi_x",
+        "1",
+        _WHEEL,
+        "1e-3",
+        1e3,
+        "of the most loaded patch: wheel minus rail, over the speed, positive forward",
+    ),
+    Quantity(
+        "xi_y",
+        "lateral creepage",
+        r"\xi_y",
+        "1",
+        _WHEEL,
+        "1e-3",
+        1e3,
+        "of the most loaded patch: wheel minus rail, over the speed, positive to the right",
+    ),
+    Quantity(
+        "phi",
+        "spin creepage",
+        r"\phi",
+        "1/m",
+        _WHEEL,
+        "1/m",
+        1.0,
+        "of the most loaded patch: about the normal into the rail",
+    ),
     Quantity("T_gamma", "wear number", r"T\gamma", "N", _WHEEL, "N", 1.0),
-    Quantity("Q0", "static wheel load", "Q_0", "N", ("wheelset", "side"), "kN", 1e-3),
-    Quantity("body_position", "position of the body", "q", "m, rad", _BODY, "m, rad", 1.0),
-    Quantity("body_velocity", "velocity of the body", r"\dot q", "m/s, rad/s", _BODY,
-             "m/s, rad/s", 1.0),
-    Quantity("body_acceleration", "acceleration of the body", "a", "m/s2, rad/s2", _BODY,
-             "m/s2, rad/s2", 1.0),
+    Quantity(
+        "Q0",
+        "static wheel load",
+        "Q_0",
+        "N",
+        ("wheelset", "side"),
+        "kN",
+        1e-3,
+        "at rest on straight level track",
+    ),
+    Quantity(
+        "body_position",
+        "position of the body",
+        "q",
+        "m, rad",
+        _BODY,
+        "mm, mrad",
+        1e3,
+        "relative to the track frame of the body; zero in the nominal position",
+    ),
+    Quantity(
+        "body_velocity",
+        "velocity of the body",
+        r"\dot q",
+        "m/s, rad/s",
+        _BODY,
+        "m/s, rad/s",
+        1.0,
+        "relative to the track frame of the body",
+    ),
+    Quantity(
+        "body_acceleration",
+        "acceleration of the body",
+        "a",
+        "m/s2, rad/s2",
+        _BODY,
+        "m/s2, rad/s2",
+        1.0,
+        "absolute, in body axes",
+    ),
 )
