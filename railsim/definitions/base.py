@@ -1,0 +1,108 @@
+"""The common base of all definitions, and the number types that their fields use.
+
+Every definition is frozen and refuses unknown keys.  Numbers are strict: no text, no truth values,
+nothing infinite.  What may be given once for both sides is always stored as the pair (left, right).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+import tomli_w
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    WithJsonSchema,
+)
+
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Count = Annotated[int, Field(strict=True, gt=0)]
+Flag = Annotated[bool, Field(strict=True)]
+Text = Annotated[str, Field(strict=True, min_length=1)]
+Name = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+
+Vector = tuple[Finite, Finite, Finite]
+PositiveVector = tuple[Positive, Positive, Positive]
+NonNegativeVector = tuple[NonNegative, NonNegative, NonNegative]
+
+
+def _pair(value: Any) -> Any:
+    return value if isinstance(value, list | tuple) else (value, value)
+
+
+def _one_or_two(member: dict[str, Any]) -> WithJsonSchema:
+    pair = {"type": "array", "items": member, "minItems": 2, "maxItems": 2}
+    return WithJsonSchema({"anyOf": [member, pair]})
+
+
+PositivePair = Annotated[
+    tuple[Positive, Positive],
+    BeforeValidator(_pair),
+    _one_or_two({"type": "number", "exclusiveMinimum": 0}),
+]
+NonNegativePair = Annotated[
+    tuple[NonNegative, NonNegative],
+    BeforeValidator(_pair),
+    _one_or_two({"type": "number", "minimum": 0}),
+]
+TextPair = Annotated[
+    tuple[Text, Text], BeforeValidator(_pair), _one_or_two({"type": "string", "minLength": 1})
+]
+
+
+def _word_or_value(value: Any) -> str:
+    return "word" if isinstance(value, str) else "value"
+
+
+_Auto = Annotated[Literal["auto"], Tag("word")]
+AutoOrNumber = Annotated[_Auto | Annotated[Finite, Tag("value")], Discriminator(_word_or_value)]
+AutoOrVector = Annotated[_Auto | Annotated[Vector, Tag("value")], Discriminator(_word_or_value)]
+
+
+class Definition(BaseModel):
+    """Base of everything that a user may write."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+
+class FileDefinition(Definition):
+    """Base of what fills a whole file."""
+
+    def to_toml(self) -> str:
+        """Return the whole definition as TOML text, defaults included, `extends` resolved."""
+        return tomli_w.dumps(self.model_dump(exclude_none=True))
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with top-level keys replaced, validated again."""
+        return type(self).model_validate({**self.model_dump(exclude_none=True), **changes})
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something allowed that an engineer would still want to be told.
+
+    Attributes
+    ----------
+    key : str
+        Dotted path of the key within the file.
+    text : str
+        What is unusual.
+    """
+
+    key: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.text}"
+
+
+def rising(rows: Sequence[Sequence[float]]) -> bool:
+    """Whether the first column increases strictly."""
+    return all(after[0] > before[0] for before, after in pairwise(rows))

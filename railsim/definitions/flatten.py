@@ -1,0 +1,299 @@
+"""From a vehicle as written to plain lists: assemblies placed, mirrored, names resolved.
+
+Two reflections occur: fore and aft (x) for a placement with `mirror = true`, and left and right (y)
+for the left copy of a part with `sides = "both"`.  Both move points; parameters with a direction
+(preloads, forces) turn with them, stiffness and damping do not.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+from railsim.definitions.base import Vector
+from railsim.definitions.elements import Element
+from railsim.definitions.names import body_names, name_faults, resolve, sided_names
+from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
+from railsim.errors import Fault, InputError
+
+# Allowed difference between an axle's height and the wheel radius, and the like [m].
+POSITION_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class FlatBody:
+    """A body in its nominal place.
+
+    Attributes
+    ----------
+    name : str
+        Full name, e.g. ``front.outer.wheelset``.
+    kind : {'body', 'wheelset', 'axlebox'}
+        An axlebox has no mass of its own, only `pitch_inertia`.
+    mass : float
+        Mass [kg].
+    inertia : tuple of 3 floats
+        Principal moments of inertia about x, y, z [kg m2].
+    position : tuple of 3 floats
+        Centre of gravity in vehicle axes (an axlebox: its bearing's centre) [m].
+    wheelset : Wheelset or None
+        Definition of the wheelset with radii and profiles.
+    parent : str or None
+        Wheelset that carries the axlebox.
+    pitch_inertia : float
+        Moment of inertia of an axlebox about the axle [kg m2].
+    """
+
+    name: str
+    kind: Literal["body", "wheelset", "axlebox"]
+    mass: float
+    inertia: Vector
+    position: Vector
+    wheelset: Wheelset | None = None
+    parent: str | None = None
+    pitch_inertia: float = 0.0
+
+
+@dataclass(frozen=True)
+class FlatElement:
+    """A force element in its nominal place.
+
+    Attributes
+    ----------
+    name, body1, body2 : str
+        Full names of the element and of the bodies it acts between.
+    point1, point2 : tuple of 3 floats
+        Where it acts in vehicle axes; an element without points: the bodies' positions [m].
+    definition : Element
+        Its parameters, with signs as they are in this place.
+    """
+
+    name: str
+    body1: str
+    body2: str
+    point1: Vector
+    point2: Vector
+    definition: Element
+
+
+@dataclass(frozen=True)
+class FlatVehicle:
+    """A vehicle without assemblies.
+
+    Attributes
+    ----------
+    name : str
+        Name of the vehicle.
+    bodies : tuple of FlatBody
+        Bodies in the order of the file, wheelsets from the leading end, axleboxes in the order of
+        their wheelsets, left before right.
+    elements : tuple of FlatElement
+        Elements in the order of the file, left before right.
+    reference : str
+        Name of the body whose arc length is the vehicle's `distance`.
+    """
+
+    name: str
+    bodies: tuple[FlatBody, ...]
+    elements: tuple[FlatElement, ...]
+    reference: str
+
+    def body(self, name: str) -> FlatBody:
+        """Return the body with this full name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def of_kind(self, kind: str) -> tuple[FlatBody, ...]:
+        """Return the bodies of one kind, in their order."""
+        return tuple(body for body in self.bodies if body.kind == kind)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a group stands: names and keys that lead to it, origin and direction of its x axis."""
+
+    scope: tuple[str, ...] = ()
+    path: tuple[str, ...] = ()
+    origin: Vector = (0.0, 0.0, 0.0)
+    x_sign: float = 1.0
+
+    def full(self, name: str) -> str:
+        return ".".join((*self.scope, name))
+
+    def key(self, *names: str) -> str:
+        return ".".join((*self.path, *names))
+
+    def signs(self, side: str | None) -> Vector:
+        return (self.x_sign, -1.0 if side == "left" else 1.0, 1.0)
+
+    def point(self, local: Vector, side: str | None = None) -> Vector:
+        signs = self.signs(side)
+        return (
+            self.origin[0] + signs[0] * local[0],
+            self.origin[1] + signs[1] * local[1],
+            self.origin[2] + local[2],
+        )
+
+    def inner(self, assembly: str, placement: Placement) -> "_Place":
+        return _Place(
+            (*self.scope, placement.name),
+            (*self.path, "assemblies", assembly),
+            self.point(placement.position),
+            -self.x_sign if placement.mirror else self.x_sign,
+        )
+
+
+def _places(
+    group: Vehicle | Assembly, place: _Place
+) -> Iterator[tuple[Vehicle | Assembly, _Place]]:
+    yield group, place
+    for name, assembly in group.assemblies.items():
+        for placement in assembly.placements:
+            yield from _places(assembly, place.inner(name, placement))
+
+
+def flatten(vehicle: Vehicle) -> FlatVehicle:
+    """Return the vehicle as plain lists of bodies and elements.
+
+    Raises
+    ------
+    InputError : names that mean nothing or are used twice, parts that do not fit together.
+    """
+    faults = vehicle_faults(vehicle)
+    if faults:
+        raise InputError(
+            Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
+        )
+    return _flat(vehicle)
+
+
+def vehicle_faults(vehicle: Vehicle) -> list[Fault]:
+    """Return what is wrong between the parts of a vehicle; the faults' file is left empty."""
+    return name_faults(vehicle.model_dump()) or position_faults(vehicle)
+
+
+def _flat(vehicle: Vehicle) -> FlatVehicle:
+    known, _ = body_names(vehicle.model_dump())
+    places = list(_places(vehicle, _Place()))
+    bodies = [body for group, place in places for body in _bodies(group, place)]
+    wheelsets = [body for group, place in places for body in _wheelsets(group, place)]
+    wheelsets.sort(key=lambda body: -body.position[0])
+    order = {body.name: index for index, body in enumerate(wheelsets)}
+    boxes = [box for group, place in places for box in _axleboxes(group, place, known)]
+    boxes.sort(key=lambda box: order[box.parent or ""])
+    flat = (*bodies, *wheelsets, *boxes)
+    positions = {body.name: body.position for body in flat}
+    elements = [e for group, place in places for e in _elements(group, place, positions)]
+    reference = vehicle.reference or flat[0].name
+    return FlatVehicle(vehicle.name, flat, tuple(elements), reference)
+
+
+def _bodies(group: Vehicle | Assembly, place: _Place) -> Iterator[FlatBody]:
+    for name, body in group.bodies.items():
+        at = place.point(body.position)
+        yield FlatBody(place.full(name), "body", body.mass, body.inertia, at)
+
+
+def _wheelsets(group: Vehicle | Assembly, place: _Place) -> Iterator[FlatBody]:
+    for name, wheelset in group.wheelsets.items():
+        at = place.point(wheelset.position)
+        yield FlatBody(place.full(name), "wheelset", wheelset.mass, wheelset.inertia, at, wheelset)
+
+
+def _axleboxes(
+    group: Vehicle | Assembly, place: _Place, known: dict[str, str]
+) -> Iterator[FlatBody]:
+    for name, box in group.axleboxes.items():
+        parent = resolve(box.wheelset, place.scope, None, known)
+        for sided, side in sided_names(name, {"sides": box.sides}):
+            yield FlatBody(
+                place.full(sided),
+                "axlebox",
+                0.0,
+                (0.0, 0.0, 0.0),
+                place.point(box.position, side),
+                parent=parent,
+                pitch_inertia=box.pitch_inertia,
+            )
+
+
+def _elements(
+    group: Vehicle | Assembly, place: _Place, positions: dict[str, Vector]
+) -> Iterator[FlatElement]:
+    for name, element in group.elements.items():
+        for sided, side in sided_names(name, {"sides": getattr(element, "sides", None)}):
+            ends = [resolve(body, place.scope, side, positions) or "" for body in element.bodies]
+            points = element.end_points()
+            if points is None:
+                at = (positions[ends[0]], positions[ends[1]])
+            else:
+                at = (place.point(points[0], side), place.point(points[1], side))
+            definition = element.mirrored(place.signs(side))
+            yield FlatElement(place.full(sided), ends[0], ends[1], at[0], at[1], definition)
+
+
+def position_faults(vehicle: Vehicle) -> list[Fault]:
+    """Return which parts of a vehicle stand where they cannot; the faults' file is left empty."""
+    flat = _flat(vehicle)
+    keys = _keys(vehicle)
+    faults = _height_faults(flat, keys) + _axlebox_faults(flat, keys)
+    wheelsets = flat.of_kind("wheelset")
+    for ahead, behind in pairwise(wheelsets):
+        if ahead.position[0] - behind.position[0] < POSITION_TOLERANCE:
+            found = f"'{ahead.name}' and '{behind.name}' stand at the same place"
+            key = f"{keys[behind.name]}.position"
+            faults.append(Fault("", key, found, "wheelsets one behind the other"))
+    for group, place in _places(vehicle, _Place()):
+        faults += _side_faults(group, place)
+    return list(dict.fromkeys(faults))
+
+
+def _keys(vehicle: Vehicle) -> dict[str, str]:
+    keys: dict[str, str] = {}
+    for group, place in _places(vehicle, _Place()):
+        for table in ("wheelsets", "axleboxes"):
+            for name, part in getattr(group, table).items():
+                for sided, _ in sided_names(name, {"sides": getattr(part, "sides", None)}):
+                    keys[place.full(sided)] = place.key(table, name)
+    return keys
+
+
+def _height_faults(flat: FlatVehicle, keys: dict[str, str]) -> list[Fault]:
+    faults = []
+    for body in flat.of_kind("wheelset"):
+        assert body.wheelset is not None  # of its kind
+        radius = 0.5 * sum(body.wheelset.radius)
+        if abs(body.position[2] + radius) > POSITION_TOLERANCE:
+            found = f"the axle of '{body.name}' is at z = {body.position[2]:g} m"
+            allowed = f"z = {-radius:g} m, so that the wheels stand on the rails"
+            faults.append(Fault("", f"{keys[body.name]}.position", found, allowed))
+    return faults
+
+
+def _axlebox_faults(flat: FlatVehicle, keys: dict[str, str]) -> list[Fault]:
+    faults = []
+    for box in flat.of_kind("axlebox"):
+        axle = flat.body(box.parent or "").position
+        if max(abs(box.position[i] - axle[i]) for i in (0, 2)) > POSITION_TOLERANCE:
+            found = f"'{box.name}' is off its axle by more than {POSITION_TOLERANCE * 1e3:g} mm"
+            allowed = f"x = {axle[0]:g} m, z = {axle[2]:g} m in vehicle axes"
+            faults.append(Fault("", f"{keys[box.name]}.position", found, allowed))
+    return faults
+
+
+def _side_faults(group: Vehicle | Assembly, place: _Place) -> list[Fault]:
+    faults = []
+    for name, box in group.axleboxes.items():
+        if box.sides == "both" and box.position[1] <= 0.0:
+            faults.append(_not_on_the_right(place.key("axleboxes", name, "position")))
+    for name, element in group.elements.items():
+        points = element.end_points()
+        if getattr(element, "sides", None) != "both" or points is None:
+            continue
+        if max(points[0][1], points[1][1]) <= 0.0:
+            faults.append(_not_on_the_right(place.key("elements", name)))
+    return faults
+
+
+def _not_on_the_right(key: str) -> Fault:
+    found = 'sides = "both", but the part is not on the right'
+    return Fault("", key, found, "y > 0: the left one is its mirror image")

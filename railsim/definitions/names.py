@@ -1,0 +1,183 @@
+"""Names within a vehicle file: which bodies there are, and which body a name means where it stands.
+
+Works on the plain nested tables of a file, whether valid or not, so that wrong names are reported
+together with wrong numbers.  A name is looked for in the innermost assembly first, then outwards;
+a dotted name reaches into other assemblies.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from railsim.errors import Fault, nearest
+
+Scope = tuple[str, ...]
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class Group:
+    """One standing assembly, or the vehicle itself.
+
+    Attributes
+    ----------
+    parts : Mapping
+        Its table: bodies, wheelsets, axleboxes, elements.
+    scope : tuple of str
+        Names of the placements that lead to it.
+    path : tuple of str
+        Keys that lead to its table in the file.
+    """
+
+    parts: Mapping[str, Any]
+    scope: Scope
+    path: tuple[str, ...]
+
+    def table(self, key: str) -> dict[str, Mapping[str, Any]]:
+        """Return the well-formed members of one of its tables."""
+        return _members(self.parts, key)
+
+    def full(self, *names: str) -> str:
+        """Return the full name of a part of this group."""
+        return ".".join((*self.scope, *names))
+
+
+def _members(parts: Mapping[str, Any], key: str) -> dict[str, Mapping[str, Any]]:
+    table = parts.get(key)
+    if not isinstance(table, Mapping):
+        return {}
+    return {name: part for name, part in table.items() if isinstance(part, Mapping)}
+
+
+def groups(
+    parts: Mapping[str, Any], scope: Scope = (), path: tuple[str, ...] = ()
+) -> Iterator[Group]:
+    """Yield the vehicle and every standing assembly in it, outer ones first."""
+    yield Group(parts, scope, path)
+    for name, assembly in _members(parts, "assemblies").items():
+        for placement in placement_names(assembly):
+            yield from groups(assembly, (*scope, placement), (*path, "assemblies", name))
+
+
+def placement_names(assembly: Mapping[str, Any]) -> list[str]:
+    """Return the names of an assembly's placements as far as they are well-formed."""
+    placements = assembly.get("placements")
+    if not isinstance(placements, list | tuple):
+        return []
+    named = [p["name"] for p in placements if isinstance(p, Mapping) and "name" in p]
+    return [name for name in named if isinstance(name, str)]
+
+
+def sided_names(name: str, part: Mapping[str, Any]) -> list[tuple[str, str | None]]:
+    """Return the names that a part gets, each with its side: left and right, or just one."""
+    if part.get("sides") == "both":
+        return [(f"{name}.{side}", side) for side in SIDES]
+    return [(name, None)]
+
+
+def body_names(parts: Mapping[str, Any]) -> tuple[dict[str, str], list[Fault]]:
+    """Return the full names of all bodies with their kind, and a fault for each name used twice."""
+    kinds: dict[str, str] = {}
+    faults: list[Fault] = []
+    for group in groups(parts):
+        for table, kind in (
+            ("bodies", "body"),
+            ("wheelsets", "wheelset"),
+            ("axleboxes", "axlebox"),
+        ):
+            for name, part in group.table(table).items():
+                key = ".".join((*group.path, table, name))
+                for sided, _ in sided_names(name, part):
+                    full = group.full(sided)
+                    if full in kinds:
+                        found = f"the name '{full}' is used twice"
+                        faults.append(Fault("", key, found, "give each body a name of its own"))
+                    kinds[full] = kind
+    return kinds, faults
+
+
+def resolve(name: str, scope: Scope, side: str | None, known: Mapping[str, Any]) -> str | None:
+    """Return the full name of the body that `name` means in an assembly, or None.
+
+    Parameters
+    ----------
+    name : str
+        Name as written, perhaps dotted.
+    scope : tuple of str
+        Where it is written.
+    side : {'left', 'right'} or None
+        Side of the element that names it: an axlebox on both sides is then the one on that side.
+    known : mapping
+        Full names of all bodies.
+    """
+    for depth in range(len(scope), -1, -1):
+        full = ".".join((*scope[:depth], name))
+        if full in known:
+            return full
+        if side is not None and f"{full}.{side}" in known:
+            return f"{full}.{side}"
+    return None
+
+
+def visible(scope: Scope, known: Mapping[str, Any]) -> list[str]:
+    """Return how the known bodies may be called from within an assembly, shortest forms first."""
+    names: list[str] = []
+    for depth in range(len(scope), -1, -1):
+        prefix = "".join(f"{part}." for part in scope[:depth])
+        names += [full.removeprefix(prefix) for full in known if full.startswith(prefix)]
+    return list(dict.fromkeys(names))
+
+
+def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
+    """Return every fault of the names in a vehicle's tables; the faults' file is left empty."""
+    known, faults = body_names(parts)
+    wheelsets = {full: kind for full, kind in known.items() if kind == "wheelset"}
+    if not wheelsets:
+        faults.append(Fault("", "wheelsets", "no wheelset", "a vehicle needs one at least"))
+    faults += _reference_faults(parts, known)
+    used: set[str] = set()
+    for group in groups(parts):
+        for name, axlebox in group.table("axleboxes").items():
+            key = ".".join((*group.path, "axleboxes", name, "wheelset"))
+            faults += _unknown(axlebox.get("wheelset"), group, None, wheelsets, key, "wheelset")
+        for name, element in group.table("elements").items():
+            key = ".".join((*group.path, "elements", name))
+            for sided, side in sided_names(name, element):
+                faults += _element_faults(element, group, side, known, key)
+                if group.full(sided) in used:
+                    found = f"the name '{group.full(sided)}' is used twice"
+                    faults.append(Fault("", key, found, "give each element a name of its own"))
+                used.add(group.full(sided))
+    return list(dict.fromkeys(faults))
+
+
+def _reference_faults(parts: Mapping[str, Any], known: Mapping[str, str]) -> list[Fault]:
+    name = parts.get("reference")
+    candidates = [full for full, kind in known.items() if kind != "axlebox"]
+    if not isinstance(name, str) or name in candidates:
+        return []
+    return [Fault("", "reference", f"no body '{name}'", nearest(name, candidates))]
+
+
+def _element_faults(
+    element: Mapping[str, Any], group: Group, side: str | None, known: Mapping[str, str], key: str
+) -> list[Fault]:
+    bodies = element.get("bodies")
+    if not isinstance(bodies, list | tuple):
+        return []
+    faults: list[Fault] = []
+    for index, name in enumerate(bodies):
+        faults += _unknown(name, group, side, known, f"{key}.bodies.{index}", "body")
+    ends = [resolve(name, group.scope, side, known) for name in bodies if isinstance(name, str)]
+    if len(ends) == 2 and ends[0] is not None and ends[0] == ends[1]:
+        found = f"both ends are on '{bodies[0]}'"
+        faults.append(Fault("", f"{key}.bodies", found, "two different bodies"))
+    return faults
+
+
+def _unknown(
+    name: Any, group: Group, side: str | None, known: Mapping[str, str], key: str, kind: str
+) -> list[Fault]:
+    if not isinstance(name, str) or resolve(name, group.scope, side, known) is not None:
+        return []
+    return [Fault("", key, f"no {kind} '{name}'", nearest(name, visible(group.scope, known)))]

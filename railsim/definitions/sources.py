@@ -1,0 +1,407 @@
+"""Finding and reading definition files: TOML, `extends`, `remove` and overrides.
+
+The result is one nested table of plain values with its provenance: for each key the file that it
+came from, so that a fault can be reported where it was written.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from railsim.errors import Fault, InputError, nearest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+FOLDERS = {"vehicle": "vehicles", "track": "tracks"}
+# Keys that hold the name of another file, relative to the file in which they stand.
+FILE_KEYS = {"profile", "rail", "file"}
+OVERRIDE = "--set"
+
+KeyPath = tuple[str, ...]
+
+
+@dataclass
+class Source:
+    """A definition as plain values.
+
+    Attributes
+    ----------
+    file : str
+        File that was asked for.
+    data : dict
+        Its content with `extends` resolved and overrides applied.
+    origin : dict
+        File by key path; a key without an entry of its own came with its table.
+    """
+
+    file: str
+    data: dict[str, Any] = field(default_factory=dict)
+    origin: dict[KeyPath, str] = field(default_factory=dict)
+
+    def file_of(self, path: KeyPath) -> str:
+        """Return the file that holds a key, or the table around it."""
+        for end in range(len(path), -1, -1):
+            if path[:end] in self.origin:
+                return self.origin[path[:end]]
+        return self.file
+
+    def fault(self, key: str, found: str, allowed: str = "") -> Fault:
+        """Return a fault of this source with the file that holds the key."""
+        return Fault(self.file_of(tuple(key.split("."))), key, found, allowed)
+
+
+def shipped_folder(kind: str) -> Path:
+    """Return the folder of the vehicles or tracks that come with railsim."""
+    installed = PACKAGE / "shipped" / FOLDERS[kind]
+    return installed if installed.is_dir() else PACKAGE.parent / FOLDERS[kind]
+
+
+def shipped_names(kind: str) -> list[str]:
+    """Return the bare names of the shipped vehicles or tracks."""
+    return sorted(path.stem for path in shipped_folder(kind).glob("*.toml"))
+
+
+def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
+    """Return the file that a path or a bare name means; a path wins over a name.
+
+    Parameters
+    ----------
+    name : str or Path
+        Path, or name of a shipped file without its ending.
+    kind : {'vehicle', 'track', 'settings'}
+        What is looked for; settings have no shipped files.
+    beside : Path, optional
+        File that names it: relative paths count from its folder.
+
+    Raises
+    ------
+    InputError : there is no such file.
+    """
+    folder = beside.parent if beside is not None else Path()
+    candidates = [folder / name]
+    if beside is not None:
+        candidates.append(folder / f"{name}.toml")
+    if kind in FOLDERS:
+        candidates.append(shipped_folder(kind) / f"{name}.toml")
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    raise InputError([_no_file(name, kind, candidates[0], beside)])
+
+
+def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
+    found = f"'{name}' is a folder" if path.is_dir() else f"no file '{name}'"
+    allowed = "a path"
+    if kind in FOLDERS:
+        names = nearest(str(name), shipped_names(kind))
+        allowed = f"a path, or the name of a shipped {kind}: {names.removeprefix('allowed: ')}"
+    if beside is not None:
+        return Fault(str(beside), "extends", found, allowed)
+    return Fault(str(name), "", found, allowed)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError : it cannot be read, is no text or no TOML (with the line).
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError([Fault(str(path), "", f"cannot be read ({error.strerror})", "")]) from None
+    except UnicodeDecodeError:
+        raise InputError([Fault(str(path), "", "not a UTF-8 text", "a TOML file")]) from None
+    return parse_toml(text, str(path))
+
+
+def parse_toml(text: str, file: str) -> dict[str, Any]:
+    """Parse TOML text; `file` is its name in messages.
+
+    Raises
+    ------
+    InputError : a syntax error, with its line.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
+        if place:
+            message = str(error).replace(place.group(0), "")
+            key = f"line {place.group(1)}"
+            found = f"broken TOML at column {place.group(2)}: {message}"
+        else:
+            line = text.count("\n") + 1
+            key, found = f"line {line}", f"broken TOML: {error}"
+        raise InputError([Fault(file, key, found, "")]) from None
+
+
+def read_source(path: Path, kind: str) -> Source:
+    """Read a file and everything that it extends.
+
+    Raises
+    ------
+    InputError : a file is missing or broken, or the chain of `extends` runs in a circle.
+    """
+    return _extended(read_toml(path), path, kind, (path.resolve(),))
+
+
+def text_source(text: str, file: str, kind: str) -> Source:
+    """Return the source of a text; relative paths in it count from the current folder."""
+    return _extended(parse_toml(text, file), Path(file), kind, ())
+
+
+def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ...]) -> Source:
+    data, base_name, removed = _without_extends(data, path)
+    _anchor_files(data, path.parent)
+    own = Source(str(path), data, dict.fromkeys(_paths(data, ()), str(path)))
+    if base_name is None:
+        return own
+    base_path = find_file(base_name, kind, beside=path)
+    if base_path.resolve() in chain:
+        names = " -> ".join(p.name for p in (*chain, base_path))
+        fault = Fault(str(path), "extends", f"a circle: {names}", "a chain with an end")
+        raise InputError([fault])
+    base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
+    if faults := [fault for key in removed for fault in _remove(base, key, str(path))]:
+        raise InputError(faults)
+    _merge(base.data, data, (), base.origin, str(path))
+    return Source(str(path), base.data, base.origin)
+
+
+def _paths(node: Any, at: KeyPath) -> Iterator[KeyPath]:
+    """Yield the key paths of everything in a nested table."""
+    members: Iterable[tuple[Any, Any]] = ()
+    if isinstance(node, dict):
+        members = node.items()
+    elif isinstance(node, list):
+        members = enumerate(node)
+    for key, value in members:
+        yield (*at, str(key))
+        yield from _paths(value, (*at, str(key)))
+
+
+def _without_extends(
+    data: dict[str, Any], path: Path
+) -> tuple[dict[str, Any], str | None, list[str]]:
+    data = dict(data)
+    base = data.pop("extends", None)
+    removed = data.pop("remove", [])
+    faults = []
+    if base is not None and not isinstance(base, str):
+        faults.append(Fault(str(path), "extends", repr(base), "a path or the name of a file"))
+    if not isinstance(removed, list) or not all(isinstance(key, str) for key in removed):
+        faults.append(Fault(str(path), "remove", repr(removed), "a list of dotted key paths"))
+    elif removed and base is None:
+        faults.append(Fault(str(path), "remove", "no 'extends'", "'remove' goes with 'extends'"))
+    if faults:
+        raise InputError(faults)
+    return data, base, removed
+
+
+def _merge(
+    table: dict[str, Any],
+    changes: dict[str, Any],
+    at: KeyPath,
+    origin: dict[KeyPath, str],
+    file: str,
+) -> None:
+    """Put `changes` over a table; a table of another `kind` replaces the old one as a whole."""
+    for key, value in changes.items():
+        path = (*at, key)
+        old = table.get(key)
+        origin[path] = file
+        if isinstance(value, dict) and isinstance(old, dict) and not _other_kind(old, value):
+            _merge(old, value, path, origin, file)
+        else:
+            table[key] = value
+            _replace_origin(origin, path, value, file)
+
+
+def _replace_origin(origin: dict[KeyPath, str], path: KeyPath, value: Any, file: str) -> None:
+    for known in [known for known in origin if known[: len(path)] == path]:
+        del origin[known]
+    origin[path] = file
+    origin.update(dict.fromkeys(_paths(value, path), file))
+
+
+def _other_kind(old: dict[str, Any], new: dict[str, Any]) -> bool:
+    return "kind" in new and new["kind"] != old.get("kind")
+
+
+def _remove(base: Source, key: str, file: str) -> list[Fault]:
+    try:
+        path = key_path(key)
+        parent, last = _descend(base.data, path)
+        del parent[last]
+    except KeyError as missing:
+        found = f"no key '{key}' in {base.file}"
+        return [Fault(file, "remove", found, str(missing.args[0]))]
+    return []
+
+
+def _anchor_files(node: Any, folder: Path) -> None:
+    """Make the names of existing files absolute, so that they mean the same from everywhere."""
+    members = node.items() if isinstance(node, dict) else enumerate(node)
+    for key, value in list(members):
+        if key in FILE_KEYS:
+            node[key] = _anchored(value, folder)
+        elif isinstance(value, dict | list):
+            _anchor_files(value, folder)
+
+
+def _anchored(value: Any, folder: Path) -> Any:
+    if isinstance(value, list):
+        return [_anchored(member, folder) for member in value]
+    if isinstance(value, str) and value and (folder / value).is_file():
+        return str((folder / value).resolve())
+    return value
+
+
+def key_path(key: str) -> list[str]:
+    """Return the parts of a dotted key; parts may be quoted as in TOML.
+
+    Examples
+    --------
+    >>> key_path('initial."front.frame".y')
+    ['initial', 'front.frame', 'y']
+
+    Raises
+    ------
+    KeyError : it is no key.
+    """
+    try:
+        node = tomllib.loads(f"{key} = 0")
+    except tomllib.TOMLDecodeError:
+        raise KeyError("a dotted path of keys such as bodies.carbody.mass") from None
+    parts = []
+    while isinstance(node, dict):
+        ((part, node),) = node.items()
+        parts.append(part)
+    return parts
+
+
+def _descend(data: Any, path: Sequence[str], create: bool = False) -> tuple[Any, Any]:
+    """Return the table or list that holds the last part of the path, and its key or index."""
+    node = data
+    for depth, part in enumerate(path):
+        key = _member(node, part)
+        last = depth == len(path) - 1
+        if last and (isinstance(node, dict) or key is not None):
+            return node, part if isinstance(node, dict) else key
+        if key is None and create and isinstance(node, dict):
+            node[part] = {}
+            key = part
+        if key is None:
+            raise KeyError(_no_member(node, part, path[:depth]))
+        node = node[key]
+    raise KeyError("a dotted path of keys")
+
+
+def _member(node: Any, part: str) -> str | int | None:
+    """Return the key or index of a member: by key, in a list by its `name`, else by its index."""
+    if isinstance(node, dict):
+        return part if part in node else None
+    if isinstance(node, list):
+        for index, member in enumerate(node):
+            if isinstance(member, dict) and member.get("name") == part:
+                return index
+        if part.isdecimal() and int(part) < len(node):
+            return int(part)
+    return None
+
+
+def _no_member(node: Any, part: str, before: Sequence[str]) -> str:
+    place = ".".join(before) or "the file"
+    if isinstance(node, dict):
+        return f"no '{part}' in {place}; {nearest(part, node)}"
+    if isinstance(node, list):
+        names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
+        known = [str(name) for name in names] or [f"0 to {len(node) - 1}"]
+        return f"no member '{part}' in {place}; {nearest(part, known)}"
+    return f"'{place}' is a value and has no members"
+
+
+def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str] = ()) -> Source:
+    """Return the source with `key.path=value` texts applied in their order.
+
+    Parameters
+    ----------
+    source : Source
+        What to change; it stays as it is.
+    overrides : iterable of str
+        Assignments with TOML values; members of lists are named by their `name`, else by index.
+    free : sequence of str
+        Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
+
+    Raises
+    ------
+    InputError : an assignment that means nothing; all of them at once.
+    """
+    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
+    faults = []
+    for text in overrides:
+        try:
+            _apply(changed, text, free)
+        except KeyError as problem:
+            key = text.partition("=")[0].strip()
+            faults.append(Fault(OVERRIDE, key, str(problem.args[0]), ""))
+    if faults:
+        raise InputError(faults)
+    return changed
+
+
+def _apply(source: Source, text: str, free: Sequence[str]) -> None:
+    key, equals, written = text.partition("=")
+    if not equals:
+        raise KeyError("an assignment key.path=value is needed")
+    path = key_path(key.strip())
+    if path[0] in free and len(path) > 2:
+        path = [path[0], ".".join(path[1:-1]), path[-1]]
+    parent, last = _descend(source.data, path, create=path[0] in free)
+    present = parent[last] if not isinstance(parent, dict) or last in parent else None
+    parent[last] = _value(written.strip(), isinstance(present, str))
+    place = tuple(str(_descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
+    _replace_origin(source.origin, place, parent[last], OVERRIDE)
+
+
+def _value(written: str, text_expected: bool) -> Any:
+    """Return a written value: TOML, and what is no TOML is text without its quotes."""
+    try:
+        value = tomllib.loads(f"value = {written}")["value"]
+    except tomllib.TOMLDecodeError:
+        if not written or written[0] in "[{\"'":
+            raise KeyError(f"the value '{written}' is no TOML") from None
+        return written
+    return written if text_expected and not isinstance(value, str) else value
+
+
+def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
+    """Sort `vehicle.`, `track.` and `settings.` assignments; the prefixes are taken off.
+
+    Examples
+    --------
+    >>> split_overrides(["track.friction=0.3", "settings.scheme=rk4"])
+    {'vehicle': [], 'track': ['friction=0.3'], 'settings': ['scheme=rk4']}
+
+    Raises
+    ------
+    InputError : an assignment with another beginning.
+    """
+    sorted_ones: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
+    faults = []
+    for text in overrides:
+        prefix, _, rest = text.partition(".")
+        if prefix in sorted_ones:
+            sorted_ones[prefix].append(rest)
+        else:
+            key = text.partition("=")[0]
+            allowed = "a path that begins with vehicle., track. or settings."
+            faults.append(Fault(OVERRIDE, key, "unknown beginning", allowed))
+    if faults:
+        raise InputError(faults)
+    return sorted_ones

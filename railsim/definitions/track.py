@@ -1,0 +1,145 @@
+"""Track files, `railsim-track/1`: plan, cant, vertical profile, rails and friction.
+
+Plan, cant and vertical profile are lists of elements, one behind the other, each with its length.
+A transition (CLO, LIR) takes its ends from its neighbours where it does not name them.  Curvature,
+cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from railsim.definitions.base import (
+    Definition,
+    FileDefinition,
+    NonNegativePair,
+    Positive,
+    Text,
+    TextPair,
+)
+
+TRACK_FORMAT = "railsim-track/1"
+
+
+def _curved(radius: float) -> float:
+    if not abs(radius) >= 5.0:
+        raise ValueError("a radius is 5 m at least, negative in a left-hand curve, inf if straight")
+    return radius
+
+
+Radius = Annotated[float, Field(strict=True), AfterValidator(_curved)]
+Cant = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
+Gradient = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.3, le=0.3)]
+
+
+class Straight(Definition):
+    """A straight."""
+
+    type: Literal["STR"]
+    length: Positive
+    """Length [m]"""
+
+
+class Circle(Definition):
+    """A circular curve."""
+
+    type: Literal["CIR"]
+    length: Positive
+    """Length along the centre line [m]"""
+    radius: Radius
+    """Radius, positive to the right [m]"""
+
+
+class Clothoid(Definition):
+    """A transition with curvature linear in the arc length."""
+
+    type: Literal["CLO"]
+    length: Positive
+    """Length [m]"""
+    radius_start: Radius | None = None
+    """Radius at its beginning, `inf` if straight [m]; by default that of the element before"""
+    radius_end: Radius | None = None
+    """Radius at its end [m]; by default that of the element behind"""
+
+
+class ConstantCant(Definition):
+    """Constant cant."""
+
+    type: Literal["CST"]
+    length: Positive
+    """Length [m]"""
+    cant: Cant
+    """Height of the left rail over the right one, on the cant base of 1.5 m [m]"""
+
+
+class CantRamp(Definition):
+    """A ramp with cant linear in the arc length."""
+
+    type: Literal["LIR"]
+    length: Positive
+    """Length [m]"""
+    cant_start: Cant | None = None
+    """Cant at its beginning [m]; by default that of the element before"""
+    cant_end: Cant | None = None
+    """Cant at its end [m]; by default that of the element behind"""
+
+
+class ConstantGradient(Definition):
+    """Constant gradient."""
+
+    type: Literal["CST"]
+    length: Positive
+    """Length [m]"""
+    gradient: Gradient
+    """Rise over horizontal distance, positive uphill [1]"""
+
+
+class GradientRamp(Definition):
+    """A vertical curve: gradient linear in the arc length, radius = length / change of gradient."""
+
+    type: Literal["LIR"]
+    length: Positive
+    """Length [m]"""
+    gradient_start: Gradient | None = None
+    """Gradient at its beginning [1]; by default that of the element before"""
+    gradient_end: Gradient | None = None
+    """Gradient at its end [1]; by default that of the element behind"""
+
+
+PlanElement = Annotated[Straight | Clothoid | Circle, Field(discriminator="type")]
+CantElement = Annotated[ConstantCant | CantRamp, Field(discriminator="type")]
+VerticalElement = Annotated[ConstantGradient | GradientRamp, Field(discriminator="type")]
+
+
+class Track(FileDefinition):
+    """A track: everything that its file says."""
+
+    format: Literal["railsim-track/1"]
+    """Kind and version of the file"""
+    name: Text
+    """What the track is called in tables and plots"""
+    source: Text | None = None
+    """Where the numbers come from"""
+    gauge: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.3, le=2.5)] = 1.435
+    """Distance between the gauge faces, 14 mm below the rail tops [m]"""
+    rail: TextPair = ("60E1", "60E1")
+    """Rail profile, a built-in name or a file, or [left, right]"""
+    inclination: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.2)] = 0.025
+    """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
+    friction: NonNegativePair = (0.4, 0.4)
+    """Coefficient of friction, one number or [left, right] [1]"""
+    rounding: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=200)] = 10.0
+    """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
+    cant_rotation: Literal["centre", "inner_rail"] = "centre"
+    """Cant turns the track about its centre line, or about the inner (lower) rail"""
+    plan: tuple[PlanElement, ...] = Field(min_length=1)
+    """Elements of the plan, from s = 0 on; the first and the last continue beyond the ends"""
+    cant: tuple[CantElement, ...] = ()
+    """Elements of the cant; where shorter than the plan, the last value continues"""
+    vertical: tuple[VerticalElement, ...] = ()
+    """Elements of the vertical profile; where shorter than the plan, the last gradient continues"""
+
+    @property
+    def length(self) -> float:
+        """Length of the plan [m]."""
+        return sum(element.length for element in self.plan)

@@ -1,0 +1,122 @@
+"""Vehicle files, `railsim-vehicle/1`: bodies, wheelsets, axleboxes, force elements, assemblies.
+
+Everything is a table with a name of its own, so that an extending file can replace a part of it.
+Positions are those of the nominal vehicle at rest on straight level track: x forward from the
+vehicle's origin, y to the right, z down from the plane through the rail tops.  An assembly is a
+group that stands at each of its placements; its coordinates count from there.
+"""
+
+from typing import Literal
+
+from pydantic import Field
+
+from railsim.definitions.base import (
+    Definition,
+    FileDefinition,
+    Flag,
+    Name,
+    Positive,
+    PositivePair,
+    PositiveVector,
+    Text,
+    TextPair,
+    Vector,
+)
+from railsim.definitions.elements import AnyElement
+
+VEHICLE_FORMAT = "railsim-vehicle/1"
+
+
+class Body(Definition):
+    """A rigid body: car body, bogie frame, bolster, traction motor."""
+
+    mass: Positive
+    """Mass [kg]"""
+    inertia: PositiveVector
+    """Moments of inertia Ixx, Iyy, Izz about the centre of gravity [kg m2]"""
+    position: Vector
+    """Centre of gravity [m]"""
+
+
+class Wheelset(Definition):
+    """Two wheels on an axle, turning with it."""
+
+    mass: Positive
+    """Mass [kg]"""
+    inertia: PositiveVector
+    """Moments of inertia Ixx, Iyy (about the axle), Izz [kg m2]"""
+    position: Vector
+    """Middle of the axle [m]; z = -radius"""
+    radius: PositivePair
+    """Nominal rolling radius, one number or [left, right] [m]"""
+    profile: TextPair
+    """Wheel profile, a built-in name or a file, or [left, right]"""
+    back_to_back: Positive = 1.360
+    """Distance between the wheels' backs [m]"""
+    tape_circle_distance: Positive = 1.5
+    """Distance between the tape circles, where the radius is measured [m]"""
+
+
+class Axlebox(Definition):
+    """An axlebox with its arm: rigid with the wheelset but for its pitch about the axle."""
+
+    wheelset: Text
+    """Name of the wheelset that carries it"""
+    position: Vector
+    """Bearing centre [m]; mass and the other inertias are part of the wheelset"""
+    pitch_inertia: Positive
+    """Moment of inertia about the axle [kg m2]"""
+    sides: Literal["both"] | None = None
+    """`both`: given on the right (y > 0), copied to the left; the names get `.right` and `.left`"""
+
+
+class Placement(Definition):
+    """One place where an assembly stands."""
+
+    name: Name
+    """Name that goes before the names within the assembly, joined by a dot"""
+    position: Vector = (0.0, 0.0, 0.0)
+    """Origin of the assembly's coordinates [m]"""
+    mirror: Flag = False
+    """Reflected fore and aft (x); left and right stay"""
+
+
+class Assembly(Definition):
+    """A group of parts that occurs at one or several places."""
+
+    placements: tuple[Placement, ...] = Field(min_length=1)
+    """Where the assembly stands"""
+    bodies: dict[Name, Body] = Field(default_factory=dict)
+    """Bodies by name"""
+    wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
+    """Wheelsets by name"""
+    axleboxes: dict[Name, Axlebox] = Field(default_factory=dict)
+    """Axleboxes by name"""
+    elements: dict[Name, AnyElement] = Field(default_factory=dict)
+    """Force elements by name"""
+    assemblies: dict[Name, "Assembly"] = Field(default_factory=dict)
+    """Assemblies within this one, by name"""
+
+
+class Vehicle(FileDefinition):
+    """A vehicle: everything that its file says."""
+
+    format: Literal["railsim-vehicle/1"]
+    """Kind and version of the file"""
+    name: Text
+    """What the vehicle is called in tables and plots"""
+    source: Text | None = None
+    """Where the numbers come from"""
+    reference: Text | None = None
+    """Full name of the body whose way is the vehicle's `distance`; by default the first body,
+    else the first wheelset"""
+    bodies: dict[Name, Body] = Field(default_factory=dict)
+    """Bodies by name"""
+    wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
+    """Wheelsets by name"""
+    axleboxes: dict[Name, Axlebox] = Field(default_factory=dict)
+    """Axleboxes by name"""
+    elements: dict[Name, AnyElement] = Field(default_factory=dict)
+    """Force elements by name"""
+    assemblies: dict[Name, Assembly] = Field(default_factory=dict)
+    """Assemblies by name"""
