@@ -1,0 +1,336 @@
+"""Static preload, static wheel loads Q0, and the state in which a run begins.
+
+Three steps, each on straight level track:
+
+1. preloads marked `auto` are solved so that every sprung body is in equilibrium in its nominal
+   position; where there are more springs than conditions, all deflect alike as far as they can
+   (least sum of F^2/k);
+2. without friction, Newton's method finds the position at rest; its wheel forces are Q0;
+3. with friction and speed, it finds the steady rolling: positions and the spin of the wheelsets.
+
+What cannot be balanced is named: body, component, force or moment.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, level_track, work_arrays
+from railsim.errors import ModelError
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.system import AXLEBOX, PRESCRIBED, RIGID, WHEELSET, Links, Mounts, System
+from railsim.kernels.track_frame import MU_LEFT, OMEGA
+from railsim.kernels.wheel_rail import W_Q
+from railsim.notation import COMPONENTS
+
+Floats = NDArray[np.float64]
+
+RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
+UNBALANCED = 1e-6  # share of the weight that may stay unbalanced by preloads (round-off)
+_STEPS = 60
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """The vehicle at rest and in steady rolling on straight level track.
+
+    Attributes
+    ----------
+    model : Model
+        The model with all preloads filled in.
+    state : float64[n_state]
+        Steady rolling at s = 0.
+    Q0 : float64[wheelset, side]
+        Static wheel loads [N].
+    residual : float
+        Largest remaining acceleration [m/s2, rad/s2].
+    """
+
+    model: Model
+    state: Floats
+    Q0: Floats
+    residual: float
+
+
+def equilibrium(model: Model, speed: float) -> Equilibrium:
+    """Find preloads, static wheel loads and the state of steady rolling at `speed` [m/s].
+
+    Raises
+    ------
+    ModelError
+        The preloads cannot carry a body, or no equilibrium is found; names what is unbalanced.
+    """
+    model = with_preloads(model)
+    level = level_track(model.system)
+    static = _Balance(model, level, speed=1.0, rolling=False)
+    state = static.solve(_first_guess(model, level))
+    Q0 = static.work.wheel[:, :, W_Q].copy()
+    rough = level._replace(track=_with_friction(level, model.system))
+    rolling = _Balance(model, rough, speed=speed, rolling=True)
+    state = rolling.solve(state)
+    return Equilibrium(model, state, Q0, rolling.residual)
+
+
+def with_preloads(model: Model) -> Model:
+    """Return the model with every `auto` preload solved.
+
+    Unknowns are the vertical force of each mount and the force of each link so marked; conditions
+    the vertical force, roll and pitch moment of each rigid body and the pitch moment of each
+    axlebox, with the preloads given by the user and gravity as loads.
+    """
+    system = model.system
+    unknowns = _auto_preloads(model)
+    conditions = _conditions(system)
+    loads = np.array([_load(system, body, component) for body, component in conditions])
+    fixed = _preload_forces(system, system.links, system.mounts, conditions)
+    columns = []
+    for group, element in unknowns:
+        links, mounts = _with_unit_preload(system, group, element)
+        columns.append(_preload_forces(system, links, mounts, conditions))
+    matrix = np.array(columns).T.reshape(len(conditions), len(unknowns))
+    # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
+    scale = np.sqrt(np.array([_stiffness(system, *unknown) for unknown in unknowns]))
+    right_side = -(loads + fixed)
+    scaled, *_ = np.linalg.lstsq(matrix * scale, right_side, rcond=1e-10)
+    values = scaled * scale
+    _check_balance(model, conditions, matrix @ values - right_side)
+    spring = system.links.spring.copy()
+    preload = system.mounts.preload.copy()
+    for (group, element), value in zip(unknowns, values, strict=True):
+        if group == "links":
+            spring[element, 2] = value
+        else:
+            preload[element, 2] = value
+    filled = system._replace(
+        links=system.links._replace(spring=spring), mounts=system.mounts._replace(preload=preload)
+    )
+    return Model(filled, model.index, model.flat, model.tables, model.profiles)
+
+
+def _auto_preloads(model: Model) -> list[tuple[str, int]]:
+    auto = {e.name for e in model.flat.elements
+            if getattr(e.definition, "preload", None) == "auto"}
+    links = [("links", i) for i, name in enumerate(model.index.links) if name in auto]
+    mounts = [("mounts", i) for i, name in enumerate(model.index.mounts) if name in auto]
+    return [unknown for unknown in links + mounts if _stiffness(model.system, *unknown) > 0.0]
+
+
+def _stiffness(system: System, group: str, element: int) -> float:
+    if group == "links":
+        return float(system.links.spring[element, 0])
+    return float(system.mounts.stiffness[element, 2])
+
+
+def _conditions(system: System) -> list[tuple[int, int]]:
+    """(body, component) of every equation: z, roll, pitch of rigid bodies, pitch of axleboxes."""
+    rows: list[tuple[int, int]] = []
+    for body, kind in enumerate(system.bodies.kind):
+        if kind == RIGID:
+            rows += [(body, 2), (body, 3), (body, 4)]
+        elif kind == AXLEBOX:
+            rows.append((body, 4))
+    return rows
+
+
+def _load(system: System, body: int, component: int) -> float:
+    weight = system.bodies.mass[body] * system.gravity
+    return float(weight) if component == 2 else 0.0
+
+
+def _with_unit_preload(system: System, group: str, element: int) -> tuple[Links, Mounts]:
+    spring = system.links.spring.copy()
+    preload = np.zeros_like(system.mounts.preload)
+    spring[:, 2] = 0.0
+    if group == "links":
+        spring[element, 2] = 1.0
+    else:
+        preload[element, 2] = 1.0
+    return system.links._replace(spring=spring), system.mounts._replace(preload=preload)
+
+
+def _preload_forces(
+    system: System, links: Links, mounts: Mounts, conditions: list[tuple[int, int]]
+) -> Floats:
+    """Forces and moments of all preloads in the nominal position, one per condition."""
+    totals = np.zeros((len(system.bodies.kind), 6))
+    for e, (i, j) in enumerate(links.body):
+        direction = _nominal(system, j, links.point[e, 1]) - _nominal(system, i, links.point[e, 0])
+        force = links.spring[e, 2] * direction / np.linalg.norm(direction)
+        _add(totals, i, links.point[e, 0], force)
+        _add(totals, j, links.point[e, 1], -force)
+    for e, (i, j) in enumerate(mounts.body):
+        _add(totals, i, mounts.point[e, 0], mounts.preload[e])
+        _add(totals, j, mounts.point[e, 1], -mounts.preload[e])
+    return np.array([totals[body, component] for body, component in conditions])
+
+
+def _nominal(system: System, body: int, lever: Floats) -> Floats:
+    frame = system.frame_offset[system.bodies.frame[body]]
+    centre = body if system.bodies.kind[body] != AXLEBOX else system.bodies.parent[body]
+    y, z = system.bodies.nominal[centre]
+    return np.array([frame, y, z]) + lever
+
+
+def _add(totals: Floats, body: int, lever: Floats, force: Floats) -> None:
+    totals[body, :3] += force
+    totals[body, 3:] += np.cross(lever, force)
+
+
+def _check_balance(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> None:
+    weight = float(np.sum(model.system.bodies.mass)) * model.system.gravity
+    lines = []
+    for (body, component), value in zip(conditions, rest, strict=True):
+        if abs(value) > UNBALANCED * weight:
+            unit = "N" if component < 3 else "N m"
+            lines.append(f"{model.index.bodies[body]}: {COMPONENTS[component]} {value:.6g} {unit}")
+    if lines:
+        raise ModelError(
+            "no static equilibrium: the springs with preload cannot carry the vehicle in its "
+            "nominal position; unbalanced: " + "; ".join(lines)
+        )
+
+
+def _with_friction(level: System, system: System):  # type: ignore[no-untyped-def]
+    """Level track with the friction that the real track has at s = 0."""
+    rail = level.track.rail.copy()
+    row = min(max(int(-system.track.s_start / system.track.ds), 0), len(system.track.rail) - 1)
+    rail[:, MU_LEFT : MU_LEFT + 2, 0] = system.track.rail[row, MU_LEFT : MU_LEFT + 2, 0]
+    return level.track._replace(rail=rail)
+
+
+def _first_guess(model: Model, level: System) -> Floats:
+    """Nominal position, every wheelset pressed into its rails by its share of the weight."""
+    state = np.zeros(model.n_state)
+    state[-1] = 1.0
+    bodies, contact = level.bodies, level.contact
+    weight = float(np.sum(bodies.mass)) * level.gravity / len(contact.body)
+    iy = round(-contact.y0 / contact.dy)
+    iroll = round(-contact.roll0 / contact.droll)
+    for w, body in enumerate(contact.body):
+        nodes = [contact.values[t, :, 0, iroll, iy] for t in contact.table[w]]
+        gap = max(float(np.min(node[:, 0])) for node in nodes)
+        stiffness = sum(float(node[np.argmin(node[:, 0]), 1]) for node in nodes)
+        state[6 * body + 2] = gap + (weight / stiffness) ** (2.0 / 3.0)
+    return state
+
+
+class _Balance:
+    """Newton's method on the accelerations of all bodies, velocities zero in the track frame."""
+
+    def __init__(self, model: Model, system: System, *, speed: float, rolling: bool) -> None:
+        self.model = model
+        self.system = system
+        self.speed = speed
+        self.work = work_arrays(system)
+        self.residual = np.inf
+        self._derivative = np.zeros(model.n_state)
+        self._state = np.zeros(model.n_state)
+        n = model.index.n_bodies
+        self._unknowns: list[int] = []
+        self._equations: list[int] = []
+        for body, kind in enumerate(system.bodies.kind):
+            for component in _components(int(kind)):
+                if body == system.bodies.reference and component == 0:
+                    continue
+                spin = kind == WHEELSET and component == 4
+                if spin and not rolling:
+                    continue
+                # the unknown of a wheelset's spin is its rate, of all others the position
+                self._unknowns.append((6 * n if spin else 0) + 6 * body + component)
+                self._equations.append(6 * n + 6 * body + component)
+
+    def solve(self, guess: Floats) -> Floats:
+        """Return the balanced state; raise ModelError with the unbalanced components."""
+        state = guess.copy()
+        state[-1] = self.speed
+        state[-2] = 0.0
+        self._start_rolling(state)
+        rest = self._accelerations(state)
+        for _ in range(_STEPS):
+            self.residual = float(np.max(np.abs(rest)))
+            if self.residual < RESIDUAL:
+                break
+            change, *_ = np.linalg.lstsq(self._jacobian(state, rest), -rest, rcond=1e-13)
+            state, rest, shorter = self._line_search(state, rest, change)
+            if not shorter:
+                break
+        self.residual = float(np.max(np.abs(rest)))
+        if self.residual > 1e3 * RESIDUAL:
+            raise ModelError(self._message(rest))
+        return state
+
+    def _start_rolling(self, state: Floats) -> None:
+        n = self.model.index.n_bodies
+        bodies = self.system.bodies
+        for body in np.flatnonzero(bodies.kind == WHEELSET):
+            state[6 * n + 6 * body + 4] = -self.speed / bodies.radius[body]
+
+    def _accelerations(self, state: Floats) -> Floats:
+        status, where, _ = right_hand_side(
+            self.system, self.work, state, PRESCRIBED, 0.0, self._derivative
+        )
+        if status != RUNNING:
+            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
+            raise ModelError(f"no static equilibrium: {sentence}")
+        return self._derivative[self._equations].copy()
+
+    def _jacobian(self, state: Floats, rest: Floats) -> Floats:
+        columns = []
+        for k in self._unknowns:
+            self._state[:] = state
+            step = 1e-9 * max(1.0, abs(state[k]))
+            self._state[k] += step
+            columns.append((self._accelerations(self._state) - rest) / step)
+        return np.array(columns).T
+
+    def _line_search(
+        self, state: Floats, rest: Floats, change: Floats
+    ) -> tuple[Floats, Floats, bool]:
+        size = float(np.linalg.norm(rest))
+        for factor in 0.5 ** np.arange(12):
+            trial = state.copy()
+            trial[self._unknowns] += factor * change
+            try:
+                trial_rest = self._accelerations(trial)
+            except ModelError:
+                continue
+            if np.linalg.norm(trial_rest) < size:
+                return trial, trial_rest, True
+        return state, rest, False
+
+    def _message(self, rest: Floats) -> str:
+        n = self.model.index.n_bodies
+        worst = np.argsort(-np.abs(rest))[:5]
+        parts = []
+        for k in worst:
+            body, component = divmod(self._equations[k] - 6 * n, 6)
+            name = self.model.index.bodies[body]
+            parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
+        return "no static equilibrium; largest remaining accelerations: " + ", ".join(parts)
+
+
+def _components(kind: int) -> tuple[int, ...]:
+    return (4,) if kind == AXLEBOX else (0, 1, 2, 3, 4, 5)
+
+
+def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) -> Floats:
+    """Steady rolling transferred to arc length `s`: at rest relative to the moving track frames.
+
+    Parameters
+    ----------
+    frames : float64[n_frames, FRAME_SIZE]
+        Track frames at the bodies' places for this `s`.
+    """
+    state = balance.state.copy()
+    state[-2] = s
+    n = model.index.n_bodies
+    speed = state[-1]
+    for body, kind in enumerate(model.system.bodies.kind):
+        if kind == AXLEBOX:
+            continue
+        # positions relative to the frame are small: its rate of turn is that of the body
+        rate = speed * frames[model.system.bodies.frame[body], OMEGA : OMEGA + 3]
+        state[6 * n + 6 * body + 3 : 6 * n + 6 * body + 6] += rate
+    return state

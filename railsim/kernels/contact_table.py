@@ -1,0 +1,131 @@
+"""Look-up of a contact table: gap and stiffness of one patch with their exact gradients.
+
+A table holds, for the right wheel and over the wheelset's lateral displacement y, roll and
+w = yaw^2, eight fields per patch (tread, flange root, flange):
+
+    0 g      vertical displacement of the wheelset at which the patch touches (m)
+    1 K      vertical stiffness: N_z = K p^(3/2) at the penetration p = z - g (N/m^1.5)
+    2, 3     c_y, c_z of the contact point from the wheelset's centre, track axes (m)
+    4        c_x / yaw (m/rad)
+    5, 6     Hertz semi-axes at unit load, a = a1 N^(1/3) (m/N^(1/3))
+    7        weight of the zone (1), for diagnosis
+
+The table's values are the coefficients of uniform cubic B-splines in y and roll (twice
+continuously differentiable, without overshoot) and are interpolated linearly in w.  The contact
+force is the gradient of U = 2/5 K p^(5/2) *through this spline*, hence conservative by
+construction, whatever the table holds.
+"""
+
+import numpy as np
+
+from railsim.kernels import jit
+
+TREAD, FLANGE_ROOT, FLANGE = range(3)
+N_PATCH = 3
+N_FIELD = 8
+
+# results of `look_up` beyond the eight fields: gradients of g and of K
+G_Y, G_ROLL, G_W, K_Y, K_ROLL, K_W = range(8, 14)
+LOOK_UP_SIZE = 14
+
+# outside of the table
+INSIDE, BELOW_Y, ABOVE_Y, OUTSIDE_ROLL, OUTSIDE_W = range(5)
+
+# A patch whose gap at the nearest node exceeds the wheel's height by more than this is skipped:
+# the node differs from the exact place by less (half a cell in y at a slope of 3).
+FAR = 4.0e-4
+LEVER = 0.75
+
+
+@jit
+def locate(contact, y, roll, w):
+    """Cell and local coordinate in the three directions; a code if outside (see above)."""
+    ty = (y - contact.y0) / contact.dy
+    tr = (roll - contact.roll0) / contact.droll
+    tw = w / contact.dw
+    shape = contact.values.shape
+    # comparisons are written so that NaN falls out of range
+    if not ty >= 1.0:
+        return BELOW_Y, 0, 0, 0, 0.0, 0.0, 0.0
+    if not ty < shape[4] - 2.0:
+        return ABOVE_Y, 0, 0, 0, 0.0, 0.0, 0.0
+    if not (tr >= 1.0 and tr < shape[3] - 2.0):
+        return OUTSIDE_ROLL, 0, 0, 0, 0.0, 0.0, 0.0
+    if not tw < shape[2] - 1.0:
+        return OUTSIDE_W, 0, 0, 0, 0.0, 0.0, 0.0
+    iy = int(ty)
+    ir = int(tr)
+    iw = int(tw)
+    return INSIDE, iy, ir, iw, ty - iy, tr - ir, tw - iw
+
+
+@jit
+def is_far(contact, table, patch, iy, ir, iw, tr, z):
+    """Whether a patch is so far from touching that its look-up can be skipped."""
+    node = contact.values[table, patch, iw, ir, iy, 0]
+    return z - (node - LEVER * contact.droll * tr) < -FAR
+
+
+@jit
+def spline_weights(t):
+    """Weights of the uniform cubic B-spline and their derivatives at t in [0, 1)."""
+    s = 1.0 - t
+    t2 = t * t
+    return (
+        s * s * s / 6.0,
+        (4.0 + t2 * (3.0 * t - 6.0)) / 6.0,
+        (4.0 + s * s * (3.0 * s - 6.0)) / 6.0,
+        t2 * t / 6.0,
+        -0.5 * s * s,
+        t * (1.5 * t - 2.0),
+        s * (2.0 - 1.5 * s),
+        0.5 * t2,
+    )
+
+
+@jit
+def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out):
+    """Fields of one patch and the gradients of g and K into ``out[LOOK_UP_SIZE]``."""
+    b0, b1, b2, b3, d0, d1, d2, d3 = spline_weights(ty)
+    r0, r1, r2, r3, e0, e1, e2, e3 = spline_weights(tr)
+    inv_dy = 1.0 / contact.dy
+    inv_dr = 1.0 / contact.droll
+    inv_dw = 1.0 / contact.dw
+    for k in range(LOOK_UP_SIZE):
+        out[k] = 0.0
+    for jw in range(2):
+        weight_w = tw if jw == 1 else 1.0 - tw
+        slope_w = inv_dw if jw == 1 else -inv_dw
+        for jr in range(4):
+            if jr == 0:
+                weight_r, slope_r = r0, e0
+            elif jr == 1:
+                weight_r, slope_r = r1, e1
+            elif jr == 2:
+                weight_r, slope_r = r2, e2
+            else:
+                weight_r, slope_r = r3, e3
+            row = contact.values[table, patch, iw + jw, ir - 1 + jr]
+            v0 = row[iy - 1]
+            v1 = row[iy]
+            v2 = row[iy + 1]
+            v3 = row[iy + 2]
+            weight = weight_w * weight_r
+            for k in range(N_FIELD):
+                out[k] += weight * (b0 * v0[k] + b1 * v1[k] + b2 * v2[k] + b3 * v3[k])
+            for k in range(2):
+                value = b0 * v0[k] + b1 * v1[k] + b2 * v2[k] + b3 * v3[k]
+                slope = d0 * v0[k] + d1 * v1[k] + d2 * v2[k] + d3 * v3[k]
+                out[G_Y + 3 * k] += weight * slope * inv_dy
+                out[G_ROLL + 3 * k] += weight_w * slope_r * value * inv_dr
+                out[G_W + 3 * k] += slope_w * weight_r * value
+
+
+def bounds(contact) -> np.ndarray:
+    """Usable range of the tables, [[y], [roll], [w]] lower and upper."""
+    shape = contact.values.shape
+    return np.array([
+        [contact.y0 + contact.dy, contact.y0 + (shape[4] - 2) * contact.dy],
+        [contact.roll0 + contact.droll, contact.roll0 + (shape[3] - 2) * contact.droll],
+        [0.0, (shape[2] - 1) * contact.dw],
+    ])

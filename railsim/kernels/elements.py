@@ -1,0 +1,185 @@
+"""Force elements between two bodies, evaluated in global axes.
+
+Springs derive from a potential of the bodies' positions, so that an undamped vehicle conserves
+energy exactly:
+
+- link: U(L) of the distance L between two points, force along the line (tension positive);
+- mount: U(d) with d = R_1^T (P_2 - P_1) in the axes of body 1; its gradient puts the force at P_2
+  on *both* bodies.  A shear spring takes half of its stiffness in the axes of each body, with P_1
+  and P_2 the body-fixed places of its mid-height: the lateral force then acts at mid-height, as in
+  a sheared column with parallel ends, and both end moments follow;
+- rotation: U = tr(K_d (1 - R)), R = R_1^T R_2, K_d = (k_1 + k_2 + k_3)/2 - diag(k): moments
+  k_i theta_i for small angles.
+
+Rates are those of d itself, v_2 - v_1 - omega_1 x (P_2 - P_1), so that a damper's power is
+force times rate.  A damper with a series stiffness k_s is a Maxwell element, F' = k_s (v - F/c)
+(Maxwell 1867); its force is an internal state.
+"""
+
+from math import sqrt
+
+from railsim.kernels import jit
+
+
+@jit
+def curve_value(curves, index, x):
+    """Piecewise linear table, continued linearly beyond its ends."""
+    first = curves.start[index]
+    last = curves.start[index + 1] - 2
+    i = first
+    while i < last and x > curves.x[i + 1]:
+        i += 1
+    slope = (curves.f[i + 1] - curves.f[i]) / (curves.x[i + 1] - curves.x[i])
+    return curves.f[i] + slope * (x - curves.x[i])
+
+
+@jit
+def link_forces(links, curves, maxwell_force, maxwell_rate, work):
+    """Add the forces of all point-to-point elements to ``work.F``, ``work.M``."""
+    R, X, V, W, F, M = work.R, work.X, work.V, work.W, work.F, work.M
+    for e in range(links.body.shape[0]):
+        i, j = links.body[e, 0], links.body[e, 1]
+        px, py, pz = links.point[e, 0, 0], links.point[e, 0, 1], links.point[e, 0, 2]
+        ax = R[i, 0] * px + R[i, 1] * py + R[i, 2] * pz
+        ay = R[i, 3] * px + R[i, 4] * py + R[i, 5] * pz
+        az = R[i, 6] * px + R[i, 7] * py + R[i, 8] * pz
+        px, py, pz = links.point[e, 1, 0], links.point[e, 1, 1], links.point[e, 1, 2]
+        bx = R[j, 0] * px + R[j, 1] * py + R[j, 2] * pz
+        by = R[j, 3] * px + R[j, 4] * py + R[j, 5] * pz
+        bz = R[j, 6] * px + R[j, 7] * py + R[j, 8] * pz
+        dx = X[j, 0] + bx - X[i, 0] - ax
+        dy = X[j, 1] + by - X[i, 1] - ay
+        dz = X[j, 2] + bz - X[i, 2] - az
+        length = sqrt(dx * dx + dy * dy + dz * dz)
+        nx, ny, nz = dx / length, dy / length, dz / length
+        rate = (
+            nx * (V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * az + W[i, 2] * ay)
+            + ny * (V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * ax + W[i, 0] * az)
+            + nz * (V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ay + W[i, 1] * ax)
+        )
+        elongation = length - links.length[e]
+        force = (links.spring[e, 2] + links.spring[e, 0] * elongation + links.spring[e, 1] * rate)
+        m = links.maxwell[e]
+        if m >= 0:
+            force += maxwell_force[m]
+            maxwell_rate[m] = rate
+        if links.curve[e, 0] >= 0:
+            force += curve_value(curves, links.curve[e, 0], elongation)
+        if links.curve[e, 1] >= 0:
+            force += curve_value(curves, links.curve[e, 1], rate)
+        fx, fy, fz = force * nx, force * ny, force * nz
+        F[i, 0] += fx
+        F[i, 1] += fy
+        F[i, 2] += fz
+        M[i, 0] += ay * fz - az * fy
+        M[i, 1] += az * fx - ax * fz
+        M[i, 2] += ax * fy - ay * fx
+        F[j, 0] -= fx
+        F[j, 1] -= fy
+        F[j, 2] -= fz
+        M[j, 0] -= by * fz - bz * fy
+        M[j, 1] -= bz * fx - bx * fz
+        M[j, 2] -= bx * fy - by * fx
+
+
+@jit
+def translation_force(mounts, curves, e, i, j, p, scale, maxwell_force, maxwell_rate, work):
+    """Force of a mount in the axes of body `i` (its point `p` first), at the point of body `j`.
+
+    `scale` is the share of the element taken in these axes: 1, or 1/2 for a shear spring.
+    """
+    R, X, V, W, F, M = work.R, work.X, work.V, work.W, work.F, work.M
+    px, py, pz = mounts.point[e, p, 0], mounts.point[e, p, 1], mounts.point[e, p, 2]
+    ax = R[i, 0] * px + R[i, 1] * py + R[i, 2] * pz
+    ay = R[i, 3] * px + R[i, 4] * py + R[i, 5] * pz
+    az = R[i, 6] * px + R[i, 7] * py + R[i, 8] * pz
+    px, py, pz = mounts.point[e, 1 - p, 0], mounts.point[e, 1 - p, 1], mounts.point[e, 1 - p, 2]
+    bx = R[j, 0] * px + R[j, 1] * py + R[j, 2] * pz
+    by = R[j, 3] * px + R[j, 4] * py + R[j, 5] * pz
+    bz = R[j, 6] * px + R[j, 7] * py + R[j, 8] * pz
+    # lever of the point of body j from the centre of body i
+    lx, ly, lz = X[j, 0] - X[i, 0] + bx, X[j, 1] - X[i, 1] + by, X[j, 2] - X[i, 2] + bz
+    gx, gy, gz = lx - ax, ly - ay, lz - az
+    vx = V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * lz + W[i, 2] * ly
+    vy = V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * lx + W[i, 0] * lz
+    vz = V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ly + W[i, 1] * lx
+    fx = 0.0
+    fy = 0.0
+    fz = 0.0
+    # seen from body j the deflection is -d: preload and odd tables keep their sign through `sign`
+    sign = 1.0 if p == 0 else -1.0
+    for k in range(3):
+        d = sign * (R[i, k] * gx + R[i, 3 + k] * gy + R[i, 6 + k] * gz)
+        rate = sign * (R[i, k] * vx + R[i, 3 + k] * vy + R[i, 6 + k] * vz)
+        force = mounts.preload[e, k] + mounts.stiffness[e, k] * d + mounts.damping[e, k] * rate
+        m = mounts.maxwell[e, k]
+        if m >= 0:
+            force += maxwell_force[m]
+            maxwell_rate[m] = rate
+        if mounts.curve[e, k] >= 0:
+            force += curve_value(curves, mounts.curve[e, k], d)
+        force *= scale * sign
+        fx += R[i, k] * force
+        fy += R[i, 3 + k] * force
+        fz += R[i, 6 + k] * force
+    F[i, 0] += fx
+    F[i, 1] += fy
+    F[i, 2] += fz
+    M[i, 0] += ly * fz - lz * fy
+    M[i, 1] += lz * fx - lx * fz
+    M[i, 2] += lx * fy - ly * fx
+    F[j, 0] -= fx
+    F[j, 1] -= fy
+    F[j, 2] -= fz
+    M[j, 0] -= by * fz - bz * fy
+    M[j, 1] -= bz * fx - bx * fz
+    M[j, 2] -= bx * fy - by * fx
+
+
+@jit
+def rotation_moment(mounts, e, i, j, work):
+    """Add the moment of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
+    R, W, M = work.R, work.W, work.M
+    k1, k2, k3 = mounts.rotation[e, 0], mounts.rotation[e, 1], mounts.rotation[e, 2]
+    c1 = mounts.rotation_damping[e, 0]
+    c2 = mounts.rotation_damping[e, 1]
+    c3 = mounts.rotation_damping[e, 2]
+    # off-diagonal terms of R_1^T R_2
+    r12 = R[i, 0] * R[j, 1] + R[i, 3] * R[j, 4] + R[i, 6] * R[j, 7]
+    r13 = R[i, 0] * R[j, 2] + R[i, 3] * R[j, 5] + R[i, 6] * R[j, 8]
+    r21 = R[i, 1] * R[j, 0] + R[i, 4] * R[j, 3] + R[i, 7] * R[j, 6]
+    r23 = R[i, 1] * R[j, 2] + R[i, 4] * R[j, 5] + R[i, 7] * R[j, 8]
+    r31 = R[i, 2] * R[j, 0] + R[i, 5] * R[j, 3] + R[i, 8] * R[j, 6]
+    r32 = R[i, 2] * R[j, 1] + R[i, 5] * R[j, 4] + R[i, 8] * R[j, 7]
+    wx, wy, wz = W[j, 0] - W[i, 0], W[j, 1] - W[i, 1], W[j, 2] - W[i, 2]
+    # moment on body 1, in its axes
+    m1 = k2 * r32 - k3 * r23 + c1 * (R[i, 0] * wx + R[i, 3] * wy + R[i, 6] * wz)
+    m2 = k3 * r13 - k1 * r31 + c2 * (R[i, 1] * wx + R[i, 4] * wy + R[i, 7] * wz)
+    m3 = k1 * r21 - k2 * r12 + c3 * (R[i, 2] * wx + R[i, 5] * wy + R[i, 8] * wz)
+    mx = R[i, 0] * m1 + R[i, 1] * m2 + R[i, 2] * m3
+    my = R[i, 3] * m1 + R[i, 4] * m2 + R[i, 5] * m3
+    mz = R[i, 6] * m1 + R[i, 7] * m2 + R[i, 8] * m3
+    M[i, 0] += mx
+    M[i, 1] += my
+    M[i, 2] += mz
+    M[j, 0] -= mx
+    M[j, 1] -= my
+    M[j, 2] -= mz
+
+
+@jit
+def mount_forces(mounts, curves, maxwell_force, maxwell_rate, work):
+    """Add the forces of all three-axis elements to ``work.F``, ``work.M``."""
+    for e in range(mounts.body.shape[0]):
+        i, j = mounts.body[e, 0], mounts.body[e, 1]
+        if mounts.flags[e, 0]:
+            if mounts.flags[e, 1]:
+                translation_force(mounts, curves, e, i, j, 0, 0.5, maxwell_force, maxwell_rate,
+                                  work)
+                translation_force(mounts, curves, e, j, i, 1, 0.5, maxwell_force, maxwell_rate,
+                                  work)
+            else:
+                translation_force(mounts, curves, e, i, j, 0, 1.0, maxwell_force, maxwell_rate,
+                                  work)
+        if mounts.flags[e, 2]:
+            rotation_moment(mounts, e, i, j, work)

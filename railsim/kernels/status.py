@@ -1,0 +1,25 @@
+"""Status codes of the time loop and their meaning: one place maps a code to words."""
+
+RUNNING = 0
+DERAILED = 1
+FELL_BETWEEN_RAILS = 2
+WHEEL_LIFT = 3
+ROLL_RANGE = 4
+YAW_RANGE = 5
+NOT_FINITE = 6
+END_OF_TRACK = 7
+STANDSTILL = 8
+
+# code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
+STATUS = {
+    RUNNING: ("complete", "the run reached its end"),
+    DERAILED: ("derailed", "{where} climbed over the rail: the flange left the contact table"),
+    FELL_BETWEEN_RAILS: ("derailed", "{where} fell between the rails: a tread left its rail"),
+    WHEEL_LIFT: ("derailed", "{where} lifted a wheel beyond the range of the model"),
+    ROLL_RANGE: ("stopped", "{where} rolled beyond the range of the contact table"),
+    YAW_RANGE: ("stopped", "{where} yawed beyond the range of the contact table"),
+    NOT_FINITE: ("stopped", "the state of {where} is not finite: the step is too long or the "
+                            "model is unstable"),
+    END_OF_TRACK: ("stopped", "the vehicle reached the end of the track's table"),
+    STANDSTILL: ("stopped", "the vehicle came to a standstill: creepage is not defined there"),
+}

@@ -1,0 +1,203 @@
+"""The model as flat arrays: what `assembly` builds once and the time loop never changes.
+
+State vector (float64[n_state]), for n bodies and m internal element states:
+
+    0 .. 6n       coordinates x, y, z, roll, pitch, yaw of each body: position of its centre of
+                  gravity relative to its nominal place, in the axes of its own track frame (m, rad)
+    6n .. 12n     velocities: x', y', z' in the axes of the track frame (m/s), then the absolute
+                  angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
+    12n .. 12n+m  internal states of elements: forces of Maxwell dampers (N), and so on
+    -2, -1        arc length s of the reference body's frame (m), speed V = s' (m/s)
+
+An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
+(here the pitch rate relative to the wheelset's axes) are used.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from railsim.kernels.track_frame import TrackTables
+
+# kinds of bodies
+RIGID, WHEELSET, AXLEBOX = range(3)
+
+# ways of driving
+PRESCRIBED, FREE = range(2)
+
+
+class Bodies(NamedTuple):
+    """Bodies; index order: rigid bodies, wheelsets from the leading end, axleboxes.
+
+    Attributes
+    ----------
+    kind : int64[n]          RIGID, WHEELSET or AXLEBOX
+    frame : int64[n]         index of the body's track frame
+    parent : int64[n]        the wheelset that carries an axlebox, else -1
+    mass : float64[n]        [kg]
+    inertia : float64[n, 3]  principal moments [kg m2]; an axlebox uses the second only
+    nominal : float64[n, 2]  y and z of the centre of gravity in the track frame [m]
+    radius : float64[n]      nominal rolling radius of a wheelset [m], else 1
+    reference : int          the body whose frame is `s`; its x is held
+    """
+
+    kind: np.ndarray
+    frame: np.ndarray
+    parent: np.ndarray
+    mass: np.ndarray
+    inertia: np.ndarray
+    nominal: np.ndarray
+    radius: np.ndarray
+    reference: int
+
+
+class Contact(NamedTuple):
+    """Wheel-rail contact; sides in the order left, right.
+
+    Attributes
+    ----------
+    body : int64[w]              body index of each wheelset
+    table : int64[w, 2]          which table serves each wheel
+    values : float64[t, 3, n_w, n_roll, n_y, 8]  tables, see `contact_table`
+    y0, dy, roll0, droll, dw : float   grid of the tables [m, rad, rad2]
+    creep : float64[k, 4]        Kalker's c11 c22 c23 c33 over log(a/b)
+    shear_modulus, damping : float   [Pa], [N s/m]
+    n_x, n_y : int               cells of FASTSIM along and across
+    """
+
+    body: np.ndarray
+    table: np.ndarray
+    values: np.ndarray
+    y0: float
+    dy: float
+    roll0: float
+    droll: float
+    dw: float
+    creep: np.ndarray
+    shear_modulus: float
+    damping: float
+    n_x: int
+    n_y: int
+
+
+class Links(NamedTuple):
+    """Point-to-point elements: springs, dampers, rods (tension positive).
+
+    Attributes
+    ----------
+    body : int64[e, 2]        the two bodies
+    point : float64[e, 2, 3]  attachment points in body axes from the centre of gravity [m]
+    length : float64[e]       nominal length [m]
+    spring : float64[e, 3]    stiffness [N/m], parallel damping [N s/m], preload [N]
+    maxwell : int64[e]        internal state of a damper with series stiffness, else -1
+    curve : int64[e, 2]       tables of force over elongation and over its rate, else -1
+    """
+
+    body: np.ndarray
+    point: np.ndarray
+    length: np.ndarray
+    spring: np.ndarray
+    maxwell: np.ndarray
+    curve: np.ndarray
+
+
+class Mounts(NamedTuple):
+    """Elements with three axes: bushings, shear springs, roll bars, bump stops.
+
+    Attributes
+    ----------
+    body : int64[e, 2]
+    point : float64[e, 2, 3]     points in body axes; coincident in the nominal position [m]
+    stiffness, damping, preload : float64[e, 3]   [N/m], [N s/m], [N]
+    rotation : float64[e, 3]     K_d of the rotational potential tr(K_d (1 - R)) [N m]
+    rotation_damping : float64[e, 3]   [N m s]
+    maxwell : int64[e, 3]        internal states, else -1
+    curve : int64[e, 3]          tables of force over deflection, else -1
+    flags : int64[e, 3]          1 if: translational part, both-ended axes (shear), rotational part
+    """
+
+    body: np.ndarray
+    point: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    preload: np.ndarray
+    rotation: np.ndarray
+    rotation_damping: np.ndarray
+    maxwell: np.ndarray
+    curve: np.ndarray
+    flags: np.ndarray
+
+
+class Curves(NamedTuple):
+    """Piecewise linear tables, one after the other; beyond its ends a table continues linearly.
+
+    Attributes
+    ----------
+    start : int64[c + 1]   first point of each table
+    x, f : float64[...]    abscissa and value
+    """
+
+    start: np.ndarray
+    x: np.ndarray
+    f: np.ndarray
+
+
+class System(NamedTuple):
+    """Everything the time loop reads.
+
+    Attributes
+    ----------
+    frame_offset : float64[f]     arc length of each frame relative to the reference [m]
+    maxwell : float64[m, 2]       damping [N s/m] and series stiffness [N/m] of each Maxwell state
+    """
+
+    bodies: Bodies
+    frame_offset: np.ndarray
+    track: TrackTables
+    contact: Contact
+    links: Links
+    mounts: Mounts
+    curves: Curves
+    maxwell: np.ndarray
+    gravity: float
+
+
+class Work(NamedTuple):
+    """Scratch arrays and by-products of one evaluation of the right-hand side.
+
+    Attributes
+    ----------
+    frames : float64[f, FRAME_SIZE];  cell : int64[f];  cell_u : float64[f]
+    R : float64[n, 9]       attitude of each body in global axes, row by row
+    X, V, W : float64[n, 3] position, velocity, angular velocity in global axes
+    F, M : float64[n, 3]    force and moment about the centre of gravity, global axes
+    S : float64[n, 4]       sin, cos of roll and of pitch
+    C : float64[n, 9]       attitude relative to the track frame
+    rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
+    acceleration : float64[n, 6]  absolute, in body axes
+    maxwell_rate : float64[m]   velocity that drives each Maxwell state [m/s]
+    spin_damping : float64[n]   estimate of -d(u_2')/d(u_2) of each wheelset [1/s]
+    patch_* : per active patch, see `wheel_rail`
+    """
+
+    frames: np.ndarray
+    cell: np.ndarray
+    cell_u: np.ndarray
+    R: np.ndarray
+    X: np.ndarray
+    V: np.ndarray
+    W: np.ndarray
+    F: np.ndarray
+    M: np.ndarray
+    S: np.ndarray
+    C: np.ndarray
+    rail_force: np.ndarray
+    acceleration: np.ndarray
+    maxwell_rate: np.ndarray
+    spin_damping: np.ndarray
+    look_up: np.ndarray
+    rail: np.ndarray
+    patch_index: np.ndarray
+    patch: np.ndarray
+    fastsim: np.ndarray
+    wheel: np.ndarray

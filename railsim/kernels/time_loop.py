@@ -1,0 +1,162 @@
+"""The time loop: integrators and recording, one compiled call per chunk of steps.
+
+`fast`: semi-implicit (symplectic) Euler; velocities first, positions with the new velocities.
+Forces of Maxwell dampers are integrated exactly over the step for a constant velocity,
+F <- F e^(-h/tau) + c (1 - e^(-h/tau)) v, tau = c/k_s, so that their short time constants do not
+limit the step; the spin of each wheelset is taken linearly implicit (its creep force is the
+stiffest mode of the vehicle), which changes no other mode.
+
+`rk4`: the classical Runge-Kutta method of order four on the whole state; the reference.
+"""
+
+from math import exp
+from typing import NamedTuple
+
+import numpy as np
+
+from railsim.kernels import jit
+from railsim.kernels.rhs import euler_rates, right_hand_side
+from railsim.kernels.status import NOT_FINITE, RUNNING
+from railsim.kernels.system import AXLEBOX, WHEELSET
+
+FAST, RK4 = range(2)
+
+
+class Recorder(NamedTuple):
+    """Arrays that receive the output of one chunk.
+
+    Attributes
+    ----------
+    time : float64[r]                 [s]
+    state : float64[r, n_state]
+    rates : float64[r, 6 n]           rates of the coordinates
+    acceleration : float64[r, n, 6]   absolute, in body axes
+    wheel : float64[r, w, 2, 8]       see `wheel_rail`
+    """
+
+    time: np.ndarray
+    state: np.ndarray
+    rates: np.ndarray
+    acceleration: np.ndarray
+    wheel: np.ndarray
+
+
+@jit
+def record(recorder, row, time, state, derivative, work):
+    """Copy the state and the by-products of its evaluation into row `row`."""
+    n_coordinates = recorder.rates.shape[1]
+    recorder.time[row] = time
+    recorder.state[row, :] = state
+    recorder.rates[row, :] = derivative[:n_coordinates]
+    recorder.acceleration[row, :, :] = work.acceleration
+    recorder.wheel[row, :, :, :] = work.wheel
+
+
+@jit
+def step_fast(system, work, state, derivative, decay, h):
+    """Advance `state` by `h` with the derivative already evaluated there."""
+    bodies = system.bodies
+    n = bodies.kind.shape[0]
+    for b in range(n):
+        q = 6 * b
+        v = 6 * n + q
+        kind = bodies.kind[b]
+        if kind == AXLEBOX:
+            state[v + 4] += h * derivative[v + 4]
+            state[q + 4] += h * state[v + 4]
+            continue
+        d1, d2, d3 = h * derivative[v + 3], h * derivative[v + 4], h * derivative[v + 5]
+        if kind == WHEELSET:
+            d2 /= 1.0 + h * work.spin_damping[b]
+        for k in range(3):
+            state[v + k] += h * derivative[v + k]
+            state[q + k] += h * state[v + k]
+        state[v + 3] += d1
+        state[v + 4] += d2
+        state[v + 5] += d3
+        r1, r2, r3 = euler_rates(kind, work.S[b], d1, d2, d3)
+        state[q + 3] += h * (derivative[q + 3] + r1)
+        state[q + 4] += h * (derivative[q + 4] + r2)
+        state[q + 5] += h * (derivative[q + 5] + r3)
+    for i in range(system.maxwell.shape[0]):
+        k = 12 * n + i
+        c = system.maxwell[i, 0]
+        state[k] = state[k] * decay[i] + c * (1.0 - decay[i]) * work.maxwell_rate[i]
+    state[-1] += h * derivative[-1]
+    state[-2] += h * state[-1]
+
+
+@jit
+def step_rk4(system, work, state, derivative, stages, driving, speed_rate, h):
+    """Advance `state` by `h`; `derivative` holds the first stage."""
+    total = stages[0]
+    trial = stages[1]
+    rate = stages[2]
+    total[:] = derivative
+    rate[:] = derivative
+    for stage in range(1, 4):
+        fraction = 0.5 * h if stage < 3 else h
+        for k in range(state.shape[0]):
+            trial[k] = state[k] + fraction * rate[k]
+        status, where, _ = right_hand_side(system, work, trial, driving, speed_rate, rate)
+        if status != RUNNING:
+            return status, where
+        weight = 2.0 if stage < 3 else 1.0
+        for k in range(state.shape[0]):
+            total[k] += weight * rate[k]
+    for k in range(state.shape[0]):
+        state[k] += h / 6.0 * total[k]
+    return RUNNING, 0
+
+
+@jit
+def all_finite(state):
+    """Index of the first entry that is not finite, -1 if there is none."""
+    for k in range(state.shape[0]):
+        if not np.isfinite(state[k]):
+            return k
+    return -1
+
+
+@jit
+def time_loop(system, work, state, derivative, stages, recorder, scheme, driving, speed_rate, h,
+              first_step, n_steps, every):
+    """Advance by `n_steps` steps of length `h` [s], recording every `every`-th state.
+
+    Parameters
+    ----------
+    state : float64[n_state]
+        Changed in place.
+    derivative : float64[n_state];  stages : float64[3, n_state]
+        Work arrays.
+    first_step : int
+        Number of steps already taken: time is `first_step` h at the beginning.
+
+    Returns
+    -------
+    status, where, steps, rows : int
+        Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
+    """
+    n_maxwell = system.maxwell.shape[0]
+    decay = np.empty(n_maxwell)
+    for i in range(n_maxwell):
+        decay[i] = exp(-h * system.maxwell[i, 1] / system.maxwell[i, 0])
+    rows = 0
+    for step in range(first_step, first_step + n_steps):
+        status, where, _ = right_hand_side(system, work, state, driving, speed_rate, derivative)
+        if status == RUNNING:
+            if step % every == 0:
+                record(recorder, rows, step * h, state, derivative, work)
+                rows += 1
+            if scheme == FAST:
+                step_fast(system, work, state, derivative, decay, h)
+            else:
+                status, where = step_rk4(system, work, state, derivative, stages, driving,
+                                         speed_rate, h)
+        if status != RUNNING or step % every == 0:
+            bad = all_finite(state)
+            if bad >= 0:
+                return NOT_FINITE, bad, step - first_step, rows
+        if status != RUNNING:
+            return status, where, step - first_step, rows
+    return RUNNING, 0, n_steps, rows

@@ -1,0 +1,139 @@
+"""The track's moving frame: position, attitude and rates of turn at an arc length.
+
+The frame at arc length s has its origin on the track centre line at rail-top level, x along the
+track, y to the right in the track plane, z down.  Its attitude is A = Rz(psi) Ry(theta) Rx(phi):
+heading, grade (nose up positive) and cant angle (left rail higher positive).
+
+Tables hold one cubic polynomial per cell and quantity, so that the position is smooth and exact
+where the plan is a straight, a circle or a clothoid, whatever the table's spacing.
+"""
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from railsim.kernels import jit
+
+# rows of TrackTables.coefficients
+X, Y, Z, PSI, THETA, PHI = range(6)
+# rows of TrackTables.rail
+Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
+
+# columns of a frame row, see `track_frame`
+ORIGIN = 0  # 0:3   origin in global axes (m)
+ATTITUDE = 3  # 3:12  A, row by row
+OMEGA = 12  # 12:15 rate of turn per metre, frame axes (1/m)
+OMEGA_S = 15  # 15:18 its derivative along the track (1/m2)
+GRAVITY = 18  # 18:21 direction of gravity in frame axes (1)
+FRAME_SIZE = 21
+
+
+class TrackTables(NamedTuple):
+    """Piecewise cubic tables over arc length, value = c0 + c1 u + c2 u^2 + c3 u^3, u = s - s_cell.
+
+    Attributes
+    ----------
+    s_start, ds : float
+        Arc length of the first cell's begin; length of a cell [m].
+    coefficients : float64[n_cells, 6, 4]
+        X, Y, Z of the centre line [m], psi, theta, phi [rad].
+    rail : float64[n_cells, 6, 4]
+        Displacement of the left and right rail, lateral (right positive) and vertical (down
+        positive) in track axes [m]; friction coefficient left, right [1].
+    has_irregularity : int
+        0 where both rails are undisturbed: `rail`'s displacements are not looked up.
+    """
+
+    s_start: float
+    ds: float
+    coefficients: np.ndarray
+    rail: np.ndarray
+    has_irregularity: int
+
+
+@jit
+def cell_of(track, s):
+    """Cell index of arc length `s`, -1 outside the table, and the distance into the cell [m]."""
+    position = (s - track.s_start) / track.ds
+    i = int(np.floor(position))
+    if not (position >= 0.0 and i < track.coefficients.shape[0]):
+        return -1, 0.0
+    return i, s - track.s_start - i * track.ds
+
+
+@jit
+def track_frame(track, s, frame):
+    """Evaluate the track frame at arc length `s` [m] into ``frame[FRAME_SIZE]``.
+
+    With s the arc length, the frame turns by omega = vee(A^T dA/ds) per metre; for the Euler angles
+    psi, theta, phi (z, y, x) omega_1 = phi' - psi' sin theta, omega_2 = theta' cos phi
+    + psi' cos theta sin phi, omega_3 = psi' cos theta cos phi - theta' sin phi.
+
+    Returns
+    -------
+    int : the cell, -1 if `s` lies outside the table (then `frame` is unchanged).
+    """
+    i, u = cell_of(track, s)
+    if i < 0:
+        return i
+    c = track.coefficients[i]
+    for k in range(3):
+        frame[ORIGIN + k] = c[k, 0] + u * (c[k, 1] + u * (c[k, 2] + u * c[k, 3]))
+    psi = c[PSI, 0] + u * (c[PSI, 1] + u * (c[PSI, 2] + u * c[PSI, 3]))
+    psi_1 = c[PSI, 1] + u * (2.0 * c[PSI, 2] + u * 3.0 * c[PSI, 3])
+    psi_2 = 2.0 * c[PSI, 2] + 6.0 * u * c[PSI, 3]
+    theta = c[THETA, 0] + u * (c[THETA, 1] + u * (c[THETA, 2] + u * c[THETA, 3]))
+    theta_1 = c[THETA, 1] + u * (2.0 * c[THETA, 2] + u * 3.0 * c[THETA, 3])
+    theta_2 = 2.0 * c[THETA, 2] + 6.0 * u * c[THETA, 3]
+    phi = c[PHI, 0] + u * (c[PHI, 1] + u * (c[PHI, 2] + u * c[PHI, 3]))
+    phi_1 = c[PHI, 1] + u * (2.0 * c[PHI, 2] + u * 3.0 * c[PHI, 3])
+    phi_2 = 2.0 * c[PHI, 2] + 6.0 * u * c[PHI, 3]
+
+    sp, cp = sin(psi), cos(psi)
+    st, ct = sin(theta), cos(theta)
+    sf, cf = sin(phi), cos(phi)
+    frame[3] = cp * ct
+    frame[4] = cp * st * sf - sp * cf
+    frame[5] = cp * st * cf + sp * sf
+    frame[6] = sp * ct
+    frame[7] = sp * st * sf + cp * cf
+    frame[8] = sp * st * cf - cp * sf
+    frame[9] = -st
+    frame[10] = ct * sf
+    frame[11] = ct * cf
+
+    frame[12] = phi_1 - psi_1 * st
+    frame[13] = theta_1 * cf + psi_1 * ct * sf
+    frame[14] = psi_1 * ct * cf - theta_1 * sf
+    frame[15] = phi_2 - psi_2 * st - psi_1 * theta_1 * ct
+    frame[16] = (theta_2 * cf - theta_1 * phi_1 * sf + psi_2 * ct * sf
+                 - psi_1 * theta_1 * st * sf + psi_1 * phi_1 * ct * cf)
+    frame[17] = (psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
+                 - theta_2 * sf - theta_1 * phi_1 * cf)
+    # gravity points along global z: the third row of A
+    frame[18] = frame[9]
+    frame[19] = frame[10]
+    frame[20] = frame[11]
+    return i
+
+
+@jit
+def rail_state(track, cell, u, side, out):
+    """Displacements y, z [m] and their slopes y', z' [1] of one rail into ``out[4]``; friction.
+
+    Returns
+    -------
+    float : friction coefficient at this rail [1].
+    """
+    c = track.rail[cell]
+    m = MU_LEFT + side
+    mu = c[m, 0] + u * (c[m, 1] + u * (c[m, 2] + u * c[m, 3]))
+    if track.has_irregularity:
+        for k in range(2):
+            row = 2 * side + k
+            out[k] = c[row, 0] + u * (c[row, 1] + u * (c[row, 2] + u * c[row, 3]))
+            out[2 + k] = c[row, 1] + u * (2.0 * c[row, 2] + u * 3.0 * c[row, 3])
+    else:
+        out[:] = 0.0
+    return mu

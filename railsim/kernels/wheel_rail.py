@@ -1,0 +1,296 @@
+"""Forces between wheelsets and rails: elastic normal contact, creepages, creep forces.
+
+Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`):
+
+- penetration p = z - g; elastic normal force as the gradient of U = 2/5 K p^(5/2), which includes
+  the small terms from the change of K along the profile;
+- contact damping c_N on the *geometric* rate of approach, faded in over 30 um, the sum never
+  pulling;
+- creepages from the velocity of the wheel's material at the patch, c from the wheelset's centre:
+  v = V e_x + w_F x r + r' + w_abs x c, minus the rail's own slope times V;
+- tangential forces by FASTSIM for all patches of the vehicle in one call.
+
+Forces on the rail in track axes: Y = T_y cos g + N sin g, Q = -T_y sin g + N cos g with the angle
+g > 0 where the normal leans to the right; on the wheel the opposite, with moment c x F.
+"""
+
+from math import sqrt
+
+from railsim.kernels import jit
+from railsim.kernels.contact_table import (
+    ABOVE_Y,
+    BELOW_Y,
+    G_ROLL,
+    G_W,
+    G_Y,
+    INSIDE,
+    K_ROLL,
+    K_W,
+    K_Y,
+    N_PATCH,
+    OUTSIDE_ROLL,
+    is_far,
+    locate,
+    look_up,
+)
+from railsim.kernels.fastsim import fastsim, kalker_lookup
+from railsim.kernels.status import (
+    DERAILED,
+    FELL_BETWEEN_RAILS,
+    ROLL_RANGE,
+    RUNNING,
+    WHEEL_LIFT,
+    YAW_RANGE,
+)
+from railsim.kernels.track_frame import OMEGA, rail_state
+
+# rows of Work.patch: one column per active patch
+(
+    A, B, NORMAL, MU_N, ANGLE_SIN, ANGLE_COS, C_X, C_Y, C_Z, XI_X, XI_Y, PHI,
+    C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION,
+) = range(20)
+PATCH_ROWS = 20
+
+# columns of Work.wheel[w, side]
+W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL = range(8)
+WHEEL_COLUMNS = 8
+
+FADE = 30e-6  # penetration over which the contact damping is faded in (m)
+LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
+
+
+@jit
+def normal_contact(system, work, speed, state):
+    """Look up all wheels, add elastic normal forces, list the active patches.
+
+    Returns
+    -------
+    status, wheelset, n : int
+        Status code, the wheelset it concerns, number of active patches.
+    """
+    contact = system.contact
+    n_bodies = system.bodies.kind.shape[0]
+    n = 0
+    for w in range(contact.body.shape[0]):
+        b = contact.body[w]
+        f = system.bodies.frame[b]
+        force = work.rail_force[b]
+        for k in range(6):
+            force[k] = 0.0
+        yaw = state[6 * b + 5]
+        y_rate = state[6 * n_bodies + 6 * b + 1]
+        z_rate = state[6 * n_bodies + 6 * b + 2]
+        # rates of the Euler angles were left here by the kinematics
+        roll_rate = work.acceleration[b, 3]
+        yaw_rate = work.acceleration[b, 5]
+        for side in range(2):
+            sign = 2.0 * side - 1.0
+            mu = rail_state(system.track, work.cell[f], work.cell_u[f], side, work.rail)
+            y = sign * (state[6 * b + 1] - work.rail[0])
+            z = state[6 * b + 2] - work.rail[1]
+            y_dot = sign * (y_rate - speed * work.rail[2])
+            z_dot = z_rate - speed * work.rail[3]
+            roll = sign * state[6 * b + 3]
+            where, iy, ir, iw, ty, tr, tw = locate(contact, y, roll, yaw * yaw)
+            if where != INSIDE:
+                return outside(where), w, n
+            table = contact.table[w, side]
+            normal = 0.0
+            lateral = 0.0
+            lift = 1.0
+            for patch in range(N_PATCH):
+                if is_far(contact, table, patch, iy, ir, iw, tr, z):
+                    continue
+                t = work.look_up
+                look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, t)
+                p = z - t[0]
+                lift = min(lift, -p)
+                if p <= 0.0:
+                    continue
+                p_rate = (z_dot - t[G_Y] * y_dot - t[G_ROLL] * sign * roll_rate
+                          - t[G_W] * 2.0 * yaw * yaw_rate)
+                root = sqrt(p)
+                elastic = t[1] * p * root
+                cos_2 = 1.0 / (1.0 + t[G_Y] * t[G_Y])
+                fade = min(1.0, p / FADE)
+                vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
+                stretch = 0.4 * p * p * root
+                q_y = sign * (vertical * t[G_Y] - stretch * t[K_Y])
+                force[1] += q_y
+                force[2] -= vertical
+                force[3] += sign * (vertical * t[G_ROLL] - stretch * t[K_ROLL])
+                force[5] += (vertical * t[G_W] - stretch * t[K_W]) * 2.0 * yaw
+                normal += vertical
+                lateral -= q_y
+                cos_g = sqrt(cos_2)
+                N = vertical / cos_g
+                if N <= 0.0:
+                    continue
+                third = N ** (1.0 / 3.0)
+                column = work.patch
+                column[A, n] = t[5] * third
+                column[B, n] = t[6] * third
+                column[NORMAL, n] = N
+                column[MU_N, n] = mu * N
+                column[ANGLE_COS, n] = cos_g
+                column[ANGLE_SIN, n] = -sign * t[G_Y] * cos_g
+                column[C_X, n] = sign * yaw * t[4]
+                column[C_Y, n] = sign * t[2]
+                column[C_Z, n] = t[3]
+                column[PENETRATION, n] = p
+                work.patch_index[n, 0] = w
+                work.patch_index[n, 1] = side
+                work.patch_index[n, 2] = patch
+                n += 1
+            wheel = work.wheel[w, side]
+            wheel[W_Q] = normal
+            wheel[W_Y] = lateral
+            wheel[W_NORMAL] = 0.0
+            wheel[W_XI_X] = 0.0
+            wheel[W_XI_Y] = 0.0
+            wheel[W_PHI] = 0.0
+            wheel[W_T_GAMMA] = 0.0
+            wheel[W_LIFT] = lift
+            if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, z):
+                return WHEEL_LIFT, w, n
+    return RUNNING, 0, n
+
+
+@jit
+def all_far(contact, table, iy, ir, iw, tr, z):
+    """Whether every patch is more than LIFT_RANGE away from its rail."""
+    for patch in range(N_PATCH):
+        if z - contact.values[table, patch, iw, ir, iy, 0] > -LIFT_RANGE:
+            return False
+    return True
+
+
+@jit
+def outside(where):
+    """Status code for a look-up outside the contact table."""
+    if where == ABOVE_Y:
+        return DERAILED
+    if where == BELOW_Y:
+        return FELL_BETWEEN_RAILS
+    if where == OUTSIDE_ROLL:
+        return ROLL_RANGE
+    return YAW_RANGE
+
+
+@jit
+def creepages(system, work, n, speed, state):
+    """Creepages of the active patches, see the module's equations."""
+    patch = work.patch
+    n_bodies = system.bodies.kind.shape[0]
+    for k in range(n):
+        w = work.patch_index[k, 0]
+        b = system.contact.body[w]
+        f = system.bodies.frame[b]
+        C = work.C[b]
+        frame = work.frames[f]
+        w1, w2, w3 = speed * frame[OMEGA], speed * frame[OMEGA + 1], speed * frame[OMEGA + 2]
+        x, y = state[6 * b], state[6 * b + 1] + system.bodies.nominal[b, 0]
+        z = state[6 * b + 2] + system.bodies.nominal[b, 1]
+        v = 6 * n_bodies + 6 * b
+        u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
+        a1 = C[0] * u1 + C[1] * u2 + C[2] * u3
+        a2 = C[3] * u1 + C[4] * u2 + C[5] * u3
+        a3 = C[6] * u1 + C[7] * u2 + C[8] * u3
+        cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
+        vx = speed + w2 * z - w3 * y + state[v] + a2 * cz - a3 * cy
+        vy = w3 * x - w1 * z + state[v + 1] + a3 * cx - a1 * cz
+        vz = w1 * y - w2 * x + state[v + 2] + a1 * cy - a2 * cx
+        if system.track.has_irregularity:
+            rail_state(system.track, work.cell[f], work.cell_u[f], work.patch_index[k, 1],
+                       work.rail)
+            vy -= speed * work.rail[2]
+            vz -= speed * work.rail[3]
+        s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
+        patch[XI_X, k] = vx / speed
+        patch[XI_Y, k] = (vy * c - vz * s) / speed
+        patch[PHI, k] = (a2 * s + a3 * c) / speed
+
+
+@jit
+def add_creep_forces(system, work, n, speed):
+    """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
+    contact = system.contact
+    patch = work.patch
+    for w in range(contact.body.shape[0]):
+        work.spin_damping[contact.body[w]] = 0.0
+    for k in range(n):
+        w, side = work.patch_index[k, 0], work.patch_index[k, 1]
+        b = contact.body[w]
+        s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
+        fx = -patch[T_X, k]
+        fy = -patch[T_Y, k] * c
+        fz = patch[T_Y, k] * s
+        cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
+        mz = patch[M_Z, k]
+        force = work.rail_force[b]
+        force[0] += fx
+        force[1] += fy
+        force[2] += fz
+        force[3] += cy * fz - cz * fy
+        force[4] += cz * fx - cx * fz - mz * s
+        force[5] += cx * fy - cy * fx - mz * c
+        wheel = work.wheel[w, side]
+        wheel[W_Q] -= fz
+        wheel[W_Y] -= fy
+        wheel[W_T_GAMMA] += (patch[T_X, k] * patch[XI_X, k] + patch[T_Y, k] * patch[XI_Y, k]
+                             + mz * patch[PHI, k])
+        if patch[NORMAL, k] > wheel[W_NORMAL]:
+            wheel[W_NORMAL] = patch[NORMAL, k]
+            wheel[W_XI_X] = patch[XI_X, k]
+            wheel[W_XI_Y] = patch[XI_Y, k]
+            wheel[W_PHI] = patch[PHI, k]
+        if patch[MU_N, k] > 0.0:
+            work.spin_damping[b] += (
+                contact.shear_modulus * patch[A, k] * patch[B, k] * patch[C11, k] * cz * cz
+                / (speed * system.bodies.inertia[b, 1])
+            )
+
+
+@jit
+def wheel_rail(system, work, speed, state):
+    """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
+
+    Row b of `rail_force`: force (3) and moment about the wheelset's centre (3), where the moment's
+    normal part is the generalised force of roll and yaw (see `rhs`), the creep part a vector.
+
+    Returns
+    -------
+    status, wheelset, n : int
+        Status code, the wheelset it concerns, number of active patches.
+    """
+    status, w, n = normal_contact(system, work, speed, state)
+    if status != RUNNING:
+        return status, w, n
+    # the normal part is generalised (about the wheelset's roll axis and the track's normal):
+    # turn it into a moment vector that does no work on the spin
+    for k in range(system.contact.body.shape[0]):
+        b = system.contact.body[k]
+        generalised_to_vector(work.C[b], work.S[b], work.rail_force[b])
+    patch = work.patch
+    creepages(system, work, n, speed, state)
+    kalker_lookup(n, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
+                  patch[C23], patch[C33])
+    fastsim(n, system.contact.n_x, system.contact.n_y, patch[A], patch[B], patch[MU_N],
+            patch[C11], patch[C22], patch[C23], system.contact.shear_modulus, patch[XI_X],
+            patch[XI_Y], patch[PHI], work.fastsim, patch[T_X], patch[T_Y], patch[M_Z])
+    add_creep_forces(system, work, n, speed)
+    return RUNNING, 0, n
+
+
+@jit
+def generalised_to_vector(C, S, force):
+    """Moment vector (track axes) from the generalised moments of roll and yaw, none on the spin.
+
+    The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
+    track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and M_2 = 0.
+    """
+    m1 = force[3]
+    m3 = force[5] / S[1]
+    force[3] = C[0] * m1 + C[2] * m3
+    force[4] = C[3] * m1 + C[5] * m3
+    force[5] = C[6] * m1 + C[8] * m3

@@ -1,0 +1,117 @@
+"""The time step: as long as the scheme stays stable for this vehicle at this speed.
+
+The linearised map of one step is formed by differences about steady rolling; the step is stable
+where no mode of the map grows faster than the vehicle itself does (a vehicle beyond its critical
+speed grows, and may).  The margin leaves room for the stiffer contacts of flange and curve.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, work_arrays
+from railsim.errors import ModelError
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.status import RUNNING
+from railsim.kernels.system import PRESCRIBED, System
+from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
+from railsim.kernels.wheel_rail import WHEEL_COLUMNS
+
+Floats = NDArray[np.float64]
+
+SCHEMES = {"fast": FAST, "rk4": RK4}
+LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}  # s; beyond them accuracy, not stability, decides
+SHORTEST_STEP = 1e-6  # s
+MARGIN = 1.3  # a step is taken if one longer by this factor is stable too
+GROWTH = 5.0  # 1/s, growth beyond that of the vehicle that counts as instability of the scheme
+_NEVER = 1 << 40
+
+
+def empty_recorder(model: Model, rows: int) -> Recorder:
+    """Recorder with room for `rows` outputs."""
+    n = model.index.n_bodies
+    wheelsets = len(model.index.wheelsets)
+    return Recorder(
+        time=np.zeros(rows),
+        state=np.zeros((rows, model.n_state)),
+        rates=np.zeros((rows, 6 * n)),
+        acceleration=np.zeros((rows, n, 6)),
+        wheel=np.zeros((rows, wheelsets, 2, WHEEL_COLUMNS)),
+    )
+
+
+def choose_step(
+    model: Model, system: System, state: Floats, scheme: str, interval: float
+) -> float:
+    """Longest stable step that divides the output interval.
+
+    Parameters
+    ----------
+    system : System
+        The model on the track on which stability is judged (straight and level).
+    state : float64[n_state]
+        Steady rolling.
+    scheme : str
+        Key of `SCHEMES`.
+    interval : float
+        Time between outputs [s].
+
+    Raises
+    ------
+    ModelError
+        No step longer than `SHORTEST_STEP` is stable.
+    """
+    growth = max(0.0, _vehicle_growth(model, system, state)) + GROWTH
+    n = max(1, int(np.ceil(interval / LONGEST_STEP[scheme] * (1.0 - 1e-9))))
+    while interval / n >= SHORTEST_STEP:
+        h = MARGIN * interval / n
+        if _step_growth(model, system, state, scheme, h) <= growth:
+            return interval / n
+        n = max(n + 1, int(n * 1.1))
+    raise ModelError(
+        f"no stable step longer than {SHORTEST_STEP:g} s: an element is too stiff for the masses "
+        "it connects"
+    )
+
+
+def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
+    """Largest real part of the eigenvalues of the linearised vehicle [1/s]."""
+    work = work_arrays(system)
+    derivative = np.zeros_like(state)
+
+    def rate(trial: Floats) -> Floats:
+        status, _, _ = right_hand_side(system, work, trial, PRESCRIBED, 0.0, derivative)
+        if status != RUNNING:
+            raise ModelError("the state of steady rolling lies outside the contact table")
+        return derivative.copy()
+
+    return float(np.max(np.linalg.eigvals(_jacobian(rate, state)).real))
+
+
+def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: float) -> float:
+    """Largest growth rate of the modes of one step of length `h` [1/s]."""
+    work = work_arrays(system)
+    derivative = np.zeros_like(state)
+    stages = np.zeros((3, len(state)))
+    recorder = empty_recorder(model, 1)
+
+    def step(trial: Floats) -> Floats:
+        after = trial.copy()
+        time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme], PRESCRIBED,
+                  0.0, h, 1, 1, _NEVER)
+        return after
+
+    radius = np.max(np.abs(np.linalg.eigvals(_jacobian(step, state))))
+    return float(np.log(radius) / h) if np.isfinite(radius) else np.inf
+
+
+def _jacobian(function, state: Floats) -> Floats:  # type: ignore[no-untyped-def]
+    """Jacobian by forward differences; the place along the track and the speed stay as they are."""
+    base = function(state)
+    size = len(state) - 2
+    columns = np.empty((size, size))
+    for k in range(size):
+        trial = state.copy()
+        change = 1e-8 * max(1.0, abs(state[k]))
+        trial[k] += change
+        columns[:, k] = (function(trial)[:size] - base[:size]) / change
+    return columns
