@@ -73,7 +73,7 @@ class Quantity:
         dots = {"body_velocity": r"\dot ", "body_acceleration": r"\ddot "}.get(self.name, "")
         return replace(
             self,
-            long_name=f"{name} {self.long_name}",
+            long_name=f"{self.long_name}, {name}",
             symbol=f"{dots}{symbol}",
             unit=own(self.unit),
             shown_unit=own(self.shown_unit),

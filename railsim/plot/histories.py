@@ -1,0 +1,196 @@
+"""Quantities of one result over time or distance.
+
+The figures of the curving study: wheel load change, lateral force, derailment quotient, roll,
+lateral displacement and yaw, with the curve shaded and the limits of EN 14363 where they exist.
+"""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from railsim.notation import Quantity
+from railsim.plot.selection import Line, Panel, panels
+from railsim.plot.style import (
+    DISTINCT,
+    LIMIT,
+    SIDE_LINES,
+    shade,
+    spans,
+    styled,
+    wheelset_colours,
+)
+from railsim.result import Result, sections
+from railsim.result.data import Array
+
+STUDY = (
+    "dQ_over_Q0",
+    "sum_abs_Y",
+    "Y_over_Q",
+    "wheelset_roll",
+    "wheelset_lateral",
+    "wheelset_yaw",
+)
+"""What is drawn unless told otherwise."""
+
+LIMITS = {"Y_over_Q": (0.8, "EN 14363: 0.8"), "dQ_over_Q0": (-0.6, "EN 14363: −60 %")}
+"""EN 14363 (2016): derailment quotient, on-track tests; wheel unloading, twisted track [SI]."""
+
+
+def histories(
+    result: Result,
+    selections: Sequence[str] = STUDY,
+    *,
+    over: str = "distance",
+    by: str = "wheel",
+) -> Figure:
+    """Draw quantities of a result.
+
+    Parameters
+    ----------
+    result : Result
+        What to draw.
+    selections : sequence of str
+        Quantities and places, see `railsim.plot.selection`.
+    over : {"distance", "time"}
+        Horizontal axis; the distance is that of the reference body.
+    by : {"wheel", "wheelset"}
+        One pair of axes for all wheels, or one for each wheelset.
+
+    Returns
+    -------
+    Figure
+        One pair of axes for each quantity, or each quantity and wheelset.
+    """
+    with styled():
+        rows = panels(result, tuple(selections))
+        if by == "wheelset":
+            cells = [_by_wheelset(result, panel) for panel in rows]
+            columns = max(len(row) for row in cells)
+            grid = [row + [None] * (columns - len(row)) for row in cells]
+        else:
+            columns = 1 if len(rows) < 3 else 2
+            grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
+            grid[-1] += [None] * (columns - len(grid[-1]))
+        return _figure(result, grid, over, by)
+
+
+def _by_wheelset(result: Result, panel: Panel) -> list[Panel | None]:
+    if not any("wheelset" in line.labels for line in panel.lines):
+        return [panel]
+    own: dict[str, list[Line]] = {name: [] for name in result.wheelsets}
+    for line in panel.lines:
+        own[line.labels["wheelset"]].append(line)
+    return [Panel(panel.quantity, tuple(lines)) if lines else None for lines in own.values()]
+
+
+def _figure(result: Result, grid: list[list[Panel | None]], over: str, by: str) -> Figure:
+    rows, columns = len(grid), len(grid[0])
+    width = 7.0 if columns == 1 else 3.0 + 3.4 * min(columns, 4)
+    figure = Figure(figsize=(width, 1.3 + 2.1 * rows), layout="constrained")
+    axes = figure.subplots(
+        rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
+    )
+    horizontal = result[over]
+    shown = spans(sections(result.track()), result["distance"], horizontal)
+    for i, row in enumerate(grid):
+        for j, panel in enumerate(row):
+            if panel is None:
+                axes[i, j].remove()
+                continue
+            _draw(axes[i, j], result, panel, horizontal, by)
+            shade(axes[i, j], shown, named=i == 0)
+            if not (i + 1 < rows and grid[i + 1][j] is not None):
+                axes[i, j].set_xlabel(result.quantities[over].label)
+                axes[i, j].tick_params(labelbottom=True)
+    drawn = [panel for row in grid for panel in row if panel is not None]
+    figure.suptitle(title(result), x=0.012, ha="left")
+    handles = _legend(result, drawn, by)
+    if handles:
+        figure.legend(handles=handles, loc="outside lower left", ncols=min(len(handles), 6))
+    return figure
+
+
+def title(result: Result) -> str:
+    """Return what a figure of a result is called: vehicle, track and speed."""
+    speed = f"{result.speed:.4g} m/s ({3.6 * result.speed:.4g} km/h)"
+    return f"{result.vehicle().name}\n{result.track().name} · {speed}"
+
+
+def _draw(axes: Axes, result: Result, panel: Panel, horizontal: Array, by: str) -> None:
+    quantity = panel.quantity
+    wheelsets = wheelset_colours(result.wheelsets)
+    others = [line for line in panel.lines if "wheelset" not in line.labels]
+    for index, line in enumerate(panel.lines):
+        side = line.labels.get("side", "left")
+        if by == "wheelset" and "side" in line.labels:
+            colour = DISTINCT[0] if side == "left" else DISTINCT[1]
+        elif "wheelset" in line.labels:
+            colour = wheelsets[line.labels["wheelset"]]
+        else:
+            colour = DISTINCT[index % len(DISTINCT)]
+        axes.plot(horizontal, line.values * quantity.scale, color=colour, ls=SIDE_LINES[side])
+    axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+    heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
+    places = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
+    if by == "wheelset" and len(places) == 1:
+        place = places.pop()
+        number = result.wheelsets.index(place) + 1
+        heading = f"{heading}: {number} {short_names(result.wheelsets)[place]}"
+    axes.set_title(heading)
+    axes.set_ylabel(_unit_label(quantity))
+    axes.margins(x=0.0)
+    if quantity.name in LIMITS:
+        _draw_limit(axes, quantity)
+    if others and len(panel.lines) > 1:
+        names = [" ".join(v for k, v in line.labels.items() if k != "component") for line in others]
+        axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
+
+
+def _unit_label(quantity: Quantity) -> str:
+    symbol = f"${quantity.symbol}$ " if quantity.symbol else ""
+    return f"{symbol}({quantity.shown_unit})" if quantity.shown_unit != "-" else symbol.strip()
+
+
+def _draw_limit(axes: Axes, quantity: Quantity) -> None:
+    value, words = LIMITS[quantity.name]
+    shown = value * quantity.scale
+    axes.axhline(shown, color=LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
+    axes.annotate(
+        words,
+        (1.0, shown),
+        xycoords=("axes fraction", "data"),
+        xytext=(-3, 2.5 if value < 0 else -2.5),
+        textcoords="offset points",
+        ha="right",
+        va="bottom" if value < 0 else "top",
+        fontsize=7.5,
+        color=LIMIT,
+    )
+
+
+def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
+    """Return the keys of all axes together: colours of the wheelsets, lines of the sides."""
+    lines = [line for panel in drawn for line in panel.lines]
+    handles = []
+    if by == "wheel":
+        colours = wheelset_colours(result.wheelsets)
+        names = short_names(result.wheelsets)
+        for number, name in enumerate(result.wheelsets, start=1):
+            if any(line.labels.get("wheelset") == name for line in lines):
+                words = f"{number} {names[name]}"
+                handles.append(Line2D([], [], color=colours[name], lw=2.0, label=words))
+    for index, (side, style) in enumerate(SIDE_LINES.items()):
+        if any(line.labels.get("side") == side for line in lines):
+            colour = "0.25" if by == "wheel" else DISTINCT[index]
+            handles.append(Line2D([], [], color=colour, ls=style, label=f"{side} wheel"))
+    return handles
+
+
+def short_names(names: Sequence[str]) -> dict[str, str]:
+    """Return names without the last part where it is the same for all of several dotted names."""
+    last = {name.split(".")[-1] for name in names}
+    if len(names) > 1 and len(last) == 1 and all("." in name for name in names):
+        return {name: name.rpartition(".")[0] for name in names}
+    return {name: name for name in names}

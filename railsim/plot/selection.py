@@ -1,0 +1,107 @@
+"""Which quantities and places to draw.
+
+A selection is the name of a quantity, followed by the places that it is wanted at, in any order:
+``Q``, ``Y:1:left``, ``body_acceleration:carbody:y``.  A wheelset is called by its name or by its
+number from the leading end.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+from railsim.errors import Fault, InputError, nearest
+from railsim.notation import Quantity
+from railsim.result import Result
+from railsim.result.data import Array
+
+MOST_LINES = 24
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a picture.
+
+    Attributes
+    ----------
+    values : ndarray, shape (time,)
+        What to draw [SI].
+    labels : mapping of str to str
+        Where: dimension to name.
+    """
+
+    values: Array
+    labels: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes: a quantity and its lines."""
+
+    quantity: Quantity
+    lines: tuple[Line, ...]
+
+
+def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Panel]:
+    """Return what to draw for each selection; components get a panel each.
+
+    Raises
+    ------
+    InputError : a quantity or place does not exist, or there are too many lines to tell apart.
+    """
+    faults: list[Fault] = []
+    found: list[Panel] = []
+    for selection in selections:
+        try:
+            found.extend(_panels(result, selection))
+        except InputError as error:
+            faults.extend(error.faults)
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _panels(result: Result, selection: str) -> list[Panel]:
+    name, *places = selection.split(":")
+    drawable = [key for key, q in result.quantities.items() if q.dims[0] == "time" != key]
+    if name not in drawable:
+        raise _fault(selection, f"no quantity '{name}'", nearest(name, drawable))
+    quantity = result.quantities[name]
+    wanted = _places(result, quantity, selection, places)
+    per_panel = ["component"] if "component" in quantity.dims else []
+    per_line = [dim for dim in quantity.dims[1:] if dim not in per_panel]
+    lines = list(product(*(wanted[dim] for dim in per_line)))
+    if len(lines) > MOST_LINES:
+        example = ":".join((name, *(wanted[dim][0] for dim in per_line)))
+        raise _fault(selection, f"{len(lines)} lines", f"choose some of them, such as {example}")
+    found = []
+    for outer in product(*(wanted[dim] for dim in per_panel)):
+        drawn = tuple(
+            _line(result, name, dict(zip((*per_panel, *per_line), (*outer, *inner), strict=True)))
+            for inner in lines
+        )
+        found.append(Panel(quantity.component(*outer) if outer else quantity, drawn))
+    return found
+
+
+def _line(result: Result, name: str, labels: dict[str, str]) -> Line:
+    return Line(result.series(name, **labels), labels)
+
+
+def _places(
+    result: Result, quantity: Quantity, selection: str, places: list[str]
+) -> dict[str, list[str]]:
+    wanted = {dim: list(result.coordinates[dim]) for dim in quantity.dims[1:]}
+    known = {label: (dim, label) for dim, labels in wanted.items() for label in labels}
+    numbered = enumerate(wanted.get("wheelset", []), start=1)
+    known |= {str(number): ("wheelset", label) for number, label in numbered}
+    chosen: dict[str, list[str]] = {}
+    for place in filter(None, places):
+        if place not in known:
+            raise _fault(selection, f"no place '{place}'", nearest(place, known))
+        dim, label = known[place]
+        chosen.setdefault(dim, []).append(label)
+    return wanted | chosen
+
+
+def _fault(selection: str, found: str, allowed: str) -> InputError:
+    return InputError([Fault("QUANTITY", selection, found, allowed)])

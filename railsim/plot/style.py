@@ -1,0 +1,181 @@
+"""What all pictures share: fonts, colours, the shading of curves, and saving.
+
+Colours are told apart with colour-blind eyes too (Okabe and Ito, "Color universal design", 2008):
+a bogie has a hue, its leading wheelset the dark shade, the left side a solid and the right side a
+dashed line.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from railsim.errors import Fault, InputError
+from railsim.result import Section
+from railsim.result.data import Array
+from railsim.result.hdf5 import check_target
+
+STYLE: Any = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": "0.35",
+    "axes.grid": True,
+    "axes.labelsize": 9,
+    "axes.linewidth": 0.7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9.5,
+    "figure.dpi": 150,
+    "figure.titlesize": 11.5,
+    "figure.titleweight": "bold",
+    "font.size": 9,
+    "grid.color": "0.88",
+    "grid.linewidth": 0.6,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "mathtext.fontset": "dejavusans",
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "svg.hashsalt": "railsim",
+}
+
+HUES = (
+    ("#004a80", "#56a8e0"),
+    ("#b8450a", "#f0a13c"),
+    ("#00664b", "#5cc0a0"),
+    ("#7d3a68", "#d493bd"),
+    ("#4d4d4d", "#a6a6a6"),
+)
+"""Dark and light shade of the first, second, ... bogie."""
+
+DISTINCT = ("#004a80", "#d1530b", "#0a8765", "#a0568a", "#3f9bd8", "#d99000", "#555555", "#8c2d19")
+"""Colours of things that have no order, such as results that are compared."""
+
+SIDE_LINES = {"left": "-", "right": (0, (4.0, 1.6))}
+SHADES = {"CLO": "0.95", "CIR": "0.90"}
+NARROW = 0.011
+"""Share of the axes' width that a letter of a section's name takes."""
+
+LIMIT = "#b3122b"
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Use the style of railsim's pictures within the block."""
+    with matplotlib.rc_context(STYLE):
+        yield
+
+
+def wheelset_colours(names: Sequence[str]) -> dict[str, Any]:
+    """Return a colour for every wheelset: a hue for each bogie, from dark to light within it.
+
+    Wheelsets belong together when the first parts of their dotted names agree.
+    """
+    bogies: dict[str, list[str]] = {}
+    for name in names:
+        bogies.setdefault(name.split(".")[0], []).append(name)
+    if len(bogies) == len(names):
+        return {name: DISTINCT[i % len(DISTINCT)] for i, name in enumerate(names)}
+    colours = {}
+    for i, members in enumerate(bogies.values()):
+        dark, light = HUES[i % len(HUES)]
+        for j, name in enumerate(members):
+            share = j / (len(members) - 1) if len(members) > 1 else 0.0
+            colours[name] = _blend(dark, light, share)
+    return colours
+
+
+def _blend(dark: str, light: str, share: float) -> Any:
+    ends = zip(to_rgb(dark), to_rgb(light), strict=True)
+    return tuple((1.0 - share) * a + share * b for a, b in ends)
+
+
+@dataclass(frozen=True)
+class Span:
+    """A section of the track on the axis of a picture, in the axis's unit."""
+
+    section: Section
+    low: float
+    high: float
+
+
+def spans(sections: Sequence[Section], distance: Array, axis: Array) -> list[Span]:
+    """Return the transitions and curves that a run passed, on the axis of a picture.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        Elements of the plan.
+    distance : ndarray, shape (time,)
+        Distance of the reference body, increasing [m].
+    axis : ndarray, shape (time,)
+        What the picture shows horizontally: the distance itself, or time.
+    """
+    found = []
+    for section in sections:
+        start, end = np.clip([section.start, section.end], distance[0], distance[-1])
+        if section.kind in SHADES and start < end:
+            low, high = np.interp([start, end], distance, axis)
+            found.append(Span(section, float(low), float(high)))
+    return found
+
+
+def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
+    """Shade transitions and curves; with `named`, write what they are above the axes."""
+    for span in shown:
+        axes.axvspan(span.low, span.high, color=SHADES[span.section.kind], lw=0, zorder=0)
+    if not named or not shown:
+        return
+    low, high = axes.get_xlim()
+    for span in shown:
+        words = "CLO" if span.section.kind == "CLO" else f"R {span.section.radius:g}"
+        if (span.high - span.low) / (high - low) < NARROW * len(words):
+            continue
+        axes.annotate(
+            words.replace("-", "−"),
+            (0.5 * (span.low + span.high), 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=6.5,
+            color="0.4",
+        )
+    axes.set_title(axes.get_title(loc="left"), pad=14.0)
+
+
+def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a figure; the ending of the name says the format (.png, .svg, .pdf).
+
+    Raises
+    ------
+    InputError : the file exists and may not be overwritten, cannot be written, or its ending is
+        none that can be drawn.
+    """
+    path = Path(path)
+    check_picture(path, overwrite=overwrite)
+    try:
+        figure.savefig(path)
+    except OSError as error:
+        fault = Fault(str(path), "", f"cannot write it ({error})", "choose another place")
+        raise InputError([fault]) from None
+    return path
+
+
+def check_picture(path: Path, *, overwrite: bool, option: str = "--out") -> None:
+    """Refuse a name that no picture can be written to; see `save`."""
+    endings = sorted(Figure().canvas.get_supported_filetypes())
+    if path.suffix.lstrip(".") not in endings:
+        found = f"{path.name} ends in '{path.suffix}'"
+        allowed = "a picture's name ends in one of: " + ", ".join(f".{end}" for end in endings)
+        raise InputError([Fault(option, "", found, allowed)])
+    check_target(path, overwrite=overwrite, option=option)

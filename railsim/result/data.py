@@ -1,0 +1,272 @@
+"""The result of a run: named arrays with units, and everything that led to them.
+
+A `Result` never changes: its arrays are read-only, and what is derived from them is computed by
+functions beside it.  Arrays that come from a file are read when they are first asked for.
+"""
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import nearest
+from railsim.notation import Quantity
+
+if TYPE_CHECKING:
+    import xarray
+
+    from railsim.definitions.track import Track
+    from railsim.definitions.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Attributes = Mapping[str, str | float | int]
+
+
+class Result:
+    """What a run computed.
+
+    Arrays are reached by the names of `railsim.notation.QUANTITIES`, as ``result.Q`` or
+    ``result["Q"]``; the first dimension of all but the static ones is time.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        One array for every quantity [SI].
+    quantities : mapping of str to Quantity
+        Unit, dimensions and meaning of every array.
+    coordinates : mapping of str to sequence of str
+        Names along every dimension other than time.
+    attributes : mapping
+        Facts about the run, the root attributes of the result file.
+    groups : mapping of str to mapping of str to ndarray
+        Arrays that belong to the inputs rather than to the outcome; ``profiles`` holds the
+        points of every wheel and rail profile that was used.
+
+    Examples
+    --------
+    >>> from railsim.notation import QUANTITIES
+    >>> result = Result(
+    ...     arrays={"time": [0.0, 0.1], "sum_Y": [[1e3, 2e3], [3e3, -4e3]]},
+    ...     quantities={name: QUANTITIES[name] for name in ("time", "sum_Y")},
+    ...     coordinates={"wheelset": ["front", "rear"]},
+    ...     attributes={"status": "complete"},
+    ... )
+    >>> result.sum_Y.shape, result.series("sum_Y", wheelset="rear")
+    ((2, 2), array([ 2000., -4000.]))
+    """
+
+    def __init__(
+        self,
+        arrays: Mapping[str, Any],
+        quantities: Mapping[str, Quantity],
+        coordinates: Mapping[str, Any],
+        attributes: Attributes,
+        groups: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+    ) -> None:
+        self._arrays = arrays if isinstance(arrays, FrozenArrays) else FrozenArrays(arrays)
+        self._quantities = MappingProxyType(dict(quantities))
+        self._coordinates = MappingProxyType(
+            {name: tuple(str(label) for label in labels) for name, labels in coordinates.items()}
+        )
+        self._attributes = MappingProxyType(dict(attributes))
+        self._groups = MappingProxyType(
+            {
+                name: members if isinstance(members, FrozenArrays) else FrozenArrays(members)
+                for name, members in groups.items()
+            }
+        )
+
+    # -- the arrays ---------------------------------------------------------------------------
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the array of quantity `name` [SI]."""
+        try:
+            return self._arrays[name]
+        except KeyError:
+            raise KeyError(f"no quantity '{name}'; {nearest(name, self._arrays)}") from None
+
+    def __getattr__(self, name: str) -> Array:
+        if not name.startswith("_") and name in self._arrays:
+            return self._arrays[name]
+        raise AttributeError(f"a result has no '{name}'; {nearest(name, self._names())}")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._arrays
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._arrays)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._arrays})
+
+    def __repr__(self) -> str:
+        steps = self["time"].shape[0] if "time" in self else 0
+        return f"<Result: {self.status}, {steps} instants, {len(self._arrays)} quantities>"
+
+    def _names(self) -> tuple[str, ...]:
+        return (*self._arrays, "attributes", "coordinates", "quantities", "profiles")
+
+    def series(self, name: str, **labels: str | int) -> Array:
+        """Return one quantity at named places along its dimensions.
+
+        Parameters
+        ----------
+        name : str
+            Quantity.
+        **labels : str or int
+            Dimension = name along it, or its index from 0.
+
+        Returns
+        -------
+        ndarray
+            The array without the dimensions that were given [SI].
+        """
+        dims = self._quantities[name].dims if name in self._quantities else ()
+        array = self[name]
+        for dim in labels:
+            if dim not in dims:
+                raise KeyError(f"{name} has no dimension '{dim}'; {nearest(dim, dims)}")
+        return array[tuple(self._index(dim, labels.get(dim)) for dim in dims)]
+
+    def _index(self, dim: str, label: str | int | None) -> int | slice:
+        if label is None:
+            return slice(None)
+        if isinstance(label, int):
+            return label
+        names = self._coordinates[dim]
+        if label not in names:
+            raise KeyError(f"no {dim} '{label}'; {nearest(label, names)}")
+        return names.index(label)
+
+    # -- what describes them ------------------------------------------------------------------
+
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Unit, dimensions and meaning of every array."""
+        return self._quantities
+
+    @property
+    def coordinates(self) -> Mapping[str, tuple[str, ...]]:
+        """Names along every dimension other than time."""
+        return self._coordinates
+
+    @property
+    def wheelsets(self) -> tuple[str, ...]:
+        """Names of the wheelsets from the leading end."""
+        return self._coordinates.get("wheelset", ())
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies."""
+        return self._coordinates.get("body", ())
+
+    @property
+    def attributes(self) -> Attributes:
+        """Facts about the run: the root attributes of the result file."""
+        return self._attributes
+
+    @property
+    def groups(self) -> Mapping[str, Mapping[str, Array]]:
+        """Arrays that belong to the inputs, by group."""
+        return self._groups
+
+    @property
+    def profiles(self) -> Mapping[str, Array]:
+        """Points of the wheel and rail profiles that were used, shape (point, 2) [m]."""
+        return self._groups.get("profiles", MappingProxyType({}))
+
+    @property
+    def status(self) -> str:
+        """How the run ended: ``complete``, ``derailed`` or ``stopped``."""
+        return str(self._attributes.get("status", ""))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the run, as they were resolved."""
+        settings: dict[str, Any] = json.loads(str(self._attributes.get("settings_json", "{}")))
+        return settings
+
+    @property
+    def speed(self) -> float:
+        """Speed at the start of the run [m/s]."""
+        return float(self._attributes["speed"])
+
+    def vehicle(self) -> "Vehicle":
+        """Rebuild the vehicle's definition from the text that the result carries."""
+        from railsim.definitions.vehicle import Vehicle
+
+        return Vehicle.model_validate(tomllib.loads(str(self._attributes["vehicle_toml"])))
+
+    def track(self) -> "Track":
+        """Rebuild the track's definition from the text that the result carries."""
+        from railsim.definitions.track import Track
+
+        return Track.model_validate(tomllib.loads(str(self._attributes["track_toml"])))
+
+    # -- elsewhere ----------------------------------------------------------------------------
+
+    def to_hdf5(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the result file; it appears under its name only when it is whole.
+
+        Raises
+        ------
+        InputError : the file exists and may not be overwritten, or cannot be written.
+        """
+        from railsim.result.hdf5 import write
+
+        return write(self, path, overwrite=overwrite)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the arrays as an `xarray.Dataset` with named coordinates and units.
+
+        Raises
+        ------
+        ImportError : xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(
+                "to_xarray needs xarray; install it with: pip install 'railsim[xarray]'"
+            ) from None
+        variables = {
+            name: (
+                quantity.dims,
+                self[name],
+                {"units": quantity.unit, "long_name": quantity.long_name},
+            )
+            for name, quantity in self._quantities.items()
+        }
+        coords: dict[str, Any] = {name: list(names) for name, names in self._coordinates.items()}
+        for name in ("time", "distance"):
+            if name in variables:
+                coords[name] = variables.pop(name)
+        return xarray.Dataset(variables, coords, dict(self._attributes))
+
+
+class FrozenArrays(Mapping[str, Array]):
+    """Read-only arrays by name."""
+
+    def __init__(self, arrays: Mapping[str, Any]) -> None:
+        self._loaded = {name: frozen(array) for name, array in arrays.items()}
+
+    def __getitem__(self, name: str) -> Array:
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._loaded)
+
+    def __len__(self) -> int:
+        return len(self._loaded)
+
+
+def frozen(array: Any) -> Array:
+    """Return a float64 view of `array` that cannot be written to."""
+    view = np.asarray(array, dtype=np.float64).view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,163 @@
+"""Largest values of a result with the place where they occur, and values at mid-curve."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from railsim.notation import Quantity
+from railsim.result.data import Array, Result
+from railsim.result.plan import Section, curves_reached
+
+PEAK_QUANTITIES = (
+    "Q",
+    "dQ_over_Q0",
+    "Y",
+    "Y_over_Q",
+    "sum_Y",
+    "sum_abs_Y",
+    "wheelset_lateral",
+    "wheelset_roll",
+    "wheelset_yaw",
+    "T_gamma",
+)
+"""What peak tables list unless told otherwise."""
+
+BY_SIGN = ("dQ_over_Q0",)
+"""Quantities whose largest and smallest value are two different questions (overload, unloading)."""
+
+
+@dataclass(frozen=True)
+class Peak:
+    """An extreme value over time and over all places of a quantity.
+
+    Attributes
+    ----------
+    quantity : Quantity
+        What it is a value of.
+    value : float
+        The value, with its sign [SI].
+    labels : mapping of str to str
+        Where: dimension to name, such as ``wheelset`` and ``side``.
+    time : float
+        When [s].
+    distance : float
+        Distance of the reference body at that time [m].
+    """
+
+    quantity: Quantity
+    value: float
+    labels: Mapping[str, str]
+    time: float
+    distance: float
+
+    @property
+    def shown(self) -> float:
+        """The value in the unit of printed tables, `quantity.shown_unit`."""
+        return self.value * self.quantity.scale
+
+    def record(self) -> dict[str, Any]:
+        """Return the peak as plain numbers and strings, SI."""
+        return {
+            "value": self.value,
+            "unit": self.quantity.unit,
+            **self.labels,
+            "time": self.time,
+            "distance": self.distance,
+        }
+
+
+def peak(result: Result, name: str, kind: str = "abs") -> Peak:
+    """Return the extreme value of a quantity.
+
+    Parameters
+    ----------
+    result : Result
+        Result with at least one instant.
+    name : str
+        Quantity with time as its first dimension.
+    kind : {"abs", "max", "min"}
+        Largest magnitude, largest or smallest value; values that are not a number are left out.
+    """
+    array = result[name]
+    keys: dict[str, Array] = {"abs": np.abs(array), "max": array, "min": -array}
+    key = keys[kind]
+    place = np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
+    quantity = result.quantities[name]
+    labels = {
+        dim: result.coordinates[dim][index]
+        for dim, index in zip(quantity.dims[1:], place[1:], strict=True)
+    }
+    instant = place[0]
+    return Peak(
+        quantity,
+        float(array[place]),
+        labels,
+        float(result["time"][instant]),
+        float(result["distance"][instant]),
+    )
+
+
+def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...]:
+    """Return the peaks of a result: by magnitude, and by sign for `BY_SIGN`.
+
+    Parameters
+    ----------
+    result : Result
+        Result with at least one instant.
+    names : iterable of str, optional
+        Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
+    """
+    if names is None:
+        names = [name for name in PEAK_QUANTITIES if name in result]
+    found: list[Peak] = []
+    for name in names:
+        kinds = ("max", "min") if name in BY_SIGN else ("abs",)
+        found.extend(peak(result, name, kind) for kind in kinds)
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class MidCurve:
+    """Values while the reference body passes the middle of a circular element.
+
+    Attributes
+    ----------
+    curve : Section
+        The circular element.
+    time : float
+        When [s].
+    values : mapping of str to ndarray
+        Quantity to its values, without the dimension time [SI].
+    """
+
+    curve: Section
+    time: float
+    values: Mapping[str, Array]
+
+
+def mid_curve_values(result: Result, names: Iterable[str] | None = None) -> tuple[MidCurve, ...]:
+    """Return the values at the middle of every curve that was reached, interpolated in distance.
+
+    Parameters
+    ----------
+    result : Result
+        Result with ``distance``.
+    names : iterable of str, optional
+        Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
+    """
+    wanted = list(names) if names is not None else [n for n in PEAK_QUANTITIES if n in result]
+    found = []
+    for curve in curves_reached(result):
+        after = max(1, int(np.searchsorted(result["distance"], curve.middle)))
+        before = after - 1
+        span = result["distance"][after] - result["distance"][before]
+        share = (curve.middle - result["distance"][before]) / span
+
+        def at(name: str, before: int = before, share: float = share) -> Array:
+            array = result[name]
+            return np.asarray((1.0 - share) * array[before] + share * array[before + 1])
+
+        found.append(MidCurve(curve, float(at("time")), {name: at(name) for name in wanted}))
+    return tuple(found)

@@ -1,0 +1,292 @@
+"""The result file: HDF5 that xarray, h5py, MATLAB and HDFView read.
+
+Layout: one dataset a quantity at the root, with dimension scales attached and the attributes
+``units``, ``long_name`` and ``comment`` (the sign convention); names of wheelsets, sides, bodies
+and components are dimension scales themselves; facts about the run are root attributes; arrays
+that belong to the inputs are in groups (``profiles``).
+
+Names are stored as fixed-length UTF-8 with the attribute ``_Encoding``: h5py, MATLAB's h5read and
+HDFView read them as they are, and xarray decodes them.  Attributes are variable-length UTF-8
+strings, which h5py returns as `str` and which may be longer than 64 kB, as an input text can be.
+
+A file is written under a hidden name beside its target and gets its own name only when it is
+whole.
+"""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+import h5py
+import numpy as np
+
+from railsim.errors import Fault, InputError
+from railsim.notation import QUANTITIES, Quantity
+from railsim.result.data import Array, Attributes, FrozenArrays, Result, frozen
+from railsim.result.sinks import (
+    ALWAYS,
+    FORMAT,
+    NOTHING,
+    SinkContext,
+    full_coordinates,
+    root_attributes,
+    timed,
+)
+
+CHUNK_BYTES = 2**18
+
+
+class Hdf5Sink(SinkContext):
+    """Streams chunks to a result file.
+
+    The file is created at once beside its target under a hidden name, so that an output that
+    cannot be written is known before anything is computed.
+
+    Parameters
+    ----------
+    path : str or Path
+        Result file.
+    overwrite : bool
+        Replace an existing file.
+    attributes : mapping
+        Root attributes to add to those of the run.
+    option : str
+        What the user knows the path by, for messages.
+
+    Raises
+    ------
+    InputError : the file exists and may not be overwritten, or cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        overwrite: bool = False,
+        attributes: Attributes = NOTHING,
+        option: str = "--out",
+    ) -> None:
+        self.path = Path(path)
+        check_target(self.path, overwrite=overwrite, option=option)
+        self._attributes = dict(attributes)
+        self._partial = self.path.with_name(f".{self.path.name}.{os.getpid()}.partial")
+        self._quantities: dict[str, Quantity] = {}
+        self._length = 0
+        try:
+            self._file = h5py.File(self._partial, "w", track_order=True)
+        except OSError as error:
+            fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another place")
+            raise InputError([fault]) from None
+
+    def begin(
+        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+    ) -> None:
+        """See `Sink.begin`."""
+        self._quantities = {quantity.name: quantity for quantity in quantities}
+        names = full_coordinates(coordinates)
+        for dim, labels in names.items():
+            _write_names(self._file, dim, labels)
+        for quantity in sorted(self._quantities.values(), key=lambda q: q.name != "time"):
+            if "time" in quantity.dims:
+                inner = tuple(len(names[dim]) for dim in quantity.dims[1:])
+                _create(self._file, quantity, inner)
+
+    def append(self, chunk: Mapping[str, Array]) -> None:
+        """See `Sink.append`."""
+        length = self._length + len(chunk["time"])
+        for name in timed(self._quantities):
+            dataset = self._file[name]
+            dataset.resize(length, axis=0)
+            dataset[self._length :] = chunk[name]
+        self._length = length
+
+    def close(
+        self,
+        attributes: Attributes,
+        statics: Mapping[str, Any] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+    ) -> Result:
+        """See `Sink.close`; the file now has its name."""
+        for name, quantity in self._quantities.items():
+            if "time" not in quantity.dims:
+                dataset = self._file.create_dataset(name, data=frozen(statics[name]))
+                _describe(dataset, quantity)
+        for group, members in groups.items():
+            for name, array in members.items():
+                self._file.create_dataset(f"{group}/{quote(name, safe=' ')}", data=frozen(array))
+        self._file.attrs.update(root_attributes(self._attributes, attributes))
+        self._file.close()
+        os.replace(self._partial, self.path)
+        return open_result(self.path)
+
+    def abort(self) -> None:
+        """Remove what was written so far; harmless after `close`."""
+        self._file.close()
+        self._partial.unlink(missing_ok=True)
+
+
+def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a result to a file; see `Result.to_hdf5`."""
+    with Hdf5Sink(path, overwrite=overwrite, option=str(path)) as sink:
+        sink.begin(result.coordinates, result.quantities.values())
+        sink.append({name: result[name] for name in timed(result.quantities)})
+        statics = {
+            name: result[name] for name in result if "time" not in result.quantities[name].dims
+        }
+        sink.close(result.attributes, statics, result.groups)
+    return sink.path
+
+
+def check_target(path: Path, *, overwrite: bool, option: str) -> None:
+    """Refuse an output file that may not or cannot be written.
+
+    Raises
+    ------
+    InputError : it exists and may not be overwritten, is a folder, or its folder cannot be
+        written to.
+    """
+    fault = None
+    if path.is_dir():
+        fault = Fault(option, "", f"{path} is a folder", "give the name of a file")
+    elif not path.parent.is_dir():
+        fault = Fault(option, "", f"there is no folder {path.parent}", "create it first")
+    elif not os.access(path.parent, os.W_OK):
+        fault = Fault(
+            option, "", f"the folder {path.parent} cannot be written to", "choose another"
+        )
+    elif path.exists() and not overwrite:
+        fault = Fault(option, "", f"{path} exists", "give --overwrite or another name")
+    if fault:
+        raise InputError([fault])
+
+
+def open_result(path: str | Path) -> Result:
+    """Open a result file; its arrays are read when they are first asked for.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote.
+
+    Raises
+    ------
+    InputError : there is no such file, or it is not a result of railsim.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(
+            [Fault(str(path), "", "there is no such file", "give a result file (.h5)")]
+        )
+    try:
+        with h5py.File(path, "r") as file:
+            return _read(file, path)
+    except OSError as error:
+        fault = Fault(str(path), "", f"not an HDF5 file ({error})", "give a result of railsim")
+        raise InputError([fault]) from None
+
+
+def _read(file: h5py.File, path: Path) -> Result:
+    found = file.attrs.get("format", "nothing")
+    if found != FORMAT:
+        fault = Fault(str(path), "format", f"found {found}", f"a result says '{FORMAT}'")
+        raise InputError([fault])
+    quantities: dict[str, Quantity] = {}
+    coordinates: dict[str, tuple[str, ...]] = {}
+    groups: dict[str, Mapping[str, Array]] = {}
+    for name, member in file.items():
+        if isinstance(member, h5py.Group):
+            groups[name] = {unquote(key): points[()] for key, points in member.items()}
+        elif h5py.check_string_dtype(member.dtype):
+            coordinates[name] = tuple(member.asstr()[()])
+        else:
+            quantities[name] = _quantity(name, member)
+    return Result(StoredArrays(path, quantities), quantities, coordinates, dict(file.attrs), groups)
+
+
+class StoredArrays(FrozenArrays):
+    """Arrays of a result file, each read when it is first asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The file; it is not kept open.
+    names : iterable of str
+        Names of the arrays.
+    """
+
+    def __init__(self, path: Path, names: Iterable[str]) -> None:
+        super().__init__({})
+        self._path = path.resolve()
+        self._names = tuple(names)
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._loaded:
+            if name not in self._names:
+                raise KeyError(name)
+            with h5py.File(self._path, "r") as file:
+                self._loaded[name] = frozen(file[name][()])
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def _write_names(file: h5py.File, dim: str, labels: Sequence[str]) -> None:
+    encoded = [label.encode() for label in labels]
+    kind = h5py.string_dtype("utf-8", max((len(label) for label in encoded), default=1))
+    dataset = file.create_dataset(dim, data=np.array(encoded, dtype=kind))
+    dataset.attrs["_Encoding"] = "utf-8"
+    dataset.attrs["long_name"] = f"name of the {dim}"
+    dataset.make_scale(dim)
+
+
+def _create(file: h5py.File, quantity: Quantity, inner: tuple[int, ...]) -> None:
+    rows = max(1, CHUNK_BYTES // (8 * max(1, int(np.prod(inner)))))
+    dataset = file.create_dataset(
+        quantity.name,
+        shape=(0, *inner),
+        maxshape=(None, *inner),
+        chunks=(min(rows, 1024), *(max(1, size) for size in inner)),
+        dtype=np.float64,
+    )
+    if quantity.name == "time":
+        dataset.make_scale("time")
+    _describe(dataset, quantity)
+
+
+def _describe(dataset: h5py.Dataset, quantity: Quantity) -> None:
+    dataset.attrs["units"] = quantity.unit
+    dataset.attrs["long_name"] = quantity.long_name
+    if quantity.sign:
+        dataset.attrs["comment"] = quantity.sign
+    if quantity.name not in QUANTITIES:
+        dataset.attrs["symbol"] = quantity.symbol
+        dataset.attrs["shown_units"] = quantity.shown_unit
+        dataset.attrs["shown_scale"] = quantity.scale
+    if quantity.name != "time":
+        for axis, dim in enumerate(quantity.dims):
+            dataset.dims[axis].attach_scale(dataset.file[dim])
+
+
+def _quantity(name: str, dataset: h5py.Dataset) -> Quantity:
+    """Return the quantity of a dataset: from the notation, else from what the file says."""
+    if name in QUANTITIES:
+        return QUANTITIES[name]
+    dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.dims)
+    facts = dataset.attrs
+    unit = str(facts.get("units", "1"))
+    return Quantity(
+        name=name,
+        long_name=str(facts.get("long_name", name)),
+        symbol=str(facts.get("symbol", "")),
+        unit=unit,
+        dims=dims,
+        shown_unit=str(facts.get("shown_units", unit)),
+        scale=float(facts.get("shown_scale", 1.0)),
+        sign=str(facts.get("comment", "")),
+    )

@@ -1,0 +1,164 @@
+"""Where a simulation puts what it computes, chunk by chunk.
+
+A simulation knows one thing about its output: a `Sink`.  It says what will come (`begin`), hands
+over chunks of consecutive instants (`append`) and ends with the facts about the run (`close`),
+which gives the `Result`.  A sink is a context manager: left before `close`, by an error or Ctrl-C,
+it leaves nothing behind.
+
+    with Hdf5Sink("run.h5") as sink:
+        sink.begin({"wheelset": [...], "body": [...]}, quantities)
+        for chunk in ...:
+            sink.append(chunk)
+        result = sink.close(attributes, statics)
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from types import MappingProxyType, TracebackType
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from railsim.notation import COMPONENTS, QUANTITIES, SIDES, Quantity
+from railsim.result.data import Array, Attributes, Result
+from railsim.version import __version__
+
+FORMAT = "railsim-result/1"
+ALWAYS = tuple(QUANTITIES.values())
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class Sink(Protocol):
+    """What a simulation needs of the place that its output goes to."""
+
+    def begin(
+        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+    ) -> None:
+        """Say what will come.
+
+        Parameters
+        ----------
+        coordinates : mapping of str to sequence of str
+            Names along the dimensions ``wheelset`` and ``body``, and along any further one that
+            `quantities` use; ``side`` and ``component`` are known.
+        quantities : iterable of Quantity
+            All quantities, those without time (for `close`) included.
+        """
+
+    def append(self, chunk: Mapping[str, Array]) -> None:
+        """Take consecutive instants: for every quantity with time an array, time first."""
+
+    def close(
+        self,
+        attributes: Attributes,
+        statics: Mapping[str, Any] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+    ) -> Result:
+        """End the run and return its result.
+
+        Parameters
+        ----------
+        attributes : mapping
+            Root attributes of the result file; ``format``, ``railsim_version`` and ``created``
+            are added.
+        statics : mapping of str to ndarray
+            The quantities without time.
+        groups : mapping of str to mapping of str to ndarray
+            Arrays that belong to the inputs, such as ``profiles``: name to points.
+        """
+
+    def abort(self) -> None:
+        """Forget everything; harmless after `close`."""
+
+
+class SinkContext:
+    """What all sinks share: leaving one before `close` forgets what it took."""
+
+    def abort(self) -> None:
+        """Forget everything; harmless after `close`."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.abort()
+
+
+class MemorySink(SinkContext):
+    """Keeps all chunks in memory.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Root attributes to add to those of the run.
+    """
+
+    def __init__(self, attributes: Attributes = NOTHING) -> None:
+        self._attributes = dict(attributes)
+        self._quantities: dict[str, Quantity] = {}
+        self._coordinates: dict[str, tuple[str, ...]] = {}
+        self._chunks: dict[str, list[Array]] = {}
+
+    def begin(
+        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+    ) -> None:
+        """See `Sink.begin`."""
+        self._quantities = {quantity.name: quantity for quantity in quantities}
+        self._coordinates = full_coordinates(coordinates)
+        self._chunks = {name: [] for name in timed(self._quantities)}
+
+    def append(self, chunk: Mapping[str, Array]) -> None:
+        """See `Sink.append`."""
+        for name, kept in self._chunks.items():
+            kept.append(np.array(chunk[name], dtype=np.float64))
+
+    def close(
+        self,
+        attributes: Attributes,
+        statics: Mapping[str, Any] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+    ) -> Result:
+        """See `Sink.close`."""
+        arrays = {
+            name: np.concatenate(kept) if kept else np.zeros((0, *self._shape(name)))
+            for name, kept in self._chunks.items()
+        }
+        arrays |= {name: statics[name] for name in self._quantities if name not in self._chunks}
+        return Result(
+            arrays,
+            self._quantities,
+            self._coordinates,
+            root_attributes(self._attributes, attributes),
+            groups,
+        )
+
+    def _shape(self, name: str) -> tuple[int, ...]:
+        return tuple(len(self._coordinates[dim]) for dim in self._quantities[name].dims[1:])
+
+
+def full_coordinates(coordinates: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
+    """Return the coordinates of a run with the ones that are always the same."""
+    known: dict[str, Sequence[str]] = {"side": SIDES, "component": COMPONENTS}
+    return {name: tuple(labels) for name, labels in (known | dict(coordinates)).items()}
+
+
+def timed(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:
+    """Return the names of the quantities that are functions of time."""
+    return tuple(name for name, quantity in quantities.items() if "time" in quantity.dims)
+
+
+def root_attributes(*given: Attributes) -> dict[str, str | float | int]:
+    """Return the root attributes of a result: the given ones and those that are always there."""
+    attributes: dict[str, str | float | int] = {
+        "format": FORMAT,
+        "railsim_version": __version__,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    for some in given:
+        attributes |= some
+    return attributes

@@ -1,0 +1,201 @@
+"""The result file and the result in memory, as INTERFACE.md describes them."""
+
+import os
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from example_result import BODIES, COORDINATES, GROUPS, WHEELSETS, arrays, example_result, feed
+
+from railsim.errors import InputError
+from railsim.notation import COMPONENTS, QUANTITIES, Quantity
+from railsim.result import Hdf5Sink, MemorySink, open_result
+
+
+@pytest.fixture
+def written(tmp_path):
+    with Hdf5Sink(tmp_path / "run.h5") as sink:
+        feed(sink)
+    return tmp_path / "run.h5"
+
+
+def test_file_holds_every_quantity_with_its_dimensions_and_units(written):
+    with h5py.File(written) as file:
+        for name, quantity in QUANTITIES.items():
+            dataset = file[name]
+            assert dataset.attrs["units"] == quantity.unit
+            assert dataset.attrs["long_name"] == quantity.long_name
+            scales = [dim.keys()[0] for dim in dataset.dims if len(dim)]
+            assert tuple(scales) == (() if name == "time" else quantity.dims)
+            np.testing.assert_array_equal(dataset[()], arrays()[name])
+
+
+def test_names_are_read_as_text(written):
+    expected = {
+        "wheelset": WHEELSETS,
+        "side": ("left", "right"),
+        "body": BODIES,
+        "component": COMPONENTS,
+    }
+    with h5py.File(written) as file:
+        for name, labels in expected.items():
+            assert tuple(file[name].asstr()[()]) == labels
+            assert file[name].dtype.kind == "S"  # fixed length: no pointers for other readers
+
+
+def test_root_attributes_are_plain_text_and_numbers(written):
+    with h5py.File(written) as file:
+        for name in ("format", "railsim_version", "status", "status_reason", "created"):
+            assert isinstance(file.attrs[name], str)
+        for name in ("vehicle_toml", "track_toml", "settings_json"):
+            assert isinstance(file.attrs[name], str)
+        for name in ("wall_time", "cpu_time", "real_time_factor"):
+            assert isinstance(file.attrs[name], float)
+        assert file.attrs["format"] == "railsim-result/1"
+
+
+def test_file_opens_in_xarray_with_coordinates_by_name(written):
+    with xarray.open_dataset(written, engine="h5netcdf") as data:
+        assert data.Q.dims == ("time", "wheelset", "side")
+        outer = data.Y_over_Q.sel(wheelset="front.outer.wheelset", side="left")
+        np.testing.assert_array_equal(outer, arrays()["Y_over_Q"][:, 0, 0])
+        yaw = data.body_position.sel(body="carbody", component="yaw")
+        np.testing.assert_array_equal(yaw, arrays()["body_position"][:, 0, 5])
+        assert data.Q.units == "N"
+
+
+def test_dataset_in_memory_equals_the_one_from_the_file(written):
+    with xarray.open_dataset(written, engine="h5netcdf") as data:
+        xarray.testing.assert_equal(
+            open_result(written).to_xarray().reset_coords("distance"), data.load()
+        )
+
+
+def test_chunks_make_no_difference(tmp_path):
+    one = feed(MemorySink(), chunks=1)
+    many = feed(MemorySink(), chunks=13)
+    with Hdf5Sink(tmp_path / "many.h5") as sink:
+        streamed = feed(sink, chunks=13)
+    for name in QUANTITIES:
+        np.testing.assert_array_equal(one[name], many[name])
+        np.testing.assert_array_equal(one[name], streamed[name])
+
+
+def test_result_survives_the_file_unchanged(tmp_path):
+    result = example_result()
+    again = open_result(result.to_hdf5(tmp_path / "run.h5"))
+    assert dict(again.attributes) == dict(result.attributes)
+    assert dict(again.coordinates) == dict(result.coordinates)
+    assert dict(again.quantities) == dict(result.quantities)
+    np.testing.assert_array_equal(again.profiles["S1002"], GROUPS["profiles"]["S1002"])
+    assert again.vehicle() == result.vehicle()
+    assert again.track() == result.track()
+
+
+def test_same_result_gives_the_same_bytes(tmp_path):
+    result = example_result()
+    first = result.to_hdf5(tmp_path / "a.h5").read_bytes()
+    assert result.to_hdf5(tmp_path / "b.h5").read_bytes() == first
+
+
+def test_profiles_keep_names_that_are_paths(tmp_path):
+    with Hdf5Sink(tmp_path / "run.h5") as sink:
+        sink.begin(COORDINATES, [QUANTITIES["time"]])
+        sink.append({"time": np.zeros(1)})
+        sink.close({"status": "complete"}, {}, {"profiles": {"../wheels/worn é.csv": np.eye(2)}})
+    assert list(open_result(tmp_path / "run.h5").profiles) == ["../wheels/worn é.csv"]
+
+
+def test_further_quantities_come_with_their_own_dimensions(tmp_path):
+    force = Quantity(
+        "element_force", "force of the element", "F", "N", ("time", "element"), "kN", 1e-3
+    )
+    with Hdf5Sink(tmp_path / "run.h5") as sink:
+        sink.begin({"element": ["damper.left", "damper.right"]}, [QUANTITIES["time"], force])
+        sink.append({"time": np.arange(2.0), "element_force": np.eye(2)})
+        result = sink.close({"status": "complete"})
+    assert result.quantities["element_force"] == force
+    np.testing.assert_array_equal(result.series("element_force", element="damper.right"), [0, 1])
+
+
+def test_arrays_cannot_be_written_to(written):
+    for result in (example_result(), open_result(written)):
+        with pytest.raises(ValueError, match="read-only"):
+            result.Q[0] = 0.0
+
+
+def test_unknown_names_are_answered_with_the_nearest(written):
+    result = open_result(written)
+    with pytest.raises(AttributeError, match="did you mean 'wheelset_yaw'"):
+        _ = result.wheelset_jaw
+    with pytest.raises(KeyError, match=r"did you mean 'front\.inner\.wheelset'"):
+        result.series("Q", wheelset="front.iner.wheelset")
+
+
+def test_series_takes_names_and_indices():
+    result = example_result()
+    by_name = result.series("Q", wheelset="rear.outer.wheelset", side="right")
+    np.testing.assert_array_equal(by_name, result.Q[:, 3, 1])
+    np.testing.assert_array_equal(result.series("Q", wheelset=3, side=1), by_name)
+
+
+@pytest.mark.parametrize("end", ["left before it is whole", "error", "interrupt"])
+def test_unfinished_file_leaves_nothing(tmp_path, end):
+    def run():
+        with Hdf5Sink(tmp_path / "run.h5") as sink:
+            sink.begin(COORDINATES)
+            if end == "error":
+                raise ZeroDivisionError
+            if end == "interrupt":
+                raise KeyboardInterrupt
+
+    if end == "left before it is whole":
+        run()
+    else:
+        with pytest.raises((ZeroDivisionError, KeyboardInterrupt)):
+            run()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_file_has_no_name_before_it_is_whole(tmp_path):
+    with Hdf5Sink(tmp_path / "run.h5") as sink:
+        sink.begin(COORDINATES)
+        assert not (tmp_path / "run.h5").exists()
+
+
+def test_unfinished_overwriting_keeps_the_old_file(tmp_path, written):
+    old = written.read_bytes()
+    with Hdf5Sink(written, overwrite=True) as sink:
+        sink.begin(COORDINATES)
+    assert written.read_bytes() == old
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("run.h5", "exists.*--overwrite"),
+        (".", "is a folder"),
+        ("missing/run.h5", "no folder"),
+        ("run.h5/run.h5", "no folder"),
+    ],
+)
+def test_output_that_cannot_be_written_is_refused_at_the_door(written, path, words):
+    with pytest.raises(InputError, match=words) as caught:
+        Hdf5Sink(written.parent / path)
+    assert caught.value.faults[0].file == "--out"
+    assert os.listdir(written.parent) == ["run.h5"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(None, "no such file"), (b"no HDF5", "not an HDF5 file"), ("hdf5", "'railsim-result/1'")],
+)
+def test_what_is_not_a_result_is_refused(tmp_path, content, words):
+    path = tmp_path / "other.h5"
+    if content == "hdf5":
+        h5py.File(path, "w").close()
+    elif content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        open_result(path)
