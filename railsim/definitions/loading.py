@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from railsim.definitions import names, sources
 from railsim.definitions.base import Remark
 from railsim.definitions.flatten import position_faults
+from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
 from railsim.definitions.track import TRACK_FORMAT, Track
@@ -59,7 +60,7 @@ class Format:
 
 FORMATS: dict[str, Format] = {
     VEHICLE_FORMAT: Format("vehicle", Vehicle, names.name_faults, position_faults),
-    TRACK_FORMAT: Format("track", Track),
+    TRACK_FORMAT: Format("track", Track, faults=track_faults, remarks=track_remarks),
     SETTINGS_FORMAT: Format("settings", Settings, free=("initial",)),
 }
 

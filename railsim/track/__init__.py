@@ -1,0 +1,9 @@
+"""The track as functions and tables over arc length.
+
+=============  ==================================================================================
+module         job
+=============  ==================================================================================
+alignment      plan, cant and vertical profile, rounded: exact functions of the arc length
+tables         all of it as piecewise cubic tables for the compiled kernels
+=============  ==================================================================================
+"""

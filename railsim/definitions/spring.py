@@ -1,0 +1,425 @@
+"""Spring files, `railsim-spring/1`: a trailing arm on its coil springs, loads, limits, search.
+
+The first five tables and `[loads]` are what every command needs; the others have defaults or
+belong to one command (`[target]` to design, `[fatigue]` to fatigue, `[vehicle]` to vehicle,
+`[search]` and `[tolerances]` to the search).  Lengths in m, forces in N, stresses in Pa.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+
+from railsim.definitions.base import (
+    Definition,
+    FileDefinition,
+    NonNegative,
+    NonNegativeVector,
+    Positive,
+    Remark,
+    Text,
+    rising,
+)
+from railsim.errors import Fault, nearest
+
+SPRING_FORMAT = "railsim-spring/1"
+
+Row = tuple[NonNegative, Positive]
+Range = tuple[Positive, Positive]
+
+
+def _rising_table(rows: Sequence[Sequence[float]]) -> Sequence[Sequence[float]]:
+    if not rows:
+        raise ValueError("a table needs one row at least")
+    if not rising(rows):
+        raise ValueError("the first column must increase from row to row")
+    return rows
+
+
+def _polyline(rows: Sequence[Sequence[float]]) -> Sequence[Sequence[float]]:
+    _rising_table(rows)
+    if any(upper < lower for lower, upper in rows):
+        raise ValueError("rows [tau_min, tau_max]: the upper stress must not be below the lower")
+    return rows
+
+
+def _ordered(bounds: Range) -> Range:
+    if bounds[1] < bounds[0]:
+        raise ValueError("[smallest, largest]: the second must not be below the first")
+    return bounds
+
+
+def _one_row(value: Any) -> Any:
+    return value if isinstance(value, list | tuple) else ((0.0, value),)
+
+
+_NUMBER = {"type": "number", "exclusiveMinimum": 0}
+_ROW = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+
+NumberOrTable = Annotated[
+    tuple[Row, ...],
+    BeforeValidator(_one_row),
+    AfterValidator(_rising_table),
+    WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _ROW, "minItems": 1}]}),
+]
+Polyline = Annotated[tuple[Row, ...], AfterValidator(_polyline)]
+Bounds = Annotated[Range, AfterValidator(_ordered)]
+
+
+class TrailingArm(Definition):
+    """The axlebox arm, horizontal under the mounting load."""
+
+    length: Positive
+    """Hinge on the bogie frame to axle centre [m]"""
+    seat_height: NonNegative
+    """Height of the outer spring's lower seat above the axle centre [m]"""
+    bush_torsional_stiffness: NonNegative
+    """Torsional stiffness of the hinge's bush, unloaded at the mounting load [N m/rad]"""
+    equilibrium: Literal["grossi", "energy"] = "grossi"
+    """Form of the nest's moment: the reference's, or the derivative of the stored energy"""
+
+
+class Material(Definition):
+    """Material of the springs."""
+
+    G: Positive
+    """Shear modulus [Pa]"""
+    E: Positive
+    """Young's modulus [Pa]"""
+    density: Positive = 7850.0
+    """Density [kg/m3]"""
+    tau_allowable: NumberOrTable | None = None
+    """Allowable shear stress of the solid spring [Pa], or rows [wire diameter m, stress Pa]"""
+
+    @model_validator(mode="after")
+    def _isotropic(self) -> Self:
+        nu = self.E / (2.0 * self.G) - 1.0
+        if not 0.0 <= nu < 0.5:
+            raise ValueError(
+                f"E/(2 G) - 1 is {nu:.3f}; Poisson's number must be from 0 to 0.5: "
+                "G must be between E/3 and E/2"
+            )
+        return self
+
+
+class HelicalSpring(Definition):
+    """A helical spring of round wire."""
+
+    mean_diameter: Positive
+    """Mean coil diameter D [m]"""
+    free_height: Positive
+    """Height without load H0 [m]"""
+    wire_diameter: Positive | None = None
+    """Wire diameter d [m]; design can do without"""
+    active_coils: Positive | None = None
+    """Number of active coils n; design finds it"""
+
+    @model_validator(mode="after")
+    def _winds(self) -> Self:
+        if self.wire_diameter is not None and self.wire_diameter >= self.mean_diameter:
+            raise ValueError("'wire_diameter' must be below 'mean_diameter'")
+        return self
+
+
+class InnerSpring(HelicalSpring):
+    """The spring within the outer one."""
+
+    engagement: NonNegative | None = None
+    """Deflection of the outer spring at which this one starts to work [m]; by default 0, its
+    seat raised by the difference of the free heights"""
+    seat_height: NonNegative | None = None
+    """Height of its lower seat above the axle centre [m] instead of `engagement`"""
+
+    @model_validator(mode="after")
+    def _one_way_of_standing(self) -> Self:
+        if self.engagement is not None and self.seat_height is not None:
+            raise ValueError("either 'engagement' or 'seat_height', not both")
+        return self
+
+
+class Point(Definition):
+    """A load with its wanted deflection."""
+
+    load: Positive
+    """Load of one primary suspension [N]"""
+    deflection: Positive
+    """Deflection of the outer spring under it [m]"""
+
+
+class Fatigue(Definition):
+    """Dynamic loads and the material's Goodman-Smith line."""
+
+    max_load: Positive | None = None
+    """Highest dynamic load [N]; by default the tare load + 20 %"""
+    min_load: Positive | None = None
+    """Lowest dynamic load [N]; by default the tare load - 35 %"""
+    tare: Text = "ODM"
+    """Name of the tare load among `loads`"""
+    goodman: Polyline = Field(min_length=2)
+    """Rows [tau_min, tau_max] of the Goodman-Smith line [Pa]"""
+
+
+class Checks(Definition):
+    """Constants and limits of the checks."""
+
+    dead_coils: NonNegative = 0.2
+    """Dead coils n_m beyond the end coils"""
+    end_coils: NonNegative = 1.5
+    """End coils n_e, closed and ground"""
+    clearance_factor: NonNegative = 0.002
+    """Reserve above the solid height over n (D + d), as in the reference study"""
+    standard_clearance_factor: NonNegative = 0.02
+    """The same for the check after EN 13906-1 (hot coiled, static)"""
+    solid_load: Text | None = None
+    """Name of the load for the solid height; by default the highest"""
+    seating: Annotated[Positive, Field(ge=0.5, le=2.0)] = 1.0
+    """Seating coefficient of EN 13906-1 for buckling; 1: seats parallel, free to move sideways"""
+    radial_clearance: NonNegative = 0.0
+    """Least clearance between inner and outer spring [m]"""
+    fatigue_margin: Positive = 1.0
+    """Least margin against the Goodman-Smith line"""
+
+
+class Search(Definition):
+    """Space, limits and aim of the search for nests."""
+
+    objective: Literal["mass", "fatigue"] = "mass"
+    """Ranked by least mass or by largest fatigue margin"""
+    wire_diameters: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None
+    """Wire diameters to choose from [m]; by default the bars of EN 10060 from 10 to 60 mm"""
+    outer_diameter_max: Positive
+    """Largest outside diameter of the outer spring [m]"""
+    inner_diameter_min: NonNegative = 0.0
+    """Smallest inside diameter of the inner spring [m]"""
+    clearance_min: NonNegative = 0.005
+    """Smallest radial clearance between the springs [m]"""
+    free_height: Bounds
+    """Smallest and largest free height [m]"""
+    spring_index: Bounds = (3.0, 12.0)
+    """Smallest and largest D/d; EN 13906-1 for hot coiled springs by default"""
+    active_coils_min: Positive = 3.0
+    """Smallest number of active coils; EN 13906-1 for hot coiled springs by default"""
+    fatigue_margin_min: Positive = 1.0
+    """Smallest margin against the Goodman-Smith line"""
+    stress_ratio_max: Positive = 1.0
+    """Largest stress of the solid spring over the allowable one"""
+    buckling_ratio_max: Positive = 0.9
+    """Largest deflection over the buckling deflection"""
+    candidates: Annotated[int, Field(strict=True, ge=64, le=2**20)] = 8192
+    """Number of nests that are tried before the best are refined"""
+    results: Annotated[int, Field(strict=True, ge=1, le=100)] = 10
+    """Number of nests that are returned"""
+    diameter_step: Positive = 0.001
+    """Step to which mean diameters and free height are rounded [m]"""
+    coil_step: Positive = 0.05
+    """Step to which the number of active coils is rounded"""
+    height_error_max: Positive = 0.003
+    """Largest error of a deflection that the rounding may cause [m]"""
+
+
+class Tolerances(Definition):
+    """Scatter of springs, plus and minus; the same for both springs."""
+
+    wire_diameter: NonNegative = 0.0
+    """Wire diameter [m]"""
+    mean_diameter: NonNegative = 0.0
+    """Mean coil diameter [m]"""
+    active_coils: NonNegative = 0.0
+    """Number of active coils"""
+    free_height: NonNegative = 0.0
+    """Free height [m]"""
+    G: Annotated[NonNegative, Field(lt=0.5)] = 0.0
+    """Shear modulus, relative"""
+    bush: Annotated[NonNegative, Field(lt=1.0)] = 0.0
+    """Torsional stiffness of the bush, relative"""
+
+
+class Bush(Definition):
+    """The rubber bush in the arm's hinge, as the vehicle model needs it."""
+
+    stiffness: NonNegativeVector
+    """Stiffness along x, y, z [N/m]"""
+    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Damping along x, y, z [N s/m]"""
+    rotational_stiffness: NonNegativeVector
+    """Stiffness about x, y, z [N m/rad]"""
+    rotational_damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Damping about x, y, z [N m s/rad]"""
+
+
+class VehicleTable(Definition):
+    """Where and how the suspension goes into a vehicle file."""
+
+    load: Text
+    """Name of the load at which the vehicle's springs are taken, normally tare"""
+    extends: Text
+    """Vehicle file that the written file extends"""
+    remove: tuple[Text, ...] = ()
+    """Parts of that vehicle that this suspension replaces"""
+    assembly: Text = "assemblies.bogie.assemblies.axle"
+    """Assembly with the wheelset; its origin is above the axle, the bogie's centre at x < 0"""
+    frame: Text = "frame"
+    """Name of the bogie frame"""
+    wheelset: Text = "wheelset"
+    """Name of the wheelset within the assembly"""
+    wheel_radius: Positive
+    """Height of the axle above the rail tops [m]"""
+    lateral_position: Positive
+    """Lateral distance of arm and springs from the vehicle's middle [m]"""
+    pitch_inertia: Positive = 10.0
+    """Moment of inertia of axlebox and arm about the axle [kg m2]"""
+    bush: Bush
+    """The bush in the hinge"""
+
+
+class TrailingArmSuspension(FileDefinition):
+    """A trailing-arm primary suspension: everything that a spring file says."""
+
+    format: Literal["railsim-spring/1"]
+    """Kind and version of the file"""
+    name: Text = "trailing-arm primary suspension"
+    """What the suspension is called in tables and plots"""
+    source: Text | None = None
+    """Where the numbers come from"""
+    arm: TrailingArm
+    """The axlebox arm"""
+    material: Material
+    """Material of the springs"""
+    outer: HelicalSpring
+    """The outer spring"""
+    inner: InnerSpring | None = None
+    """The inner spring, if there is one"""
+    mounting: Point
+    """Load under which the arm is horizontal, and the deflection wanted there"""
+    target: Point | None = None
+    """One further load with its wanted deflection, for the design"""
+    loads: dict[Text, Positive] = Field(min_length=1)
+    """Loads of one primary suspension by name [N]"""
+    fatigue: Fatigue | None = None
+    """Dynamic loads and Goodman-Smith line"""
+    checks: Checks = Checks()
+    """Constants and limits of the checks"""
+    search: Search | None = None
+    """Space and limits for the search for nests"""
+    tolerances: Tolerances | None = None
+    """Scatter of the springs"""
+    vehicle: VehicleTable | None = None
+    """Where the suspension goes in a vehicle file"""
+
+    @property
+    def springs(self) -> dict[str, HelicalSpring]:
+        """The springs by name, outer first."""
+        both = {"outer": self.outer, "inner": self.inner}
+        return {name: spring for name, spring in both.items() if spring is not None}
+
+    @property
+    def engagement(self) -> float:
+        """Deflection of the outer spring at which the inner one starts to work [m]."""
+        if self.inner is None:
+            return 0.0
+        if self.inner.seat_height is not None:
+            lower_top = self.inner.seat_height + self.inner.free_height
+            return self.arm.seat_height + self.outer.free_height - lower_top
+        return self.inner.engagement or 0.0
+
+    @property
+    def seat_heights(self) -> tuple[float, ...]:
+        """Height of each spring's lower seat above the axle centre, outer first [m]."""
+        if self.inner is None:
+            return (self.arm.seat_height,)
+        raised = self.outer.free_height - self.inner.free_height - self.engagement
+        return (self.arm.seat_height, self.arm.seat_height + raised)
+
+
+def spring_faults(suspension: TrailingArmSuspension) -> list[Fault]:
+    """Faults between the parts of a valid spring file: names of loads, springs that do not fit."""
+    faults = _load_name_faults(suspension)
+    if suspension.inner is None:
+        return faults
+    if suspension.engagement < -1e-9:
+        faults.append(
+            Fault(
+                "",
+                "inner.seat_height",
+                f"the inner spring would touch {-suspension.engagement * 1e3:.1f} mm before the "
+                "outer one",
+                "lower inner.seat_height or inner.free_height by as much: the outer spring must "
+                "be the first to work",
+            )
+        )
+    elif suspension.seat_heights[1] < 0.0:
+        faults.append(
+            Fault(
+                "",
+                "inner.free_height",
+                f"the inner spring would stand {-suspension.seat_heights[1] * 1e3:.1f} mm below "
+                "the axle centre",
+                "shorten inner.free_height, or raise arm.seat_height or outer.free_height",
+            )
+        )
+    return faults + _radial_faults(suspension)
+
+
+def spring_remarks(suspension: TrailingArmSuspension) -> list[Remark]:
+    """What is allowed in a spring file but unusual."""
+    remarks = []
+    for name, spring in suspension.springs.items():
+        if spring.wire_diameter is not None:
+            index = spring.mean_diameter / spring.wire_diameter
+            if not 3.0 <= index <= 12.0:
+                remarks.append(
+                    Remark(
+                        f"{name}.mean_diameter",
+                        f"spring index D/d is {index:.2f}; EN 13906-1 covers 3 to 12 for hot "
+                        "coiled springs",
+                    )
+                )
+        if spring.active_coils is not None and spring.active_coils < 3.0:
+            remarks.append(
+                Remark(f"{name}.active_coils", "EN 13906-1 covers hot coiled springs from 3 on")
+            )
+    return remarks
+
+
+def _load_name_faults(suspension: TrailingArmSuspension) -> list[Fault]:
+    named: dict[str, str | None] = {"checks.solid_load": suspension.checks.solid_load}
+    if suspension.vehicle is not None:
+        named["vehicle.load"] = suspension.vehicle.load
+    fatigue = suspension.fatigue
+    if fatigue is not None and None in (fatigue.max_load, fatigue.min_load):
+        named["fatigue.tare"] = fatigue.tare
+    faults = [
+        Fault("", key, f"no load '{name}' in [loads]", nearest(name, suspension.loads))
+        for key, name in named.items()
+        if name is not None and name not in suspension.loads
+    ]
+    if fatigue is None or fatigue.max_load is None or fatigue.min_load is None:
+        return faults
+    if fatigue.max_load <= fatigue.min_load:
+        found = f"{fatigue.max_load:g} N is not above fatigue.min_load {fatigue.min_load:g} N"
+        faults.append(Fault("", "fatigue.max_load", found, "the highest dynamic load"))
+    return faults
+
+
+def _radial_faults(suspension: TrailingArmSuspension) -> list[Fault]:
+    outer, inner = suspension.outer, suspension.inner
+    if inner is None:
+        return []
+    clearance = radial_clearance(outer, inner)
+    if clearance > 0.0:
+        return []
+    return [
+        Fault(
+            "",
+            "inner.mean_diameter",
+            f"the inner spring does not fit into the outer one: radial clearance "
+            f"{clearance * 1e3:.1f} mm",
+            "reduce inner.mean_diameter or a wire diameter, or raise outer.mean_diameter",
+        )
+    ]
+
+
+def radial_clearance(outer: HelicalSpring, inner: HelicalSpring) -> float:
+    """Radial gap between two concentric springs; without wire diameters, of the mean lines [m]."""
+    wires = (outer.wire_diameter or 0.0) + (inner.wire_diameter or 0.0)
+    return 0.5 * (outer.mean_diameter - inner.mean_diameter - wires)

@@ -1,0 +1,185 @@
+"""Plan, cant and vertical profile as exact functions of the arc length.
+
+Curvature, cant and gradient are piecewise linear as written in the track file.  Rounding replaces
+each by its mean over a window of the length `rounding` (a box filter): kinks become parabolas, the
+integral over a transition stays the same.  All means are differences of antiderivatives, so nothing
+is sampled.
+
+The centre line obeys dX/ds = cos(psi) cos(theta), dY/ds = sin(psi) cos(theta), dZ/ds = -sin(theta)
+with the heading psi (to the right), dpsi/ds = kappa, and the grade angle theta (nose up).  At s = 0
+all of X, Y, Z, psi are 0.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PPoly
+
+from railsim.definitions.layout import (
+    Section,
+    cant_sections,
+    curvature_sections,
+    gradient_sections,
+    track_faults,
+)
+from railsim.definitions.track import Track
+from railsim.errors import Fault, InputError
+
+# Distance between the lines on which the cant is measured, 2 b0 [m].
+CANT_BASE = 1.5
+
+Array = NDArray[np.float64]
+
+
+def _array(s: ArrayLike) -> Array:
+    return np.asarray(s, dtype=np.float64)
+
+
+class RoundedProfile:
+    """A piecewise linear function, constant beyond its ends, averaged over a window.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        Values over arc length; none at all means zero everywhere.
+    rounding : float
+        Length of the window [m]; 0 leaves the kinks.
+    """
+
+    def __init__(self, sections: Sequence[Section], rounding: float) -> None:
+        knots = [-1.0, 0.0, *(section.end for section in sections)]
+        slopes = [0.0, *(section.slope for section in sections), 0.0]
+        first = sections[0].start_value if sections else 0.0
+        last = sections[-1].end_value if sections else 0.0
+        values = [first, *(section.start_value for section in sections), last]
+        self._plain = PPoly(np.array([slopes, values]), np.array([*knots, knots[-1] + 1.0]))
+        self._integral = self._plain.antiderivative()
+        self._double_integral = self._integral.antiderivative()
+        self._half_window = 0.5 * rounding
+
+    def _mean(self, integral: PPoly, s: ArrayLike) -> Array:
+        at, h = _array(s), self._half_window
+        mean: Array = (integral(at + h) - integral(at - h)) / (2.0 * h)
+        return mean
+
+    def __call__(self, s: ArrayLike) -> Array:
+        """Value at the arc length `s` [m]."""
+        if self._half_window == 0.0:
+            return np.asarray(self._plain(_array(s)))
+        return self._mean(self._integral, s)
+
+    def rate(self, s: ArrayLike) -> Array:
+        """Derivative along the track at `s`."""
+        if self._half_window == 0.0:
+            return np.asarray(self._plain.derivative()(_array(s)))
+        return self._mean(self._plain, s)
+
+    def second_rate(self, s: ArrayLike) -> Array:
+        """Second derivative along the track."""
+        if self._half_window == 0.0:
+            return np.zeros_like(_array(s))
+        return self._mean(self._plain.derivative(), s)
+
+    def integral(self, s: ArrayLike) -> Array:
+        """Integral from 0 to `s`."""
+        if self._half_window == 0.0:
+            return np.asarray(self._integral(_array(s)) - self._integral(0.0))
+        return self._mean(self._double_integral, s) - self._mean(self._double_integral, 0.0)
+
+
+class Alignment:
+    """Geometry of a track's centre line and track plane over arc length.
+
+    Every method takes arc lengths of any shape [m] and returns an array of that shape.
+
+    Parameters
+    ----------
+    track : Track
+        The track; beyond its ends the end elements continue.
+
+    Raises
+    ------
+    InputError : elements that do not fit together.
+
+    Examples
+    --------
+    >>> from railsim.definitions.loading import load_track
+    >>> alignment = Alignment(load_track("curve_r250"))
+    >>> float(1.0 / alignment.curvature(390.0))
+    250.0
+    """
+
+    def __init__(self, track: Track) -> None:
+        if faults := track_faults(track):
+            file = f"track '{track.name}'"
+            raise InputError(Fault(file, f.key, f.found, f.allowed) for f in faults)
+        self.length = track.length
+        self._curvature = RoundedProfile(curvature_sections(track), track.rounding)
+        cant = cant_sections(track)
+        self._cant = RoundedProfile(cant, track.rounding)
+        self._gradient = RoundedProfile(gradient_sections(track), track.rounding)
+        rising = _magnitudes(cant) if track.cant_rotation == "inner_rail" else []
+        self._lifting_cant = RoundedProfile(rising, track.rounding)
+
+    def curvature(self, s: ArrayLike) -> Array:
+        """Curvature kappa, positive to the right [1/m]."""
+        return self._curvature(s)
+
+    def curvature_rate(self, s: ArrayLike) -> Array:
+        """Derivative of the curvature along the track [1/m2]."""
+        return self._curvature.rate(s)
+
+    def heading(self, s: ArrayLike) -> Array:
+        """Heading psi, positive to the right [rad]."""
+        return self._curvature.integral(s)
+
+    def cant(self, s: ArrayLike) -> Array:
+        """Cant: height of the left rail over the right one [m]."""
+        return self._cant(s)
+
+    def cant_angle(self, s: ArrayLike) -> Array:
+        """Cant angle phi = asin(cant / 1.5 m), positive = left rail higher [rad]."""
+        return np.arcsin(self._cant(s) / CANT_BASE)
+
+    def cant_angle_rate(self, s: ArrayLike) -> Array:
+        """Derivative of the cant angle along the track [rad/m]."""
+        sine = self._cant(s) / CANT_BASE
+        return self._cant.rate(s) / (CANT_BASE * np.sqrt(1.0 - sine**2))
+
+    def gradient(self, s: ArrayLike) -> Array:
+        """Gradient of the vertical profile, rise over horizontal distance [1]."""
+        return self._gradient(s)
+
+    def grade_angle(self, s: ArrayLike) -> Array:
+        """Grade angle theta of the centre line, positive = nose up [rad].
+
+        With the cant about the inner rail the centre line also rises by half the cant.
+        """
+        return np.arcsin(self._climb(s))
+
+    def grade_angle_rate(self, s: ArrayLike) -> Array:
+        """Derivative of the grade angle along the track [rad/m]."""
+        gradient = self._gradient(s)
+        climb_rate = self._gradient.rate(s) / (1.0 + gradient**2) ** 1.5
+        climb_rate += 0.5 * self._lifting_cant.second_rate(s)
+        return climb_rate / np.sqrt(1.0 - self._climb(s) ** 2)
+
+    def _climb(self, s: ArrayLike) -> Array:
+        gradient = self._gradient(s)
+        return gradient / np.sqrt(1.0 + gradient**2) + 0.5 * self._lifting_cant.rate(s)
+
+
+def _magnitudes(sections: Sequence[Section]) -> list[Section]:
+    """Return the sections of the absolute value; a ramp through zero becomes two."""
+    parts = []
+    for section in sections:
+        start, end = section.start_value, section.end_value
+        if start * end < 0.0:
+            zero = section.begin - start / section.slope
+            parts.append(replace(section, end=zero, start_value=abs(start), end_value=0.0))
+            parts.append(replace(section, begin=zero, start_value=0.0, end_value=abs(end)))
+        else:
+            parts.append(replace(section, start_value=abs(start), end_value=abs(end)))
+    return parts
