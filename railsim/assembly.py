@@ -44,7 +44,7 @@ from railsim.kernels.system import (
 from railsim.kernels.track_frame import FRAME_SIZE, TrackTables
 from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.profiles import Profile, load_profile
-from railsim.track.alignment import track_tables
+from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
 GRAVITY = 9.81  # m/s2, as in the reference study

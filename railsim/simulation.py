@@ -137,7 +137,7 @@ def simulate(
         "cpu_time": cpu_time,
         "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
     }
-    groups = {"profiles": {name: p.points() for name, p in prepared.model.profiles.items()}}
+    groups = {"profiles": {name: np.column_stack([p.y, p.z]) for name, p in prepared.model.profiles.items()}}
     return sink.close(attributes, {"Q0": prepared.balance.Q0}, groups)
 
 
