@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from railsim.definitions.layout import curvature_sections
 from railsim.notation import Quantity
 from railsim.plot.selection import Line, Panel, panels
 from railsim.plot.style import (
@@ -21,7 +22,7 @@ from railsim.plot.style import (
     styled,
     wheelset_colours,
 )
-from railsim.result import Result, sections
+from railsim.result import Result
 from railsim.result.data import Array
 
 STUDY = (
@@ -93,7 +94,7 @@ def _figure(result: Result, grid: list[list[Panel | None]], over: str, by: str) 
         rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
     )
     horizontal = result[over]
-    shown = spans(sections(result.track()), result["distance"], horizontal)
+    shown = spans(curvature_sections(result.track()), result["distance"], horizontal)
     for i, row in enumerate(grid):
         for j, panel in enumerate(row):
             if panel is None:

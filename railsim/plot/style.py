@@ -17,8 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from railsim.definitions.layout import Section
 from railsim.errors import Fault, InputError
-from railsim.result import Section
 from railsim.result.data import Array
 from railsim.result.hdf5 import check_target
 
@@ -121,8 +121,8 @@ def spans(sections: Sequence[Section], distance: Array, axis: Array) -> list[Spa
     """
     found = []
     for section in sections:
-        start, end = np.clip([section.start, section.end], distance[0], distance[-1])
-        if section.kind in SHADES and start < end:
+        start, end = np.clip([section.begin, section.end], distance[0], distance[-1])
+        if section.type in SHADES and start < end:
             low, high = np.interp([start, end], distance, axis)
             found.append(Span(section, float(low), float(high)))
     return found
@@ -131,12 +131,12 @@ def spans(sections: Sequence[Section], distance: Array, axis: Array) -> list[Spa
 def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
     """Shade transitions and curves; with `named`, write what they are above the axes."""
     for span in shown:
-        axes.axvspan(span.low, span.high, color=SHADES[span.section.kind], lw=0, zorder=0)
+        axes.axvspan(span.low, span.high, color=SHADES[span.section.type], lw=0, zorder=0)
     if not named or not shown:
         return
     low, high = axes.get_xlim()
     for span in shown:
-        words = "CLO" if span.section.kind == "CLO" else f"R {span.section.radius:g}"
+        words = "CLO" if span.section.type == "CLO" else f"R {1.0 / span.section.start_value:.6g}"
         if (span.high - span.low) / (high - low) < NARROW * len(words):
             continue
         axes.annotate(

@@ -3,7 +3,6 @@
 ==============  ===========================================================================
 `data.py`       `Result`: arrays by name, coordinates, attributes, the embedded inputs
 `extremes.py`   largest values with wheelset, side, time and distance; values at mid-curve
-`plan.py`       where the straights, transitions and curves of the track begin and end
 `sinks.py`      `Sink`, what a simulation writes to; `MemorySink`
 `hdf5.py`       layout of the result file, `Hdf5Sink`, `open_result`
 ==============  ===========================================================================
@@ -12,21 +11,19 @@ Begin reading in `data.py`.
 """
 
 from railsim.result.data import Result
-from railsim.result.extremes import Peak, mid_curve_values, peak, peaks
+from railsim.result.extremes import MidCurve, Peak, mid_curves, peak, peaks
 from railsim.result.hdf5 import Hdf5Sink, open_result
-from railsim.result.plan import Section, sections
 from railsim.result.sinks import MemorySink, Sink
 
 __all__ = [
     "Hdf5Sink",
     "MemorySink",
+    "MidCurve",
     "Peak",
     "Result",
-    "Section",
     "Sink",
-    "mid_curve_values",
+    "mid_curves",
     "open_result",
     "peak",
     "peaks",
-    "sections",
 ]

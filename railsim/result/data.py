@@ -5,7 +5,6 @@ functions beside it.  Arrays that come from a file are read when they are first 
 """
 
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from railsim.errors import nearest
 from railsim.notation import Quantity
+from railsim.profiles.profile import Profile
 
 if TYPE_CHECKING:
     import xarray
@@ -43,9 +43,8 @@ class Result:
         Names along every dimension other than time.
     attributes : mapping
         Facts about the run, the root attributes of the result file.
-    groups : mapping of str to mapping of str to ndarray
-        Arrays that belong to the inputs rather than to the outcome; ``profiles`` holds the
-        points of every wheel and rail profile that was used.
+    profiles : mapping of str to Profile
+        Every wheel and rail profile that was used, by its name in the vehicle or track.
 
     Examples
     --------
@@ -66,7 +65,7 @@ class Result:
         quantities: Mapping[str, Quantity],
         coordinates: Mapping[str, Any],
         attributes: Attributes,
-        groups: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+        profiles: Mapping[str, Profile] = MappingProxyType({}),
     ) -> None:
         self._arrays = arrays if isinstance(arrays, FrozenArrays) else FrozenArrays(arrays)
         self._quantities = MappingProxyType(dict(quantities))
@@ -74,12 +73,7 @@ class Result:
             {name: tuple(str(label) for label in labels) for name, labels in coordinates.items()}
         )
         self._attributes = MappingProxyType(dict(attributes))
-        self._groups = MappingProxyType(
-            {
-                name: members if isinstance(members, FrozenArrays) else FrozenArrays(members)
-                for name, members in groups.items()
-            }
-        )
+        self._profiles = MappingProxyType(dict(profiles))
 
     # -- the arrays ---------------------------------------------------------------------------
 
@@ -171,14 +165,9 @@ class Result:
         return self._attributes
 
     @property
-    def groups(self) -> Mapping[str, Mapping[str, Array]]:
-        """Arrays that belong to the inputs, by group."""
-        return self._groups
-
-    @property
-    def profiles(self) -> Mapping[str, Array]:
-        """Points of the wheel and rail profiles that were used, shape (point, 2) [m]."""
-        return self._groups.get("profiles", MappingProxyType({}))
+    def profiles(self) -> Mapping[str, Profile]:
+        """Wheel and rail profiles that were used, by their names in the vehicle or track."""
+        return self._profiles
 
     @property
     def status(self) -> str:
@@ -198,15 +187,15 @@ class Result:
 
     def vehicle(self) -> "Vehicle":
         """Rebuild the vehicle's definition from the text that the result carries."""
-        from railsim.definitions.vehicle import Vehicle
+        from railsim.definitions.loading import load_vehicle_text
 
-        return Vehicle.model_validate(tomllib.loads(str(self._attributes["vehicle_toml"])))
+        return load_vehicle_text(str(self._attributes["vehicle_toml"]))
 
     def track(self) -> "Track":
         """Rebuild the track's definition from the text that the result carries."""
-        from railsim.definitions.track import Track
+        from railsim.definitions.loading import load_track_text
 
-        return Track.model_validate(tomllib.loads(str(self._attributes["track_toml"])))
+        return load_track_text(str(self._attributes["track_toml"]))
 
     # -- elsewhere ----------------------------------------------------------------------------
 

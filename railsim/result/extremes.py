@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from railsim.definitions.layout import curvature_sections
 from railsim.notation import Quantity
 from railsim.result.data import Array, Result
-from railsim.result.plan import Section, curves_reached
 
 PEAK_QUANTITIES = (
     "Q",
@@ -85,15 +85,11 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
     key = keys[kind]
     place = np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
     quantity = result.quantities[name]
-    labels = {
-        dim: result.coordinates[dim][index]
-        for dim, index in zip(quantity.dims[1:], place[1:], strict=True)
-    }
     instant = place[0]
     return Peak(
         quantity,
         float(array[place]),
-        labels,
+        _labels(result, name, place[1:]),
         float(result["time"][instant]),
         float(result["distance"][instant]),
     )
@@ -124,21 +120,38 @@ class MidCurve:
 
     Attributes
     ----------
-    curve : Section
-        The circular element.
+    radius : float
+        Signed radius of the element, positive to the right [m].
+    distance : float
+        Distance of its middle along the track [m].
     time : float
-        When [s].
+        When the reference body is there [s].
     values : mapping of str to ndarray
         Quantity to its values, without the dimension time [SI].
+    peaks : tuple of Peak
+        Largest magnitude of every quantity over its places.
     """
 
-    curve: Section
+    radius: float
+    distance: float
     time: float
     values: Mapping[str, Array]
+    peaks: tuple[Peak, ...]
+
+    def record(self) -> dict[str, Any]:
+        """Return the values as plain numbers and strings, SI."""
+        return {
+            "radius": self.radius,
+            "distance": self.distance,
+            "time": self.time,
+            "values": {name: values.tolist() for name, values in self.values.items()},
+        }
 
 
-def mid_curve_values(result: Result, names: Iterable[str] | None = None) -> tuple[MidCurve, ...]:
-    """Return the values at the middle of every curve that was reached, interpolated in distance.
+def mid_curves(result: Result, names: Iterable[str] | None = None) -> tuple[MidCurve, ...]:
+    """Return the values at the middle of every circular element that was passed.
+
+    They are interpolated linearly between the two instants around the middle.
 
     Parameters
     ----------
@@ -148,16 +161,36 @@ def mid_curve_values(result: Result, names: Iterable[str] | None = None) -> tupl
         Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
     """
     wanted = list(names) if names is not None else [n for n in PEAK_QUANTITIES if n in result]
+    distance = result["distance"]
     found = []
-    for curve in curves_reached(result):
-        after = max(1, int(np.searchsorted(result["distance"], curve.middle)))
-        before = after - 1
-        span = result["distance"][after] - result["distance"][before]
-        share = (curve.middle - result["distance"][before]) / span
-
-        def at(name: str, before: int = before, share: float = share) -> Array:
-            array = result[name]
-            return np.asarray((1.0 - share) * array[before] + share * array[before + 1])
-
-        found.append(MidCurve(curve, float(at("time")), {name: at(name) for name in wanted}))
+    for section in curvature_sections(result.track()):
+        middle = 0.5 * (section.begin + section.end)
+        if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:
+            found.append(_mid_curve(result, wanted, 1.0 / section.start_value, middle))
     return tuple(found)
+
+
+def _mid_curve(result: Result, names: list[str], radius: float, middle: float) -> MidCurve:
+    distance = result["distance"]
+    after = max(1, int(np.searchsorted(distance, middle)))
+    share = (middle - distance[after - 1]) / (distance[after] - distance[after - 1])
+
+    def there(name: str) -> Array:
+        array = result[name]
+        return np.asarray((1.0 - share) * array[after - 1] + share * array[after])
+
+    values = {name: there(name) for name in names}
+    time = float(there("time"))
+    largest = []
+    for name, array in values.items():
+        place = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
+        labels = _labels(result, name, place)
+        peak = Peak(result.quantities[name], float(array[place]), labels, time, middle)
+        largest.append(peak)
+    return MidCurve(radius, middle, time, values, tuple(largest))
+
+
+def _labels(result: Result, name: str, place: tuple[Any, ...]) -> dict[str, str]:
+    dims = result.quantities[name].dims[1:]
+    names = zip(dims, place, strict=True)
+    return {dim: result.coordinates[dim][index] for dim, index in names}

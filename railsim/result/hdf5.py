@@ -2,8 +2,8 @@
 
 Layout: one dataset a quantity at the root, with dimension scales attached and the attributes
 ``units``, ``long_name`` and ``comment`` (the sign convention); names of wheelsets, sides, bodies
-and components are dimension scales themselves; facts about the run are root attributes; arrays
-that belong to the inputs are in groups (``profiles``).
+and components are dimension scales themselves; facts about the run are root attributes; the
+group ``profiles`` holds the points of every profile that was used.
 
 Names are stored as fixed-length UTF-8 with the attribute ``_Encoding``: h5py, MATLAB's h5read and
 HDFView read them as they are, and xarray decodes them.  Attributes are variable-length UTF-8
@@ -24,6 +24,7 @@ import numpy as np
 
 from railsim.errors import Fault, InputError
 from railsim.notation import QUANTITIES, Quantity
+from railsim.profiles.profile import Profile
 from railsim.result.data import Array, Attributes, FrozenArrays, Result, frozen
 from railsim.result.sinks import (
     ALWAYS,
@@ -106,16 +107,15 @@ class Hdf5Sink(SinkContext):
         self,
         attributes: Attributes,
         statics: Mapping[str, Any] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+        profiles: Mapping[str, Profile] = NOTHING,
     ) -> Result:
         """See `Sink.close`; the file now has its name."""
         for name, quantity in self._quantities.items():
             if "time" not in quantity.dims:
                 dataset = self._file.create_dataset(name, data=frozen(statics[name]))
                 _describe(dataset, quantity)
-        for group, members in groups.items():
-            for name, array in members.items():
-                self._file.create_dataset(f"{group}/{quote(name, safe=' ')}", data=frozen(array))
+        for name, profile in profiles.items():
+            _write_profile(self._file, name, profile)
         self._file.attrs.update(root_attributes(self._attributes, attributes))
         self._file.close()
         os.replace(self._partial, self.path)
@@ -135,7 +135,7 @@ def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
         statics = {
             name: result[name] for name in result if "time" not in result.quantities[name].dims
         }
-        sink.close(result.attributes, statics, result.groups)
+        sink.close(result.attributes, statics, result.profiles)
     return sink.path
 
 
@@ -194,15 +194,17 @@ def _read(file: h5py.File, path: Path) -> Result:
         raise InputError([fault])
     quantities: dict[str, Quantity] = {}
     coordinates: dict[str, tuple[str, ...]] = {}
-    groups: dict[str, Mapping[str, Array]] = {}
+    profiles: dict[str, Profile] = {}
     for name, member in file.items():
         if isinstance(member, h5py.Group):
-            groups[name] = {unquote(key): points[()] for key, points in member.items()}
+            profiles |= {unquote(key): _profile(dataset) for key, dataset in member.items()}
         elif h5py.check_string_dtype(member.dtype):
             coordinates[name] = tuple(member.asstr()[()])
         else:
             quantities[name] = _quantity(name, member)
-    return Result(StoredArrays(path, quantities), quantities, coordinates, dict(file.attrs), groups)
+    return Result(
+        StoredArrays(path, quantities), quantities, coordinates, dict(file.attrs), profiles
+    )
 
 
 class StoredArrays(FrozenArrays):
@@ -289,4 +291,27 @@ def _quantity(name: str, dataset: h5py.Dataset) -> Quantity:
         shown_unit=str(facts.get("shown_units", unit)),
         scale=float(facts.get("shown_scale", 1.0)),
         sign=str(facts.get("comment", "")),
+    )
+
+
+def _write_profile(file: h5py.File, name: str, profile: Profile) -> None:
+    points = np.column_stack([profile.y, profile.z])
+    dataset = file.create_dataset(f"profiles/{quote(name, safe=' ')}", data=points)
+    dataset.attrs["units"] = "m"
+    dataset.attrs["long_name"] = f"{profile.kind} profile {profile.name}: y, z"
+    for fact in ("name", "kind", "source", "inclination"):
+        dataset.attrs[fact] = getattr(profile, fact)
+    dataset.attrs["notes"] = "\n".join(profile.notes)
+
+
+def _profile(dataset: h5py.Dataset) -> Profile:
+    points, facts = dataset[()], dataset.attrs
+    return Profile(
+        name=facts["name"],
+        kind=facts["kind"],
+        y=points[:, 0],
+        z=points[:, 1],
+        source=facts["source"],
+        inclination=float(facts["inclination"]),
+        notes=tuple(facts["notes"].splitlines()),
     )

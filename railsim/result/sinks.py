@@ -20,6 +20,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from railsim.notation import COMPONENTS, QUANTITIES, SIDES, Quantity
+from railsim.profiles.profile import Profile
 from railsim.result.data import Array, Attributes, Result
 from railsim.version import __version__
 
@@ -52,7 +53,7 @@ class Sink(Protocol):
         self,
         attributes: Attributes,
         statics: Mapping[str, Any] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+        profiles: Mapping[str, Profile] = NOTHING,
     ) -> Result:
         """End the run and return its result.
 
@@ -63,8 +64,8 @@ class Sink(Protocol):
             are added.
         statics : mapping of str to ndarray
             The quantities without time.
-        groups : mapping of str to mapping of str to ndarray
-            Arrays that belong to the inputs, such as ``profiles``: name to points.
+        profiles : mapping of str to Profile
+            Every profile that was used, by its name in the vehicle or track.
         """
 
     def abort(self) -> None:
@@ -121,7 +122,7 @@ class MemorySink(SinkContext):
         self,
         attributes: Attributes,
         statics: Mapping[str, Any] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+        profiles: Mapping[str, Profile] = NOTHING,
     ) -> Result:
         """See `Sink.close`."""
         arrays = {
@@ -134,7 +135,7 @@ class MemorySink(SinkContext):
             self._quantities,
             self._coordinates,
             root_attributes(self._attributes, attributes),
-            groups,
+            profiles,
         )
 
     def _shape(self, name: str) -> tuple[int, ...]:

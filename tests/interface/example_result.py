@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from railsim.notation import QUANTITIES
+from railsim.profiles.profile import Profile
 from railsim.result import MemorySink, Result
 
 ROOT = Path(__file__).parents[2]
@@ -76,7 +77,10 @@ def arrays(speed=20.0, duration=49.0, rate=50.0, gain=1.0):
     }
 
 
-GROUPS = {"profiles": {"S1002": np.array([[-0.07, 0.0], [0.0, 0.0], [0.06, -0.001]])}}
+PROFILES = {
+    "S1002": Profile("S1002", "wheel", [-0.07, 0.0, 0.06], [0.0, 0.0, -0.001], "made up"),
+    "60E1": Profile("60E1", "rail", [-0.03, 0.0, 0.03], [0.01, 0.0, 0.01], "made up", 0.025),
+}
 
 
 def feed(sink, chunks=7, extra=(), **how):
@@ -86,7 +90,7 @@ def feed(sink, chunks=7, extra=(), **how):
     timed = [name for name in given if name != "Q0"]
     for part in np.array_split(np.arange(given["time"].size), chunks):
         sink.append({name: given[name][part] for name in timed})
-    return sink.close(attributes(), {"Q0": given["Q0"]}, GROUPS)
+    return sink.close(attributes(), {"Q0": given["Q0"]}, PROFILES)
 
 
 def example_result(**how) -> Result:

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
-from example_result import BODIES, COORDINATES, GROUPS, WHEELSETS, arrays, example_result, feed
+from example_result import BODIES, COORDINATES, PROFILES, WHEELSETS, arrays, example_result, feed
 
 from railsim.errors import InputError
 from railsim.notation import COMPONENTS, QUANTITIES, Quantity
@@ -88,7 +88,7 @@ def test_result_survives_the_file_unchanged(tmp_path):
     assert dict(again.attributes) == dict(result.attributes)
     assert dict(again.coordinates) == dict(result.coordinates)
     assert dict(again.quantities) == dict(result.quantities)
-    np.testing.assert_array_equal(again.profiles["S1002"], GROUPS["profiles"]["S1002"])
+    assert dict(again.profiles) == PROFILES
     assert again.vehicle() == result.vehicle()
     assert again.track() == result.track()
 
@@ -103,7 +103,7 @@ def test_profiles_keep_names_that_are_paths(tmp_path):
     with Hdf5Sink(tmp_path / "run.h5") as sink:
         sink.begin(COORDINATES, [QUANTITIES["time"]])
         sink.append({"time": np.zeros(1)})
-        sink.close({"status": "complete"}, {}, {"profiles": {"../wheels/worn é.csv": np.eye(2)}})
+        sink.close({"status": "complete"}, {}, {"../wheels/worn é.csv": PROFILES["S1002"]})
     assert list(open_result(tmp_path / "run.h5").profiles) == ["../wheels/worn é.csv"]
 
 

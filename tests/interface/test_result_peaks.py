@@ -5,7 +5,7 @@ import pytest
 from example_result import arrays, attributes, example_result
 
 from railsim.notation import QUANTITIES
-from railsim.result import Result, mid_curve_values, peak, peaks, sections
+from railsim.result import Result, mid_curves, peak, peaks
 
 
 def small(values, distance=(0.0, 10.0, 20.0)):
@@ -37,29 +37,21 @@ def test_unloading_and_overload_are_both_listed():
     assert found == [values.max(), values.min()]
 
 
-def test_sections_follow_the_plan():
-    kinds = [(s.kind, s.start, s.end) for s in sections(example_result().track())]
-    assert kinds == [
-        ("STR", 0.0, 300.0),
-        ("CLO", 300.0, 360.0),
-        ("CIR", 360.0, 420.0),
-        ("CLO", 420.0, 480.0),
-        ("STR", 480.0, 980.0),
-    ]
-
-
 def test_mid_curve_values_are_those_at_the_middle_of_the_circle():
-    (middle,) = mid_curve_values(example_result())
-    assert middle.curve.radius == 250.0
+    (middle,) = mid_curves(example_result())
+    assert middle.radius == pytest.approx(250.0)
     assert middle.time == pytest.approx(390.0 / 20.0)
     np.testing.assert_allclose(middle.values["wheelset_yaw"][0], -9.6e-3)
+    yaw = next(p for p in middle.peaks if p.quantity.name == "wheelset_yaw")
+    assert yaw.value == pytest.approx(-9.6e-3)
+    assert yaw.labels == {"wheelset": "front.outer.wheelset"}
 
 
 def test_mid_curve_values_are_interpolated_between_instants():
     result = small([[[0.0, 0.0]], [[1.0, 2.0]], [[2.0, 4.0]]], distance=[380.0, 385.0, 395.0])
-    (middle,) = mid_curve_values(result)
+    (middle,) = mid_curves(result)
     np.testing.assert_allclose(middle.values["Q"], [[1.5, 3.0]])
 
 
 def test_no_mid_curve_values_before_the_curve():
-    assert mid_curve_values(example_result(duration=15.0)) == ()
+    assert mid_curves(example_result(duration=15.0)) == ()
