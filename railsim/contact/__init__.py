@@ -1,0 +1,23 @@
+"""Wheel-rail contact: geometry, normal contact, tables for the time integration.
+
+=========== ====================================================================
+module      job
+=========== ====================================================================
+`hertzian`  elliptic Hertz contact, exact
+`curves`    profiles placed on axle and track, with slopes and averaged curvatures
+`table`     the contact table: generator, cache on disk
+=========== ====================================================================
+
+Read `table` first: it says what the simulation takes from this package.
+"""
+
+from railsim.contact.hertzian import HertzContact, hertz
+from railsim.contact.table import ContactTable, build_contact_table, cached_contact_table
+
+__all__ = [
+    "ContactTable",
+    "HertzContact",
+    "build_contact_table",
+    "cached_contact_table",
+    "hertz",
+]

@@ -1,0 +1,287 @@
+"""Profiles prepared for contact search: placed, single-valued, with slopes and curvatures.
+
+A wheel becomes candidate points along the axle, a rail a function of the lateral place.  Both keep
+only the part that a vertical search can reach: slopes up to `STEEPEST`; beyond, the rail goes on
+straight.  The frame is that of the right wheel and rail in track axes: y to the right from the
+track's centre line, z down from the plane through the rail tops.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from railsim.errors import Fault, InputError
+from railsim.profiles.profile import FLANGE_BACK, Profile
+
+Array = NDArray[np.float64]
+
+STEEPEST = 5.67
+"""Steepest slope of a rail that is searched, the tangent of 80 degrees [1]."""
+
+STEEPEST_BACK = 2.0
+"""Steepest slope on the back of the flange's tip that is searched [1]."""
+
+GAUGE_DEPTH = 0.014
+"""Depth below the rail tops at which the gauge is measured [m] (EN 13848-1)."""
+
+RAIL_SPACING = 2e-5
+"""Distance of the rail's nodes [m]."""
+
+HALF_WIDTHS = np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.5, 7.0, 11.0]) * 1e-3
+"""Half-widths over which curvatures are averaged [m]."""
+
+ARC_SPACING = 5e-5
+"""Distance along the contour at which curvatures are averaged [m]."""
+
+
+@dataclass(frozen=True)
+class WheelCurve:
+    """Candidate points of a right wheel.
+
+    Attributes
+    ----------
+    y : ndarray, shape (n,)
+        Lateral place from the tape circle, field side positive [m].
+    u : ndarray, shape (n,)
+        Place along the axle from the wheelset's centre [m].
+    r : ndarray, shape (n,)
+        Radius [m].
+    t : ndarray, shape (n,)
+        Slope dr/du [1].
+    du : ndarray, shape (n,)
+        Quadrature weight: half the distance of the neighbours [m].
+    curvature : ndarray, shape (n_width, n)
+        Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
+    """
+
+    y: Array
+    u: Array
+    r: Array
+    t: Array
+    du: Array
+    curvature: Array
+
+
+@dataclass(frozen=True)
+class RailCurve:
+    """A right rail in the track, as a function of the lateral place.
+
+    Attributes
+    ----------
+    Y0, dY : float
+        First node and spacing [m].
+    z : ndarray, shape (n,)
+        Height below the rail-top plane [m].
+    slope : ndarray, shape (n,)
+        dz/dY [1].
+    curvature : ndarray, shape (n_width, n)
+        Curvature, convex positive, averaged over `HALF_WIDTHS` [1/m].
+    """
+
+    Y0: float
+    dY: float
+    z: Array
+    slope: Array
+    curvature: Array
+
+    @property
+    def Y(self) -> Array:
+        """Lateral places of the nodes [m], shape (n,)."""
+        places: Array = self.Y0 + self.dY * np.arange(self.z.size)
+        return places
+
+
+def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
+    """Curvature of a contour averaged over the patch, with the patch's parabolic weight.
+
+    The weight is 3/(4 b) (1 - (s/b)^2) over the contour's length s within half a width b.
+
+    Parameters
+    ----------
+    y, slope : ndarray, shape (n,)
+        Lateral place, increasing [m], and dz/dy [1].
+    sign : float
+        1 for a rail (z down, convex upwards), -1 for a wheel.
+
+    Returns
+    -------
+    ndarray, shape (n_width, n)
+        Averages at the given points, for each of `HALF_WIDTHS` [1/m].
+    """
+    length = np.concatenate(
+        ([0.0], np.cumsum(np.diff(y) * np.sqrt(1.0 + (0.5 * (slope[1:] + slope[:-1])) ** 2)))
+    )
+    n = max(int(np.ceil(length[-1] / ARC_SPACING)), 2)
+    even = np.linspace(0.0, length[-1], n + 1)
+    step = even[1]
+    angle = np.arctan(np.interp(even, length, slope))
+    curvature = sign * np.gradient(angle, step)
+    result = np.empty((HALF_WIDTHS.size, y.size))
+    for i, half_width in enumerate(HALF_WIDTHS):
+        m = max(int(round(half_width / step)), 1)
+        weight = 1.0 - (np.arange(-m, m + 1) / (m + 0.5)) ** 2
+        weight /= weight.sum()
+        padded = np.pad(curvature, m, mode="edge")
+        result[i] = np.interp(length, even, np.convolve(padded, weight, mode="valid"))
+    return result
+
+
+def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
+    """Largest run of points around `start` that goes forward in y with slopes up to `limit`."""
+    dy, dz = np.diff(y), np.diff(z)
+    good = (dy > 0.0) & (np.abs(dz) <= limit * dy)
+    first = start
+    while first > 0 and good[first - 1]:
+        first -= 1
+    last = start
+    while last < y.size - 1 and good[last]:
+        last += 1
+    return slice(first, last + 1)
+
+
+def wheel_curve(
+    profile: Profile, radius: float, tape_circle: float, spacing: float = 1e-4
+) -> WheelCurve:
+    """Candidate points of a wheel.
+
+    Parameters
+    ----------
+    profile : Profile
+        Wheel profile.
+    radius : float
+        Rolling radius at the tape circle [m].
+    tape_circle : float
+        Place of the tape circle from the wheelset's centre [m].
+    spacing : float
+        Distance of the candidates on level parts [m]; it shrinks with the slope t by the factor
+        (1 + t^2)^(-3/4), as the width of a contact in lateral projection does.
+
+    Returns
+    -------
+    WheelCurve
+    """
+    y, z = profile.y, profile.z
+    tip = int(np.argmax(z))
+    on_tread = int(np.argmin(np.abs(y)))
+    part = single_valued_part(y, z, on_tread, 3.0 * STEEPEST)
+    if part.start > tip:
+        raise InputError(
+            [
+                Fault(
+                    profile.name,
+                    "",
+                    "the contour is not continuous from tread to flange tip",
+                    "a wheel profile must run in one piece from the flange's tip to the field side",
+                )
+            ]
+        )
+    spline = CubicSpline(y[part], z[part])
+    fine = np.linspace(y[part.start], y[part.stop - 1], 40_001)
+    slope = spline(fine, 1)
+    back = np.flatnonzero((fine < y[tip]) & (slope > STEEPEST_BACK))
+    fine = fine[(back[-1] + 1 if back.size else 0) :]
+    slope = spline(fine, 1)
+    density = (1.0 + slope**2) ** 0.75 / spacing
+    count = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))))
+    n = int(np.ceil(count[-1]))
+    places = np.interp(np.linspace(0.0, count[-1], n + 1), count, fine)
+    t = spline(places, 1)
+    return WheelCurve(
+        y=places,
+        u=places + tape_circle,
+        r=radius + spline(places),
+        t=t,
+        du=np.gradient(places),
+        curvature=averaged_curvature(places, t, -1.0),
+    )
+
+
+def tape_circle_place(back_to_back: float) -> float:
+    """Place of the right tape circle from the wheelset's centre [m].
+
+    The wheels sit on the axle at the given back-to-back distance; profiles are given from a tape
+    circle 70 mm from the wheel back.
+    """
+    return 0.5 * back_to_back - FLANGE_BACK
+
+
+def inclined(profile: Profile, inclination: float) -> tuple[Array, Array]:
+    """Points of a rail turned to the given inclination (total, as tangent), its top at z = 0."""
+    angle = np.arctan(inclination) - np.arctan(profile.inclination)
+    y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
+    z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
+    crown = CubicSpline(y[top_slice(z)], z[top_slice(z)])
+    roots = crown.derivative().roots(extrapolate=False)
+    top = float(np.min(crown(roots))) if roots.size else float(z.min())
+    return y, z - top
+
+
+def top_slice(z: Array) -> slice:
+    """A few points around the highest one."""
+    i = int(np.argmin(z))
+    return slice(max(i - 3, 0), i + 4)
+
+
+def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
+    """Innermost lateral place of a rail's gauge side within `depth` below its top [m].
+
+    Raises
+    ------
+    ValueError
+        If the contour does not reach that deep on the gauge side.
+    """
+    top = int(np.argmin(z))
+    if z[: top + 1].max() < depth:
+        raise ValueError(f"the gauge side ends {1e3 * z[: top + 1].max():.1f} mm below the top")
+    below = int(np.flatnonzero(z[: top + 1] >= depth)[-1])
+    share = (depth - z[below + 1]) / (z[below] - z[below + 1])
+    crossing = y[below + 1] + share * (y[below] - y[below + 1])
+    return float(min(crossing, y[below + 1 : top + 1].min()))
+
+
+def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
+    """Place a right rail in the track.
+
+    Parameters
+    ----------
+    profile : Profile
+        Rail profile.
+    gauge : float
+        Distance of the gauge faces within 14 mm below the rail tops [m].
+    inclination : float
+        Inclination towards the track's centre, as tangent [1]; what the profile already carries
+        counts.
+
+    Returns
+    -------
+    RailCurve
+    """
+    y, z = inclined(profile, inclination)
+    try:
+        face = gauge_face(y, z)
+    except ValueError as error:
+        raise InputError(
+            [
+                Fault(
+                    profile.name,
+                    "",
+                    str(error),
+                    f"the gauge is measured {1e3 * GAUGE_DEPTH:.0f} mm below the top",
+                )
+            ]
+        ) from None
+    y = y - face + 0.5 * gauge
+    part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
+    spline = CubicSpline(y[part], z[part])
+    n = int((y[part.stop - 1] - y[part.start]) / RAIL_SPACING)
+    places = y[part.start] + RAIL_SPACING * np.arange(n + 1)
+    slope = spline(places, 1)
+    return RailCurve(
+        Y0=float(places[0]),
+        dY=RAIL_SPACING,
+        z=spline(places),
+        slope=slope,
+        curvature=averaged_curvature(places, slope, 1.0),
+    )

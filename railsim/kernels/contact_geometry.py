@@ -1,0 +1,289 @@
+"""Contact geometry of one wheel on one rail, for the contact table.
+
+The wheel, turned by roll and yaw, is reduced to its trace (silhouette) line in the track's
+cross-section: at the lateral place u of the axle the point u l + r e with
+
+    e_x = t l_x,   e_y l_y + e_z l_z = -e_x l_x,   |e| = 1,   t = dr/du,   l the axle's direction,
+
+is the one whose normal has no component along the rail.  The gap is measured vertically between
+that line and the rail; a soft minimum over a zone of the wheel's profile gives the height at
+which the zone touches.
+"""
+
+import math
+
+import numba
+import numpy as np
+
+from railsim.kernels import FASTMATH
+
+SPREAD = 30.0  # candidates whose gap exceeds the least by more than SPREAD eps have no weight
+WIDTH_ITERATIONS = 8
+
+# Fields of a table, see `railsim.contact.table`.
+G, K, C_Y, C_Z, C_X, A1, B1, WEIGHT = range(8)
+N_FIELD = 8
+
+
+def _jit(function):
+    """Compile as `railsim.kernels.jit`, but letting other Python threads run meanwhile."""
+    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, nogil=True)(function)
+
+
+@_jit
+def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, usable):
+    """Trace line of a wheel relative to the wheelset's centre, in track axes.
+
+    Parameters
+    ----------
+    u, r, t : ndarray, shape (n,)
+        Place along the axle from the wheelset's centre [m], radius [m], and dr/du [1].
+    roll, yaw : float
+        Attitude of the wheelset, C = Rz(yaw) Rx(roll) [rad].
+    c_x, c_y, c_z : ndarray, shape (n,)
+        Points of the line (output) [m].
+    usable : ndarray of bool, shape (n,)
+        False where the profile is so steep against the yaw that no trace point exists (output).
+    """
+    l_x = -math.sin(yaw) * math.cos(roll)
+    l_y = math.cos(yaw) * math.cos(roll)
+    l_z = math.sin(roll)
+    m = math.sqrt(l_y * l_y + l_z * l_z)
+    for k in range(u.size):
+        e_x = t[k] * l_x
+        along = -e_x * l_x / m
+        rest = 1.0 - e_x * e_x - along * along
+        usable[k] = rest > 0.0
+        across = math.sqrt(max(rest, 0.0))
+        c_x[k] = u[k] * l_x + r[k] * e_x
+        c_y[k] = u[k] * l_y + r[k] * (along * l_y - across * l_z) / m
+        c_z[k] = u[k] * l_z + r[k] * (along * l_z + across * l_y) / m
+
+
+@_jit
+def rail_height(Y, Y0, dY, z, slope):
+    """Height of the rail's surface and its slope at the lateral place `Y`, cubic, straight beyond.
+
+    Parameters
+    ----------
+    Y : float
+        Lateral place [m].
+    Y0, dY : float
+        First place and spacing of the nodes [m].
+    z, slope : ndarray, shape (n_rail,)
+        Height [m] and slope [1] at the nodes.
+
+    Returns
+    -------
+    float, float, int
+        Height [m], slope [1] and nearest lower node.
+    """
+    x = (Y - Y0) / dY
+    n = z.size
+    if not x > 0.0:
+        return z[0] + slope[0] * (Y - Y0), slope[0], 0
+    if not x < n - 1:
+        return z[n - 1] + slope[n - 1] * (Y - Y0 - (n - 1) * dY), slope[n - 1], n - 2
+    j = int(x)
+    x -= j
+    d0 = slope[j] * dY
+    d1 = slope[j + 1] * dY
+    rise = z[j + 1] - z[j]
+    c2 = 3.0 * rise - 2.0 * d0 - d1
+    c3 = d0 + d1 - 2.0 * rise
+    return z[j] + x * (d0 + x * (c2 + x * c3)), (d0 + x * (2.0 * c2 + 3.0 * x * c3)) / dY, j
+
+
+@_jit
+def interpolated(x, x0, dx, values):
+    """Linear interpolation on a uniform grid, constant beyond its ends."""
+    s = (x - x0) / dx
+    if not s > 0.0:
+        return values[0]
+    if not s < values.size - 1:
+        return values[-1]
+    i = int(s)
+    return values[i] + (s - i) * (values[i + 1] - values[i])
+
+
+@_jit
+def fill_table_slice(
+    values,
+    y_nodes,
+    roll,
+    yaw,
+    centre_height,
+    wheel_u,
+    wheel_r,
+    wheel_t,
+    wheel_du,
+    log_window,
+    window,
+    first,
+    last,
+    wheel_curvature,
+    rail_Y0,
+    rail_dY,
+    rail_z,
+    rail_slope,
+    rail_curvature,
+    half_widths,
+    ellipse_x0,
+    ellipse_dx,
+    ellipse,
+    eps,
+    load,
+    floor_ratio,
+):
+    """Fill the table for one roll and one yaw.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_patch, n_y, N_FIELD)
+        Slice of the table (output).  `K` is left without the normalisation of `g`.
+    y_nodes : ndarray, shape (n_y,)
+        Lateral displacements of the wheelset's centre [m].
+    roll, yaw : float
+        Attitude [rad].
+    centre_height : float
+        Height of the wheelset's centre above the rail tops at z = 0 [m].
+    wheel_u, wheel_r, wheel_t, wheel_du : ndarray, shape (n_u,)
+        Place along the axle [m], radius [m], slope [1] and quadrature weight [m] of the candidates.
+    log_window, window : ndarray, shape (n_patch, n_u)
+        Partition of unity over the candidates and its logarithm [1].
+    first, last : ndarray of int, shape (n_patch,)
+        Range of candidates with a window above zero, `last` exclusive.
+    wheel_curvature : ndarray, shape (n_width, n_u)
+        Curvature of the wheel averaged over a patch of each half-width, convex positive [1/m].
+    rail_Y0, rail_dY, rail_z, rail_slope
+        Rail as for `rail_height`.
+    rail_curvature : ndarray, shape (n_width, n_rail)
+        As `wheel_curvature`, for the rail [1/m].
+    half_widths : ndarray, shape (n_width,)
+        Half-widths of the averages, ascending [m].
+    ellipse_x0, ellipse_dx : float
+        Grid of `ellipse` over ln(A/B).
+    ellipse : ndarray, shape (3, n)
+        Logarithms of a1 A^(1/3), b/a and d1 A^(-1/3).
+    eps : float
+        Softness of the minimum [m].
+    load : float
+        Force for which the patch's width sets the averaging of the curvatures [N].
+    floor_ratio : float
+        B is kept above about this many A [1].
+    """
+    n_u = wheel_u.size
+    n_patch = values.shape[0]
+    n_width = half_widths.size
+    c_x = np.empty(n_u)
+    c_y = np.empty(n_u)
+    c_z = np.empty(n_u)
+    h = np.empty(n_u)
+    slope = np.empty(n_u)
+    node = np.empty(n_u, np.int64)
+    usable = np.empty(n_u, np.bool_)
+    curvature = np.empty(n_width)
+    trace_line(wheel_u, wheel_r, wheel_t, roll, yaw, c_x, c_y, c_z, usable)
+    # c_x is odd in yaw: its ratio to yaw has a limit, taken at a yaw that is small but not zero
+    yaw_for_x = yaw if abs(yaw) > 1e-6 else 1e-6
+    sine = math.sin(yaw_for_x) / yaw_for_x * math.cos(roll)
+    for k in range(n_u):
+        c_x[k] = -(wheel_u[k] + wheel_r[k] * wheel_t[k]) * sine
+    for i in range(y_nodes.size):
+        for k in range(n_u):
+            h[k], slope[k], node[k] = rail_height(
+                y_nodes[i] + c_y[k], rail_Y0, rail_dY, rail_z, rail_slope
+            )
+            h[k] += centre_height - c_z[k]
+            if not usable[k]:
+                h[k] = 1.0
+        for p in range(n_patch):
+            least = 1e9
+            for k in range(first[p], last[p]):
+                least = min(least, h[k] - eps * log_window[p, k])
+            total = 0.0
+            s_window = s_y = s_z = s_x = s_slope = s_r = 0.0
+            for m in range(n_width):
+                curvature[m] = 0.0
+            for k in range(first[p], last[p]):
+                excess = (h[k] - eps * log_window[p, k] - least) / eps
+                if excess < SPREAD:
+                    weight = math.exp(-excess) * wheel_du[k]
+                    total += weight
+                    s_window += weight * window[p, k]
+                    s_y += weight * c_y[k]
+                    s_z += weight * c_z[k]
+                    s_x += weight * c_x[k]
+                    s_slope += weight * slope[k]
+                    s_r += weight * wheel_r[k]
+                    for m in range(n_width):
+                        curvature[m] += weight * (
+                            wheel_curvature[m, k] + rail_curvature[m, node[k]]
+                        )
+            inverse = 1.0 / total
+            for m in range(n_width):
+                curvature[m] *= inverse
+            tan_gamma = s_slope * inverse
+            cos_gamma = 1.0 / math.sqrt(1.0 + tan_gamma * tan_gamma)
+            A = 0.5 * cos_gamma / (s_r * inverse)
+            a1, b1, d1 = averaged_ellipse(
+                A,
+                curvature,
+                half_widths,
+                ellipse_x0,
+                ellipse_dx,
+                ellipse,
+                load,
+                floor_ratio,
+            )
+            out = values[p, i]
+            out[G] = least - eps * math.log(total)
+            out[K] = s_window * inverse * (cos_gamma**2.5) * d1**-1.5
+            out[C_Y] = s_y * inverse
+            out[C_Z] = s_z * inverse
+            out[C_X] = s_x * inverse
+            out[A1] = a1
+            out[B1] = b1
+            out[WEIGHT] = s_window * inverse
+
+
+@_jit
+def averaged_ellipse(A, curvature, half_widths, ellipse_x0, ellipse_dx, ellipse, load, floor_ratio):
+    """Unit-load ellipse with the lateral curvature averaged over the patch itself.
+
+    Parameters
+    ----------
+    A : float
+        Half the relative curvature along the rail [1/m].
+    curvature : ndarray, shape (n_width,)
+        Relative curvature across, averaged over each of `half_widths` [1/m].
+    half_widths, ellipse_x0, ellipse_dx, ellipse, load, floor_ratio
+        See `fill_table_slice`; `ellipse` holds the material as well.
+
+    Returns
+    -------
+    a1, b1, d1 : float
+        As `railsim.kernels.hertz.unit_load_ellipse`.
+    """
+    n = half_widths.size
+    b = 0.004
+    third = load ** (1.0 / 3.0)
+    a1 = b1 = d1 = 0.0
+    scale = A ** (1.0 / 3.0)
+    least_B = floor_ratio * A
+    for _ in range(WIDTH_ITERATIONS):
+        j = 0
+        while j < n - 2 and b > half_widths[j + 1]:
+            j += 1
+        x = (b - half_widths[j]) / (half_widths[j + 1] - half_widths[j])
+        x = min(max(x, 0.0), 1.0)
+        B = 0.5 * (curvature[j] + x * (curvature[j + 1] - curvature[j]))
+        # a smooth maximum of B and the floor: B + floor^2/B far above, floor at B = 0
+        B = 0.5 * (B + math.sqrt(B * B + 4.0 * least_B * least_B))
+        place = math.log(A / B)
+        a1 = math.exp(interpolated(place, ellipse_x0, ellipse_dx, ellipse[0])) / scale
+        b1 = a1 * math.exp(interpolated(place, ellipse_x0, ellipse_dx, ellipse[1]))
+        d1 = math.exp(interpolated(place, ellipse_x0, ellipse_dx, ellipse[2])) * scale
+        # the geometric mean damps the iteration, which may swing in the flange root
+        b = math.sqrt(b * b1 * third)
+    return a1, b1, d1

@@ -1,0 +1,188 @@
+"""The built-in profiles, generated from their definitions.
+
+Nothing is copied from tables of points: each profile is the chain of polynomials, arcs and lines
+that its source states, sampled densely enough (0.05 mm) for cubic interpolation to 1e-8 m.
+"""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.profiles.profile import Profile
+
+Array = NDArray[np.float64]
+
+SPACING = 0.05
+"""Distance of the points along the contour [mm]."""
+
+S1002_SECTIONS = (
+    # lower end [mm], upper end [mm], name of the section in EN 13715
+    (-70.0, -62.764705882, "H"),
+    (-62.764705882, -49.662510381, "G"),
+    (-49.662510381, -39.764473993, "F"),
+    (-39.764473993, -38.426669071, "E"),
+    (-38.426669071, -35.0, "D"),
+    (-35.0, -26.0, "C"),
+    (-26.0, 32.15796, "B"),
+    (32.15796, 60.0, "A"),
+)
+
+S1002_TREAD = (
+    0.0,
+    -3.358537058e-2,
+    1.565681624e-3,
+    -2.810427944e-5,
+    5.844240864e-8,
+    -1.562379023e-8,
+    5.309217349e-15,
+    -5.957839843e-12,
+    2.646656573e-13,
+)
+S1002_ROOT = (
+    -4.320221063e3,
+    -1.038384026e3,
+    -1.065501873e2,
+    -6.051367875,
+    -2.054332446e-1,
+    -4.169739389e-3,
+    -4.687195829e-5,
+    -2.252755540e-7,
+)
+
+
+def s1002_height(y: Array) -> Array:
+    """Height of the S1002 contour [mm] at the lateral place y [mm], flange at negative y.
+
+    Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H.  The standard's
+    polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
+    """
+
+    def circle(y: Array, centre_y: float, centre_z: float, radius: float) -> Array:
+        half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
+        return centre_z + np.copysign(half, radius)
+
+    section: dict[str, Callable[[Array], Array]] = {
+        "A": lambda y: 1.364323640 - 0.066666667 * y,
+        "B": lambda y: np.polynomial.polynomial.polyval(y, S1002_TREAD),
+        "C": lambda y: np.polynomial.polynomial.polyval(y, S1002_ROOT),
+        "D": lambda y: circle(y, -26.210665, 16.446, -13.0),
+        "E": lambda y: -93.576667419 - 2.747477419 * y,
+        "F": lambda y: circle(y, -58.558326413, 8.834924130, 20.0),
+        "G": lambda y: circle(y, -55.0, 16.0, 12.0),
+        "H": lambda y: circle(y, -49.5, 9.519259302, 20.5),
+    }
+    upper = [end for _, end, _ in S1002_SECTIONS[:-1]]
+    index = np.searchsorted(upper, y, side="right")
+    z = np.empty_like(y)
+    for i, (_, _, name) in enumerate(S1002_SECTIONS):
+        inside = index == i
+        z[inside] = section[name](y[inside])
+    return z
+
+
+def even_points(y: Array, z: Array, spacing: float) -> Array:
+    """Lateral places at about equal distances along the contour through the given points."""
+    length = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
+    n = max(int(np.ceil(length[-1] / spacing)), 1)
+    places: Array = np.interp(np.linspace(0.0, length[-1], n + 1), length, y)
+    return places
+
+
+def s1002() -> Profile:
+    """Wheel profile S1002 of EN 13715, flange 32.5 mm thick and 28 mm high."""
+    # finely pre-sampled so that the distances along the nearly vertical flange back are right
+    fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
+    y = even_points(fine, s1002_height(fine), SPACING)
+    return Profile("S1002", "wheel", 1e-3 * y, 1e-3 * s1002_height(y), "EN 13715, profile S1002")
+
+
+def arc_chain_rail(
+    half_width_crown: float,
+    half_width_shoulder: float,
+    radii: tuple[float, float, float] = (300.0, 80.0, 13.0),
+    flank_slope: float = 0.05,
+    depth: float = 38.0,
+) -> tuple[Array, Array]:
+    """Rail head of three tangent arcs and a straight flank, symmetric about its axis.
+
+    Parameters
+    ----------
+    half_width_crown, half_width_shoulder : float
+        Distance from the axis at which the first arc meets the second, the second the third [mm].
+    radii : tuple of float
+        Radii of crown, shoulder and gauge corner [mm].
+    flank_slope : float
+        Flank's inclination to the vertical [1].
+    depth : float
+        Depth below the crown to which the flank is drawn [mm].
+
+    Returns
+    -------
+    y, z : ndarray, shape (n,)
+        Contour from the left flank to the right one, z down from the crown [mm].
+    """
+    angles = [0.0, float(np.arcsin(half_width_crown / radii[0]))]
+    centre = [(0.0, radii[0])]
+    for radius, previous, half_width in (
+        (radii[1], radii[0], half_width_crown),
+        (radii[2], radii[1], half_width_shoulder),
+    ):
+        # the joint lies on both arcs, its normal goes through both centres
+        angle = angles[-1]
+        y_c = centre[-1][0] + (previous - radius) * np.sin(angle)
+        z_c = centre[-1][1] - (previous - radius) * np.cos(angle)
+        centre.append((y_c, z_c))
+        if radius == radii[1]:
+            angles.append(float(np.arcsin((half_width_shoulder - y_c) / radius)))
+    angles.append(float(np.arctan2(1.0, flank_slope)))
+    y_parts, z_parts = [], []
+    for i, radius in enumerate(radii):
+        n = max(int(np.ceil(radius * (angles[i + 1] - angles[i]) / SPACING)), 1)
+        angle_points = np.linspace(angles[i], angles[i + 1], n + 1)[(1 if i else 0) :]
+        y_parts.append(centre[i][0] + radius * np.sin(angle_points))
+        z_parts.append(centre[i][1] - radius * np.cos(angle_points))
+    y_end, z_end = y_parts[-1][-1], z_parts[-1][-1]
+    n = int(np.ceil((depth - z_end) / SPACING))
+    z_flank = np.linspace(z_end, depth, n + 1)[1:]
+    y_parts.append(y_end + flank_slope * (z_flank - z_end))
+    z_parts.append(z_flank)
+    y, z = np.concatenate(y_parts), np.concatenate(z_parts)
+    return np.concatenate((-y[:0:-1], y)), np.concatenate((z[:0:-1], z))
+
+
+def rail_60e1() -> Profile:
+    """Rail 60E1 of EN 13674-1, upright."""
+    y, z = arc_chain_rail(10.228, 26.0265)
+    return Profile("60E1", "rail", 1e-3 * y, 1e-3 * z, "EN 13674-1, profile 60E1, tangent arcs")
+
+
+def rail_benchmark() -> Profile:
+    """The Manchester contact benchmark's UIC 60 rail, canted 1:40, from its arcs."""
+    y, z = arc_chain_rail(10.49979, 25.98803)
+    angle = np.arctan(1.0 / 40.0)
+    y_turned = y * np.cos(angle) + z * np.sin(angle)
+    z_turned = -y * np.sin(angle) + z * np.cos(angle)
+    return Profile(
+        "benchmark",
+        "rail",
+        1e-3 * y_turned,
+        1e-3 * (z_turned - z_turned.min()),
+        "Manchester contact benchmark, UIC 60 as an arc chain 300/80/13 mm "
+        "with half-widths 10.49979 and 25.98803 mm, canted by atan(1/40)",
+        inclination=1.0 / 40.0,
+    )
+
+
+DEFINITIONS: dict[str, Callable[[], Profile]] = {
+    "S1002": s1002,
+    "60E1": rail_60e1,
+    "benchmark": rail_benchmark,
+}
+
+
+@cache
+def builtin_profile(name: str) -> Profile:
+    """Built-in profile by its name, a key of `DEFINITIONS`."""
+    return DEFINITIONS[name]()

@@ -1,0 +1,78 @@
+"""A wheel or rail profile as points, frozen and comparable.
+
+Frames, the same for the right wheel and the right rail (z always points down at the contact):
+
+wheel
+    y from the tape circle, positive to the field side, flange negative; z outwards from the
+    axle, so that the rolling radius is ``radius + z``.
+rail
+    y positive to the field side, gauge side negative; z down, crown at z = 0.
+
+The left side is the mirror image.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Kind = Literal["wheel", "rail"]
+
+FLANGE_BACK = -0.070
+"""Lateral place of the wheel back from the tape circle [m] (EN 13715: 70 mm)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A wheel or rail profile.
+
+    Attributes
+    ----------
+    name : str
+        Name for messages, plots and results.
+    kind : "wheel" or "rail"
+        What it is.
+    y, z : ndarray, shape (n,)
+        Points along the contour from the flange (gauge) side to the field side [m]; frames in the
+        module's text.  The arrays are read-only.
+    source : str
+        Where the numbers come from.
+    inclination : float
+        Inclination that a rail's points already carry, as tangent (0.025 for 1:40) [1].
+    notes : tuple of str
+        What was recognised and put right when the profile was read, a sentence each.
+    """
+
+    name: str
+    kind: Kind
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]
+    source: str = ""
+    inclination: float = 0.0
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for name in ("y", "z"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Profile):
+            return NotImplemented
+        return (
+            self.name == other.name
+            and self.kind == other.kind
+            and self.inclination == other.inclination
+            and np.array_equal(self.y, other.y)
+            and np.array_equal(self.z, other.z)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.kind, self.inclination, self.y.tobytes(), self.z.tobytes()))
+
+    def key(self) -> bytes:
+        """Everything that enters the geometry, for hashing: not the name, not the source."""
+        head = f"{self.kind} {self.inclination!r} {self.y.size} ".encode()
+        return head + self.y.tobytes() + self.z.tobytes()
