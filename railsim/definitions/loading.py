@@ -19,6 +19,12 @@ from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
+from railsim.definitions.spring import (
+    SPRING_FORMAT,
+    TrailingArmSuspension,
+    spring_faults,
+    spring_remarks,
+)
 from railsim.definitions.track import TRACK_FORMAT, Track
 from railsim.definitions.vehicle import VEHICLE_FORMAT, Vehicle
 from railsim.errors import Fault, InputError, nearest
@@ -62,6 +68,13 @@ FORMATS: dict[str, Format] = {
     VEHICLE_FORMAT: Format("vehicle", Vehicle, names.name_faults, position_faults),
     TRACK_FORMAT: Format("track", Track, faults=track_faults, remarks=track_remarks),
     SETTINGS_FORMAT: Format("settings", Settings, free=("initial",)),
+    SPRING_FORMAT: Format(
+        "spring",
+        TrailingArmSuspension,
+        faults=spring_faults,
+        remarks=spring_remarks,
+        free=("loads",),
+    ),
 }
 
 
@@ -97,6 +110,11 @@ def load_settings(path: str | Path | None = None, overrides: Iterable[str] = ())
     if path is None:
         return _loaded(Settings, Source("settings", {"format": SETTINGS_FORMAT}), overrides)
     return _loaded(Settings, _file_source(path, "settings"), overrides)
+
+
+def load_spring(path: str | Path, overrides: Iterable[str] = ()) -> TrailingArmSuspension:
+    """Load a spring file, or a shipped one by its name; as `load_vehicle`."""
+    return _loaded(TrailingArmSuspension, _file_source(path, "spring"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -15,7 +15,7 @@ from typing import Any
 from railsim.errors import Fault, InputError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
-FOLDERS = {"vehicle": "vehicles", "track": "tracks"}
+FOLDERS = {"vehicle": "vehicles", "track": "tracks", "spring": "vehicles/springs"}
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
 OVERRIDE = "--set"
