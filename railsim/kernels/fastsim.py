@@ -21,21 +21,29 @@ import math
 
 import numpy as np
 
-from . import jit
+from . import fastsim_simd, jit
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
-WORK_ROWS = 8
-WORK_LANES = 8  # strips are padded to a multiple of this, so that the SIMD loop has no remainder
+WORK_ROWS = 10
+_COLUMNS_MIN = 24  # least number of strips that a march takes (three vectors of eight)
 # Added under the root: the least traction (relative to the bound) that counts is 1e-15.
 _TINY = 1e-30
-# Growth per cell relative to the bound beyond which the strip is in full sliding at once.
+# Growth per cell relative to the bound beyond which the patch is in full sliding at once.
 _GROWTH_MAX = 1e9
 
 
-def fastsim_workspace(n_patch, ny):
-    """Work array of `fastsim` for up to n_patch patches of ny strips, shape (8, n_columns)."""
-    lanes = (n_patch * ny + WORK_LANES - 1) // WORK_LANES * WORK_LANES
-    return np.zeros((WORK_ROWS, lanes))
+def fastsim_workspace(n_patch, ny, nx=0):
+    """Work array of `fastsim` for up to n_patch patches of ny strips and nx <= 128 or nx cells.
+
+    Returns
+    -------
+    work : ndarray, shape (WORK_ROWS, n_columns)
+        Starts on a cache line: the SIMD loads of an unaligned array cost a third more.
+    """
+    columns = max((n_patch * ny + 7) // 8 * 8, (nx + 7) // 8 * 8, 128)
+    block = np.zeros(WORK_ROWS * columns + 8)
+    first = -(block.ctypes.data // 8) % 8
+    return block[first : first + WORK_ROWS * columns].reshape(WORK_ROWS, columns)
 
 
 @jit
@@ -69,48 +77,83 @@ def kalker_lookup(n, a, b, table, c11, c22, c23, c33):
 
 
 @jit
-def _strip_slopes(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, gx, gy, gs):
-    """Growth of the scaled traction per cell of every strip: gx, gy constant, gs times x/l."""
+def _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, spin_a, spin_b):
+    """Growth per cell of the scaled traction of every patch, at the middle strip.
+
+    With p0 = 2 mu N/(pi a b), dx = 2 a/nx and the flexibilities: sx = dx xi_x/(L1 p0) and so on,
+    spin_a = dx phi a/(L3 p0), spin_b = dx phi b/(L3 p0).  Zero without contact or friction.
+    """
     for i in range(n):
-        first = i * ny
-        if mu_N[i] > 0.0 and a[i] > 0.0 and b[i] > 0.0:
-            # a dx / p0 with dx = 2 l/nx and p0 = 2 mu N/(pi a b); divided by l^2 below
-            unit = math.pi * a[i] * a[i] * b[i] / (mu_N[i] * nx)
-            per_L1 = 3.0 * G * c11[i] / (8.0 * a[i])
-            per_L2 = 3.0 * G * c22[i] / (8.0 * a[i])
-            per_L3 = 4.0 * G * c23[i] / (math.pi * a[i] * math.sqrt(a[i] / b[i]))
-            sx = unit * xi_x[i] * per_L1
-            sy = unit * xi_y[i] * per_L2
-            spin = unit * phi[i] * per_L3
-        else:
-            sx = sy = spin = 0.0
-        for j in range(ny):
-            y = (2 * j + 1 - ny) / ny
-            per_l = 1.0 / math.sqrt(1.0 - y * y)
-            x_growth = (sx - spin * b[i] * y) * per_l
-            y_growth = sy * per_l
-            s_growth = spin * a[i]
-            total = abs(x_growth) + abs(y_growth) + abs(s_growth)
-            shrink = _GROWTH_MAX / total if total > _GROWTH_MAX else 1.0
-            gx[first + j] = shrink * x_growth
-            gy[first + j] = shrink * y_growth
-            gs[first + j] = shrink * s_growth
+        loaded = mu_N[i] > 0.0 and a[i] > 0.0 and b[i] > 0.0
+        unit = math.pi * G * a[i] * b[i] / ((mu_N[i] if loaded else 1.0) * nx)
+        slip = 0.375 * unit
+        spin = (
+            (4.0 / math.pi) * unit * c23[i] * phi[i] * math.sqrt(b[i] / (a[i] if loaded else 1.0))
+        )
+        x = slip * c11[i] * xi_x[i]
+        y = slip * c22[i] * xi_y[i]
+        along = spin * a[i]
+        across = spin * b[i]
+        total = abs(x) + abs(y) + abs(along) + abs(across)
+        scale = min(1.0, _GROWTH_MAX / (total + 1.0)) if loaded else 0.0
+        sx[i] = scale * x
+        sy[i] = scale * y
+        spin_a[i] = scale * along
+        spin_b[i] = scale * across
 
 
 @jit
-def _march_step(m, weight, xi, centre, bound, gx, gy, gs, px, py, sum_x, sum_y, sum_m):
-    """One cell further on all m strips: grow, cut back to the bound, add up.  The hot loop."""
+def _march_plain(work, m, nx, bounds):
+    """Go along m strips from the leading edge: grow, cut back to the bound, add up.
+
+    Rows of work: growth per cell in x and y at the leading edge's slip, growth by spin; sums of x
+    and y traction, sum of the running sum of y; the rest is the state.
+    """
+    gx, gy, gs = work[0], work[1], work[2]
+    sum_x, sum_y, sum_m = work[3], work[4], work[5]
+    px, py, grow = work[6], work[7], work[8]
     for c in range(m):
-        x = px[c] + weight * gx[c]
-        y = py[c] + weight * (gy[c] + xi * gs[c])
-        f = min(1.0, bound / math.sqrt(x * x + y * y + _TINY))
-        x *= f
-        y *= f
-        px[c] = x
-        py[c] = y
-        sum_x[c] += x
-        sum_y[c] += y
-        sum_m[c] += centre * y
+        # a full step from here is the half step that the first cell needs
+        grow[c] = gy[c] + gs[c]
+        px[c] = -0.5 * gx[c]
+        py[c] = -0.5 * grow[c] - 0.25 / nx * gs[c]
+        sum_x[c] = sum_y[c] = sum_m[c] = 0.0
+    for k in range(nx):
+        bound = bounds[k]
+        for c in range(m):
+            x = px[c] + gx[c]
+            y = py[c] + grow[c]
+            f = min(1.0, bound / math.sqrt(x * x + y * y + _TINY))
+            x *= f
+            y *= f
+            px[c] = x
+            py[c] = y
+            grow[c] -= 2.0 / nx * gs[c]
+            sum_x[c] += x
+            sum_y[c] += y
+            sum_m[c] += sum_y[c]
+
+
+@jit
+def _march_simd(work, m, nx, bounds):
+    """Do what `_march_plain` does in blocks of 3 to 5 vectors of 8 strips; m >= 24."""
+    vectors = m // 8
+    blocks = (vectors + 4) // 5
+    first = 0
+    while blocks > 0:
+        size = (vectors + blocks - 1) // blocks
+        if size == 3:
+            fastsim_simd.march_3(work, first, bounds, nx)
+        elif size == 4:
+            fastsim_simd.march_4(work, first, bounds, nx)
+        else:
+            fastsim_simd.march_5(work, first, bounds, nx)
+        first += 8 * size
+        vectors -= size
+        blocks -= 1
+
+
+_march = _march_simd if fastsim_simd.available() else _march_plain
 
 
 @jit
@@ -135,7 +178,7 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     xi_x, xi_y, phi : ndarray, shape (>= n,)
         Creepages, wheel minus rail (contact frame: x forward, t to the right, n into the rail)
         [1, 1, 1/m].
-    work : ndarray, shape (8, >= n ny rounded up to a multiple of 8)
+    work : ndarray, shape (WORK_ROWS, >= n ny and >= nx)
         From `fastsim_workspace`; contents before the call do not matter.
     T_x, T_y, M_z : ndarray, shape (>= n,), written
         Force on the rail and moment about n at the patch centre [N, N, N m].
@@ -146,39 +189,58 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     bound at the cells' centres (the first step is half a cell), slip at the middle of each step.
     Source: Kalker (1982).  Sign: the force on the rail has the sign of the creepage.
     """
-    used = n * ny
-    m = (used + WORK_LANES - 1) // WORK_LANES * WORK_LANES
+    columns = n * ny
+    padded = max((columns + 7) // 8 * 8, _COLUMNS_MIN)
     gx, gy, gs = work[0], work[1], work[2]
-    px, py = work[3], work[4]
-    sum_x, sum_y, sum_m = work[5], work[6], work[7]
-    _strip_slopes(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, gx, gy, gs)
-    for c in range(used, m):
+    sx, sy, spin_a, spin_b = work[3], work[4], work[5], work[6]
+    _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, spin_a, spin_b)
+    for j in range(ny):
+        y = (2 * j + 1 - ny) / ny
+        per_l = 1.0 / math.sqrt(1.0 - y * y)
+        y_per_l = y * per_l
+        for i in range(n):
+            gx[j * n + i] = sx[i] * per_l - spin_b[i] * y_per_l
+            gy[j * n + i] = sy[i] * per_l
+            gs[j * n + i] = spin_a[i]
+    for c in range(columns, padded):
         gx[c] = gy[c] = gs[c] = 0.0
-    for c in range(m):
-        px[c] = py[c] = 0.0
-        sum_x[c] = sum_y[c] = sum_m[c] = 0.0
+    bounds = work[9]
     for k in range(nx):
         centre = 1.0 - (2 * k + 1) / nx
-        if k == 0:
-            middle, weight = 1.0 - 0.5 / nx, 0.5
-        else:
-            middle, weight = 1.0 - 2.0 * k / nx, 1.0
-        bound = 1.0 - centre * centre
-        _march_step(m, weight, middle, centre, bound, gx, gy, gs, px, py, sum_x, sum_y, sum_m)
+        bounds[k] = 1.0 - centre * centre
+    _march(work, padded, nx, bounds)
+    _sum_of_strips(n, nx, ny, a, b, mu_N, work, T_x, T_y, M_z)
+
+
+@jit
+def _sum_of_strips(n, nx, ny, a, b, mu_N, work, T_x, T_y, M_z):
+    """Force and moment of every patch from the sums along its strips.
+
+    The x-weighted sum of y traction follows from the sum of its running sum:
+    sum_k x_k q_k = 2/nx (sum_k sum_(i<=k) q_i) - (1 + 1/nx) sum_k q_k, x_k = 1 - (2 k + 1)/nx.
+    """
+    sum_x, sum_y, sum_m = work[3], work[4], work[5]
+    tx, ty, mz = work[6], work[7], work[8]
     for i in range(n):
-        tx = ty = mx = my = 0.0
-        for j in range(ny):
-            c = i * ny + j
-            y = (2 * j + 1 - ny) / ny
-            l2 = 1.0 - y * y
-            l = math.sqrt(l2)
-            w = l * l2
-            tx += w * sum_x[c]
-            ty += w * sum_y[c]
-            mx += w * y * sum_x[c]
-            my += w * l * sum_m[c]
-        # p0 times the area of a strip's cell: 2 mu N/(pi a b) (2 a l/nx) (2 b/ny)
+        tx[i] = ty[i] = mz[i] = 0.0
+    for j in range(ny):
+        y = (2 * j + 1 - ny) / ny
+        l2 = 1.0 - y * y
+        weight = l2 * math.sqrt(l2)
+        weight_a = 2.0 / nx * l2 * l2
+        weight_b = weight * y
+        # one loop per result: each one is vectorised, all in one is not
+        for i in range(n):
+            tx[i] += weight * sum_x[j * n + i]
+        for i in range(n):
+            ty[i] += weight * sum_y[j * n + i]
+        for i in range(n):
+            c = j * n + i
+            arm_sum = sum_m[c] - 0.5 * (nx + 1) * sum_y[c]
+            mz[i] += weight_a * a[i] * arm_sum - weight_b * b[i] * sum_x[c]
+    for i in range(n):
+        # p0 times the area of a cell at the middle: 2 mu N/(pi a b) (2 a/nx) (2 b/ny)
         unit = max(mu_N[i], 0.0) * 8.0 / (math.pi * nx * ny)
-        T_x[i] = unit * tx
-        T_y[i] = unit * ty
-        M_z[i] = unit * (a[i] * my - b[i] * mx)
+        T_x[i] = unit * tx[i]
+        T_y[i] = unit * ty[i]
+        M_z[i] = unit * mz[i]
