@@ -292,6 +292,7 @@ def _contact(
         body=np.array([names.index(body.name) for body in wheelsets], dtype=np.int64),
         table=which,
         values=np.ascontiguousarray(values, dtype=float),
+        shear=np.array([t.shear for t in tables]),
         y0=first.y0,
         dy=first.dy,
         roll0=first.roll0,

@@ -120,7 +120,7 @@ def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
     curvature = sign * np.gradient(angle, step)
     result = np.empty((HALF_WIDTHS.size, y.size))
     for i, half_width in enumerate(HALF_WIDTHS):
-        m = max(int(round(half_width / step)), 1)
+        m = max(round(half_width / step), 1)
         weight = 1.0 - (np.arange(-m, m + 1) / (m + 0.5)) ** 2
         weight /= weight.sum()
         padded = np.pad(curvature, m, mode="edge")

@@ -14,6 +14,9 @@ The table's values are the coefficients of uniform cubic B-splines in y and roll
 continuously differentiable, without overshoot) and are interpolated linearly in w.  The contact
 force is the gradient of U = 2/5 K p^(5/2) *through this spline*, hence conservative by
 construction, whatever the table holds.
+
+The first axis of the grid is s = y - shear * roll, the lateral displacement of the wheel's foot,
+see `railsim.contact.table`.
 """
 
 import numpy as np
@@ -38,9 +41,9 @@ LEVER = 0.75
 
 
 @jit
-def locate(contact, y, roll, w):
+def locate(contact, table, y, roll, w):
     """Cell and local coordinate in the three directions; a code if outside (see above)."""
-    ty = (y - contact.y0) / contact.dy
+    ty = (y - contact.shear[table] * roll - contact.y0) / contact.dy
     tr = (roll - contact.roll0) / contact.droll
     tw = w / contact.dw
     shape = contact.values.shape
@@ -93,6 +96,7 @@ def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out):
     inv_dw = 1.0 / contact.dw
     for k in range(LOOK_UP_SIZE):
         out[k] = 0.0
+    values = contact.values
     for jw in range(2):
         weight_w = tw if jw == 1 else 1.0 - tw
         slope_w = inv_dw if jw == 1 else -inv_dw
@@ -105,17 +109,21 @@ def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out):
                 weight_r, slope_r = r2, e2
             else:
                 weight_r, slope_r = r3, e3
-            row = contact.values[table, patch, iw + jw, ir - 1 + jr]
-            v0 = row[iy - 1]
-            v1 = row[iy]
-            v2 = row[iy + 1]
-            v3 = row[iy + 2]
+            i, j = iw + jw, ir - 1 + jr
             weight = weight_w * weight_r
+            w0, w1, w2, w3 = weight * b0, weight * b1, weight * b2, weight * b3
             for k in range(N_FIELD):
-                out[k] += weight * (b0 * v0[k] + b1 * v1[k] + b2 * v2[k] + b3 * v3[k])
+                out[k] += (w0 * values[table, patch, i, j, iy - 1, k]
+                           + w1 * values[table, patch, i, j, iy, k]
+                           + w2 * values[table, patch, i, j, iy + 1, k]
+                           + w3 * values[table, patch, i, j, iy + 2, k])
             for k in range(2):
-                value = b0 * v0[k] + b1 * v1[k] + b2 * v2[k] + b3 * v3[k]
-                slope = d0 * v0[k] + d1 * v1[k] + d2 * v2[k] + d3 * v3[k]
+                v0 = values[table, patch, i, j, iy - 1, k]
+                v1 = values[table, patch, i, j, iy, k]
+                v2 = values[table, patch, i, j, iy + 1, k]
+                v3 = values[table, patch, i, j, iy + 2, k]
+                value = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
+                slope = d0 * v0 + d1 * v1 + d2 * v2 + d3 * v3
                 out[G_Y + 3 * k] += weight * slope * inv_dy
                 out[G_ROLL + 3 * k] += weight_w * slope_r * value * inv_dr
                 out[G_W + 3 * k] += slope_w * weight_r * value

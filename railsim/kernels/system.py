@@ -59,6 +59,7 @@ class Contact(NamedTuple):
     body : int64[w]              body index of each wheelset
     table : int64[w, 2]          which table serves each wheel
     values : float64[t, 3, n_w, n_roll, n_y, 8]  tables, see `contact_table`
+    shear : float64[t]           lever of roll in the tables' lateral coordinate [m]
     y0, dy, roll0, droll, dw : float   grid of the tables [m, rad, rad2]
     creep : float64[k, 4]        Kalker's c11 c22 c23 c33 over log(a/b)
     shear_modulus, damping : float   [Pa], [N s/m]
@@ -68,6 +69,7 @@ class Contact(NamedTuple):
     body: np.ndarray
     table: np.ndarray
     values: np.ndarray
+    shear: np.ndarray
     y0: float
     dy: float
     roll0: float

@@ -69,14 +69,14 @@ def normal_contact(system, work, speed, state):
         Status code, the wheelset it concerns, number of active patches.
     """
     contact = system.contact
+    force, wheel, column, t = work.rail_force, work.wheel, work.patch, work.look_up
     n_bodies = system.bodies.kind.shape[0]
     n = 0
     for w in range(contact.body.shape[0]):
         b = contact.body[w]
         f = system.bodies.frame[b]
-        force = work.rail_force[b]
         for k in range(6):
-            force[k] = 0.0
+            force[b, k] = 0.0
         yaw = state[6 * b + 5]
         y_rate = state[6 * n_bodies + 6 * b + 1]
         z_rate = state[6 * n_bodies + 6 * b + 2]
@@ -91,17 +91,16 @@ def normal_contact(system, work, speed, state):
             y_dot = sign * (y_rate - speed * work.rail[2])
             z_dot = z_rate - speed * work.rail[3]
             roll = sign * state[6 * b + 3]
-            where, iy, ir, iw, ty, tr, tw = locate(contact, y, roll, yaw * yaw)
+            table = contact.table[w, side]
+            where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, yaw * yaw)
             if where != INSIDE:
                 return outside(where), w, n
-            table = contact.table[w, side]
             normal = 0.0
             lateral = 0.0
             lift = 1.0
             for patch in range(N_PATCH):
                 if is_far(contact, table, patch, iy, ir, iw, tr, z):
                     continue
-                t = work.look_up
                 look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, t)
                 p = z - t[0]
                 lift = min(lift, -p)
@@ -116,10 +115,10 @@ def normal_contact(system, work, speed, state):
                 vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
                 stretch = 0.4 * p * p * root
                 q_y = sign * (vertical * t[G_Y] - stretch * t[K_Y])
-                force[1] += q_y
-                force[2] -= vertical
-                force[3] += sign * (vertical * t[G_ROLL] - stretch * t[K_ROLL])
-                force[5] += (vertical * t[G_W] - stretch * t[K_W]) * 2.0 * yaw
+                force[b, 1] += q_y
+                force[b, 2] -= vertical
+                force[b, 3] += sign * (vertical * t[G_ROLL] - stretch * t[K_ROLL])
+                force[b, 5] += (vertical * t[G_W] - stretch * t[K_W]) * 2.0 * yaw
                 normal += vertical
                 lateral -= q_y
                 cos_g = sqrt(cos_2)
@@ -127,7 +126,6 @@ def normal_contact(system, work, speed, state):
                 if N <= 0.0:
                     continue
                 third = N ** (1.0 / 3.0)
-                column = work.patch
                 column[A, n] = t[5] * third
                 column[B, n] = t[6] * third
                 column[NORMAL, n] = N
@@ -142,15 +140,14 @@ def normal_contact(system, work, speed, state):
                 work.patch_index[n, 1] = side
                 work.patch_index[n, 2] = patch
                 n += 1
-            wheel = work.wheel[w, side]
-            wheel[W_Q] = normal
-            wheel[W_Y] = lateral
-            wheel[W_NORMAL] = 0.0
-            wheel[W_XI_X] = 0.0
-            wheel[W_XI_Y] = 0.0
-            wheel[W_PHI] = 0.0
-            wheel[W_T_GAMMA] = 0.0
-            wheel[W_LIFT] = lift
+            wheel[w, side, W_Q] = normal
+            wheel[w, side, W_Y] = lateral
+            wheel[w, side, W_NORMAL] = 0.0
+            wheel[w, side, W_XI_X] = 0.0
+            wheel[w, side, W_XI_Y] = 0.0
+            wheel[w, side, W_PHI] = 0.0
+            wheel[w, side, W_T_GAMMA] = 0.0
+            wheel[w, side, W_LIFT] = lift
             if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, z):
                 return WHEEL_LIFT, w, n
     return RUNNING, 0, n
@@ -180,22 +177,20 @@ def outside(where):
 @jit
 def creepages(system, work, n, speed, state):
     """Creepages of the active patches, see the module's equations."""
-    patch = work.patch
+    patch, C, frames = work.patch, work.C, work.frames
     n_bodies = system.bodies.kind.shape[0]
     for k in range(n):
         w = work.patch_index[k, 0]
         b = system.contact.body[w]
         f = system.bodies.frame[b]
-        C = work.C[b]
-        frame = work.frames[f]
-        w1, w2, w3 = speed * frame[OMEGA], speed * frame[OMEGA + 1], speed * frame[OMEGA + 2]
+        w1, w2, w3 = speed * frames[f, OMEGA], speed * frames[f, OMEGA + 1], speed * frames[f, OMEGA + 2]
         x, y = state[6 * b], state[6 * b + 1] + system.bodies.nominal[b, 0]
         z = state[6 * b + 2] + system.bodies.nominal[b, 1]
         v = 6 * n_bodies + 6 * b
         u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
-        a1 = C[0] * u1 + C[1] * u2 + C[2] * u3
-        a2 = C[3] * u1 + C[4] * u2 + C[5] * u3
-        a3 = C[6] * u1 + C[7] * u2 + C[8] * u3
+        a1 = C[b, 0] * u1 + C[b, 1] * u2 + C[b, 2] * u3
+        a2 = C[b, 3] * u1 + C[b, 4] * u2 + C[b, 5] * u3
+        a3 = C[b, 6] * u1 + C[b, 7] * u2 + C[b, 8] * u3
         cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
         vx = speed + w2 * z - w3 * y + state[v] + a2 * cz - a3 * cy
         vy = w3 * x - w1 * z + state[v + 1] + a3 * cx - a1 * cz
@@ -215,7 +210,7 @@ def creepages(system, work, n, speed, state):
 def add_creep_forces(system, work, n, speed):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
-    patch = work.patch
+    patch, force, wheel = work.patch, work.rail_force, work.wheel
     for w in range(contact.body.shape[0]):
         work.spin_damping[contact.body[w]] = 0.0
     for k in range(n):
@@ -227,23 +222,21 @@ def add_creep_forces(system, work, n, speed):
         fz = patch[T_Y, k] * s
         cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
         mz = patch[M_Z, k]
-        force = work.rail_force[b]
-        force[0] += fx
-        force[1] += fy
-        force[2] += fz
-        force[3] += cy * fz - cz * fy
-        force[4] += cz * fx - cx * fz - mz * s
-        force[5] += cx * fy - cy * fx - mz * c
-        wheel = work.wheel[w, side]
-        wheel[W_Q] -= fz
-        wheel[W_Y] -= fy
-        wheel[W_T_GAMMA] += (patch[T_X, k] * patch[XI_X, k] + patch[T_Y, k] * patch[XI_Y, k]
+        force[b, 0] += fx
+        force[b, 1] += fy
+        force[b, 2] += fz
+        force[b, 3] += cy * fz - cz * fy
+        force[b, 4] += cz * fx - cx * fz - mz * s
+        force[b, 5] += cx * fy - cy * fx - mz * c
+        wheel[w, side, W_Q] -= fz
+        wheel[w, side, W_Y] -= fy
+        wheel[w, side, W_T_GAMMA] += (patch[T_X, k] * patch[XI_X, k] + patch[T_Y, k] * patch[XI_Y, k]
                              + mz * patch[PHI, k])
-        if patch[NORMAL, k] > wheel[W_NORMAL]:
-            wheel[W_NORMAL] = patch[NORMAL, k]
-            wheel[W_XI_X] = patch[XI_X, k]
-            wheel[W_XI_Y] = patch[XI_Y, k]
-            wheel[W_PHI] = patch[PHI, k]
+        if patch[NORMAL, k] > wheel[w, side, W_NORMAL]:
+            wheel[w, side, W_NORMAL] = patch[NORMAL, k]
+            wheel[w, side, W_XI_X] = patch[XI_X, k]
+            wheel[w, side, W_XI_Y] = patch[XI_Y, k]
+            wheel[w, side, W_PHI] = patch[PHI, k]
         if patch[MU_N, k] > 0.0:
             work.spin_damping[b] += (
                 contact.shear_modulus * patch[A, k] * patch[B, k] * patch[C11, k] * cz * cz
@@ -270,7 +263,7 @@ def wheel_rail(system, work, speed, state):
     # turn it into a moment vector that does no work on the spin
     for k in range(system.contact.body.shape[0]):
         b = system.contact.body[k]
-        generalised_to_vector(work.C[b], work.S[b], work.rail_force[b])
+        generalised_to_vector(b, work.C, work.S[b, 1], work.rail_force)
     patch = work.patch
     creepages(system, work, n, speed, state)
     kalker_lookup(n, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
@@ -283,14 +276,14 @@ def wheel_rail(system, work, speed, state):
 
 
 @jit
-def generalised_to_vector(C, S, force):
+def generalised_to_vector(b, C, cos_roll, force):
     """Moment vector (track axes) from the generalised moments of roll and yaw, none on the spin.
 
     The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
     track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and M_2 = 0.
     """
-    m1 = force[3]
-    m3 = force[5] / S[1]
-    force[3] = C[0] * m1 + C[2] * m3
-    force[4] = C[3] * m1 + C[5] * m3
-    force[5] = C[6] * m1 + C[8] * m3
+    m1 = force[b, 3]
+    m3 = force[b, 5] / cos_roll
+    force[b, 3] = C[b, 0] * m1 + C[b, 2] * m3
+    force[b, 4] = C[b, 3] * m1 + C[b, 5] * m3
+    force[b, 5] = C[b, 6] * m1 + C[b, 8] * m3

@@ -29,6 +29,8 @@ S1002_SECTIONS = (
     (32.15796, 60.0, "A"),
 )
 
+S1002_OUTER = (1.364323640, -0.066666667)
+S1002_FLANK = (-93.576667419, -2.747477419)
 S1002_TREAD = (
     0.0,
     -3.358537058e-2,
@@ -61,14 +63,18 @@ def s1002_height(y: Array) -> Array:
 
     def circle(y: Array, centre_y: float, centre_z: float, radius: float) -> Array:
         half = np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
-        return centre_z + np.copysign(half, radius)
+        z: Array = centre_z + np.copysign(half, radius)
+        return z
+
+    def polynomial(y: Array, coefficients: tuple[float, ...]) -> Array:
+        return np.asarray(np.polynomial.polynomial.polyval(y, coefficients), dtype=np.float64)
 
     section: dict[str, Callable[[Array], Array]] = {
-        "A": lambda y: 1.364323640 - 0.066666667 * y,
-        "B": lambda y: np.polynomial.polynomial.polyval(y, S1002_TREAD),
-        "C": lambda y: np.polynomial.polynomial.polyval(y, S1002_ROOT),
+        "A": lambda y: polynomial(y, S1002_OUTER),
+        "B": lambda y: polynomial(y, S1002_TREAD),
+        "C": lambda y: polynomial(y, S1002_ROOT),
         "D": lambda y: circle(y, -26.210665, 16.446, -13.0),
-        "E": lambda y: -93.576667419 - 2.747477419 * y,
+        "E": lambda y: polynomial(y, S1002_FLANK),
         "F": lambda y: circle(y, -58.558326413, 8.834924130, 20.0),
         "G": lambda y: circle(y, -55.0, 16.0, 12.0),
         "H": lambda y: circle(y, -49.5, 9.519259302, 20.5),
@@ -123,19 +129,15 @@ def arc_chain_rail(
     y, z : ndarray, shape (n,)
         Contour from the left flank to the right one, z down from the crown [mm].
     """
-    angles = [0.0, float(np.arcsin(half_width_crown / radii[0]))]
-    centre = [(0.0, radii[0])]
-    for radius, previous, half_width in (
-        (radii[1], radii[0], half_width_crown),
-        (radii[2], radii[1], half_width_shoulder),
-    ):
-        # the joint lies on both arcs, its normal goes through both centres
-        angle = angles[-1]
-        y_c = centre[-1][0] + (previous - radius) * np.sin(angle)
-        z_c = centre[-1][1] - (previous - radius) * np.cos(angle)
-        centre.append((y_c, z_c))
-        if radius == radii[1]:
-            angles.append(float(np.arcsin((half_width_shoulder - y_c) / radius)))
+    angles, centre = [0.0], [(0.0, radii[0])]
+    for i, half_width in enumerate((half_width_crown, half_width_shoulder)):
+        angle = float(np.arcsin((half_width - centre[i][0]) / radii[i]))
+        # the next centre lies on the normal through the joint
+        offset = radii[i] - radii[i + 1]
+        centre.append(
+            (centre[i][0] + offset * np.sin(angle), centre[i][1] - offset * np.cos(angle))
+        )
+        angles.append(angle)
     angles.append(float(np.arctan2(1.0, flank_slope)))
     y_parts, z_parts = [], []
     for i, radius in enumerate(radii):
