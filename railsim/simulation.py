@@ -137,8 +137,7 @@ def simulate(
         "cpu_time": cpu_time,
         "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
     }
-    groups = {"profiles": {name: np.column_stack([p.y, p.z]) for name, p in prepared.model.profiles.items()}}
-    return sink.close(attributes, {"Q0": prepared.balance.Q0}, groups)
+    return sink.close(attributes, {"Q0": prepared.balance.Q0}, prepared.model.profiles)
 
 
 def run_length(
@@ -210,7 +209,8 @@ def output_interval(settings: Settings, speed: float) -> float:
 def _start(model: Model, balance: Equilibrium, settings: Settings) -> Floats:
     """Initial state: steady rolling at s = 0 with the disturbances of the settings."""
     work = work_arrays(model.system)
-    if locate_frames(model.system, work, 0.0) != RUNNING:
+    if locate_frames(model.system.track, model.system.frame_offset, 0.0, work.frames,
+                     work.cell, work.cell_u) != RUNNING:
         raise ModelError("the vehicle is longer than the track's table allows")
     state = initial_state(model, balance, 0.0, work.frames)
     n = model.index.n_bodies

@@ -127,6 +127,9 @@ def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out):
                 out[G_Y + 3 * k] += weight * slope * inv_dy
                 out[G_ROLL + 3 * k] += weight_w * slope_r * value * inv_dr
                 out[G_W + 3 * k] += slope_w * weight_r * value
+    # the table's lateral coordinate moves with roll: the chain rule
+    out[G_ROLL] -= contact.shear[table] * out[G_Y]
+    out[K_ROLL] -= contact.shear[table] * out[K_Y]
 
 
 def bounds(contact) -> np.ndarray:

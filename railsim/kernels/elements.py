@@ -34,9 +34,8 @@ def curve_value(curves, index, x):
 
 
 @jit
-def link_forces(links, curves, maxwell_force, maxwell_rate, work):
-    """Add the forces of all point-to-point elements to ``work.F``, ``work.M``."""
-    R, X, V, W, F, M = work.R, work.X, work.V, work.W, work.F, work.M
+def link_forces(links, curves, maxwell_force, maxwell_rate, R, X, V, W, F, M):
+    """Add the forces of all point-to-point elements to `F`, `M`."""
     for e in range(links.body.shape[0]):
         i, j = links.body[e, 0], links.body[e, 1]
         px, py, pz = links.point[e, 0, 0], links.point[e, 0, 1], links.point[e, 0, 2]
@@ -83,12 +82,12 @@ def link_forces(links, curves, maxwell_force, maxwell_rate, work):
 
 
 @jit
-def translation_force(mounts, curves, e, i, j, p, scale, maxwell_force, maxwell_rate, work):
+def translation_force(mounts, curves, e, i, j, p, scale, maxwell_force, maxwell_rate,
+                      R, X, V, W, F, M):
     """Force of a mount in the axes of body `i` (its point `p` first), at the point of body `j`.
 
     `scale` is the share of the element taken in these axes: 1, or 1/2 for a shear spring.
     """
-    R, X, V, W, F, M = work.R, work.X, work.V, work.W, work.F, work.M
     px, py, pz = mounts.point[e, p, 0], mounts.point[e, p, 1], mounts.point[e, p, 2]
     ax = R[i, 0] * px + R[i, 1] * py + R[i, 2] * pz
     ay = R[i, 3] * px + R[i, 4] * py + R[i, 5] * pz
@@ -137,9 +136,8 @@ def translation_force(mounts, curves, e, i, j, p, scale, maxwell_force, maxwell_
 
 
 @jit
-def rotation_moment(mounts, e, i, j, work):
+def rotation_moment(mounts, e, i, j, R, W, M):
     """Add the moment of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
-    R, W, M = work.R, work.W, work.M
     k1, k2, k3 = mounts.rotation[e, 0], mounts.rotation[e, 1], mounts.rotation[e, 2]
     c1 = mounts.rotation_damping[e, 0]
     c2 = mounts.rotation_damping[e, 1]
@@ -168,18 +166,16 @@ def rotation_moment(mounts, e, i, j, work):
 
 
 @jit
-def mount_forces(mounts, curves, maxwell_force, maxwell_rate, work):
-    """Add the forces of all three-axis elements to ``work.F``, ``work.M``."""
+def mount_forces(mounts, curves, maxwell_force, maxwell_rate, R, X, V, W, F, M):
+    """Add the forces of all three-axis elements to `F`, `M`."""
     for e in range(mounts.body.shape[0]):
         i, j = mounts.body[e, 0], mounts.body[e, 1]
         if mounts.flags[e, 0]:
-            if mounts.flags[e, 1]:
-                translation_force(mounts, curves, e, i, j, 0, 0.5, maxwell_force, maxwell_rate,
-                                  work)
+            both = mounts.flags[e, 1]
+            translation_force(mounts, curves, e, i, j, 0, 0.5 if both else 1.0, maxwell_force,
+                              maxwell_rate, R, X, V, W, F, M)
+            if both:
                 translation_force(mounts, curves, e, j, i, 1, 0.5, maxwell_force, maxwell_rate,
-                                  work)
-            else:
-                translation_force(mounts, curves, e, i, j, 0, 1.0, maxwell_force, maxwell_rate,
-                                  work)
+                                  R, X, V, W, F, M)
         if mounts.flags[e, 2]:
-            rotation_moment(mounts, e, i, j, work)
+            rotation_moment(mounts, e, i, j, R, W, M)

@@ -55,7 +55,7 @@ def record(recorder, row, time, state, derivative, work):
 @jit
 def step_fast(system, work, state, derivative, decay, h):
     """Advance `state` by `h` with the derivative already evaluated there."""
-    bodies = system.bodies
+    bodies, S = system.bodies, work.S
     n = bodies.kind.shape[0]
     for b in range(n):
         q = 6 * b
@@ -74,7 +74,7 @@ def step_fast(system, work, state, derivative, decay, h):
         state[v + 3] += d1
         state[v + 4] += d2
         state[v + 5] += d3
-        r1, r2, r3 = euler_rates(kind, work.S[b], d1, d2, d3)
+        r1, r2, r3 = euler_rates(kind, S[b, 0], S[b, 1], S[b, 2], S[b, 3], d1, d2, d3)
         state[q + 3] += h * (derivative[q + 3] + r1)
         state[q + 4] += h * (derivative[q + 4] + r2)
         state[q + 5] += h * (derivative[q + 5] + r3)

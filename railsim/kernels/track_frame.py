@@ -63,8 +63,8 @@ def cell_of(track, s):
 
 
 @jit
-def track_frame(track, s, frame):
-    """Evaluate the track frame at arc length `s` [m] into ``frame[FRAME_SIZE]``.
+def track_frame(track, s, frames, f):
+    """Evaluate the track frame at arc length `s` [m] into ``frames[f, FRAME_SIZE]``.
 
     With s the arc length, the frame turns by omega = vee(A^T dA/ds) per metre; for the Euler angles
     psi, theta, phi (z, y, x) omega_1 = phi' - psi' sin theta, omega_2 = theta' cos phi
@@ -72,50 +72,53 @@ def track_frame(track, s, frame):
 
     Returns
     -------
-    int : the cell, -1 if `s` lies outside the table (then `frame` is unchanged).
+    cell : int
+        -1 if `s` lies outside the table (then `frames` is unchanged).
+    u : float
+        Distance into the cell [m].
     """
     i, u = cell_of(track, s)
     if i < 0:
-        return i
-    c = track.coefficients[i]
+        return i, 0.0
+    c = track.coefficients
     for k in range(3):
-        frame[ORIGIN + k] = c[k, 0] + u * (c[k, 1] + u * (c[k, 2] + u * c[k, 3]))
-    psi = c[PSI, 0] + u * (c[PSI, 1] + u * (c[PSI, 2] + u * c[PSI, 3]))
-    psi_1 = c[PSI, 1] + u * (2.0 * c[PSI, 2] + u * 3.0 * c[PSI, 3])
-    psi_2 = 2.0 * c[PSI, 2] + 6.0 * u * c[PSI, 3]
-    theta = c[THETA, 0] + u * (c[THETA, 1] + u * (c[THETA, 2] + u * c[THETA, 3]))
-    theta_1 = c[THETA, 1] + u * (2.0 * c[THETA, 2] + u * 3.0 * c[THETA, 3])
-    theta_2 = 2.0 * c[THETA, 2] + 6.0 * u * c[THETA, 3]
-    phi = c[PHI, 0] + u * (c[PHI, 1] + u * (c[PHI, 2] + u * c[PHI, 3]))
-    phi_1 = c[PHI, 1] + u * (2.0 * c[PHI, 2] + u * 3.0 * c[PHI, 3])
-    phi_2 = 2.0 * c[PHI, 2] + 6.0 * u * c[PHI, 3]
+        frames[f, ORIGIN + k] = c[i, k, 0] + u * (c[i, k, 1] + u * (c[i, k, 2] + u * c[i, k, 3]))
+    psi = c[i, PSI, 0] + u * (c[i, PSI, 1] + u * (c[i, PSI, 2] + u * c[i, PSI, 3]))
+    psi_1 = c[i, PSI, 1] + u * (2.0 * c[i, PSI, 2] + u * 3.0 * c[i, PSI, 3])
+    psi_2 = 2.0 * c[i, PSI, 2] + 6.0 * u * c[i, PSI, 3]
+    theta = c[i, THETA, 0] + u * (c[i, THETA, 1] + u * (c[i, THETA, 2] + u * c[i, THETA, 3]))
+    theta_1 = c[i, THETA, 1] + u * (2.0 * c[i, THETA, 2] + u * 3.0 * c[i, THETA, 3])
+    theta_2 = 2.0 * c[i, THETA, 2] + 6.0 * u * c[i, THETA, 3]
+    phi = c[i, PHI, 0] + u * (c[i, PHI, 1] + u * (c[i, PHI, 2] + u * c[i, PHI, 3]))
+    phi_1 = c[i, PHI, 1] + u * (2.0 * c[i, PHI, 2] + u * 3.0 * c[i, PHI, 3])
+    phi_2 = 2.0 * c[i, PHI, 2] + 6.0 * u * c[i, PHI, 3]
 
     sp, cp = sin(psi), cos(psi)
     st, ct = sin(theta), cos(theta)
     sf, cf = sin(phi), cos(phi)
-    frame[3] = cp * ct
-    frame[4] = cp * st * sf - sp * cf
-    frame[5] = cp * st * cf + sp * sf
-    frame[6] = sp * ct
-    frame[7] = sp * st * sf + cp * cf
-    frame[8] = sp * st * cf - cp * sf
-    frame[9] = -st
-    frame[10] = ct * sf
-    frame[11] = ct * cf
+    frames[f, 3] = cp * ct
+    frames[f, 4] = cp * st * sf - sp * cf
+    frames[f, 5] = cp * st * cf + sp * sf
+    frames[f, 6] = sp * ct
+    frames[f, 7] = sp * st * sf + cp * cf
+    frames[f, 8] = sp * st * cf - cp * sf
+    frames[f, 9] = -st
+    frames[f, 10] = ct * sf
+    frames[f, 11] = ct * cf
 
-    frame[12] = phi_1 - psi_1 * st
-    frame[13] = theta_1 * cf + psi_1 * ct * sf
-    frame[14] = psi_1 * ct * cf - theta_1 * sf
-    frame[15] = phi_2 - psi_2 * st - psi_1 * theta_1 * ct
-    frame[16] = (theta_2 * cf - theta_1 * phi_1 * sf + psi_2 * ct * sf
+    frames[f, 12] = phi_1 - psi_1 * st
+    frames[f, 13] = theta_1 * cf + psi_1 * ct * sf
+    frames[f, 14] = psi_1 * ct * cf - theta_1 * sf
+    frames[f, 15] = phi_2 - psi_2 * st - psi_1 * theta_1 * ct
+    frames[f, 16] = (theta_2 * cf - theta_1 * phi_1 * sf + psi_2 * ct * sf
                  - psi_1 * theta_1 * st * sf + psi_1 * phi_1 * ct * cf)
-    frame[17] = (psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
+    frames[f, 17] = (psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
                  - theta_2 * sf - theta_1 * phi_1 * cf)
     # gravity points along global z: the third row of A
-    frame[18] = frame[9]
-    frame[19] = frame[10]
-    frame[20] = frame[11]
-    return i
+    frames[f, 18] = frames[f, 9]
+    frames[f, 19] = frames[f, 10]
+    frames[f, 20] = frames[f, 11]
+    return i, u
 
 
 @jit
@@ -126,14 +129,15 @@ def rail_state(track, cell, u, side, out):
     -------
     float : friction coefficient at this rail [1].
     """
-    c = track.rail[cell]
+    c = track.rail
     m = MU_LEFT + side
-    mu = c[m, 0] + u * (c[m, 1] + u * (c[m, 2] + u * c[m, 3]))
+    mu = c[cell, m, 0] + u * (c[cell, m, 1] + u * (c[cell, m, 2] + u * c[cell, m, 3]))
     if track.has_irregularity:
         for k in range(2):
             row = 2 * side + k
-            out[k] = c[row, 0] + u * (c[row, 1] + u * (c[row, 2] + u * c[row, 3]))
-            out[2 + k] = c[row, 1] + u * (2.0 * c[row, 2] + u * 3.0 * c[row, 3])
+            out[k] = c[cell, row, 0] + u * (c[cell, row, 1] + u * (c[cell, row, 2] + u * c[cell, row, 3]))
+            out[2 + k] = c[cell, row, 1] + u * (2.0 * c[cell, row, 2] + u * 3.0 * c[cell, row, 3])
     else:
-        out[:] = 0.0
+        for k in range(4):
+            out[k] = 0.0
     return mu
