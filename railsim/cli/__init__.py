@@ -1,0 +1,131 @@
+"""The command line: one module per command, imported when the command is called.
+
+`main` is the entry point and the one place where an exception becomes an exit status.  A command's
+module holds a click command named `command`; heavy parts of railsim are imported inside its
+function, so that ``railsim --help`` answers at once.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+import click
+
+from railsim.errors import InputError, ModelError
+from railsim.version import __version__
+
+DONE, FAILED, WRONG_INPUT, ENDED_EARLY, INTERRUPTED = 0, 1, 2, 3, 130
+
+# name of a command: its module in this package, and what it does
+COMMANDS = {
+    "run": ("run", "One vehicle on one track: one HDF5 file and the table of peaks."),
+    "study": ("study", "Every combination of vehicles, tracks and speeds."),
+    "compare": ("compare", "Results side by side: tables and overlaid plots."),
+    "plot": ("plot", "Time histories of a result; a track in plan."),
+    "animate": ("animate", "A vehicle and its contacts moving along the track."),
+    "report": ("report", "One page of inputs, tables against limits and plots."),
+    "assess": ("assess", "Running safety and ride comfort of results."),
+    "modes": ("modes", "Eigenfrequencies, damping and mode shapes of a vehicle."),
+    "critical-speed": ("critical_speed", "Linear and non-linear critical speed."),
+    "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
+    "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
+    "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),
+    "validate": ("validate", "Check files and list every fault."),
+    "info": ("info", "What a vehicle, track or result file holds, in a screenful."),
+    "bench": ("bench", "The runtime benchmark on this machine."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands that this version has."""
+        here = Path(__file__).parent
+        return [name for name, (module, _) in COMMANDS.items() if _has(here, module)]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and return a command."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        module = import_module(f"railsim.cli.{COMMANDS[cmd_name][0]}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the arguments begin with; a wrong name gets the nearest one."""
+        if args and args[0] not in self.list_commands(ctx) and not args[0].startswith("-"):
+            from railsim.errors import nearest
+
+            ctx.fail(f"no command '{args[0]}'; {nearest(args[0], self.list_commands(ctx))}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name][1]) for name in self.list_commands(ctx)])
+
+
+def _has(folder: Path, module: str) -> bool:
+    return (folder / f"{module}.py").exists() or (folder / module / "__init__.py").exists()
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="railsim")
+def railsim() -> None:
+    r"""Simulate the dynamics of rail vehicles.
+
+    \b
+    Example:
+      railsim run coach_manchester curve_r250 --speed 20
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Arguments after the program's name; by default those of the process.
+
+    Returns
+    -------
+    int
+        0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted, 1 anything
+        else.  Unforeseen exceptions pass: Python prints their traceback and ends with 1.
+    """
+    try:
+        status = _called(sys.argv[1:] if arguments is None else list(arguments))
+        sys.stdout.flush()
+        return status
+    except InputError as error:
+        for fault in error.faults:
+            click.echo(str(fault), err=True)
+        return WRONG_INPUT
+    except ModelError as error:
+        click.echo(f"railsim: {error}", err=True)
+        return WRONG_INPUT
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("railsim: interrupted", err=True)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # the reader of a pipe has seen enough; keep the interpreter from flushing into it again
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+
+
+def _called(arguments: list[str]) -> int:
+    try:
+        with railsim.make_context("railsim", arguments) as context:
+            status = railsim.invoke(context)
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except click.ClickException as error:
+        error.show()
+        return WRONG_INPUT
+    return status if isinstance(status, int) else DONE

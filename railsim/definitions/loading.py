@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from railsim.definitions import names, sources
-from railsim.definitions.base import Remark
+from railsim.definitions.base import FileDefinition, Remark
 from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
@@ -29,7 +29,7 @@ from railsim.definitions.track import TRACK_FORMAT, Track
 from railsim.definitions.vehicle import VEHICLE_FORMAT, Vehicle
 from railsim.errors import Fault, InputError, nearest
 
-D = TypeVar("D", bound=BaseModel)
+D = TypeVar("D", bound=FileDefinition)
 
 
 def _nothing(_: Any) -> list[Any]:
@@ -57,7 +57,7 @@ class Format:
     """
 
     kind: str
-    model: type[BaseModel]
+    model: type[FileDefinition]
     raw_faults: Callable[[Mapping[str, Any]], list[Fault]] = _nothing
     faults: Callable[[Any], list[Fault]] = _nothing
     remarks: Callable[[Any], list[Remark]] = _nothing
@@ -127,18 +127,20 @@ def load_track_text(text: str, file: str = "track_toml") -> Track:
     return _loaded(Track, sources.text_source(text, file, "track"), ())
 
 
-def load_any(path: str | Path) -> tuple[BaseModel, Format]:
-    """Load a file of whatever definition its `format` key names.
+def load_any(path: str | Path, overrides: Iterable[str] = ()) -> tuple[FileDefinition, Format]:
+    """Load a file of whatever definition its `format` key names, or a shipped one by its name.
 
     Raises
     ------
     InputError : everything that is wrong in it; an unknown format.
     """
-    head = sources.read_toml(Path(path)).get("format")
+    file = sources.find_any(path)
+    head = sources.read_toml(file).get("format")
     known = FORMATS.get(head) if isinstance(head, str) else None
     if known is None:
         raise InputError([_format_fault(str(path), head, FORMATS)])
-    return _loaded(known.model, _file_source(path, known.kind), ()), known
+    source = sources.read_source(file, known.kind)
+    return _loaded(known.model, source, overrides), known
 
 
 def _file_source(path: str | Path, kind: str) -> Source:
@@ -178,6 +180,8 @@ def _validation_faults(
 ) -> list[Fault]:
     faults = []
     for detail in error.errors(include_url=False):
+        if detail["type"] == "too_short" and detail["ctx"]["actual_length"] < len(detail["input"]):
+            continue  # members with faults of their own do not count
         path = _written_path(detail, source.data)
         found, allowed = _wording(detail, model)
         faults.append(Fault(source.file_of(path), ".".join(path), found, allowed))

@@ -92,6 +92,24 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     raise InputError([_no_file(name, kind, candidates[0], beside)])
 
 
+def find_any(name: str | Path) -> Path:
+    """Return the file that a path or the bare name of anything shipped means.
+
+    Raises
+    ------
+    InputError : there is no such file.
+    """
+    if Path(name).is_file():
+        return Path(name)
+    for kind in FOLDERS:
+        if str(name) in shipped_names(kind):
+            return find_file(name, kind)
+    found = f"'{name}' is a folder" if Path(name).is_dir() else f"no file '{name}'"
+    known = [name for kind in FOLDERS for name in shipped_names(kind)]
+    hint = nearest(str(name), known).removeprefix("allowed: ")
+    raise InputError([Fault(str(name), "", found, f"a path, or a shipped name: {hint}")])
+
+
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
     found = f"'{name}' is a folder" if path.is_dir() else f"no file '{name}'"
     allowed = "a path"

@@ -1,0 +1,82 @@
+"""What the commands share: options, tables, machine-readable output."""
+
+import json
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def json_option(function: F) -> F:
+    """Add ``--json`` as the argument `as_json`."""
+    return click.option(
+        "--json", "as_json", is_flag=True, help="Machine-readable results on stdout."
+    )(function)
+
+
+def quiet_option(function: F) -> F:
+    """Add ``--quiet``."""
+    return click.option("--quiet", is_flag=True, help="No progress bars and remarks.")(function)
+
+
+def overwrite_option(function: F) -> F:
+    """Add ``--overwrite``."""
+    return click.option("--overwrite", is_flag=True, help="Replace output that exists.")(function)
+
+
+def set_option(function: F) -> F:
+    """Add ``--set key.path=value``, repeatable, as the argument `assignments`."""
+    return click.option(
+        "--set",
+        "assignments",
+        multiple=True,
+        metavar="KEY.PATH=VALUE",
+        help="Replace one value of the input; may be given several times.",
+    )(function)
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON; numbers that JSON lacks become null."""
+    click.echo(json.dumps(_plain(data), indent=2, allow_nan=False))
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {str(key): _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value) for value in data]
+    if isinstance(data, float):
+        return data if abs(data) < float("inf") else None
+    return data
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1) -> list[str]:
+    r"""Return the lines of a table.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Column titles.
+    rows : sequence of sequences of str
+        Cells.
+    numbers : int
+        First column that is aligned to the right.
+
+    Examples
+    --------
+    >>> print("\n".join(table(["body", "mass"], [["frame", "2615"], ["car", "43628"]])))
+    body    mass
+    frame   2615
+    car    43628
+    """
+    widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
+    lines = []
+    for row in (header, *rows):
+        cells = [
+            cell.ljust(width) if column < numbers else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return lines

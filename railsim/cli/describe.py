@@ -1,0 +1,284 @@
+"""What vehicles, tracks and results hold, as plain data and as lines for a screen."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from railsim.cli.common import table
+
+if TYPE_CHECKING:
+    from railsim.definitions.elements import Element
+    from railsim.definitions.layout import Section
+    from railsim.definitions.track import Track
+    from railsim.definitions.vehicle import Assembly, Vehicle
+    from railsim.result import Result
+
+GRAVITY = 9.81
+CANT_BASE = 1.5
+# Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
+USUAL_CANT_DEFICIENCY = 0.150
+
+
+def _point(point: Sequence[float]) -> str:
+    return " ".join(f"{value:8.3f}" for value in point)
+
+
+# vehicles -----------------------------------------------------------------------------------------
+
+
+def vehicle_data(vehicle: "Vehicle") -> dict[str, Any]:
+    """Return a vehicle without assemblies as plain data [SI]."""
+    from railsim.definitions.flatten import flatten
+
+    flat = flatten(vehicle)
+    bodies = [
+        {
+            "name": body.name,
+            "kind": body.kind,
+            "mass": body.mass,
+            "inertia": body.inertia,
+            "position": body.position,
+            "profile": body.wheelset.profile if body.wheelset else None,
+            "radius": body.wheelset.radius if body.wheelset else None,
+            "wheelset": body.parent,
+            "pitch_inertia": body.pitch_inertia,
+        }
+        for body in flat.bodies
+    ]
+    elements = [
+        {
+            "name": element.name,
+            "bodies": (element.body1, element.body2),
+            "points": (element.point1, element.point2),
+            **element.definition.model_dump(exclude={"bodies", "points", "point", "sides"}),
+        }
+        for element in flat.elements
+    ]
+    mass = sum(body.mass for body in flat.bodies)
+    return {
+        "kind": "vehicle",
+        "name": vehicle.name,
+        "source": vehicle.source,
+        "reference": flat.reference,
+        "mass": mass,
+        "mean_wheel_load": mass * GRAVITY / (2 * len(flat.of_kind("wheelset"))),
+        "bodies": bodies,
+        "elements": elements,
+    }
+
+
+def vehicle_lines(vehicle: "Vehicle") -> list[str]:
+    """Return a vehicle in a screenful: bodies, then elements as they are written."""
+    data = vehicle_data(vehicle)
+    kinds = Counter(body["kind"] for body in data["bodies"])
+    counted = ", ".join(f"{n} {_counted_kind(kind, n)}" for kind, n in kinds.items())
+    lines = [
+        f"{vehicle.name}",
+        f"  {counted}, {len(data['elements'])} elements; mass {data['mass'] / 1e3:.3f} t; "
+        f"mean wheel load {data['mean_wheel_load'] / 1e3:.2f} kN; "
+        f"distance is that of '{data['reference']}'",
+    ]
+    lines += [f"  source: {vehicle.source}"] if vehicle.source else []
+    rows = []
+    for body in data["bodies"]:
+        inertia = body["inertia"] if body["kind"] != "axlebox" else (0, body["pitch_inertia"], 0)
+        wheels = _either(body["profile"]) if body["profile"] else body["wheelset"] or ""
+        cells = [f"{value:.0f}" for value in (body["mass"], *inertia)]
+        rows.append([body["name"], body["kind"], wheels, *cells, _point(body["position"])])
+    header = ["body", "kind", "wheels", "m kg", "Ixx", "Iyy", "Izz kg m2", "x, y, z m"]
+    lines += ["", *table(header, rows, numbers=3), ""]
+    lines += table(["element", "kind", "number", "between", "values"], _element_rows(vehicle), 9)
+    return [*lines, *_assumption_lines(vehicle)]
+
+
+def _counted_kind(kind: str, number: int) -> str:
+    words = {"body": ("body", "bodies"), "axlebox": ("axlebox", "axleboxes")}
+    return words.get(kind, (kind, f"{kind}s"))[number > 1]
+
+
+def _either(pair: Sequence[object]) -> str:
+    return str(pair[0]) if pair[0] == pair[1] else f"{pair[0]} / {pair[1]}"
+
+
+def _element_rows(
+    group: "Vehicle | Assembly", path: tuple[str, ...] = (), copies: int = 1
+) -> list[list[str]]:
+    rows = []
+    for name, element in group.elements.items():
+        number = copies * (2 if getattr(element, "sides", None) == "both" else 1)
+        between = " - ".join(element.bodies)
+        values = _values(element)
+        rows.append([".".join((*path, name)), element.kind, str(number), between, values])
+    for name, assembly in group.assemblies.items():
+        rows += _element_rows(assembly, (*path, name), copies * len(assembly.placements))
+    return rows
+
+
+def _values(element: "Element") -> str:
+    """Return the parameters that differ from their defaults, without units."""
+    given = element.model_dump(
+        exclude_defaults=True, exclude={"kind", "bodies", "points", "point", "sides"}
+    )
+    return ", ".join(f"{key} {_short(value)}" for key, value in given.items())
+
+
+def _short(value: object) -> str:
+    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
+        return f"{len(value)} rows"
+    if isinstance(value, tuple):
+        return "[" + " ".join(_short(member) for member in value) + "]"
+    return _number(value) if isinstance(value, float) else str(value)
+
+
+def _number(value: float) -> str:
+    """Write a number shortly: 31.391e6 rather than 3.1391e+07."""
+    if abs(value) < 1e5:
+        return f"{value:.6g}"
+    exponent = 3 * int(math.log10(abs(value)) // 3)
+    return f"{value / 10**exponent:.6g}e{exponent}"
+
+
+def _assumption_lines(vehicle: "Vehicle") -> list[str]:
+    from railsim.definitions.flatten import flatten
+
+    flat = flatten(vehicle)
+    found = [e.name for e in flat.elements if getattr(e.definition, "preload", 0) == "auto"]
+    if not found:
+        return []
+    text = f"preload of {len(found)} elements found so that the nominal position is in equilibrium"
+    return ["", f"assumed: {text}"]
+
+
+# tracks -------------------------------------------------------------------------------------------
+
+
+def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
+    """Return a track's elements with the speeds that suit its curves, as plain data [SI]."""
+    from railsim.definitions.layout import cant_sections, curvature_sections, gradient_sections
+
+    plan, cant = curvature_sections(track), cant_sections(track)
+    return {
+        "kind": "track",
+        "name": track.name,
+        "source": track.source,
+        "length": track.length,
+        "gauge": track.gauge,
+        "rail": track.rail,
+        "inclination": track.inclination,
+        "friction": track.friction,
+        "rounding": track.rounding,
+        "plan": [_plan_row(section, cant, speeds) for section in plan],
+        "cant": [_row(section) for section in cant],
+        "vertical": [_row(section) for section in gradient_sections(track)],
+    }
+
+
+def _row(section: "Section") -> dict[str, Any]:
+    return {
+        "type": section.type,
+        "begin": section.begin,
+        "end": section.end,
+        "values": (section.start_value, section.end_value),
+    }
+
+
+def _plan_row(
+    section: "Section", cant: Sequence["Section"], speeds: Sequence[float]
+) -> dict[str, Any]:
+    row = _row(section)
+    kappa = max(section.start_value, section.end_value, key=abs)
+    height = _cant_at(cant, 0.5 * (section.begin + section.end))
+    row["radii"] = tuple(1.0 / k if k else math.inf for k in row.pop("values"))
+    row["cant"] = tuple(_cant_at(cant, s) for s in (section.begin, section.end))
+    if section.type == "CIR" and kappa:
+        outwards = height if kappa > 0.0 else -height
+        row["balanced_speed"] = _speed(outwards, kappa)
+        row["usual_speed"] = _speed(outwards + USUAL_CANT_DEFICIENCY, kappa)
+        row["cant_deficiency"] = {
+            speed: CANT_BASE * speed**2 * abs(kappa) / GRAVITY - outwards for speed in speeds
+        }
+    return row
+
+
+def _speed(cant: float, kappa: float) -> float:
+    """Speed at which a cant balances the curve's acceleration on the cant base [m/s]."""
+    return math.sqrt(max(cant, 0.0) * GRAVITY / (CANT_BASE * abs(kappa)))
+
+
+def _cant_at(cant: Sequence["Section"], s: float) -> float:
+    for section in cant:
+        if s < section.end:
+            return section.value(s)
+    return cant[-1].end_value if cant else 0.0
+
+
+def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
+    """Return a track in a screenful: plan with cant, speeds of the curves, vertical profile."""
+    data = track_data(track, speeds)
+    lines = [
+        f"{track.name}",
+        f"  {track.length:g} m, gauge {1e3 * track.gauge:g} mm, rail {_either(track.rail)} "
+        f"1:{1.0 / track.inclination if track.inclination else math.inf:g}, "
+        f"friction {_either(track.friction)}, rounded over {track.rounding:g} m",
+    ]
+    lines += [f"  source: {track.source}"] if track.source else []
+    header = ["plan", "from m", "to m", "radius m", "cant mm", "balanced at", "150 mm at"]
+    header += [f"{speed:g} m/s" for speed in speeds]
+    rows = [_plan_cells(row, speeds) for row in data["plan"]]
+    lines += ["", *table(header, rows)]
+    if speeds and any("cant_deficiency" in row for row in data["plan"]):
+        lines.append("columns of speeds: cant deficiency in mm")
+    vertical = [
+        [row["type"], f"{row['begin']:g}", f"{row['end']:g}", _range(row["values"], 1e3)]
+        for row in data["vertical"]
+    ]
+    if vertical:
+        lines += ["", *table(["vertical", "from m", "to m", "gradient per mille"], vertical)]
+    return lines
+
+
+def _plan_cells(row: dict[str, Any], speeds: Sequence[float]) -> list[str]:
+    cells = [row["type"], f"{row['begin']:g}", f"{row['end']:g}"]
+    cells += [_range(row["radii"], 1.0), _range(row["cant"], 1e3)]
+    if "balanced_speed" not in row:
+        return [*cells, "", "", *("" for _ in speeds)]
+    cells += [f"{row['balanced_speed']:.1f} m/s", f"{row['usual_speed']:.1f} m/s"]
+    return [*cells, *(f"{1e3 * row['cant_deficiency'][speed]:.0f}" for speed in speeds)]
+
+
+def _range(values: Sequence[float], scale: float) -> str:
+    written = [f"{scale * value:g}" for value in values]
+    return written[0] if written[0] == written[1] else " to ".join(written)
+
+
+# results -----------------------------------------------------------------------------
+
+
+def result_data(result: "Result") -> dict[str, Any]:
+    """Return what a result holds, without its arrays."""
+    inputs = ("vehicle_toml", "track_toml", "settings_json")
+    attributes = {k: v for k, v in result.attributes.items() if k not in inputs}
+    quantities = {
+        name: {"dims": quantity.dims, "shape": result[name].shape, "unit": quantity.unit}
+        for name, quantity in result.quantities.items()
+    }
+    coordinates = {name: list(labels) for name, labels in result.coordinates.items()}
+    return {
+        "kind": "result",
+        "attributes": attributes,
+        "coordinates": coordinates,
+        "quantities": quantities,
+    }
+
+
+def result_lines(result: "Result") -> list[str]:
+    """Return a result in a screenful: facts about the run, dimensions, quantities."""
+    data = result_data(result)
+    lines = [f"{name:18} {value}" for name, value in data["attributes"].items()]
+    lines += ["", *(f"{k:18} {', '.join(names)}" for k, names in data["coordinates"].items())]
+    rows = [
+        [name, ", ".join(q["dims"]), " x ".join(str(n) for n in q["shape"]), q["unit"]]
+        for name, q in data["quantities"].items()
+    ]
+    return [*lines, "", *table(["quantity", "dimensions", "shape", "unit"], rows, numbers=4)]
