@@ -244,7 +244,8 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
             faults.append(Fault("", key, found, "wheelsets one behind the other"))
     for group, place in _places(vehicle, _Place()):
         faults += _side_faults(group, place)
-    return list(dict.fromkeys(faults))
+    # a definition that stands several times is told of once
+    return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
 
 def _keys(vehicle: Vehicle) -> dict[str, str]:

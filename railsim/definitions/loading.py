@@ -216,31 +216,38 @@ def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
     """Return what was found and what is allowed, in words."""
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     message = detail["msg"].replace("Input should be", "must be")
-    if kind == "missing":
-        return _missing(detail, model)
-    if kind == "extra_forbidden":
-        return "unknown key", nearest(str(detail["loc"][-1]), _fields(model, detail["loc"][:-1]))
-    if kind == "union_tag_invalid":
-        tags = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
-        return f"unknown {context['discriminator']} {context['tag']!r}", nearest(
-            context["tag"], tags
-        )
-    if kind == "union_tag_not_found":
-        return f"no key {context['discriminator']}", "it tells what the table describes"
-    if kind == "string_pattern_mismatch":
-        return repr(value), "a name: letters, digits, _ and -, beginning with a letter"
-    if kind == "value_error":
-        message = message.removeprefix("Value error, ")
-    if isinstance(value, dict | list | tuple) and kind == "value_error":
-        return message, ""
+    match kind:
+        case "missing":
+            return _missing(detail, model)
+        case "extra_forbidden":
+            fields = _fields(_annotation_at(model, detail["loc"][:-1]))
+            return "unknown key", nearest(str(detail["loc"][-1]), fields)
+        case "union_tag_invalid":
+            tags = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
+            found = f"unknown {context['discriminator']} {context['tag']!r}"
+            return found, nearest(context["tag"], tags)
+        case "union_tag_not_found":
+            return f"no key {context['discriminator']}", "it tells what the table describes"
+        case "string_pattern_mismatch":
+            return repr(value), "a name: letters, digits, _ and -, beginning with a letter"
+        case "tuple_type":
+            return _shown(value), _list_of(_annotation_at(model, detail["loc"]))
+        case "too_long" | "too_short" if isinstance(value, list | tuple):
+            return _counted(value), _list_of(_annotation_at(model, detail["loc"]))
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return _shown(value), "must be a table"
+        case "value_error":
+            message = message.removeprefix("Value error, ")
+            if isinstance(value, dict | list | tuple):
+                return message, ""
     return _shown(value), message
 
 
 def _missing(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
     if isinstance(detail["input"], list | tuple):
-        return f"{len(detail['input'])} values", "more values are needed here"
+        return _counted(detail["input"]), _list_of(_annotation_at(model, detail["loc"][:-1]))
     *parents, name = detail["loc"]
-    field = _fields(model, tuple(parents)).get(str(name))
+    field = _fields(_annotation_at(model, parents)).get(str(name))
     meaning = " ".join(field.description.split()) if field and field.description else ""
     return "missing", f"needed: {meaning}" if meaning else "needed"
 
@@ -250,28 +257,43 @@ def _shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _fields(annotation: Any, location: Sequence[str | int]) -> Mapping[str, Any]:
-    """Return the fields of the definition at a location of the validator."""
-    if typing.get_origin(annotation) is typing.Annotated:
-        return _fields(typing.get_args(annotation)[0], location)
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        fields = annotation.model_fields
-        if not location:
-            return fields
-        field = fields.get(str(location[0]))
-        return _fields(field.annotation, location[1:]) if field else {}
+def _counted(value: Sequence[object]) -> str:
+    return f"{len(value)} value" if len(value) == 1 else f"{len(value)} values"
+
+
+def _list_of(annotation: Any) -> str:
     members = typing.get_args(annotation)
-    if not location or not members:
-        return {}
+    if typing.get_origin(annotation) is not tuple or Ellipsis in members:
+        return "a list"
+    return f"a list of {len(members)}"
+
+
+def _fields(annotation: Any) -> Mapping[str, Any]:
+    """Return the fields of a definition, none where it is something else."""
+    is_model = isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return annotation.model_fields if is_model else {}
+
+
+def _annotation_at(annotation: Any, location: Sequence[str | int]) -> Any:
+    """Return the type that is expected at a location of the validator; None where unknown."""
+    if typing.get_origin(annotation) is typing.Annotated:
+        return _annotation_at(typing.get_args(annotation)[0], location)
+    if not location:
+        return annotation
+    step, *rest = location
+    if fields := _fields(annotation):
+        field = fields.get(str(step))
+        return _annotation_at(field.annotation, rest) if field else None
+    members = [m for m in typing.get_args(annotation) if m is not type(None)]
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
-        for member in members:
-            found = _fields(member, location[1:] if _tag(member) == location[0] else location)
-            if found and _tag(member) in (location[0], None):
-                return found
-        return {}
-    return _fields(
-        members[-1] if typing.get_origin(annotation) is dict else members[0], location[1:]
-    )
+        chosen = [member for member in members if _tag(member) == step]
+        if chosen:
+            return _annotation_at(chosen[0], rest)
+        return _annotation_at(members[0], location) if len(members) == 1 else None
+    if not members:
+        return None
+    inner = members[-1] if typing.get_origin(annotation) is dict else members[0]
+    return _annotation_at(inner, rest)
 
 
 def _tag(member: Any) -> str | None:
@@ -280,6 +302,6 @@ def _tag(member: Any) -> str | None:
         return None
     for key in ("kind", "type"):
         field = member.model_fields.get(key)
-        if field is not None:
+        if field is not None and typing.get_origin(field.annotation) is typing.Literal:
             return str(typing.get_args(field.annotation)[0])
     return None

@@ -86,9 +86,13 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
         candidates.append(folder / f"{name}.toml")
     if kind in FOLDERS:
         candidates.append(shipped_folder(kind) / f"{name}.toml")
-    for candidate in candidates:
-        if candidate.is_file():
+    found = [candidate for candidate in candidates if candidate.is_file()]
+    for candidate in found:
+        # a file that extends its own name means the shipped one
+        if beside is None or candidate.resolve() != beside.resolve():
             return candidate
+    if found:
+        return found[0]
     raise InputError([_no_file(name, kind, candidates[0], beside)])
 
 
@@ -395,7 +399,7 @@ def _value(written: str, text_expected: bool) -> Any:
         if not written or written[0] in "[{\"'":
             raise KeyError(f"the value '{written}' is no TOML") from None
         return written
-    return written if text_expected and not isinstance(value, str) else value
+    return written if text_expected and not isinstance(value, str | list | dict) else value
 
 
 def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:

@@ -1,0 +1,97 @@
+"""``railsim info``: what files hold, in a screenful."""
+
+import json
+import math
+
+import pytest
+from example_result import example_result
+
+from railsim import cli
+
+
+def lines_of(capsys, *arguments):
+    assert cli.main(["info", *arguments]) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def data_of(capsys, *arguments):
+    return json.loads("\n".join(lines_of(capsys, "--json", *arguments)))
+
+
+def test_vehicle_fits_on_a_screen(capsys):
+    lines = lines_of(capsys, "coach_manchester")
+    assert len(lines) < 40
+    text = "\n".join(lines)
+    for part in ("56.110 t", "front.outer.wheelset", "S1002", "bogie.axle.primary", "bump_stop"):
+        assert part in text
+    assert "preload of 12 elements" in lines[-1]
+
+
+def test_vehicle_as_json_is_placed_and_mirrored(capsys):
+    data = data_of(capsys, "coach_manchester")
+    assert data["mass"] == pytest.approx(56110.0)
+    # all of the weight on eight wheels
+    assert data["mean_wheel_load"] == pytest.approx(56110.0 * 9.81 / 8.0)
+    wheelsets = [body["name"] for body in data["bodies"] if body["kind"] == "wheelset"]
+    assert wheelsets[0] == "front.outer.wheelset"
+    assert len(data["elements"]) == 34
+
+
+def test_value_can_be_replaced_before_looking(capsys):
+    data = data_of(capsys, "coach_manchester", "--set", "bodies.carbody.mass=40000")
+    assert data["bodies"][0]["mass"] == 40000.0
+
+
+def test_track_shows_curves_with_their_speeds(capsys):
+    lines = lines_of(capsys, "curve_r250", "--speed", "20")
+    circle = next(line for line in lines if line.startswith("CIR"))
+    # balanced: sqrt(0.15 * 9.81 / 1.5 * 250) = 15.66 m/s; at 20 m/s 244.6 - 150 mm are missing
+    assert circle.split() == ["CIR", "360", "420", "250", "150", "15.7", "m/s", "22.1", "m/s", "95"]
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_cant_deficiency_is_positive_outwards_on_either_hand(capsys, direction):
+    sets = [f"plan.2.radius={250.0 * direction}", f"cant.2.cant={0.15 * direction}"]
+    options = [text for pair in sets for text in ("--set", pair)]
+    data = data_of(capsys, "curve_r250", "--speed", "20", *options)
+    circle = data["plan"][2]
+    assert circle["cant_deficiency"]["20.0"] == pytest.approx(1.5 * 400 / 250 / 9.81 - 0.15)
+    assert circle["balanced_speed"] == pytest.approx(math.sqrt(0.15 * 9.81 / 1.5 * 250.0))
+    assert data["plan"][0]["radii"] == [None, None]  # infinite
+
+
+def test_gradients_are_shown(capsys, tmp_path):
+    path = tmp_path / "hill.toml"
+    path.write_text(
+        'format = "railsim-track/1"\nname = "hill"\nplan = [{type="STR", length=300.0}]\n'
+        'vertical = [{type="CST", length=100.0, gradient=0.0}, {type="LIR", length=100.0},'
+        '{type="CST", length=100.0, gradient=0.01}]\n'
+    )
+    assert any("0 to 10" in line for line in lines_of(capsys, str(path)))
+
+
+def test_remarks_are_shown(capsys):
+    lines = lines_of(capsys, "curve_r250", "--set", "rounding=80.0")
+    assert any(line.startswith("remark: plan.1") for line in lines)
+
+
+def test_spring_file_is_shown(capsys):
+    assert "railsim-spring/1" in lines_of(capsys, "turasas_axlebox")[0]
+
+
+def test_wrong_file_is_status_2(capsys, tmp_path):
+    assert cli.main(["info", str(tmp_path)]) == 2
+    assert cli.main(["info", "curve_r250", "--speed", "0"]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_result_shows_status_dimensions_and_units(capsys, tmp_path):
+    path = str(example_result().to_hdf5(tmp_path / "example.h5"))
+    lines = lines_of(capsys, path)
+    assert any(line.split() == ["status", "complete"] for line in lines)
+    row = next(line for line in lines if line.startswith("Q "))
+    assert "time, wheelset, side" in row
+    assert row.endswith("N")
+    data = data_of(capsys, path)
+    assert data["quantities"]["sum_Y"]["dims"] == ["time", "wheelset"]
+    assert "vehicle_toml" not in data["attributes"]

@@ -1,0 +1,155 @@
+"""``railsim validate`` and the exit status of the command line as a whole."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+import click
+import pytest
+
+from railsim import cli
+from railsim.errors import ModelError
+from railsim.version import __version__
+
+COACH = 'format = "railsim-vehicle/1"\nname = "mine"\nextends = "coach_manchester"\n'
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(name, text):
+        path = tmp_path / name
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def test_good_files_pass(capsys):
+    assert cli.main(["validate", "coach_manchester", "benchmark_vehicle1", "curve_r250"]) == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines() == [
+        "coach_manchester: vehicle, no faults",
+        "benchmark_vehicle1: vehicle, no faults",
+        "curve_r250: track, no faults",
+    ]
+    assert err == ""
+
+
+def test_every_fault_is_one_line_on_stderr(write, capsys):
+    path = write("mine.toml", COACH + "[bodies.carbody]\nmass = -1\nmas = 2\n")
+    assert cli.main(["validate", path, "curve_r250"]) == 2
+    out, err = capsys.readouterr()
+    assert len(err.splitlines()) == 2
+    assert all(line.startswith(path) for line in err.splitlines())
+    assert out == "curve_r250: track, no faults\n"
+
+
+def test_json_lists_faults_and_remarks(write, capsys):
+    bad = write("bad.toml", COACH + "[bodies.carbody]\nmass = -1\n")
+    track = 'format = "railsim-track/1"\nname = "t"\n'
+    plan = 'plan = [{type="STR", length=50.0}, {type="CIR", length=50.0, radius=300.0}]\n'
+    odd = write("odd.toml", track + plan)
+    assert cli.main(["validate", "--json", bad, odd]) == 2
+    out, err = capsys.readouterr()
+    reports = json.loads(out)
+    assert err == ""
+    assert reports[0]["faults"][0]["key"] == "bodies.carbody.mass"
+    assert reports[1]["faults"] == []
+    assert "without a transition" in reports[1]["remarks"][0]["text"]
+
+
+def test_unknown_profile_is_a_fault_of_the_key_that_names_it(write, capsys):
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset"
+    path = write("mine.toml", COACH + f'[{key}]\nprofile = "S1003"\n')
+    assert cli.main(["validate", path]) == 2
+    err = capsys.readouterr().err
+    assert f"{path}: {key}.profile: profile 'S1003'" in err
+
+
+def test_wheel_profile_on_the_rail_is_a_fault(write, capsys):
+    text = 'format = "railsim-track/1"\nname = "t"\nrail = "S1002"\n'
+    path = write("t.toml", text + 'plan = [{type="STR", length=50.0}]\n')
+    assert cli.main(["validate", path]) == 2
+    assert f"{path}: rail: profile 'S1002'" in capsys.readouterr().err
+
+
+def test_missing_file_is_a_fault(capsys):
+    assert cli.main(["validate", "nowhere.toml", "curve_r25"]) == 2
+    err = capsys.readouterr().err
+    assert "nowhere.toml: no file" in err
+    assert "curve_r250" in err
+
+
+# the command line as a whole ----------------------------------------------------------------------
+
+
+def test_help_answers_at_once_and_loads_nothing_heavy():
+    code = (
+        "import sys; from railsim.cli import main; main(['--help']);"
+        "heavy = {'numba', 'matplotlib', 'pydantic', 'numpy', 'h5py'} & set(sys.modules);"
+        "sys.exit(f'{heavy} loaded' if heavy else 0)"
+    )
+    begin = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    # 0.3 s on a free machine; tests share theirs
+    assert time.perf_counter() - begin < 1.0
+    assert done.returncode == 0, done.stderr
+    assert "validate" in done.stdout
+
+
+@pytest.mark.parametrize("command", cli.railsim.list_commands(click.Context(cli.railsim)))
+def test_every_command_has_help_with_an_example(command, capsys):
+    assert cli.main([command, "--help"]) == 0
+    assert "railsim " + command in capsys.readouterr().out.split("Usage", 1)[1]
+
+
+def test_version(capsys):
+    assert cli.main(["--version"]) == 0
+    assert __version__ in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments", [["validat"], ["validate"], ["validate", "--nothing"], ["info"], []]
+)
+def test_wrong_usage_is_status_2(arguments, capsys):
+    assert cli.main(arguments) == 2
+    assert "Usage" in capsys.readouterr().err
+
+
+def test_wrong_command_gets_the_nearest_one(capsys):
+    assert cli.main(["validat", "x"]) == 2
+    assert "did you mean 'validate'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [(KeyboardInterrupt(), 130), (click.Abort(), 130), (ModelError("too much"), 2)],
+)
+def test_exception_becomes_an_exit_status(error, status, monkeypatch, capsys):
+    def failing(*_):
+        raise error
+
+    monkeypatch.setattr("railsim.cli.validate._report", failing)
+    assert cli.main(["validate", "x"]) == status
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_unforeseen_exception_keeps_its_traceback(monkeypatch):
+    def failing(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("railsim.cli.validate._report", failing)
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["validate", "x"])
+
+
+def test_reader_that_closes_the_pipe_is_no_error():
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "railsim", "info", "coach_manchester"]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    assert done.returncode == 0
+    assert done.stderr == b""

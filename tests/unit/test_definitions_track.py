@@ -1,0 +1,165 @@
+"""Track and settings definitions: open ends, contradictions, and what is worth a remark."""
+
+import pytest
+from pydantic import ValidationError
+
+from railsim.definitions.layout import (
+    cant_sections,
+    curvature_sections,
+    track_faults,
+    track_remarks,
+)
+from railsim.definitions.loading import load_track
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.errors import InputError
+from railsim.track.alignment import Alignment
+
+STRAIGHT = {"type": "STR", "length": 100.0}
+CLOTHOID = {"type": "CLO", "length": 50.0}
+CIRCLE = {"type": "CIR", "length": 80.0, "radius": 300.0}
+LEVEL = {"type": "CST", "length": 100.0, "cant": 0.0}
+RAMP = {"type": "LIR", "length": 50.0}
+CANTED = {"type": "CST", "length": 80.0, "cant": 0.1}
+
+
+def track(plan, cant=(), **more):
+    return Track(format="railsim-track/1", name="t", plan=plan, cant=cant, **more)
+
+
+def test_transition_takes_its_ends_from_its_neighbours():
+    sections = curvature_sections(track([STRAIGHT, CLOTHOID, CIRCLE]))
+    assert (sections[1].start_value, sections[1].end_value) == (0.0, 1.0 / 300.0)
+    assert (sections[1].begin, sections[1].end) == (100.0, 150.0)
+
+
+def test_transition_between_two_curves_leads_from_one_to_the_other():
+    left = {**CIRCLE, "radius": -500.0}
+    section = curvature_sections(track([CIRCLE, CLOTHOID, left]))[1]
+    assert (section.start_value, section.end_value) == (1.0 / 300.0, -1.0 / 500.0)
+
+
+def test_two_transitions_meet_at_a_given_radius():
+    first = {**CLOTHOID, "radius_end": 600.0}
+    sections = curvature_sections(track([STRAIGHT, first, CLOTHOID, CIRCLE]))
+    assert sections[2].start_value == 1.0 / 600.0
+
+
+@pytest.mark.parametrize(
+    ("plan", "cant", "expected"),
+    [
+        ([CLOTHOID, CIRCLE], [], "plan.0: the start of the CLO is open"),
+        ([CIRCLE, CLOTHOID], [], "plan.1: the end of the CLO is open"),
+        ([STRAIGHT, CLOTHOID, CLOTHOID, CIRCLE], [], "plan.1: the end of the CLO is open"),
+        (
+            [STRAIGHT, {**CLOTHOID, "radius_end": 250.0}, CIRCLE],
+            [],
+            "plan.1.radius_end: 250 m, the element behind has 300 m",
+        ),
+        (
+            [STRAIGHT, {**CLOTHOID, "radius_start": 900.0}, CIRCLE],
+            [],
+            "plan.1.radius_start: 900 m, the element before has inf",
+        ),
+        ([STRAIGHT], [LEVEL, CANTED], "cant.1: the cant steps from 0 to 0.1 m"),
+        ([STRAIGHT], [LEVEL, {**RAMP, "cant_end": 0.2}, CANTED], "cant.1.cant_end: 0.2"),
+        ([STRAIGHT], [LEVEL, RAMP], "cant.1: the end of the LIR is open"),
+    ],
+)
+def test_contradicting_track_is_refused(plan, cant, expected):
+    faults = [str(fault) for fault in track_faults(track(plan, cant))]
+    assert any(expected in fault for fault in faults), faults
+    with pytest.raises(InputError):
+        Alignment(track(plan, cant))
+
+
+@pytest.mark.parametrize(
+    ("plan", "cant", "more", "expected"),
+    [
+        ([STRAIGHT, CIRCLE], [], {}, "without a transition"),
+        ([STRAIGHT], [CANTED], {}, "cant without curve: 100 mm"),
+        ([CIRCLE], [{**CANTED, "cant": -0.1}], {}, "cant on the wrong side"),
+        ([CIRCLE], [{**CANTED, "cant": 0.25}], {}, "a cant of 250 mm"),
+        ([CIRCLE], [{**CANTED, "length": 90.0}], {}, "longer (90 m) than the plan (80 m)"),
+        ([CIRCLE], [CANTED, {**RAMP, "length": 20.0, "cant_end": 0.0}], {}, "5.00 mm/m"),
+        ([STRAIGHT, CLOTHOID, CIRCLE], [], {"rounding": 60.0}, "shorter (50 m) than the rounding"),
+        (
+            [STRAIGHT],
+            [],
+            {"vertical": [{"type": "CST", "length": 50.0, "gradient": g} for g in (0.0, 0.01)]},
+            "the gradient steps",
+        ),
+    ],
+)
+def test_unusual_track_is_remarked_on(plan, cant, more, expected):
+    unusual = track(plan, cant, **more)
+    assert track_faults(unusual) == []
+    remarks = [str(remark) for remark in track_remarks(unusual)]
+    assert any(expected in remark for remark in remarks), remarks
+
+
+@pytest.mark.parametrize("name", ["straight", "curve_r250", "curve_r500"])
+def test_shipped_track_gives_no_cause_for_remarks(name):
+    assert track_remarks(load_track(name)) == []
+
+
+def test_cant_list_shorter_than_the_plan_is_usual():
+    track_ = track([CIRCLE, {**CIRCLE, "length": 500.0}], [CANTED])
+    assert track_remarks(track_) == []
+    assert cant_sections(track_)[-1].end == 80.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"plan": []},
+        {"plan": [{**STRAIGHT, "length": 0.0}]},
+        {"plan": [{**STRAIGHT, "length": -5.0}]},
+        {"plan": [{**STRAIGHT, "length": float("inf")}]},
+        {"plan": [{**STRAIGHT, "radius": 100.0}]},
+        {"plan": [{**CIRCLE, "radius": 0.0}]},
+        {"plan": [{**CIRCLE, "radius": float("nan")}]},
+        {"plan": [{"type": "CIR", "length": 3.0}]},
+        {"cant": [{**CANTED, "cant": 150.0}]},
+        {"gauge": 1435.0},
+        {"inclination": 40.0},
+        {"friction": -0.1},
+        {"friction": [0.1, 0.2, 0.3]},
+        {"rounding": -1.0},
+        {"cant_rotation": "outer"},
+        {"vertical": [{"type": "CST", "length": 5.0, "gradient": 12.0}]},
+    ],
+)
+def test_wrong_value_is_refused(change):
+    with pytest.raises(ValidationError):
+        track(**{"plan": [STRAIGHT], **change})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"scheme": "euler"},
+        {"step": 0.0},
+        {"output_rate": -1.0},
+        {"fastsim_grid": [0, 10]},
+        {"fastsim_grid": [10.5, 10]},
+        {"poisson": 0.5},
+        {"contact_damping": -1.0},
+        {"initial": {"frame": {"w": 1.0}}},
+    ],
+)
+def test_wrong_setting_is_refused(change):
+    with pytest.raises(ValidationError):
+        Settings.model_validate(change)
+
+
+def test_settings_have_defaults_and_read_back():
+    assert Settings().fastsim_grid == (10, 10)
+    assert "fastsim_grid" in Settings().to_toml()
+
+
+def test_replace_validates_the_copy():
+    straight = track([STRAIGHT])
+    assert straight.replace(friction=0.2).friction == (0.2, 0.2)
+    with pytest.raises(ValidationError):
+        straight.replace(friction=-0.2)

@@ -1,0 +1,272 @@
+"""Vehicle definitions: what is refused, how assemblies are placed, mirrored and named."""
+
+import pytest
+from pydantic import ValidationError
+
+from railsim.definitions.elements import two_sided
+from railsim.definitions.flatten import flatten
+from railsim.definitions.loading import load_vehicle, load_vehicle_text
+from railsim.definitions.names import resolve
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError
+
+BODY = {"mass": 10.0, "inertia": [1.0, 1.0, 1.0], "position": [0.0, 0.0, -0.6]}
+WHEELSET = {
+    "mass": 1000.0,
+    "inertia": [600.0, 80.0, 600.0],
+    "position": [0.0, 0.0, -0.46],
+    "radius": 0.46,
+    "profile": "S1002",
+}
+
+
+def vehicle(**parts):
+    return Vehicle.model_validate({"format": "railsim-vehicle/1", "name": "test", **parts})
+
+
+def faults_of(definition):
+    with pytest.raises(InputError) as caught:
+        flatten(definition)
+    return [str(fault) for fault in caught.value.faults]
+
+
+def wagon(element=None, **more):
+    """Frame on two wheelsets, with one element between the frame and the leading wheelset."""
+    rear = {**WHEELSET, "position": [-2.0, 0.0, -0.46]}
+    front = {**WHEELSET, "position": [2.0, 0.0, -0.46]}
+    elements = {"link": element} if element else {}
+    parts = {
+        "bodies": {"frame": BODY},
+        "wheelsets": {"rear": rear, "front": front},
+        "elements": elements,
+    }
+    return vehicle(**{**parts, **more})
+
+
+def bushing(**more):
+    return {"kind": "bushing", "bodies": ["frame", "front"], "point": [2.0, 1.0, -0.5], **more}
+
+
+def test_wheelsets_are_ordered_from_the_leading_end():
+    flat = flatten(wagon())
+    assert [body.name for body in flat.bodies] == ["frame", "front", "rear"]
+    assert flat.reference == "frame"
+
+
+def test_a_single_wheelset_is_a_vehicle():
+    flat = flatten(vehicle(wheelsets={"axle": WHEELSET}))
+    assert flat.reference == "axle"
+
+
+def test_number_given_once_holds_for_both_sides():
+    flat = flatten(vehicle(wheelsets={"axle": {**WHEELSET, "profile": ["S1002", "worn.csv"]}}))
+    definition = flat.bodies[0].wheelset
+    assert definition.radius == (0.46, 0.46)
+    assert definition.profile == ("S1002", "worn.csv")
+
+
+def test_left_copy_is_the_mirror_image():
+    element = bushing(sides="both", preload=[1.0, 2.0, -3.0])
+    left, right = flatten(wagon(element)).elements
+    assert (left.name, right.name) == ("link.left", "link.right")
+    assert left.point1 == (2.0, -1.0, -0.5)
+    assert right.point1 == (2.0, 1.0, -0.5)
+    assert right.definition.preload == (1.0, 2.0, -3.0)
+    assert left.definition.preload == (1.0, -2.0, -3.0)
+
+
+def assembly_of_assemblies():
+    """Two bogies of two axles each; every inner assembly is mirrored in its second place."""
+    axle = {
+        "placements": [
+            {"name": "outer", "position": [1.0, 0.0, 0.0]},
+            {"name": "inner", "position": [-1.0, 0.0, 0.0], "mirror": True},
+        ],
+        "wheelsets": {"wheelset": WHEELSET},
+        "elements": {
+            "rod": bushing(
+                bodies=["frame", "wheelset"],
+                point=[0.2, 1.0, -0.46],
+                sides="both",
+                preload=[5.0, 1.0, 0.0],
+            )
+        },
+    }
+    bogie = {
+        "placements": [
+            {"name": "front", "position": [9.0, 0.0, 0.0]},
+            {"name": "rear", "position": [-9.0, 0.0, 0.0], "mirror": True},
+        ],
+        "bodies": {"frame": BODY},
+        "assemblies": {"axle": axle},
+    }
+    return vehicle(bodies={"car": BODY}, assemblies={"bogie": bogie})
+
+
+def test_nested_mirrors_compose():
+    flat = flatten(assembly_of_assemblies())
+    x = {body.name: body.position[0] for body in flat.of_kind("wheelset")}
+    assert x == {
+        "front.outer.wheelset": 10.0,
+        "front.inner.wheelset": 8.0,
+        "rear.inner.wheelset": -8.0,
+        "rear.outer.wheelset": -10.0,
+    }
+    right = {e.name: e for e in flat.elements if e.name.endswith("right")}
+    signs = {
+        "front.outer": 1.0,
+        "front.inner": -1.0,
+        "rear.inner": 1.0,  # mirrored twice
+        "rear.outer": -1.0,
+    }
+    for place, sign in signs.items():
+        element = right[f"{place}.rod.right"]
+        assert element.definition.preload == (5.0 * sign, 1.0, 0.0)
+        assert element.point1[0] == pytest.approx(x[f"{place}.wheelset"] + sign * 0.2, abs=1e-15)
+        assert element.body1 == f"{place.split('.')[0]}.frame"
+
+
+def test_names_resolve_from_the_innermost_assembly_outwards():
+    known = dict.fromkeys(["frame", "front.frame", "front.outer.box.left", "car"])
+    assert resolve("frame", ("front", "outer"), None, known) == "front.frame"
+    assert resolve("frame", (), None, known) == "frame"
+    assert resolve("car", ("front", "outer"), None, known) == "car"
+    assert resolve("front.frame", ("rear",), None, known) == "front.frame"
+    assert resolve("box", ("front", "outer"), "left", known) == "front.outer.box.left"
+    assert resolve("box", ("front", "outer"), None, known) is None
+
+
+def with_axleboxes(**element):
+    box = {
+        "wheelset": "front",
+        "position": [2.0, 1.0, -0.46],
+        "pitch_inertia": 10.0,
+        "sides": "both",
+    }
+    return wagon({**bushing(bodies=["frame", "box"]), **element}, axleboxes={"box": box})
+
+
+def test_sided_element_takes_the_axlebox_of_its_side():
+    flat = flatten(with_axleboxes(sides="both"))
+    assert [e.body2 for e in flat.elements] == ["box.left", "box.right"]
+    boxes = flat.of_kind("axlebox")
+    assert [box.name for box in boxes] == ["box.left", "box.right"]
+    assert [box.position[1] for box in boxes] == [-1.0, 1.0]
+    assert {box.parent for box in boxes} == {"front"}
+
+
+def test_element_without_side_must_say_which_axlebox():
+    (fault,) = faults_of(with_axleboxes())
+    assert "elements.link.bodies.1: no body 'box'" in fault
+    assert "box.left" in fault
+
+
+def test_element_without_points_stands_at_its_bodies():
+    bar = {"kind": "roll_bar", "bodies": ["frame", "front"], "stiffness": 1.0}
+    (element,) = flatten(wagon(bar)).elements
+    assert element.point1 == (0.0, 0.0, -0.6)
+    assert element.point2 == (2.0, 0.0, -0.46)
+
+
+@pytest.mark.parametrize(
+    ("parts", "expected"),
+    [
+        ({"bodies": {"frame": BODY}}, "a vehicle needs one at least"),
+        ({"wheelsets": {"a": WHEELSET}, "reference": "b"}, "no body 'b'"),
+        ({"wheelsets": {"a": WHEELSET, "b": WHEELSET}}, "stand at the same place"),
+        ({"wheelsets": {"a": {**WHEELSET, "radius": 0.5}}}, "z = -0.5 m"),
+        ({"wheelsets": {"a": WHEELSET}, "bodies": {"a": BODY}}, "the name 'a' is used twice"),
+    ],
+)
+def test_vehicle_that_does_not_hang_together_is_refused(parts, expected):
+    assert any(expected in fault for fault in faults_of(vehicle(**parts)))
+
+
+@pytest.mark.parametrize(
+    ("element", "expected"),
+    [
+        (bushing(bodies=["frame", "fromt"]), "did you mean 'front'?"),
+        (bushing(bodies=["frame", "frame"]), "both ends are on 'frame'"),
+        (bushing(point=[2.0, -1.0, -0.5], sides="both"), "not on the right"),
+    ],
+)
+def test_element_that_does_not_fit_is_refused(element, expected):
+    (fault,) = faults_of(wagon(element))
+    assert expected in fault
+    assert "elements.link" in fault
+
+
+def test_same_placement_name_in_two_assemblies_is_refused():
+    group = {"placements": [{"name": "front"}], "bodies": {"frame": BODY}}
+    parts = {"wheelsets": {"a": WHEELSET}, "assemblies": {"one": group, "two": group}}
+    assert any("'front.frame' is used twice" in fault for fault in faults_of(vehicle(**parts)))
+
+
+DAMPER = {"kind": "spring_damper", "bodies": ["a", "b"], "points": [[0, 0, 0], [0, 0, -1]]}
+
+
+@pytest.mark.parametrize(
+    "element",
+    [
+        {**DAMPER, "stiffness": -1.0},
+        {**DAMPER, "stiffness": True},
+        {**DAMPER, "stiffness": "1"},
+        {**DAMPER, "stiffness": float("nan")},
+        {**DAMPER, "stiffness": float("inf")},
+        {**DAMPER, "points": [[0, 0, 0], [0, 0, 0]]},
+        {**DAMPER, "points": [[0, 0, 0]]},
+        {**DAMPER, "preload": "later"},
+        {**DAMPER, "series_stiffness": 1.0},
+        {**DAMPER, "damping": 1.0, "damper_table": [[0, 0], [1, 2]]},
+        {**DAMPER, "stiffness": 1.0, "spring_table": [[0, 0], [1, 2]]},
+        {**DAMPER, "damper_table": [[0, 0]]},
+        {**DAMPER, "damper_table": [[0, 1], [1, 2]]},
+        {**DAMPER, "damper_table": [[0.5, 0], [1, 2]]},
+        {**DAMPER, "damper_table": [[0, 0], [1, 2], [1, 3]]},
+        {**DAMPER, "damper_table": [[0, 0], [1, 2], [2, 1]]},
+        {**DAMPER, "kind": "bushing"},
+        {**DAMPER, "kind": "bushing", "point": [0, 0, 0]},
+        {"kind": "bushing", "bodies": ["a", "b"]},
+        {"kind": "bushing", "bodies": ["a", "b"], "point": [0, 0]},
+        {"kind": "bushing", "bodies": ["a"], "point": [0, 0, 0]},
+        bushing(stiffness=[1, -1, 1]),
+        bushing(series_stiffness=[1, 0, 0]),
+        {"kind": "roll_bar", "bodies": ["a", "b"], "stiffness": 0.0},
+        {"kind": "roll_bar", "bodies": ["a", "b"], "stiffness": 1.0, "sides": "both"},
+        {"kind": "bump_stop", "bodies": ["a", "b"], "point": [0, 0, 0], "axis": "w"},
+    ],
+)
+def test_element_with_a_wrong_value_is_refused(element):
+    if element["kind"] == "bushing" and element.get("points"):
+        element = {**element, "stifness": [1, 1, 1]}
+    with pytest.raises(ValidationError):
+        vehicle(wheelsets={"w": WHEELSET}, elements={"e": element})
+
+
+def test_two_sided_table_keeps_what_is_given_for_both_directions():
+    rows = ((-0.1, -2.0), (0.2, 8.0))
+    assert two_sided(rows) == rows
+    assert two_sided(((0.0, 0.0), (0.2, 8.0))) == ((-0.2, -8.0), (0.0, 0.0), (0.2, 8.0))
+
+
+@pytest.mark.parametrize("name", ["coach_manchester", "benchmark_vehicle1"])
+def test_shipped_vehicle_reads_back_from_its_own_text(name):
+    original = load_vehicle(name)
+    assert load_vehicle_text(original.to_toml()) == original
+
+
+def test_benchmark_vehicle_differs_from_the_study_coach_where_the_sources_differ():
+    coach, benchmark = flatten(load_vehicle("coach_manchester")), load_vehicle("benchmark_vehicle1")
+    other = flatten(benchmark)
+    changed = [a.name for a, b in zip(coach.bodies, other.bodies, strict=True) if a != b]
+    assert changed == ["carbody"]
+    changed = [a.name for a, b in zip(coach.elements, other.elements, strict=True) if a != b]
+    assert len(changed) == 8
+    assert all(".primary." in name for name in changed)
+
+
+def test_coach_weighs_what_the_study_says():
+    flat = flatten(load_vehicle("coach_manchester"))
+    # 43628 + 2 x 2615 + 4 x 1813 kg
+    assert sum(body.mass for body in flat.bodies) == pytest.approx(56110.0, abs=1e-9)
+    assert len(flat.elements) == 2 * (2 + 2 + 2 + 1 + 1 + 1 + 2 * (2 + 2))

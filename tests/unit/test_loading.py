@@ -1,0 +1,335 @@
+"""Loading files: extends, remove, overrides, shipped names, and faults with their file and key."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from railsim.definitions import sources
+from railsim.definitions.loading import (
+    load_any,
+    load_settings,
+    load_track,
+    load_track_text,
+    load_vehicle,
+)
+from railsim.errors import InputError
+
+HEAD = 'format = "railsim-vehicle/1"\nname = "mine"\n'
+COACH = HEAD + 'extends = "coach_manchester"\n'
+TRACK = 'format = "railsim-track/1"\nname = "mine"\nplan = [{ type = "STR", length = 10.0 }]\n'
+PRIMARY = "assemblies.bogie.assemblies.axle.elements.primary"
+
+
+def faults(load, *arguments):
+    with pytest.raises(InputError) as caught:
+        load(*arguments)
+    return caught.value.faults
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(name, text):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_extending_file_replaces_only_what_it_names(write):
+    path = write("mine.toml", COACH + f"[{PRIMARY}]\nstiffness = [1.0, 2.0, 3.0]\n")
+    mine, coach = load_vehicle(path), load_vehicle("coach_manchester")
+    axle = mine.assemblies["bogie"].assemblies["axle"]
+    assert axle.elements["primary"].stiffness == (1.0, 2.0, 3.0)
+    assert axle.elements["primary"].damping == (15000.0, 2000.0, 0.0)
+    assert mine.bodies == coach.bodies
+    assert mine.name == "mine"
+
+
+def test_element_of_another_kind_replaces_the_old_one_whole(write):
+    bar = 'kind = "roll_bar"\nbodies = ["frame", "wheelset"]\nstiffness = 5.0\n'
+    path = write("mine.toml", COACH + f"[{PRIMARY}]\n{bar}")
+    axle = load_vehicle(path).assemblies["bogie"].assemblies["axle"]
+    assert axle.elements["primary"].kind == "roll_bar"
+
+
+def test_remove_takes_parts_away_before_merging(write):
+    path = write("mine.toml", COACH + f'remove = ["{PRIMARY}", "source"]\n')
+    mine = load_vehicle(path)
+    assert "primary" not in mine.assemblies["bogie"].assemblies["axle"].elements
+    assert mine.source is None
+
+
+def test_remove_names_members_of_lists(write):
+    base = write("base.toml", COACH)
+    text = HEAD + f'extends = "{base.name}"\nremove = ["assemblies.bogie.placements.rear"]\n'
+    mine = load_vehicle(write("mine.toml", text))
+    assert [p.name for p in mine.assemblies["bogie"].placements] == ["front"]
+
+
+def test_extends_finds_a_file_beside_it_with_and_without_its_ending(write):
+    write("base.toml", COACH)
+    for name in ("base", "base.toml"):
+        path = write("mine.toml", HEAD + f'extends = "{name}"\n')
+        assert load_vehicle(path).bodies["carbody"].mass == 43628.0
+
+
+def test_path_wins_over_a_shipped_name(write, monkeypatch, tmp_path):
+    write("coach_manchester", COACH.replace("mine", "my own coach"))
+    monkeypatch.chdir(tmp_path)
+    assert load_vehicle("coach_manchester").name == "my own coach"
+
+
+def test_shipped_files_are_found_from_anywhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert load_track("curve_r250").length == 980.0
+    assert {"coach_manchester", "benchmark_vehicle1"} <= set(sources.shipped_names("vehicle"))
+    assert {"curve_r250", "curve_r500", "straight"} <= set(sources.shipped_names("track"))
+
+
+def test_shipped_files_come_from_the_package_once_installed(tmp_path, monkeypatch):
+    folder = tmp_path / "railsim" / "shipped" / "tracks"
+    folder.mkdir(parents=True)
+    (folder / "packed.toml").write_text(TRACK)
+    monkeypatch.setattr(sources, "PACKAGE", tmp_path / "railsim")
+    assert load_track("packed").length == 10.0
+
+
+def test_loading_needs_neither_numba_nor_matplotlib():
+    code = (
+        "import sys; from railsim.definitions.loading import load_vehicle;"
+        "load_vehicle('coach_manchester');"
+        "assert not {'numba', 'matplotlib', 'scipy'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# faults -------------------------------------------------------------------------------------------
+
+
+def test_all_faults_of_a_file_come_at_once_with_their_keys(write):
+    path = write(
+        "mine.toml",
+        COACH
+        + """
+[bodies.carbody]
+mass = -1
+mas = 3
+[bodies.extra]
+mass = nan
+[assemblies.bogie.elements.new]
+kind = "bushin"
+bodies = ["frame", "carbdy"]
+[assemblies.bogie.elements.other]
+kind = "roll_bar"
+bodies = ["fram", "carbody"]
+stiffness = -5.0
+""",
+    )
+    found = {fault.key: (fault.found, fault.allowed) for fault in faults(load_vehicle, path)}
+    other = "assemblies.bogie.elements.other"
+    assert found["bodies.carbody.mass"] == ("-1", "must be greater than 0")
+    assert found["bodies.carbody.mas"] == ("unknown key", "did you mean 'mass'?")
+    assert found["bodies.extra.mass"] == ("nan", "must be a finite number")
+    assert found["bodies.extra.inertia"][0] == "missing"
+    assert found["bodies.extra.position"] == ("missing", "needed: Centre of gravity [m]")
+    assert found["assemblies.bogie.elements.new"][1] == "did you mean 'bushing'?"
+    assert found["assemblies.bogie.elements.new.bodies.1"][1] == "did you mean 'carbody'?"
+    assert found[f"{other}.bodies.0"] == ("no body 'fram'", "did you mean 'frame'?")
+    assert found[f"{other}.stiffness"] == ("-5.0", "must be greater than 0")
+    assert len(found) == 9
+
+
+def test_fault_names_the_file_that_holds_the_key(write):
+    base = write("base.toml", COACH + "[bodies.carbody]\nmass = -1\n")
+    text = HEAD + 'extends = "base"\n[bodies.carbody]\ninertia = [1, 2]\n'
+    mine = write("mine.toml", text)
+    files = {fault.key: fault.file for fault in faults(load_vehicle, mine)}
+    assert files == {"bodies.carbody.mass": str(base), "bodies.carbody.inertia": str(mine)}
+
+
+def test_short_vector_says_how_many_numbers_are_needed(write):
+    path = write("mine.toml", COACH + "[bodies.carbody]\nposition = [1.0]\ninertia = 5.0\n")
+    position, inertia = sorted(faults(load_vehicle, path), key=lambda f: f.key, reverse=True)
+    assert str(position).endswith("bodies.carbody.position: 1 value; a list of 3")
+    assert str(inertia).endswith("bodies.carbody.inertia: 5.0; a list of 3")
+
+
+def test_wheelset_without_profile_is_named(write):
+    text = COACH + 'remove = ["assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"]\n'
+    (fault,) = faults(load_vehicle, write("mine.toml", text))
+    assert fault.key == "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"
+    assert fault.found == "missing"
+
+
+def test_fault_of_a_definition_that_stands_several_times_is_told_once(write):
+    key = "assemblies.bogie.assemblies.axle.wheelsets.wheelset"
+    (fault,) = faults(load_vehicle, write("mine.toml", COACH + f"[{key}]\nradius = 0.5\n"))
+    assert fault.key == f"{key}.position"
+
+
+def test_circular_extends_is_refused(write):
+    write("a.toml", HEAD + 'extends = "b.toml"\n')
+    path = write("b.toml", HEAD + 'extends = "a.toml"\n')
+    (fault,) = faults(load_vehicle, path)
+    assert fault.key == "extends"
+    assert "b.toml -> a.toml -> b.toml" in fault.found
+
+
+def test_file_that_extends_itself_is_refused(write):
+    (fault,) = faults(load_vehicle, write("a.toml", HEAD + 'extends = "a"\n'))
+    assert "a.toml -> a.toml" in fault.found
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "found"),
+    [
+        ("x = 1\ny = = 2\n", "line 2", "broken TOML"),
+        ('x = "open', "line 1", "broken TOML"),
+        ("[a]\n[a]\n", "line 2", "broken TOML"),
+    ],
+)
+def test_broken_toml_is_reported_with_its_line(write, text, key, found):
+    (fault,) = faults(load_vehicle, write("broken.toml", text))
+    assert fault.key == key
+    assert found in fault.found
+
+
+def test_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "picture.toml"
+    path.write_bytes(b"\xff\xfe\x00\x81")
+    (fault,) = faults(load_vehicle, path)
+    assert "UTF-8" in fault.found
+
+
+@pytest.mark.parametrize(
+    ("line", "key"),
+    [
+        ("extends = 3", "extends"),
+        ('extends = "nowhere"', "extends"),
+        ('remove = ["name"]', "remove"),
+        ('extends = "coach_manchester"\nremove = "name"', "remove"),
+        ('extends = "coach_manchester"\nremove = ["bodies.carbdy"]', "remove"),
+        ('extends = "coach_manchester"\nremove = ["a b"]', "remove"),
+    ],
+)
+def test_wrong_extends_or_remove_is_refused(write, line, key):
+    (fault,) = faults(load_vehicle, write("mine.toml", HEAD + line + "\n"))
+    assert fault.key == key
+
+
+def test_missing_file_names_what_is_shipped(tmp_path):
+    (fault,) = faults(load_vehicle, "coach_mancester")
+    assert "coach_manchester" in fault.allowed
+    (fault,) = faults(load_vehicle, tmp_path)
+    assert "is a folder" in fault.found
+    (fault,) = faults(load_settings, "nowhere.toml")
+    assert "no file" in fault.found
+
+
+@pytest.mark.parametrize("text", ["", 'format = "railsim-vehicle/2"', "format = 5"])
+def test_wrong_format_is_the_only_fault(write, text):
+    for load in (load_vehicle, load_any):
+        (fault,) = faults(load, write("mine.toml", text))
+        assert fault.key == "format"
+        assert "railsim-vehicle/1" in fault.allowed
+
+
+def test_name_that_is_no_name_is_refused(write):
+    path = write("mine.toml", HEAD + '[bodies."my.body"]\nmass = 1.0\n')
+    assert any("letters, digits" in fault.allowed for fault in faults(load_vehicle, path))
+
+
+# overrides ----------------------------------------------------------------------------------------
+
+
+def test_override_replaces_a_value():
+    mine = load_vehicle("coach_manchester", [f"{PRIMARY}.stiffness.1=3.884e6", 'name="x"'])
+    primary = mine.assemblies["bogie"].assemblies["axle"].elements["primary"]
+    assert primary.stiffness == (31.391e6, 3.884e6, 936340.0)
+    assert mine.name == "x"
+
+
+def test_override_names_members_of_lists_by_name_or_index():
+    for member in ("rear", "1"):
+        mine = load_vehicle(
+            "coach_manchester", [f"assemblies.bogie.placements.{member}.mirror=false"]
+        )
+        assert not mine.assemblies["bogie"].placements[1].mirror
+
+
+def test_override_of_text_needs_no_quotes_even_if_it_looks_like_a_number():
+    assert load_track("straight", ["rail=54E1"]).rail == ("54E1", "54E1")
+    assert load_track("straight", ['rail=["60E1", "54E1"]']).rail == ("60E1", "54E1")
+
+
+def test_override_of_the_initial_state_takes_dotted_body_names():
+    for key in ("initial.front.frame.y", 'initial."front.frame".y'):
+        settings = load_settings(None, [f"{key}=0.003"])
+        assert settings.initial["front.frame"].y == 0.003
+
+
+def test_later_override_wins():
+    assert load_settings(None, ["scheme=rk4", "scheme=fast"]).scheme == "fast"
+
+
+def test_wrong_overrides_come_at_once():
+    wrong = [
+        "bodies.carbdy.mass=3",
+        "assemblies.bogie.placements.frnt.mirror=true",
+        "bodies.carbody.mass.x=3",
+        "nothing",
+        "bodies.carbody.mass=[1,",
+        "a b=3",
+        "bodies.carbody.inertia.7=3",
+    ]
+    found = [str(fault) for fault in faults(load_vehicle, "coach_manchester", wrong)]
+    assert len(found) == len(wrong)
+    assert all(text.startswith("--set") for text in found)
+    assert "did you mean 'carbody'?" in found[0]
+    assert "did you mean 'front'?" in found[1]
+
+
+def test_fault_of_an_overridden_value_names_the_option():
+    wrong = ["bodies.carbody.mass=-3", "bodies.carbody.weight=3", "reference=engine"]
+    found = faults(load_vehicle, "coach_manchester", wrong)
+    assert {fault.file for fault in found} == {"--set"}
+    assert {f.key for f in found} == {"bodies.carbody.mass", "bodies.carbody.weight", "reference"}
+
+
+def test_overrides_are_sorted_by_their_beginning():
+    texts = ["vehicle.name=x", "track.friction=0.3", "settings.step=1e-3"]
+    assert sources.split_overrides(texts) == {
+        "vehicle": ["name=x"],
+        "track": ["friction=0.3"],
+        "settings": ["step=1e-3"],
+    }
+    (fault,) = faults(sources.split_overrides, ["friction=0.3"])
+    assert "vehicle., track. or settings." in fault.allowed
+
+
+def test_override_leaves_the_file_alone():
+    load_track("straight", ["plan.0.length=5.0"])
+    assert load_track("straight").length == 1000.0
+
+
+# files that files name ----------------------------------------------------------------------------
+
+
+def test_profile_file_is_found_beside_the_file_that_names_it(write):
+    profile = write("worn.csv", "y_mm,z_mm\n")
+    path = write("mine.toml", TRACK + 'rail = ["worn.csv", "60E1"]\n')
+    assert load_track(path).rail == (str(profile.resolve()), "60E1")
+
+
+def test_text_of_a_track_reads_back():
+    track = load_track("curve_r250", ["plan.2.radius=-300.0", "cant.2.cant=-0.1"])
+    assert load_track_text(track.to_toml()) == track
+
+
+def test_any_file_is_recognised_by_its_format():
+    definition, known = load_any(Path(sources.shipped_folder("track")) / "straight.toml")
+    assert known.kind == "track"
+    assert definition.name.startswith("Straight")
