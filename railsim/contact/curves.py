@@ -285,3 +285,42 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
         slope=slope,
         curvature=averaged_curvature(places, slope, 1.0),
     )
+
+
+def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float) -> list[tuple[str, str]]:
+    """Why a wheelset of this wheel cannot run in this track, on both sides the same.
+
+    Parameters
+    ----------
+    wheel : WheelCurve
+    rail : RailCurve
+    gauge : float
+        For the message [m].
+
+    Returns
+    -------
+    list of (found, remedy)
+        Empty if it can: in the middle of the track the tread stands on the rail, and pushed to one
+        side until the flange touches, the other wheel still has the rail under it.
+    """
+    remedy = "check gauge, back-to-back distance and both profiles"
+    flank = int(np.argmin(wheel.t))
+    flank_place = wheel.u[flank]
+    corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
+    slack = 0.5 * gauge - flank_place
+    if corner - flank_place < 0.0:
+        return [(
+            f"the flange stands on the rail, {-1e3 * slack:.1f} mm beyond the gauge face, when the "
+            "wheelset is central",
+            remedy,
+        )]
+    if wheel.u[-1] - slack < corner:
+        return [(
+            "the wheelset falls between the rails: with one flange at its rail, the outer end of "
+            f"the other wheel is {1e3 * (corner + slack - wheel.u[-1]):.1f} mm short of the rail",
+            remedy,
+        )]
+    height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
+    if int(np.argmin(height)) <= flank:
+        return [("the flange touches the rail when the wheelset is central", remedy)]
+    return []

@@ -26,6 +26,13 @@ same weights.  l makes g agree with the hard minimum in the zone's typical conta
 share W = <omega> multiplies the stiffness: a contact on the border of two zones is shared, not
 counted twice.
 
+Place of contact under load.  Lowered without load, a wheel in its flange root would touch first on
+the steep flank, where a given normal distance is the longest vertical one; under load the patch is
+where the *normal* approach is greatest.  The minimum is therefore taken of h + delta_r/cos(gamma),
+the gap of surfaces that already overlap by delta_r along the normal (80 um, the approach under
+some 60 kN), and delta_r/cos(gamma) is taken off g again.  At that approach the gradient of U, with
+the change of K, is exactly the rail's slope at the place of contact.
+
 Frame: right wheel and rail, track axes (x forward, y right, z down), forces and places relative to
 the wheelset's centre.  The left wheel is the mirror image (y and roll change sign); where left and
 right differ in profile or radius a second table is built for the left, as a right one.
@@ -47,10 +54,12 @@ from numpy.typing import NDArray
 from railsim.contact.curves import (
     HALF_WIDTHS,
     WheelCurve,
+    misfits,
     rail_curve,
     tape_circle_place,
     wheel_curve,
 )
+from railsim.errors import Fault, InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
@@ -59,7 +68,7 @@ Array = NDArray[np.float64]
 
 FORMAT = "railsim-contact-table/1"
 PATCHES = ("tread", "flange root", "flange")
-FIELDS = ("g", "K", "c_y", "c_z", "c_x", "a1", "b1", "weight")
+FIELDS = ("g", "K", "c_y", "c_z", "c_x", "a1", "b1", "tan_gamma")
 
 
 @dataclass(frozen=True)
@@ -82,18 +91,21 @@ class TableGrid:
         Wheel load for whose patch the curvatures are averaged [N].
     floor_ratio : float
         Half relative curvature across is kept above about this share of that along [1].
+    approach : float
+        Normal approach at which the place of contact is sought [m].
     """
 
     s_min: float = -0.020
     s_max: float = 0.014
     ds: float = 5e-5
     roll_max: float = 0.030
-    droll: float = 1.5e-3
+    droll: float = 1.0e-3
     yaw_max: float = 0.040
     n_w: int = 5
-    eps: float = 1.5e-6
+    eps: float = 3.0e-6
     load: float = 60e3
     floor_ratio: float = 0.02
+    approach: float = 80e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +116,7 @@ class ContactTable:
     ----------
     values : ndarray, shape (n_patch, n_w, n_roll, n_y, n_field)
         Spline coefficients; fields 0 g [m], 1 K [N/m^1.5], 2 c_y [m], 3 c_z [m], 4 c_x/yaw
-        [m/rad], 5 a1, 6 b1 [m/N^(1/3)], 7 weight of the zone [1].
+        [m/rad], 5 a1, 6 b1 [m/N^(1/3)], 7 tan of the contact angle [1].
     y0, dy : float
         First node and spacing of s = y - shear * roll [m].
     roll0, droll : float
@@ -228,11 +240,22 @@ def build_contact_table(
     Returns
     -------
     ContactTable
+
+    Raises
+    ------
+    InputError
+        If the wheelset does not fit into the track, or a profile cannot be used.
     """
     grid = grid or TableGrid()
     height = radius if centre_height is None else centre_height
     wheel_points = wheel_curve(wheel, radius, tape_circle_place(back_to_back))
     rail_nodes = rail_curve(rail, gauge, inclination)
+    faults = [
+        Fault(f"gauge {1e3 * gauge:.1f} mm", f"{wheel.name} on {rail.name}", found, remedy)
+        for found, remedy in misfits(wheel_points, rail_nodes, gauge)
+    ]
+    if faults:
+        raise InputError(faults)
     window = zone_windows(wheel_points)
     present = window > 1e-6
     first = np.array([int(np.argmax(row)) for row in present])
@@ -277,6 +300,7 @@ def build_contact_table(
             grid.eps,
             grid.load,
             grid.floor_ratio,
+            grid.approach,
         )
         values[:, i_w, i_roll] = part
 

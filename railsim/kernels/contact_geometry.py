@@ -21,7 +21,7 @@ SPREAD = 30.0  # candidates whose gap exceeds the least by more than SPREAD eps 
 WIDTH_ITERATIONS = 8
 
 # Fields of a table, see `railsim.contact.table`.
-G, K, C_Y, C_Z, C_X, A1, B1, WEIGHT = range(8)
+G, K, C_Y, C_Z, C_X, A1, B1, TAN_GAMMA = range(8)
 N_FIELD = 8
 
 
@@ -134,6 +134,7 @@ def fill_table_slice(
     eps,
     load,
     floor_ratio,
+    approach,
 ):
     """Fill the table for one roll and one yaw.
 
@@ -171,6 +172,8 @@ def fill_table_slice(
         Force for which the patch's width sets the averaging of the curvatures [N].
     floor_ratio : float
         B is kept above about this many A [1].
+    approach : float
+        Normal approach at which the place of contact is sought, see `railsim.contact.table` [m].
     """
     n_u = wheel_u.size
     n_patch = values.shape[0]
@@ -180,6 +183,7 @@ def fill_table_slice(
     c_z = np.empty(n_u)
     h = np.empty(n_u)
     slope = np.empty(n_u)
+    lift = np.empty(n_u)
     node = np.empty(n_u, np.int64)
     usable = np.empty(n_u, np.bool_)
     curvature = np.empty(n_width)
@@ -194,7 +198,8 @@ def fill_table_slice(
             h[k], slope[k], node[k] = rail_height(
                 y_nodes[i] + c_y[k], rail_Y0, rail_dY, rail_z, rail_slope
             )
-            h[k] += centre_height - c_z[k]
+            lift[k] = approach * math.sqrt(1.0 + slope[k] * slope[k])
+            h[k] += centre_height - c_z[k] + lift[k]
             if not usable[k]:
                 h[k] = 1.0
         for p in range(n_patch):
@@ -202,7 +207,7 @@ def fill_table_slice(
             for k in range(first[p], last[p]):
                 least = min(least, h[k] - eps * log_window[p, k])
             total = 0.0
-            s_window = s_y = s_z = s_x = s_slope = s_r = 0.0
+            s_window = s_y = s_z = s_x = s_slope = s_r = s_lift = 0.0
             for m in range(n_width):
                 curvature[m] = 0.0
             for k in range(first[p], last[p]):
@@ -216,6 +221,7 @@ def fill_table_slice(
                     s_x += weight * c_x[k]
                     s_slope += weight * slope[k]
                     s_r += weight * wheel_r[k]
+                    s_lift += weight * lift[k]
                     for m in range(n_width):
                         curvature[m] += weight * (
                             wheel_curvature[m, k] + rail_curvature[m, node[k]]
@@ -237,14 +243,14 @@ def fill_table_slice(
                 floor_ratio,
             )
             out = values[p, i]
-            out[G] = least - eps * math.log(total)
+            out[G] = least - eps * math.log(total) - s_lift * inverse
             out[K] = s_window * inverse * (cos_gamma**2.5) * d1**-1.5
             out[C_Y] = s_y * inverse
             out[C_Z] = s_z * inverse
             out[C_X] = s_x * inverse
             out[A1] = a1
             out[B1] = b1
-            out[WEIGHT] = s_window * inverse
+            out[TAN_GAMMA] = -tan_gamma
 
 
 @_jit
@@ -287,3 +293,167 @@ def averaged_ellipse(A, curvature, half_widths, ellipse_x0, ellipse_dx, ellipse,
         # the geometric mean damps the iteration, which may swing in the flange root
         b = math.sqrt(b * b1 * third)
     return a1, b1, d1
+
+
+# Results of `rigid_contact`.
+R_GAP, R_U, R_RADIUS, R_PLACE, R_SLOPE, R_INDEX = range(6)
+
+
+@_jit
+def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y, roll, out):
+    """First contact of a rigid wheel that is lowered onto its rail, without yaw.
+
+    Parameters
+    ----------
+    wheel : ndarray, shape (3, n)
+        Candidates u [m], r [m], dr/du [1] along the axle.
+    rail_Y0, rail_dY, rail_z, rail_slope
+        Rail as for `rail_height`.
+    centre_height, y, roll : float
+        Height of the wheelset's centre above the rail tops, its lateral displacement [m], its
+        roll [rad].
+    out : ndarray, shape (6,)
+        Height at which the wheel touches [m], place u on the axle [m], rolling radius [m], lateral
+        place [m] and slope [1] on the rail, candidate (-1 if the contact is at the wheel's end).
+    """
+    cosine, sine = math.cos(roll), math.sin(roll)
+    n = wheel.shape[1]
+    least = 1e9
+    best = 0
+    for k in range(n):
+        u, r = wheel[0, k], wheel[1, k]
+        h = rail_height(y + u * cosine - r * sine, rail_Y0, rail_dY, rail_z, rail_slope)[0]
+        h += centre_height - u * sine - r * cosine
+        if h < least:
+            least = h
+            best = k
+    u, r = wheel[0, best], wheel[1, best]
+    # the gap's slope is interpolated to its zero between this candidate and a neighbour
+    own = _gap_slope(wheel, best, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine)
+    other = best - 1 if own > 0.0 else best + 1
+    index = best
+    if 0 <= other < n:
+        there = _gap_slope(wheel, other, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine)
+        if own * there < 0.0:
+            x = own / (own - there)
+            du = wheel[0, other] - u
+            slope = wheel[2, best] + 0.5 * x * (wheel[2, other] - wheel[2, best])
+            r += slope * x * du
+            u += x * du
+            least += 0.5 * own * x * du
+    else:
+        index = -1
+    place = y + u * cosine - r * sine
+    out[R_GAP] = least
+    out[R_U] = u
+    out[R_RADIUS] = r
+    out[R_PLACE] = place
+    out[R_SLOPE] = rail_height(place, rail_Y0, rail_dY, rail_z, rail_slope)[1]
+    out[R_INDEX] = index
+
+
+@_jit
+def _gap_slope(wheel, k, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine):
+    """Derivative of the gap with respect to u at a candidate [1]."""
+    u, r, t = wheel[0, k], wheel[1, k], wheel[2, k]
+    slope = rail_height(y + u * cosine - r * sine, rail_Y0, rail_dY, rail_z, rail_slope)[1]
+    return slope * (cosine - t * sine) - (sine + t * cosine)
+
+
+@_jit
+def rigid_sweep(
+    lateral,
+    wheel_right,
+    right_Y0,
+    right_z,
+    right_slope,
+    wheel_left,
+    left_Y0,
+    left_z,
+    left_slope,
+    rail_dY,
+    centre_height,
+    roll_max,
+    roll,
+    contacts,
+):
+    """Roll of a rigid wheelset on both rails, and its contacts, over the lateral displacement.
+
+    The left side is given as a right one; it is looked up at -y and -roll.  The roll is the one
+    nearest to the previous displacement's at which both wheels touch, found by bracketing and
+    regula falsi (Illinois).
+
+    Parameters
+    ----------
+    lateral : ndarray, shape (n,)
+        Lateral displacements [m].
+    wheel_right, wheel_left, right_*, left_*, rail_dY
+        As for `rigid_contact`.
+    centre_height, roll_max : float
+        As for `rigid_contact`; largest roll that is tried [rad].
+    roll : ndarray, shape (n,)
+        Roll (output), nan where none was found [rad].
+    contacts : ndarray, shape (n, 2, 6)
+        Left and right contact as from `rigid_contact` (output).
+    """
+    left, right = np.empty(6), np.empty(6)
+    previous = 0.0
+
+    for i in range(lateral.size):
+        y = lateral[i]
+        step = 1e-4
+        a = b = previous
+        f_a = f_b = 0.0
+        for trial in range(-1, 64):
+            if trial < 0:
+                x = previous
+            else:
+                # away from the previous roll, in growing steps to both sides
+                x = previous + (step if trial % 2 == 0 else -step)
+            rigid_contact(
+                wheel_right, right_Y0, rail_dY, right_z, right_slope, centre_height, y, x, right
+            )
+            rigid_contact(
+                wheel_left, left_Y0, rail_dY, left_z, left_slope, centre_height, -y, -x, left
+            )
+            f = right[R_GAP] - left[R_GAP]
+            if trial < 0:
+                f_a = f_b = f
+                if f == 0.0:
+                    break
+            elif f * f_b <= 0.0:
+                a, f_a = x, f
+                break
+            elif trial % 2 == 1:
+                step *= 1.5
+                if step > 2.0 * roll_max:
+                    break
+        if f_a * f_b > 0.0:
+            roll[i] = math.nan
+            for k in range(6):
+                contacts[i, 0, k] = math.nan
+                contacts[i, 1, k] = math.nan
+            continue
+        x = b
+        for _ in range(60):
+            if f_a == f_b:
+                break
+            x = b - f_b * (b - a) / (f_b - f_a)
+            rigid_contact(
+                wheel_right, right_Y0, rail_dY, right_z, right_slope, centre_height, y, x, right
+            )
+            rigid_contact(
+                wheel_left, left_Y0, rail_dY, left_z, left_slope, centre_height, -y, -x, left
+            )
+            f = right[R_GAP] - left[R_GAP]
+            if f * f_b < 0.0:
+                a, f_a = b, f_b
+            else:
+                f_a *= 0.5
+            b, f_b = x, f
+            if abs(f) < 1e-12 or abs(b - a) < 1e-13:
+                break
+        previous = x
+        roll[i] = x
+        contacts[i, 0] = left
+        contacts[i, 1] = right

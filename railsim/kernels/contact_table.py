@@ -8,7 +8,7 @@ w = yaw^2, eight fields per patch (tread, flange root, flange):
     2, 3     c_y, c_z of the contact point from the wheelset's centre, track axes (m)
     4        c_x / yaw (m/rad)
     5, 6     Hertz semi-axes at unit load, a = a1 N^(1/3) (m/N^(1/3))
-    7        weight of the zone (1), for diagnosis
+    7        tan gamma, slope of the rail at the place of contact (1)
 
 The table's values are the coefficients of uniform cubic B-splines in y and roll (twice
 continuously differentiable, without overshoot) and are interpolated linearly in w.  The contact
@@ -26,6 +26,8 @@ from railsim.kernels import jit
 TREAD, FLANGE_ROOT, FLANGE = range(3)
 N_PATCH = 3
 N_FIELD = 8
+
+TAN_GAMMA = 7
 
 # results of `look_up` beyond the eight fields: gradients of g and of K
 G_Y, G_ROLL, G_W, K_Y, K_ROLL, K_W = range(8, 14)

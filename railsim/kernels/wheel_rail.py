@@ -29,6 +29,7 @@ from railsim.kernels.contact_table import (
     K_Y,
     N_PATCH,
     OUTSIDE_ROLL,
+    TAN_GAMMA,
     is_far,
     locate,
     look_up,
@@ -110,7 +111,7 @@ def normal_contact(system, work, speed, state):
                           - t[G_W] * 2.0 * yaw * yaw_rate)
                 root = sqrt(p)
                 elastic = t[1] * p * root
-                cos_2 = 1.0 / (1.0 + t[G_Y] * t[G_Y])
+                cos_2 = 1.0 / (1.0 + t[TAN_GAMMA] * t[TAN_GAMMA])
                 fade = min(1.0, p / FADE)
                 vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
                 stretch = 0.4 * p * p * root
@@ -131,7 +132,7 @@ def normal_contact(system, work, speed, state):
                 column[NORMAL, n] = N
                 column[MU_N, n] = mu * N
                 column[ANGLE_COS, n] = cos_g
-                column[ANGLE_SIN, n] = -sign * t[G_Y] * cos_g
+                column[ANGLE_SIN, n] = sign * t[TAN_GAMMA] * cos_g
                 column[C_X, n] = sign * yaw * t[4]
                 column[C_Y, n] = sign * t[2]
                 column[C_Z, n] = t[3]
