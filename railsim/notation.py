@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 SIDES = ("left", "right")
+DECIMALS = {"kN": 2, "mm": 2, "mrad": 2, "%": 2, "-": 3, "N": 1, "1e-3": 3, "s": 2, "m": 1}
+"""Decimals in printed tables by shown unit; four digits for the others."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,23 @@ class Quantity:
     shown_unit: str
     scale: float
     sign: str = ""
+
+    def text(self, value: float) -> str:
+        """Return a stored value as text in the shown unit, without the unit.
+
+        Examples
+        --------
+        >>> QUANTITIES["Q"].text(89123.4), QUANTITIES["Y_over_Q"].text(0.39012)
+        ('89.12', '0.390')
+        """
+        shown = value * self.scale
+        decimals = DECIMALS.get(self.shown_unit)
+        return f"{shown:.4g}" if decimals is None else f"{shown:.{decimals}f}"
+
+    @property
+    def words(self) -> str:
+        """Long name with the shown unit, for printed tables."""
+        return self.long_name if self.shown_unit == "-" else f"{self.long_name} ({self.shown_unit})"
 
     @property
     def label(self) -> str:

@@ -5,7 +5,7 @@
 `selection.py`     which quantities and places to draw: ``Q``, ``Y:1:left``
 `histories.py`     quantities over time or distance
 `overlay.py`       the same quantities of several results in one picture
-`line.py`          a track: plan, curvature and cant
+`track.py`         a track: plan, curvature and cant
 =================  ==========================================================================
 
 Every function returns a `matplotlib.figure.Figure` that is not shown anywhere; `save` writes it.

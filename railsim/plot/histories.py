@@ -6,11 +6,13 @@ lateral displacement and yaw, with the curve shaded and the limits of EN 14363 w
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.definitions.layout import curvature_sections
+from railsim.errors import Fault, InputError
 from railsim.notation import Quantity
 from railsim.plot.selection import Line, Panel, panels
 from railsim.plot.style import (
@@ -45,6 +47,7 @@ def histories(
     *,
     over: str = "distance",
     by: str = "wheel",
+    between: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw quantities of a result.
 
@@ -58,12 +61,19 @@ def histories(
         Horizontal axis; the distance is that of the reference body.
     by : {"wheel", "wheelset"}
         One pair of axes for all wheels, or one for each wheelset.
+    between : (float, float), optional
+        Part of the horizontal axis to show, in its unit.
 
     Returns
     -------
     Figure
         One pair of axes for each quantity, or each quantity and wheelset.
+
+    Raises
+    ------
+    InputError : a quantity or place that the result does not have, an empty part.
     """
+    window = slice(None) if between is None else _window(result[over], between)
     with styled():
         rows = panels(result, tuple(selections))
         if by == "wheelset":
@@ -74,7 +84,16 @@ def histories(
             columns = 1 if len(rows) < 3 else 2
             grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
             grid[-1] += [None] * (columns - len(grid[-1]))
-        return _figure(result, grid, over, by)
+        return _figure(result, grid, over, by, window)
+
+
+def _window(horizontal: Array, between: tuple[float, float]) -> slice:
+    start, stop = np.searchsorted(horizontal, between)
+    if stop - start < 2:
+        found = f"nothing between {between[0]:g} and {between[1]:g}"
+        allowed = f"the run goes from {horizontal[0]:.6g} to {horizontal[-1]:.6g}"
+        raise InputError([Fault("--between", "", found, allowed)])
+    return slice(int(start), int(stop))
 
 
 def _by_wheelset(result: Result, panel: Panel) -> list[Panel | None]:
@@ -86,21 +105,23 @@ def _by_wheelset(result: Result, panel: Panel) -> list[Panel | None]:
     return [Panel(panel.quantity, tuple(lines)) if lines else None for lines in own.values()]
 
 
-def _figure(result: Result, grid: list[list[Panel | None]], over: str, by: str) -> Figure:
+def _figure(
+    result: Result, grid: list[list[Panel | None]], over: str, by: str, window: slice
+) -> Figure:
     rows, columns = len(grid), len(grid[0])
     width = 7.0 if columns == 1 else 3.0 + 3.4 * min(columns, 4)
     figure = Figure(figsize=(width, 1.3 + 2.1 * rows), layout="constrained")
     axes = figure.subplots(
         rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
     )
-    horizontal = result[over]
-    shown = spans(curvature_sections(result.track()), result["distance"], horizontal)
+    horizontal = result[over][window]
+    shown = spans(curvature_sections(result.track()), result["distance"][window], horizontal)
     for i, row in enumerate(grid):
         for j, panel in enumerate(row):
             if panel is None:
                 axes[i, j].remove()
                 continue
-            _draw(axes[i, j], result, panel, horizontal, by)
+            _draw(axes[i, j], result, panel, horizontal, by, window)
             shade(axes[i, j], shown, named=i == 0)
             if not (i + 1 < rows and grid[i + 1][j] is not None):
                 axes[i, j].set_xlabel(result.quantities[over].label)
@@ -119,7 +140,9 @@ def title(result: Result) -> str:
     return f"{result.vehicle().name}\n{result.track().name} · {speed}"
 
 
-def _draw(axes: Axes, result: Result, panel: Panel, horizontal: Array, by: str) -> None:
+def _draw(
+    axes: Axes, result: Result, panel: Panel, horizontal: Array, by: str, window: slice
+) -> None:
     quantity = panel.quantity
     wheelsets = wheelset_colours(result.wheelsets)
     others = [line for line in panel.lines if "wheelset" not in line.labels]
@@ -131,7 +154,14 @@ def _draw(axes: Axes, result: Result, panel: Panel, horizontal: Array, by: str) 
             colour = wheelsets[line.labels["wheelset"]]
         else:
             colour = DISTINCT[index % len(DISTINCT)]
-        axes.plot(horizontal, line.values * quantity.scale, color=colour, ls=SIDE_LINES[side])
+        above = 3.0 - 0.01 * index  # the leading wheelset stays visible
+        axes.plot(
+            horizontal,
+            line.values[window] * quantity.scale,
+            color=colour,
+            ls=SIDE_LINES[side],
+            zorder=above,
+        )
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
     places = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
@@ -140,21 +170,24 @@ def _draw(axes: Axes, result: Result, panel: Panel, horizontal: Array, by: str) 
         number = result.wheelsets.index(place) + 1
         heading = f"{heading}: {number} {short_names(result.wheelsets)[place]}"
     axes.set_title(heading)
-    axes.set_ylabel(_unit_label(quantity))
+    axes.set_ylabel(unit_label(quantity))
     axes.margins(x=0.0)
-    if quantity.name in LIMITS:
-        _draw_limit(axes, quantity)
+    draw_limit(axes, quantity)
     if others and len(panel.lines) > 1:
         names = [" ".join(v for k, v in line.labels.items() if k != "component") for line in others]
         axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
 
 
-def _unit_label(quantity: Quantity) -> str:
+def unit_label(quantity: Quantity) -> str:
+    """Return symbol and shown unit, for a vertical axis."""
     symbol = f"${quantity.symbol}$ " if quantity.symbol else ""
     return f"{symbol}({quantity.shown_unit})" if quantity.shown_unit != "-" else symbol.strip()
 
 
-def _draw_limit(axes: Axes, quantity: Quantity) -> None:
+def draw_limit(axes: Axes, quantity: Quantity) -> None:
+    """Draw the limit of a quantity that has one."""
+    if quantity.name not in LIMITS:
+        return
     value, words = LIMITS[quantity.name]
     shown = value * quantity.scale
     axes.axhline(shown, color=LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)

@@ -44,6 +44,8 @@ class Peak:
         When [s].
     distance : float
         Distance of the reference body at that time [m].
+    kind : {"abs", "max", "min"}
+        Largest magnitude, largest or smallest value.
     """
 
     quantity: Quantity
@@ -51,6 +53,7 @@ class Peak:
     labels: Mapping[str, str]
     time: float
     distance: float
+    kind: str = "abs"
 
     @property
     def shown(self) -> float:
@@ -60,6 +63,8 @@ class Peak:
     def record(self) -> dict[str, Any]:
         """Return the peak as plain numbers and strings, SI."""
         return {
+            "quantity": self.quantity.name,
+            "kind": self.kind,
             "value": self.value,
             "unit": self.quantity.unit,
             **self.labels,
@@ -92,6 +97,7 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
         _labels(result, name, place[1:]),
         float(result["time"][instant]),
         float(result["distance"][instant]),
+        kind,
     )
 
 
@@ -145,6 +151,7 @@ class MidCurve:
             "distance": self.distance,
             "time": self.time,
             "values": {name: values.tolist() for name, values in self.values.items()},
+            "largest": {peak.quantity.name: peak.value for peak in self.peaks},
         }
 
 

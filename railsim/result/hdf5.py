@@ -72,7 +72,7 @@ class Hdf5Sink(SinkContext):
         self.path = Path(path)
         check_target(self.path, overwrite=overwrite, option=option)
         self._attributes = dict(attributes)
-        self._partial = self.path.with_name(f".{self.path.name}.{os.getpid()}.partial")
+        self._partial = partial_path(self.path, os.getpid())
         self._quantities: dict[str, Quantity] = {}
         self._length = 0
         try:
@@ -125,6 +125,11 @@ class Hdf5Sink(SinkContext):
         """Remove what was written so far; harmless after `close`."""
         self._file.close()
         self._partial.unlink(missing_ok=True)
+
+
+def partial_path(path: Path, process: int) -> Path:
+    """Return the hidden name of a result file that a process is writing."""
+    return path.with_name(f".{path.name}.{process}.partial")
 
 
 def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:

@@ -1,0 +1,215 @@
+"""``railsim run``: one vehicle on one track at one speed."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import (
+    json_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+    table,
+)
+from railsim.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from railsim.result import MidCurve, Peak, Result
+    from railsim.studies.case import Case
+
+
+@click.command()
+@click.argument("vehicle", metavar="VEHICLE")
+@click.argument("track", metavar="TRACK")
+@click.option("--speed", type=float, required=True, metavar="V", help="Speed in m/s.")
+@click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
+@click.option("--duration", type=float, metavar="T", help="End of the run in s.")
+@click.option("--until", type=float, metavar="S", help="End of the run in m along the track.")
+@click.option("--settings", metavar="F", help="Settings file.")
+@set_option
+@overwrite_option
+@click.option("--plots", is_flag=True, help="Draw the result beside its file (.png).")
+@json_option
+@quiet_option
+def command(
+    vehicle: str,
+    track: str,
+    speed: float,
+    out: str | None,
+    duration: float | None,
+    until: float | None,
+    settings: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    plots: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    r"""Run one vehicle over one track and print its largest values.
+
+    VEHICLE and TRACK are files or names of shipped ones.  The run ends with the track unless
+    --duration or --until says otherwise.  Paths of --set begin with vehicle., track. or settings.
+
+    \b
+    Example:
+      railsim run coach_manchester curve_r250 --speed 20 --overwrite
+      railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.3 --out dry.h5
+    """
+    from railsim.cli import DONE, ENDED_EARLY
+    from railsim.studies.case import run_name
+    from railsim.studies.run import run_case
+
+    path = Path(out or f"{run_name(vehicle, track, speed)}.h5")
+    picture = path.with_suffix(".png") if plots else None
+    case = _checked_case(
+        (vehicle, track, speed),
+        {
+            "settings": settings,
+            "duration": duration,
+            "until": until,
+            "assignments": assignments,
+        },
+        [path, *([picture] if picture else [])],
+        overwrite,
+    )
+    if not (quiet or as_json):
+        click.echo("\n".join(_assumption_lines(case)))
+    with progress_bar(case.name, quiet=quiet) as progress:
+        result = run_case(case, path, overwrite=overwrite, progress=progress)
+    if picture:
+        from railsim.plot.histories import histories
+        from railsim.plot.style import save
+
+        save(histories(result), picture, overwrite=overwrite)
+    if as_json:
+        print_json({"file": str(path), **result_record(result)})
+    else:
+        click.echo("\n".join(_report_lines(result, path)))
+    return DONE if result.status == "complete" else ENDED_EARLY
+
+
+def _checked_case(
+    what: tuple[str, str, float], how: dict[str, Any], paths: list[Path], overwrite: bool
+) -> "Case":
+    """Load the case; everything that is wrong in it or with the output at once."""
+    from railsim.errors import Fault, InputError
+    from railsim.result.hdf5 import check_target
+    from railsim.studies.combine import load_case
+
+    faults: list[Fault] = []
+    case = None
+    try:
+        case = load_case(*what, **how)
+    except InputError as error:
+        faults.extend(error.faults)
+    for path in paths:
+        try:
+            check_target(path, overwrite=overwrite, option="--out")
+        except InputError as error:
+            faults.extend(error.faults)
+    if faults or case is None:
+        raise InputError(faults)
+    return case
+
+
+def result_record(result: "Result") -> dict[str, Any]:
+    """Return what is printed of a result as plain numbers and strings, SI."""
+    from railsim.result import mid_curves, peaks
+    from railsim.studies.summary import FACTS
+
+    return {
+        **{name: result.attributes[name] for name in FACTS if name in result.attributes},
+        "peaks": [peak.record() for peak in peaks(result)],
+        "mid_curves": [curve.record() for curve in mid_curves(result)],
+    }
+
+
+def _assumption_lines(case: "Case") -> list[str]:
+    """Return what the run rests on, in the habits of the field."""
+    from railsim.definitions.flatten import flatten
+
+    track, settings = case.track, case.settings
+    wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)
+    wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
+    inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
+    nx, ny = settings.fastsim_grid
+    step = "chosen" if settings.step is None else f"{settings.step * 1e3:g} ms"
+    rate = (
+        f"every {settings.output_spacing:g} m"
+        if settings.output_spacing
+        else f"{settings.output_rate:g} per s"
+    )
+    return [
+        f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)",
+        f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
+        f"{track.gauge * 1e3:g} mm, friction {_listed(f'{mu:g}' for mu in track.friction)}",
+        f"  forces    FASTSIM {nx} x {ny}, G {settings.shear_modulus / 1e9:g} GPa, "
+        f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
+        f"  track     transitions rounded over {track.rounding:g} m, cant about the "
+        f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
+        f"  time      scheme {settings.scheme}, step {step}, output {rate}",
+    ]
+
+
+def _listed(names: "Any") -> str:
+    return " / ".join(dict.fromkeys(str(name) for name in names))
+
+
+def _report_lines(result: "Result", path: Path) -> list[str]:
+    from railsim.result import mid_curves, peaks
+
+    facts = result.attributes
+    end = f"{result.status}: {facts['status_reason']}"
+    lines = [
+        f"  {end}; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m",
+        f"  step {1e3 * float(facts['step']):g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
+        f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
+        "",
+        *peak_lines(result, peaks(result)),
+    ]
+    for curve in mid_curves(result):
+        lines += ["", *_mid_curve_lines(result, curve)]
+    return [*lines, "", str(path)]
+
+
+def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
+    """Return a table of peaks; the distance is that of the reference body."""
+    kinds = {"abs": "largest magnitude", "max": "largest", "min": "smallest"}
+    rows = []
+    for peak in found:
+        place = peak.labels.get("wheelset", "")
+        number = f"{result.wheelsets.index(place) + 1} {place}" if place else ""
+        words = peak.quantity.words
+        rows.append(
+            [
+                peak.quantity.name,
+                words if peak.kind == "abs" else f"{words}, {kinds[peak.kind]}",
+                number,
+                peak.labels.get("side", ""),
+                peak.quantity.text(peak.value),
+                f"{peak.time:.2f}",
+                f"{peak.distance:.1f}",
+            ]
+        )
+    header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "t (s)", "s (m)"]
+    return table(header, rows, numbers=4)
+
+
+def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:
+    rows = []
+    for name, values in curve.values.items():
+        quantity = result.quantities[name]
+        if quantity.dims[1:] == ("wheelset", "side"):
+            for side, label in enumerate(result.coordinates["side"]):
+                cells = [quantity.text(value) for value in values[:, side]]
+                rows.append([name, quantity.words, label, *cells])
+        elif quantity.dims[1:] == ("wheelset",):
+            rows.append([name, quantity.words, "", *(quantity.text(value) for value in values)])
+    numbers = [str(index + 1) for index in range(len(result.wheelsets))]
+    title = f"Mid-curve R {curve.radius:.6g} m, t = {curve.time:.2f} s, s = {curve.distance:.1f} m"
+    header = ["", "wheelset", "side", *numbers]
+    return [title, *table(header, rows, numbers=3)]

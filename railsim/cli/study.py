@@ -1,0 +1,217 @@
+"""``railsim study``: every combination of vehicles, tracks and speeds."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import (
+    json_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+)
+from railsim.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from railsim.studies import Outcome
+    from railsim.studies.summary import Record
+
+MANY = ("--vehicles", "--tracks", "--speeds", "--grid")
+
+
+class ManyValues(click.Command):
+    """A command some of whose options take all the values that follow them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Write such an option before each of its values, as click wants it."""
+        return super().parse_args(ctx, spread(args))
+
+
+def spread(args: list[str]) -> list[str]:
+    """Return arguments with every option of `MANY` repeated before each of its values.
+
+    Examples
+    --------
+    >>> spread(["--speeds", "10", "-5", "--out", "d"])
+    ['--speeds', '10', '--speeds', '-5', '--out', 'd']
+    """
+    found: list[str] = []
+    option = ""
+    for arg in args:
+        if arg in MANY:
+            option = arg
+        elif arg.startswith("-") and not _is_number(arg):
+            option = ""
+            found.append(arg)
+        else:
+            found.extend([option, arg] if option else [arg])
+    return found
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+@click.command(cls=ManyValues)
+@click.option("--vehicles", multiple=True, metavar="F...", help="Vehicles: files or names.")
+@click.option("--tracks", multiple=True, metavar="F...", help="Tracks: files or names.")
+@click.option("--speeds", multiple=True, type=float, metavar="V...", help="Speeds in m/s.")
+@click.option(
+    "--grid",
+    "grids",
+    multiple=True,
+    metavar="KEY.PATH=A,B,C...",
+    help="Values of further keys; paths begin with vehicle., track. or settings.",
+)
+@click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
+@click.option("--duration", type=float, metavar="T", help="End of all runs in s.")
+@click.option("--until", type=float, metavar="S", help="End of all runs in m along the track.")
+@click.option("--settings", metavar="F", help="Settings file for all runs.")
+@set_option
+@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Default: all cores.")
+@click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
+@click.option("--resume", is_flag=True, help="Go on with the study in DIR; compute what changed.")
+@overwrite_option
+@click.option("--plots", is_flag=True, help="Draw every run, and vehicles against each other.")
+@json_option
+@quiet_option
+def command(
+    vehicles: tuple[str, ...],
+    tracks: tuple[str, ...],
+    speeds: tuple[float, ...],
+    grids: tuple[str, ...],
+    out: str,
+    assignments: tuple[str, ...],
+    resume: bool,
+    as_json: bool,
+    quiet: bool,
+    **how: Any,
+) -> int:
+    r"""Run every combination of vehicles, tracks, speeds and the values of a grid.
+
+    One HDF5 file a run, summary.csv and study.json go to DIR.  A run that is there with the same
+    inputs is not computed again, so the same command can be typed again after an interruption.
+    With --resume alone the study that DIR holds goes on.
+
+    \b
+    Example:
+      railsim study --vehicles coach_manchester --tracks curve_r250 curve_r500 \
+          --speeds 15 20 --out curves --plots
+      railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \
+          --grid track.friction=0.3,0.4,0.5 --out friction
+    """
+    from railsim.studies import study
+
+    inputs: dict[str, Any] = {
+        "vehicles": list(vehicles),
+        "tracks": list(tracks),
+        "speeds": list(speeds),
+        "grid": _grid(grids),
+        "assignments": list(assignments),
+        **{name: how.pop(name) for name in ("settings", "duration", "until")},
+    }
+    if resume and not any(inputs.values()):
+        inputs = _stored_inputs(Path(out))
+    else:
+        _require(vehicles, tracks, speeds)
+    with progress_bar("study", quiet=quiet) as progress:
+        outcome = study(
+            out=out,
+            resume=resume,
+            progress=progress,
+            on_record=None if quiet or as_json else _print_record,
+            **inputs,
+            **how,
+        )
+    if as_json:
+        print_json({"folder": str(outcome.folder), "runs": list(outcome.records)})
+    else:
+        _print_end(outcome)
+    return _status(outcome)
+
+
+def _grid(texts: tuple[str, ...]) -> dict[str, list[str]]:
+    from railsim.errors import Fault, InputError
+    from railsim.studies.combine import parse_grid
+
+    grid: dict[str, list[str]] = {}
+    faults: list[Fault] = []
+    for text in texts:
+        try:
+            key, values = parse_grid(text)
+        except InputError as error:
+            faults.extend(error.faults)
+            continue
+        grid.setdefault(key, []).extend(values)
+    if faults:
+        raise InputError(faults)
+    return grid
+
+
+def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[float, ...]) -> None:
+    from railsim.errors import Fault, InputError
+
+    given = {"--vehicles": vehicles, "--tracks": tracks, "--speeds": speeds}
+    faults = [
+        Fault(option, "", "not given", "give one value at least")
+        for option, values in given.items()
+        if not values
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def _stored_inputs(folder: Path) -> dict[str, Any]:
+    from railsim.errors import Fault, InputError
+
+    try:
+        inputs: dict[str, Any] = json.loads((folder / "study.json").read_text())["inputs"]
+        inputs.pop("railsim_version")
+    except (OSError, ValueError, KeyError):
+        found = f"no study in {folder} to resume"
+        allowed = "give --vehicles, --tracks and --speeds"
+        raise InputError([Fault("--resume", "", found, allowed)]) from None
+    return inputs
+
+
+def _print_record(record: "Record") -> None:
+    from tqdm import tqdm
+
+    from railsim.notation import QUANTITIES
+
+    shown = {peak["quantity"]: peak for peak in record.get("peaks", ()) if peak["kind"] != "min"}
+    values = []
+    for name, words in (("dQ_over_Q0", "dQ/Q0"), ("Y_over_Q", "Y/Q"), ("sum_abs_Y", "sum|Y|")):
+        if name in shown:
+            quantity = QUANTITIES[name]
+            unit = "" if quantity.shown_unit == "-" else f" {quantity.shown_unit}"
+            values.append(f"{words} {quantity.text(shown[name]['value'])}{unit}")
+    status = record["status"]
+    if status != "complete":
+        status += f" ({record['status_reason']})"
+    with tqdm.external_write_mode():
+        click.echo("  ".join([record["name"], status, *values]))
+
+
+def _print_end(outcome: "Outcome") -> None:
+    there = len(outcome.records) - outcome.computed
+    kept = f", {there} were there" if there else ""
+    click.echo(f"{outcome.computed} of {len(outcome.records)} runs computed{kept}")
+    if outcome.failed:
+        click.echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
+    click.echo(str(outcome.folder / "summary.csv"))
+
+
+def _status(outcome: "Outcome") -> int:
+    from railsim.cli import DONE, ENDED_EARLY, FAILED
+
+    if outcome.failed:
+        return FAILED
+    return ENDED_EARLY if outcome.ended_early else DONE

@@ -1,0 +1,100 @@
+"""The same quantities of several results in one picture, to be compared by eye."""
+
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from railsim.definitions.layout import curvature_sections
+from railsim.plot.histories import STUDY, draw_limit, unit_label
+from railsim.plot.selection import Panel, panels
+from railsim.plot.style import DISTINCT, SIDE_LINES, shade, spans, styled
+from railsim.result import Result
+from railsim.result.data import Array
+
+LEADING = tuple(f"{name}:1" for name in STUDY)
+"""What is drawn unless told otherwise: the leading wheelset."""
+
+
+def overlay(
+    results: Mapping[str, Result], selections: Sequence[str] = LEADING, *, over: str = "distance"
+) -> Figure:
+    """Draw the same quantities of several results into the same axes.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+        Results by what they are called in the picture.
+    selections : sequence of str
+        Quantities and places, see `railsim.plot.selection`; all results must have them.
+    over : {"distance", "time"}
+        Horizontal axis; the distance is that of the reference body.
+
+    Returns
+    -------
+    Figure
+        One pair of axes for each quantity; a colour for each result.
+    """
+    drawn = {label: panels(result, tuple(selections)) for label, result in results.items()}
+    first = next(iter(results.values()))
+    sections = curvature_sections(first.track())
+    same_plan = all(curvature_sections(other.track()) == sections for other in results.values())
+    shown = spans(sections, first["distance"], first[over]) if same_plan else []
+    count = max(len(found) for found in drawn.values())
+    columns = 1 if count < 3 else 2
+    rows = -(-count // columns)
+    with styled():
+        figure = Figure(
+            figsize=(7.0 if columns == 1 else 9.8, 1.3 + 2.1 * rows), layout="constrained"
+        )
+        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        cells = list(grid.flat)
+        for axes, *same in zip_longest(cells, *drawn.values()):
+            if not any(same):
+                axes.remove()
+                continue
+            for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
+                if panel is not None:
+                    _draw(axes, result[over], panel, DISTINCT[index % len(DISTINCT)])
+            _label(axes, next(panel for panel in same if panel is not None))
+            shade(axes, shown, named=axes in cells[:columns])
+        for axes in cells[max(0, count - columns) : count]:
+            axes.set_xlabel(first.quantities[over].label)
+            axes.tick_params(labelbottom=True)
+        figure.legend(handles=_legend(list(results), drawn), loc="outside lower left", ncols=6)
+        return figure
+
+
+def _draw(axes: Axes, horizontal: Array, panel: Panel, colour: str) -> None:
+    for line in panel.lines:
+        style = SIDE_LINES[line.labels.get("side", "left")]
+        axes.plot(horizontal, line.values * panel.quantity.scale, color=colour, ls=style)
+
+
+def _label(axes: Axes, panel: Panel) -> None:
+    quantity = panel.quantity
+    places = {
+        label for line in panel.lines for dim, label in line.labels.items() if dim != "side"
+    } - {quantity.long_name.rpartition(", ")[2]}
+    heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
+    if len(places) == 1:
+        heading += f": {places.pop()}"
+    axes.set_title(heading)
+    axes.set_ylabel(unit_label(quantity))
+    axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+    axes.margins(x=0.0)
+    draw_limit(axes, quantity)
+
+
+def _legend(labels: Sequence[str], drawn: Mapping[str, Sequence[Panel]]) -> list[Line2D]:
+    handles = [
+        Line2D([], [], color=DISTINCT[index % len(DISTINCT)], lw=2.0, label=label)
+        for index, label in enumerate(labels)
+    ]
+    lines = [line for found in drawn.values() for panel in found for line in panel.lines]
+    for side, style in SIDE_LINES.items():
+        if any(line.labels.get("side") == side for line in lines):
+            handles.append(Line2D([], [], color="0.25", ls=style, label=f"{side} wheel"))
+    return handles

@@ -1,0 +1,18 @@
+"""Studies: every combination of vehicles, tracks, speeds and further values, one file a run.
+
+==============  ===========================================================================
+`case.py`       `Case`: all that one run depends on, with its name and its key
+`combine.py`    from lists and grids to cases; every fault of all of them at once
+`run.py`        a case becomes a file
+`execute.py`    cases over processes or a dask cluster
+`summary.py`    ``summary.csv`` and ``study.json``
+`study.py`      `study`: the whole job
+==============  ===========================================================================
+
+Begin reading in `study.py`.
+"""
+
+from railsim.studies.case import Case
+from railsim.studies.study import Outcome, study
+
+__all__ = ["Case", "Outcome", "study"]

@@ -1,0 +1,90 @@
+"""A case: all that one run depends on."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from railsim.definitions.flatten import flatten
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.profiles import load_profile
+from railsim.version import __version__
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: vehicle, track, speed and settings.
+
+    Attributes
+    ----------
+    name : str
+        Name of the run, and of its file without the ending.
+    vehicle, track, settings
+        Definitions.
+    speed : float
+        Speed [m/s].
+    duration, until : float or None
+        End of the run: time [s] or distance [m]; the end of the track's plan if neither.
+    labels : mapping of str to str or float
+        What tells the case apart: ``vehicle``, ``track``, ``speed`` and the keys of a grid.
+    """
+
+    name: str
+    vehicle: Vehicle
+    track: Track
+    settings: Settings
+    speed: float
+    duration: float | None = None
+    until: float | None = None
+    labels: Mapping[str, str | float] = field(default_factory=dict)
+
+    @property
+    def file_name(self) -> str:
+        """Name of the result file."""
+        return f"{self.name}.h5"
+
+    def key(self) -> str:
+        """Hash of everything that the numbers of the run depend on.
+
+        Definitions with their defaults, the points of the profiles and the version of railsim;
+        neither the name nor the labels.
+        """
+        inputs = {
+            "railsim": __version__,
+            "vehicle": self.vehicle.to_toml(),
+            "track": self.track.to_toml(),
+            "settings": self.settings.to_toml(),
+            "speed": self.speed,
+            "duration": self.duration,
+            "until": self.until,
+            "profiles": {
+                name: hashlib.sha256(load_profile(name).key()).hexdigest()
+                for name in sorted(self._profile_names())
+            },
+        }
+        text = json.dumps(inputs, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def _profile_names(self) -> set[str]:
+        wheelsets = (body.wheelset for body in flatten(self.vehicle).bodies)
+        wheels = {name for wheelset in wheelsets if wheelset for name in wheelset.profile}
+        return wheels | set(self.track.rail)
+
+
+def short_name(path: str | Path) -> str:
+    """Return what a file is called in the names of runs: its name without folder and ending."""
+    return Path(path).name.removesuffix(".toml")
+
+
+def run_name(vehicle: str | Path, track: str | Path, speed: float) -> str:
+    """Return the name of a run.
+
+    Examples
+    --------
+    >>> run_name("vehicles/coach_manchester.toml", "curve_r250", 20.0)
+    'coach_manchester_curve_r250_20'
+    """
+    return f"{short_name(vehicle)}_{short_name(track)}_{speed:.10g}"

@@ -1,0 +1,177 @@
+"""From lists and grids to cases, with every fault of all of them at once."""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import TypeVar
+
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.sources import split_overrides
+from railsim.definitions.track import Track
+from railsim.errors import Fault, InputError
+from railsim.simulation import run_length
+from railsim.studies.case import Case, run_name, short_name
+
+T = TypeVar("T")
+Grid = Mapping[str, Sequence[str]]
+
+
+def load_case(
+    vehicle: str | Path,
+    track: str | Path,
+    speed: float,
+    *,
+    settings: str | Path | None = None,
+    duration: float | None = None,
+    until: float | None = None,
+    assignments: Sequence[str] = (),
+) -> Case:
+    """Load what one run needs.
+
+    Parameters
+    ----------
+    vehicle, track : str or Path
+        File, or name of a shipped one.
+    speed : float
+        Speed [m/s].
+    settings : str or Path, optional
+        Settings file.
+    duration, until : float, optional
+        End of the run: time [s] or distance [m].
+    assignments : sequence of str
+        ``key.path=value``, the paths beginning with ``vehicle.``, ``track.`` or ``settings.``.
+
+    Raises
+    ------
+    InputError : everything that is wrong in any of them.
+    """
+    (case,) = combinations(
+        [vehicle],
+        [track],
+        [speed],
+        settings=settings,
+        duration=duration,
+        until=until,
+        assignments=assignments,
+    )
+    return case
+
+
+def combinations(
+    vehicles: Sequence[str | Path],
+    tracks: Sequence[str | Path],
+    speeds: Sequence[float],
+    grid: Grid | None = None,
+    *,
+    settings: str | Path | None = None,
+    duration: float | None = None,
+    until: float | None = None,
+    assignments: Sequence[str] = (),
+) -> list[Case]:
+    """Return a case for every combination, vehicles outermost; see `load_case`.
+
+    Parameters
+    ----------
+    grid : mapping of str to sequence of str, optional
+        Values, written as in a file, of further keys.
+
+    Raises
+    ------
+    InputError : everything that is wrong in any of them.
+    """
+    faults: list[Fault] = []
+    grid = grid or {}
+    if not (vehicles and tracks and speeds and all(grid.values())):
+        raise InputError([Fault("study", "", "no combination", "give a vehicle, a track, a speed")])
+
+    @cache
+    def loaded(load: Callable[..., T], path: str | Path | None, own: tuple[str, ...]) -> T | None:
+        try:
+            return load(path, own)
+        except InputError as error:
+            faults.extend(error.faults)
+            return None
+
+    cases: list[Case] = []
+    points = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+    for point in points:
+        try:
+            split_overrides(_assigned(assignments, point))
+        except InputError as error:
+            raise InputError(dict.fromkeys(error.faults)) from None
+    for vehicle, track, speed, point in product(vehicles, tracks, speeds, points):
+        own = split_overrides(_assigned(assignments, point))
+        a_vehicle = loaded(load_vehicle, vehicle, tuple(own["vehicle"]))
+        a_track = loaded(load_track, track, tuple(own["track"]))
+        a_settings = loaded(load_settings, settings, tuple(own["settings"]))
+        if a_track:
+            faults.extend(_end_faults(a_track, speed, duration, until))
+        if a_vehicle and a_track and a_settings:
+            labels: dict[str, str | float] = {
+                "vehicle": short_name(vehicle),
+                "track": short_name(track),
+                "speed": speed,
+                **point,
+            }
+            name = run_name(vehicle, track, speed) + _suffix(point)
+            case = Case(name, a_vehicle, a_track, a_settings, speed, duration, until, labels)
+            cases.append(case)
+    if not faults:
+        faults += _double_names(cases)
+    if faults:
+        raise InputError(dict.fromkeys(faults))
+    return cases
+
+
+def _assigned(assignments: Sequence[str], point: Mapping[str, str]) -> list[str]:
+    return [*assignments, *(f"{key}={value}" for key, value in point.items())]
+
+
+def _end_faults(
+    track: Track, speed: float, duration: float | None, until: float | None
+) -> list[Fault]:
+    try:
+        run_length(track, speed, duration, until)
+    except InputError as error:
+        return list(error.faults)
+    return []
+
+
+def _suffix(point: Mapping[str, str]) -> str:
+    """Return what a point of the grid adds to the name of its run."""
+    last = {key: key.rpartition(".")[2] for key in point}
+    unique = len(set(last.values())) == len(last)
+    parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
+    return "".join("_" + re.sub(r"[^\w.+=-]+", "-", part).strip("-") for part in parts)
+
+
+def _double_names(cases: Sequence[Case]) -> list[Fault]:
+    counts = Counter(case.name for case in cases)
+    return [
+        Fault("study", name, f"{count} runs of this name", "give files with different names")
+        for name, count in counts.items()
+        if count > 1
+    ]
+
+
+def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
+    """Return the key and the values of ``key.path=a,b,c``; commas within brackets do not part.
+
+    Examples
+    --------
+    >>> parse_grid("settings.fastsim_grid=[10,10],[20,20]")
+    ('settings.fastsim_grid', ('[10,10]', '[20,20]'))
+
+    Raises
+    ------
+    InputError : it is nothing of the kind.
+    """
+    key, equals, written = text.partition("=")
+    values = tuple(value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written))
+    if not (equals and key.strip() and all(values)):
+        fault = Fault("--grid", text, "not understood", "allowed: key.path=a,b,c")
+        raise InputError([fault])
+    return key.strip(), values

@@ -1,0 +1,30 @@
+"""The pictures of a study: every run, and the vehicles against each other."""
+
+from railsim.plot.histories import histories
+from railsim.plot.overlay import overlay
+from railsim.plot.style import save
+from railsim.studies.study import Outcome
+
+
+def draw(outcome: Outcome) -> None:
+    """Draw the runs that have no picture newer than themselves, and all comparisons.
+
+    Runs that differ by nothing but the vehicle are drawn into one picture,
+    ``compare_TRACK_SPEED.png``.
+    """
+    results = outcome.results()
+    alike: dict[str, dict[str, str]] = {}
+    for record in outcome.records:
+        if record["name"] not in results:
+            continue
+        file = outcome.folder / record["file"]
+        picture = file.with_suffix(".png")
+        if not picture.exists() or picture.stat().st_mtime < file.stat().st_mtime:
+            save(histories(results[record["name"]]), picture, overwrite=True)
+        vehicle = str(record["labels"]["vehicle"])
+        rest = record["name"].removeprefix(f"{vehicle}_")
+        alike.setdefault(rest, {})[vehicle] = record["name"]
+    for rest, names in alike.items():
+        if len(names) > 1:
+            figure = overlay({vehicle: results[name] for vehicle, name in names.items()})
+            save(figure, outcome.folder / f"compare_{rest}.png", overwrite=True)
