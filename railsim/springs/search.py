@@ -1,0 +1,380 @@
+"""Which nests of two springs fit the space, hold the stresses and meet the wanted deflections?
+
+Free are both wires (from a list), both mean diameters and the free height; the stiffnesses follow
+from the design equations, the numbers of coils from the stiffnesses.  In four steps:
+
+1. `candidates`: thousands of nests from a Sobol sequence, all evaluated in one call;
+2. the best nest of each pair of wires is bettered by samples around it; the best pairs go to their
+   optimum (SLSQP of scipy, gradients by differences that are evaluated in the same call);
+3. diameters, height and coils are rounded to what is made, and the nest is verified again *as
+   built*, with the deflections that rounding leaves;
+4. ranked by mass or by fatigue margin; `active` names the limits that hold each optimum in place.
+
+Every limit is a slack, relative and positive when it is kept (`LIMITS` says what each one means).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from railsim.definitions.spring import Search, TrailingArmSuspension
+from railsim.errors import Fault, InputError
+from railsim.springs import nests as many
+from railsim.springs.nests import Dimensions, Evaluation, Task, evaluate
+
+Floats = NDArray[np.float64]
+
+# limit: key of the file that loosens it, and how
+LIMITS = {
+    "outer_diameter": ("search.outer_diameter_max", "raise it"),
+    "inner_diameter": ("search.inner_diameter_min", "reduce it"),
+    "radial_clearance": ("search.clearance_min", "reduce it"),
+    "free_height_min": ("search.free_height", "reduce the smallest free height"),
+    "free_height_max": ("search.free_height", "raise the largest free height"),
+    "index_outer": ("search.spring_index", "widen it"),
+    "index_inner": ("search.spring_index", "widen it"),
+    "coils_outer": ("search.active_coils_min", "reduce it, or allow thicker wire"),
+    "coils_inner": ("search.active_coils_min", "reduce it, or allow thicker wire"),
+    "stiffness": ("target", "bring load and deflection to what two springs can do; see design"),
+    "height_outer": ("search.free_height", "raise it, or allow thinner wire"),
+    "height_inner": ("search.free_height", "raise it, or allow thinner wire"),
+    "yield_outer": ("search.stress_ratio_max", "raise it or material.tau_allowable"),
+    "yield_inner": ("search.stress_ratio_max", "raise it or material.tau_allowable"),
+    "fatigue_outer": ("search.fatigue_margin_min", "reduce it, or allow more space"),
+    "fatigue_inner": ("search.fatigue_margin_min", "reduce it, or allow more space"),
+    "buckling_outer": ("search.buckling_ratio_max", "raise it, or reduce search.free_height"),
+    "buckling_inner": ("search.buckling_ratio_max", "raise it, or reduce search.free_height"),
+    "equilibrium": ("loads", "reduce the highest load"),
+}
+ACTIVE = 2e-3  # relative slack below which a limit counts as active at an optimum
+_SEED = 20260
+_ROUNDS, _AROUND, _CLOSER = 12, 48, 0.7  # samples around the best nest of each pair of wires
+_DIFFERENCE = 1e-7  # of the scaled dimensions: error of the slopes 1e-7 by cut and by round-off
+_MASS = 50.0  # kg: makes the masses of nests numbers of order one
+_SPARE = 10  # pairs refined beyond those asked for: some do not survive rounding
+
+
+@dataclass(frozen=True)
+class BuiltSpring:
+    """One spring as it would be ordered: mean and wire diameter, coils, free height [m]."""
+
+    mean_diameter: float
+    wire_diameter: float
+    active_coils: float
+    free_height: float
+
+
+@dataclass(frozen=True)
+class Nest:
+    """A feasible nest with rounded dimensions.
+
+    Attributes
+    ----------
+    outer, inner : BuiltSpring
+        The springs.
+    mass : float
+        Mass of both [kg].
+    fatigue_margin : float
+        The smaller one of the two springs' margins, `inf` without a table `[fatigue]`.
+    mounting_error, target_error : float
+        Deviation from the wanted deflections that rounding leaves [m].
+    active : tuple of str
+        Limits that hold the optimum in place, before rounding.
+    slack : dict of str to float
+        Relative distance to each limit, as built.
+    """
+
+    outer: BuiltSpring
+    inner: BuiltSpring
+    mass: float
+    fatigue_margin: float
+    mounting_error: float
+    target_error: float
+    active: tuple[str, ...]
+    slack: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """Feasible nests, the best first.
+
+    Attributes
+    ----------
+    nests : tuple of Nest
+        One for each pair of wires, ranked.
+    objective : str
+        What they are ranked by.
+    tried, feasible : int
+        Number of candidates and how many of them kept every limit.
+    broken : dict of str to int
+        Number of candidates that broke a limit, by limit.
+    alone : dict of str to int
+        Number of candidates that broke this limit only.
+    cloud : ndarray, shape (feasible, 2)
+        Mass [kg] and fatigue margin of the feasible candidates.
+    """
+
+    nests: tuple[Nest, ...]
+    objective: str
+    tried: int
+    feasible: int
+    broken: Mapping[str, int]
+    alone: Mapping[str, int]
+    cloud: Floats
+
+
+def search(suspension: TrailingArmSuspension) -> SearchResult:
+    """Search the feasible nests of a suspension file.
+
+    Raises
+    ------
+    InputError : a table that the search needs is missing, or no nest keeps all limits: which
+        limits stand in the way, and how to loosen them.
+    """
+    task = many.task_of(suspension)
+    sample = candidates(task.limits, task.wires)
+    found = evaluate(task, sample)
+    feasible = found.feasible
+    broken = {name: ~(slack >= -1e-9) for name, slack in found.slack.items()}
+    count = np.sum(list(broken.values()), axis=0)
+    optima = _optima(task, sample, found)
+    nests = [nest for optimum in optima if (nest := _built(task, *optimum)) is not None]
+    by_mass = task.limits.objective == "mass"
+    nests.sort(key=lambda nest: nest.mass if by_mass else -nest.fatigue_margin)
+    result = SearchResult(
+        nests=tuple(nests[: task.limits.results]),
+        objective=task.limits.objective,
+        tried=len(sample.H0),
+        feasible=int(np.sum(feasible)),
+        broken={name: int(np.sum(mask)) for name, mask in broken.items()},
+        alone={name: int(np.sum(mask & (count == 1))) for name, mask in broken.items()},
+        cloud=np.column_stack([found.mass, np.minimum(*found.margin)])[feasible],
+    )
+    if not nests:
+        raise InputError(_nothing_fits(suspension, result))
+    return result
+
+
+def candidates(limits: Search, wires: Floats) -> Dimensions:
+    """Nests from a scrambled Sobol sequence that use the space as far as it goes.
+
+    Wires are taken from the list; the mean diameters lie between the spring index and the space
+    that is left, so that most candidates fit geometrically.
+    """
+    power = int(np.ceil(np.log2(limits.candidates)))
+    unit = qmc.Sobol(d=5, seed=np.random.default_rng(_SEED)).random_base2(power)
+    unit = unit[: limits.candidates]
+    index = np.minimum((unit[:, :2] * len(wires)).astype(int), len(wires) - 1)
+    d_outer, d_inner = wires[index[:, 0]], wires[index[:, 1]]
+    w_min, w_max = limits.spring_index
+    gap = d_outer + d_inner + 2.0 * limits.clearance_min
+    low_inner = np.maximum(w_min * d_inner, limits.inner_diameter_min + d_inner)
+    low = np.maximum(w_min * d_outer, low_inner + gap)
+    high = np.minimum(w_max * d_outer, limits.outer_diameter_max - d_outer)
+    D_outer = low + unit[:, 2] * (high - low)
+    high = np.minimum(w_max * d_inner, D_outer - gap)
+    D_inner = low_inner + unit[:, 3] * (high - low_inner)
+    shortest, longest = limits.free_height
+    return Dimensions(
+        d_outer, d_inner, D_outer, D_inner, shortest + unit[:, 4] * (longest - shortest)
+    )
+
+
+def _optima(
+    task: Task, sample: Dimensions, found: Evaluation
+) -> list[tuple[Dimensions, tuple[str, ...]]]:
+    """Optima of the most promising pairs of wires, with their active limits."""
+    leaders, merit = _leaders(task, sample, _merit(task, found))
+    best = np.argsort(merit, kind="stable")[: task.limits.results + _SPARE]
+    return [optimum for i in best if (optimum := _optimum(task, leaders, int(i))) is not None]
+
+
+def _merit(task: Task, found: Evaluation) -> Floats:
+    """The aim, to be made small; a limit broken by one percent costs ten percent."""
+    slack = np.array(list(found.slack.values()))
+    violation = -np.sum(np.minimum(np.nan_to_num(slack, nan=-1.0), 0.0), axis=0)
+    aim = np.max(_aims(task, found), axis=0)
+    merit: Floats = np.nan_to_num(aim * (1.0 + 10.0 * violation), nan=np.inf)
+    return merit
+
+
+def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions, Floats]:
+    """The best nest of each pair of wires, bettered by samples drawn closer and closer around."""
+    random = np.random.default_rng(_SEED)
+    pairs = np.stack([sample.d_outer, sample.d_inner], axis=-1)
+    order = np.argsort(merit, kind="stable")
+    _, first = np.unique(pairs[order], axis=0, return_index=True)
+    chosen = order[first]
+    x = np.stack([sample.D_outer, sample.D_inner, sample.H0], axis=-1)[chosen]
+    d, merit = pairs[chosen], merit[chosen]
+    shortest, longest = task.limits.free_height
+    reach = np.array([0.1, 0.1, 0.5]) * np.array(
+        [task.limits.outer_diameter_max, task.limits.outer_diameter_max, longest - shortest]
+    )
+    for turn in range(_ROUNDS):
+        if turn % 2 == 0:  # leave the worse half of the pairs, as long as enough are left
+            kept = np.argsort(merit, kind="stable")[: max(len(merit) // 2, 4 * _SPARE)]
+            x, d, merit = x[kept], d[kept], merit[kept]
+        tried = x[:, None, :] + reach * random.uniform(-1.0, 1.0, (len(x), _AROUND, 3))
+        tried[..., 2] = np.clip(tried[..., 2], shortest, longest)
+        wires = np.repeat(d, _AROUND, axis=0).T
+        found = evaluate(task, Dimensions(*wires, *tried.reshape(-1, 3).T))
+        merits = _merit(task, found).reshape(len(x), _AROUND)
+        best = np.argmin(merits, axis=1)
+        rows = np.arange(len(x))
+        better = merits[rows, best] < merit
+        x = np.where(better[:, None], tried[rows, best], x)
+        merit = np.where(better, merits[rows, best], merit)
+        reach = _CLOSER * reach
+    return Dimensions(*d.T, *x.T), merit
+
+
+def _optimum(
+    task: Task, sample: Dimensions, start: int
+) -> tuple[Dimensions, tuple[str, ...]] | None:
+    """Best mean diameters and free height for one pair of wires, or None where none fit.
+
+    Variables are (D_outer, D_inner, H0) over the size of the space, and a bound t that is made as
+    small as the aims allow: one aim for the mass, two for the springs' inverse margins.
+    """
+    d_outer, d_inner = float(sample.d_outer[start]), float(sample.d_inner[start])
+    largest, longest = task.limits.outer_diameter_max, task.limits.free_height[1]
+    scale = np.array([largest, largest, longest])
+    neighbours = np.vstack([np.zeros(3), _DIFFERENCE * np.eye(3)])
+
+    def at(points: Floats) -> Dimensions:
+        D_outer, D_inner, H0 = (points * scale).T
+        ones = np.ones_like(H0)
+        return Dimensions(d_outer * ones, d_inner * ones, D_outer, D_inner, H0)
+
+    def values(points: Floats) -> tuple[Floats, Floats, list[str]]:
+        """Aims and slacks of each point, with the limits' names."""
+        found = evaluate(task, at(points))
+        aims = np.stack(_aims(task, found), axis=-1)
+        slack = np.stack(list(found.slack.values()), axis=-1)
+        # far outside the model's range: finite, and clearly wrong
+        aims = np.nan_to_num(aims, nan=1e3, posinf=1e3)
+        return aims, np.clip(np.nan_to_num(slack, nan=-1.0), -10.0, 10.0), list(found.slack)
+
+    @lru_cache(maxsize=8)
+    def linearised(point: bytes) -> tuple[Floats, Floats]:
+        """Constraints (aims under the bound, slacks) and their slopes; without the bound t."""
+        aims, slack, _ = values(np.frombuffer(point)[:3] + neighbours)
+        block = np.hstack([-aims, slack])
+        slopes = (block[1:] - block[0]).T / _DIFFERENCE
+        bound = np.concatenate([np.ones(aims.shape[1]), np.zeros(slack.shape[1])])
+        return block[0], np.column_stack([slopes, bound])
+
+    def constraints(x: Floats) -> Floats:
+        value, slope = linearised(np.ascontiguousarray(x).tobytes())
+        at_bound: Floats = value + slope[:, 3] * x[3]
+        return at_bound
+
+    def slopes(x: Floats) -> Floats:
+        _, slope = linearised(np.ascontiguousarray(x).tobytes())
+        return slope
+
+    first = np.array([sample.D_outer[start], sample.D_inner[start], sample.H0[start]]) / scale
+    t = float(np.max(values(first[None, :])[0]))
+    w_min, w_max = task.limits.spring_index
+    shortest = task.limits.free_height[0]
+    all_above_zero: Any = {"type": "ineq", "fun": constraints, "jac": slopes}
+    solution = minimize(
+        _bound,
+        np.append(first, t),
+        jac=_bound_slope,
+        bounds=[
+            (w_min * d_outer / largest, w_max * d_outer / largest),
+            (w_min * d_inner / largest, w_max * d_inner / largest),
+            (shortest / longest, 1.0),
+            (None, None),
+        ],
+        constraints=all_above_zero,
+        method="SLSQP",
+        options={"maxiter": 40, "ftol": 1e-6},
+    )
+    _, slack, names = values(solution.x[None, :3])
+    if not np.all(slack[0] >= -1e-4):
+        return None
+    active = tuple(name for name, value in zip(names, slack[0], strict=True) if value < ACTIVE)
+    return at(solution.x[None, :3]), active
+
+
+def _bound(x: Floats) -> float:
+    return float(x[3])
+
+
+def _bound_slope(x: Floats) -> Floats:
+    return np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def _aims(task: Task, found: Evaluation) -> list[Floats]:
+    """What is to be made small, of order one: the mass, or both springs' inverse margins."""
+    if task.limits.objective == "mass":
+        return [found.mass / _MASS]
+    return [1.0 / margin for margin in found.margin]
+
+
+def _built(task: Task, optimum: Dimensions, active: tuple[str, ...]) -> Nest | None:
+    """The best rounding of an optimum that keeps every limit, None where none does."""
+    step, coil_step = task.limits.diameter_step, task.limits.coil_step
+    axes = [
+        [np.floor(value[0] / step) * step + k * step for k in (-1, 0, 1, 2)]
+        for value in (optimum.D_outer, optimum.D_inner, optimum.H0)
+    ]
+    D_outer, D_inner, H0 = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
+    ones = np.ones_like(H0)
+    rounded = Dimensions(optimum.d_outer * ones, optimum.d_inner * ones, D_outer, D_inner, H0)
+    exact = evaluate(task, rounded).n
+    x = Dimensions(*(np.repeat(value, 4) for value in vars(rounded).values()))
+    up = np.tile([[0, 0], [0, 1], [1, 0], [1, 1]], (len(H0), 1))
+    n_outer, n_inner = (
+        (np.floor(np.repeat(n, 4) / coil_step) + up[:, i]) * coil_step for i, n in enumerate(exact)
+    )
+    result = evaluate(task, x, (n_outer, n_inner))
+    error = np.max(np.abs(result.deflection_error), axis=0)
+    fits = result.feasible & (error <= task.limits.height_error_max)
+    if not np.any(fits):
+        return None
+    margin = np.minimum(*result.margin)
+    # a third of a percent of the aim is worth less than a millimetre of ride height
+    aim = result.mass / np.min(result.mass[fits])
+    if task.limits.objective == "fatigue":
+        aim = -margin / np.max(margin[fits])
+    best = int(np.argmin(np.where(fits, aim + 3.0 * error, np.inf)))
+
+    def spring(d: Floats, D: Floats, n: Floats, H: Floats) -> BuiltSpring:
+        return BuiltSpring(*(round(float(value[best]), 9) for value in (D, d, n, H)))
+
+    return Nest(
+        outer=spring(x.d_outer, x.D_outer, n_outer, x.H0),
+        inner=spring(x.d_inner, x.D_inner, n_inner, x.H0 - task.height_difference),
+        mass=float(result.mass[best]),
+        fatigue_margin=float(margin[best]),
+        mounting_error=float(result.deflection_error[0][best]),
+        target_error=float(result.deflection_error[1][best]),
+        active=active,
+        slack={name: float(values[best]) for name, values in result.slack.items()},
+    )
+
+
+def _nothing_fits(suspension: TrailingArmSuspension, result: SearchResult) -> list[Fault]:
+    """The limits that stand in the way: those that are broken alone, else the most broken."""
+    counts = result.alone if any(result.alone.values()) else result.broken
+    worst = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])[:3]
+    how = "alone keeps" if counts is result.alone else "keeps"
+    return [
+        Fault(
+            suspension.name,
+            LIMITS[name][0],
+            f"no nest fits: the limit '{name}' {how} out {counts[name]} of {result.tried}",
+            LIMITS[name][1],
+        )
+        for name in worst
+    ]
