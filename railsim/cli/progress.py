@@ -7,7 +7,7 @@ from threading import Timer
 
 import click
 
-PATIENCE = 3.0  # seconds without progress before the user is told why
+PATIENCE = 5.0  # seconds without progress before the user is told why
 FIRST_RUN = (
     "preparing: the first run after an installation compiles the time loop and builds the contact "
     "tables of its profiles (up to a minute; kept for later runs)"

@@ -46,19 +46,10 @@ def _through_zero(rows: Rows) -> Rows:
     return rows
 
 
-def _one_sided(rows: Rows) -> Rows:
-    if rows[0] != (0.0, 0.0):
-        raise ValueError("the first row must be [0, 0]; the table serves both directions")
-    return rows
-
-
 Characteristic = Annotated[
     tuple[tuple[Finite, Finite], ...],
     AfterValidator(_characteristic),
     AfterValidator(_through_zero),
-]
-StopCharacteristic = Annotated[
-    tuple[tuple[Finite, Finite], ...], AfterValidator(_characteristic), AfterValidator(_one_sided)
 ]
 
 
@@ -86,8 +77,8 @@ def _mirrored_preload(preload: Literal["auto"] | Vector, signs: Signs) -> dict[s
 class Element(Definition):
     """What all force elements have in common."""
 
-    bodies: tuple[Text, Text]
-    """Names of body 1 and body 2, found from the innermost assembly outwards"""
+    bodies: tuple[Text, ...]
+    """Names of the bodies, found from the innermost assembly outwards"""
 
     def end_points(self) -> tuple[Vector, Vector] | None:
         """Points on body 1 and body 2 as written [m]; None where the element has none."""
@@ -98,7 +89,14 @@ class Element(Definition):
         return self
 
 
-class SidedElement(Element):
+class PairElement(Element):
+    """An element between two bodies."""
+
+    bodies: tuple[Text, Text]
+    """Names of body 1 and body 2, found from the innermost assembly outwards"""
+
+
+class SidedElement(PairElement):
     """An element that may stand on both sides."""
 
     sides: Literal["both"] | None = None
@@ -218,7 +216,7 @@ class ShearSpring(SidedElement):
         return self.model_copy(update=_mirrored_preload(self.preload, signs))
 
 
-class RollBar(Element):
+class RollBar(PairElement):
     """Anti-roll bar: a moment about x against the relative roll of two bodies."""
 
     kind: Literal["roll_bar"]
@@ -229,15 +227,144 @@ class RollBar(Element):
 
 
 class BumpStop(PointElement):
-    """Stop with free travel along one axis of body 1, the same in both directions."""
+    """Stop with free travel along one axis of body 1; a spring with clearance."""
 
     kind: Literal["bump_stop"]
     axis: Literal["x", "y", "z"]
     """Axis of body 1 along which the stop acts"""
-    table: StopCharacteristic
-    """Rows [travel m, force N], beginning with [0, 0]; serves both directions"""
+    table: Characteristic
+    """Rows [travel of body 2 m, force N]; from [0, 0] on it serves both directions"""
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the stop in a mirrored place: the two directions of its axis change places."""
+        if signs["xyz".index(self.axis)] > 0.0 or self.table[0][0] == 0.0:
+            return self
+        turned = tuple((-x, -force) for x, force in reversed(self.table))
+        return self.model_copy(update={"table": turned})
+
+
+class Friction(PointElement):
+    """Dry friction along the axes of body 1, with a spring in parallel: leaf spring, friction pad.
+
+    Along each axis the sliding force is at most friction_force + friction_coefficient |N|, with N
+    the vertical spring force of this element; below it the pad sticks elastically.
+    """
+
+    kind: Literal["friction"]
+    friction_force: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Constant part of the largest friction force along x, y, z [N]"""
+    friction_coefficient: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Part that grows with the vertical spring force, along x, y, z [1]"""
+    stick_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Stiffness of the sticking pad along x, y, z, needed where there is friction [N/m]"""
+    stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Stiffness of the parallel spring along x, y, z [N/m]"""
+    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Damping along x, y, z [N s/m]"""
+    preload: AutoOrVector = "auto"
+    """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+
+    @model_validator(mode="after")
+    def _friction_needs_a_sticking_stiffness(self) -> Self:
+        limits = zip(self.friction_force, self.friction_coefficient, strict=True)
+        slides = [force > 0.0 or coefficient > 0.0 for force, coefficient in limits]
+        if not any(slides):
+            raise ValueError("no friction: 'friction_force' or 'friction_coefficient' is needed")
+        for axis, sliding, sticking in zip("xyz", slides, self.stick_stiffness, strict=True):
+            if sliding and sticking == 0.0:
+                raise ValueError(f"friction along {axis} needs 'stick_stiffness' along {axis}")
+        return self
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the element in a mirrored place: the preload turns with the axes."""
+        return self.model_copy(update=_mirrored_preload(self.preload, signs))
+
+
+class Airspring(PointElement):
+    """Air spring with reservoir after Nishimura: three springs and the orifice's damping.
+
+    Vertical force: area_stiffness z + bellows_stiffness (z - w), where the orifice closes the
+    balance bellows_stiffness (z - w) = reservoir_stiffness w + orifice_damping w'.
+    """
+
+    kind: Literal["airspring"]
+    bellows_stiffness: Positive
+    """Stiffness of the air in the bellows alone [N/m]"""
+    reservoir_stiffness: NonNegative
+    """Further stiffness of the air in the reservoir [N/m]"""
+    area_stiffness: NonNegative = 0.0
+    """Stiffness from the change of the effective area [N/m]"""
+    orifice_damping: Positive
+    """Damping of the orifice, referred to the bellows [N s/m]"""
+    horizontal_stiffness: tuple[NonNegative, NonNegative]
+    """Stiffness along x and y [N/m]"""
+    horizontal_damping: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    """Damping along x and y [N s/m]"""
+    torsional_stiffness: NonNegative = 0.0
+    """Stiffness about z [N m/rad]"""
+    preload: AutoOrVector = "auto"
+    """Force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the spring in a mirrored place: the preload turns with the axes."""
+        return self.model_copy(update=_mirrored_preload(self.preload, signs))
+
+
+def _in_time(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if not rising(rows):
+        raise ValueError("the time must increase from row to row")
+    return rows
+
+
+TimeRows = Annotated[
+    tuple[tuple[Finite, Finite, Finite, Finite], ...],
+    Field(min_length=1),
+    AfterValidator(_in_time),
+]
+
+
+class AppliedForce(Element):
+    """A force and a torque on one body over time: wind, traction, a test load."""
+
+    kind: Literal["applied_force"]
+    bodies: tuple[Text]
+    """Name of the body, found from the innermost assembly outwards"""
+    point: Vector | None = None
+    """Where the force acts [m]; by default at the centre of gravity"""
+    axes: Literal["body", "track"] = "body"
+    """Axes of force and torque: those of the body, or those of the track at its place"""
+    force_table: TimeRows | None = None
+    """Rows [time s, Fx, Fy, Fz N], linear in between, constant beyond"""
+    torque_table: TimeRows | None = None
+    """Rows [time s, Mx, My, Mz N m], linear in between, constant beyond"""
+
+    @model_validator(mode="after")
+    def _something_acts(self) -> Self:
+        if self.force_table is None and self.torque_table is None:
+            raise ValueError("'force_table' or 'torque_table' is needed")
+        return self
+
+    def end_points(self) -> tuple[Vector, Vector] | None:
+        """Point of action as written, twice [m]; None for the centre of gravity."""
+        return None if self.point is None else (self.point, self.point)
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the load in a mirrored place; a torque turns the other way round than a force."""
+        handed = signs[0] * signs[1] * signs[2]
+        turns = (handed * signs[0], handed * signs[1], handed * signs[2])
+        tables = {
+            "force_table": (self.force_table, signs),
+            "torque_table": (self.torque_table, turns),
+        }
+        update = {
+            key: tuple((row[0], *_times(row[1:], factors)) for row in rows)
+            for key, (rows, factors) in tables.items()
+            if rows is not None
+        }
+        return self.model_copy(update=update)
 
 
 AnyElement = Annotated[
-    SpringDamper | Bushing | ShearSpring | RollBar | BumpStop, Field(discriminator="kind")
+    SpringDamper | Bushing | ShearSpring | RollBar | BumpStop | Friction | Airspring | AppliedForce,
+    Field(discriminator="kind"),
 ]

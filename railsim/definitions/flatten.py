@@ -61,7 +61,8 @@ class FlatElement:
     Attributes
     ----------
     name, body1, body2 : str
-        Full names of the element and of the bodies it acts between.
+        Full names of the element and of the bodies it acts between; an applied force has no
+        second body (an empty name).
     point1, point2 : tuple of 3 floats
         Where it acts in vehicle axes; an element without points: the bodies' positions [m].
     definition : Element
@@ -224,11 +225,12 @@ def _elements(
             ends = [resolve(body, place.scope, side, positions) or "" for body in element.bodies]
             points = element.end_points()
             if points is None:
-                at = (positions[ends[0]], positions[ends[1]])
+                at = (positions[ends[0]], positions[ends[-1]])
             else:
                 at = (place.point(points[0], side), place.point(points[1], side))
             definition = element.mirrored(place.signs(side))
-            yield FlatElement(place.full(sided), ends[0], ends[1], at[0], at[1], definition)
+            body2 = ends[1] if len(ends) == 2 else ""
+            yield FlatElement(place.full(sided), ends[0], body2, at[0], at[1], definition)
 
 
 def position_faults(vehicle: Vehicle) -> list[Fault]:

@@ -17,6 +17,7 @@ from railsim.definitions import names, sources
 from railsim.definitions.base import FileDefinition, Remark
 from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
+from railsim.definitions.measured import embed_measured
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
 from railsim.definitions.spring import (
@@ -46,6 +47,8 @@ class Format:
         Word for it: vehicle, track, settings.
     model : type
         Its definition.
+    prepare : callable
+        Completes the plain tables from further files, in place, and returns their faults.
     raw_faults : callable
         Checks on the plain tables, valid or not; the faults' file is left empty.
     faults : callable
@@ -62,11 +65,14 @@ class Format:
     faults: Callable[[Any], list[Fault]] = _nothing
     remarks: Callable[[Any], list[Remark]] = _nothing
     free: tuple[str, ...] = ()
+    prepare: Callable[[dict[str, Any]], list[Fault]] = _nothing
 
 
 FORMATS: dict[str, Format] = {
     VEHICLE_FORMAT: Format("vehicle", Vehicle, names.name_faults, position_faults),
-    TRACK_FORMAT: Format("track", Track, faults=track_faults, remarks=track_remarks),
+    TRACK_FORMAT: Format(
+        "track", Track, faults=track_faults, remarks=track_remarks, prepare=embed_measured
+    ),
     SETTINGS_FORMAT: Format("settings", Settings, free=("initial",)),
     SPRING_FORMAT: Format(
         "spring",
@@ -153,7 +159,8 @@ def _loaded(model: type[D], source: Source, overrides: Iterable[str]) -> D:
         file = source.file_of(("format",))
         raise InputError([_format_fault(file, source.data.get("format"), [format_name])])
     source = sources.apply_overrides(source, overrides, known.free)
-    faults = [_placed(fault, source) for fault in known.raw_faults(source.data)]
+    faults = [*known.prepare(source.data), *known.raw_faults(source.data)]
+    faults = [_placed(fault, source) for fault in faults]
     try:
         definition = model.model_validate(source.data)
     except ValidationError as error:
@@ -172,7 +179,7 @@ def _format_fault(file: str, found: object, allowed: Iterable[str]) -> Fault:
 
 
 def _placed(fault: Fault, source: Source) -> Fault:
-    return source.fault(fault.key, fault.found, fault.allowed)
+    return fault if fault.file else source.fault(fault.key, fault.found, fault.allowed)
 
 
 def _validation_faults(

@@ -1,8 +1,8 @@
 """Settings files, `railsim-settings/1`: how a run is computed and what it puts out."""
 
-from typing import Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from railsim.definitions.base import (
     Count,
@@ -11,9 +11,24 @@ from railsim.definitions.base import (
     Finite,
     NonNegative,
     Positive,
+    rising,
 )
 
 SETTINGS_FORMAT = "railsim-settings/1"
+
+
+def _forward(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    if not rising(rows):
+        raise ValueError("the first column must increase from row to row")
+    return rows
+
+
+SpeedRows = Annotated[
+    tuple[tuple[Finite, Positive], ...], Field(min_length=1), AfterValidator(_forward)
+]
+TractionRows = Annotated[
+    tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), AfterValidator(_forward)
+]
 
 
 class InitialState(Definition):
@@ -45,6 +60,28 @@ class InitialState(Definition):
     """Angular velocity about z [rad/s]"""
 
 
+class Drive(Definition):
+    """How the speed goes along the track."""
+
+    mode: Literal["constant", "table", "free"] = "constant"
+    """`constant`: the speed of the run; `table`: after `speed_table`; `free`: the run's speed at
+    the start, then by traction and resistance"""
+    speed_table: SpeedRows | None = None
+    """Rows [arc length m, speed m/s], linear in between, constant beyond"""
+    traction_table: TractionRows | None = None
+    """Rows [speed m/s, force N] on the reference body, braking negative, constant beyond"""
+    resistance: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    """Running resistance a + b V + c V^2 on the reference body [N, N s/m, N s2/m2]"""
+
+    @model_validator(mode="after")
+    def _what_the_mode_needs(self) -> Self:
+        if (self.mode == "table") != (self.speed_table is not None):
+            raise ValueError("'speed_table' belongs to mode = \"table\" and only to it")
+        if self.mode != "free" and (self.traction_table or any(self.resistance)):
+            raise ValueError("'traction_table' and 'resistance' belong to mode = \"free\"")
+        return self
+
+
 class Settings(FileDefinition):
     """How a run is computed: everything that a settings file says."""
 
@@ -68,11 +105,13 @@ class Settings(FileDefinition):
     """Shear modulus of wheels and rails [Pa]"""
     poisson: NonNegative = 0.28
     """Poisson's number of wheels and rails [1]"""
+    drive: Drive = Drive()
+    """How the speed goes along the track"""
     initial: dict[str, InitialState] = Field(default_factory=dict)
     """Disturbance at the start by the body's full name"""
 
     @model_validator(mode="after")
-    def _physical(self) -> "Settings":
+    def _physical(self) -> Self:
         if self.poisson >= 0.5:
             raise ValueError("'poisson' must be below 0.5")
         return self

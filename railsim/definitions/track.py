@@ -1,22 +1,26 @@
-"""Track files, `railsim-track/1`: plan, cant, vertical profile, rails and friction.
+"""Track files, `railsim-track/1`: plan, cant, vertical profile, rails, friction, irregularities.
 
 Plan, cant and vertical profile are lists of elements, one behind the other, each with its length.
 A transition (CLO, LIR) takes its ends from its neighbours where it does not name them.  Curvature,
 cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from railsim.definitions.base import (
     Definition,
     FileDefinition,
+    Finite,
+    NonNegative,
     NonNegativePair,
     Positive,
     Text,
     TextPair,
+    rising,
 )
+from railsim.definitions.irregularity import Irregularity
 
 TRACK_FORMAT = "railsim-track/1"
 
@@ -27,6 +31,52 @@ def _curved(radius: float) -> float:
     return radius
 
 
+def _forward(rows: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not rising(rows):
+        raise ValueError("the arc length must increase from row to row")
+    return rows
+
+
+def _same_on_both_sides(value: Any) -> Any:
+    return _completed(value, 1.0)
+
+
+def _shared_by_both_sides(value: Any) -> Any:
+    return _completed(value, 0.5)
+
+
+def _completed(value: Any, share: float) -> Any:
+    """Return rows [s, value] as [s, left, right]."""
+    if not isinstance(value, list | tuple):
+        return value
+    return [
+        (row[0], share * row[1], share * row[1])
+        if isinstance(row, list | tuple) and len(row) == 2 and isinstance(row[1], int | float)
+        else row
+        for row in value
+    ]
+
+
+_ROWS = WithJsonSchema(
+    {
+        "type": "array",
+        "minItems": 1,
+        "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
+    }
+)
+Widening = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.05, le=0.1)]
+FrictionRows = Annotated[
+    Annotated[tuple[tuple[Finite, NonNegative, NonNegative], ...], Field(min_length=1)],
+    AfterValidator(_forward),
+    BeforeValidator(_same_on_both_sides),
+    _ROWS,
+]
+WideningRows = Annotated[
+    Annotated[tuple[tuple[Finite, Widening, Widening], ...], Field(min_length=1)],
+    AfterValidator(_forward),
+    BeforeValidator(_shared_by_both_sides),
+    _ROWS,
+]
 Radius = Annotated[float, Field(strict=True), AfterValidator(_curved)]
 Cant = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
 Gradient = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.3, le=0.3)]
@@ -128,6 +178,11 @@ class Track(FileDefinition):
     """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
     friction: NonNegativePair = (0.4, 0.4)
     """Coefficient of friction, one number or [left, right] [1]"""
+    friction_table: FrictionRows | None = None
+    """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
+    gauge_widening: WideningRows | None = None
+    """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
+    much each rail stands further out than the gauge says, one number being shared by both rails"""
     rounding: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=200)] = 10.0
     """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
     cant_rotation: Literal["centre", "inner_rail"] = "centre"
@@ -138,6 +193,9 @@ class Track(FileDefinition):
     """Elements of the cant; where shorter than the plan, the last value continues"""
     vertical: tuple[VerticalElement, ...] = ()
     """Elements of the vertical profile; where shorter than the plan, the last gradient continues"""
+
+    irregularities: tuple[Irregularity, ...] = ()
+    """Displacements of the rails from their ideal places; they add up"""
 
     @property
     def length(self) -> float:

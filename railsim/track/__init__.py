@@ -4,6 +4,7 @@
 module         job
 =============  ==================================================================================
 alignment      plan, cant and vertical profile, rounded: exact functions of the arc length
+irregularity   displacements of the rails: measured, single, random; gauge widening
 tables         all of it as piecewise cubic tables for the compiled kernels
 =============  ==================================================================================
 """

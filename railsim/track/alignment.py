@@ -46,15 +46,19 @@ class RoundedProfile:
         Values over arc length; none at all means zero everywhere.
     rounding : float
         Length of the window [m]; 0 leaves the kinks.
+    origin : float
+        Arc length from which the sections' ends count [m].
     """
 
-    def __init__(self, sections: Sequence[Section], rounding: float) -> None:
+    def __init__(self, sections: Sequence[Section], rounding: float, origin: float = 0.0) -> None:
         knots = [-1.0, 0.0, *(section.end for section in sections)]
         slopes = [0.0, *(section.slope for section in sections), 0.0]
         first = sections[0].start_value if sections else 0.0
         last = sections[-1].end_value if sections else 0.0
         values = [first, *(section.start_value for section in sections), last]
-        self._plain = PPoly(np.array([slopes, values]), np.array([*knots, knots[-1] + 1.0]))
+        self._plain = PPoly(
+            np.array([slopes, values]), origin + np.array([*knots, knots[-1] + 1.0])
+        )
         self._integral = self._plain.antiderivative()
         self._double_integral = self._integral.antiderivative()
         self._half_window = 0.5 * rounding

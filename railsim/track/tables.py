@@ -11,6 +11,7 @@ import numpy as np
 from railsim.definitions.track import Track
 from railsim.kernels.track_frame import TrackTables
 from railsim.track.alignment import Alignment, Array
+from railsim.track.irregularity import Displacement, displacement, shortest_length
 
 # Usual length of a cell, and the largest number of them that is worth its memory.
 CELL_LENGTH = 0.25
@@ -59,13 +60,15 @@ def track_tables(
         coefficients[:, row] = hermite(value, rate, ds)
     for row, (value, rate) in enumerate(_angles(alignment, s)):
         coefficients[:, 3 + row] = hermite(value, rate, ds)
-    return TrackTables(float(s[0]), float(ds), coefficients, _rails(track, n_cells), 0)
+    moved = displacement(track)
+    rail = _rails(track, moved, s)
+    return TrackTables(float(s[0]), float(ds), coefficients, rail, int(moved is not None))
 
 
 def usual_cell_length(track: Track, margin: float = BEFORE + AFTER) -> float:
-    """Length of a cell [m]: 0.25 m, less for short roundings, more for very long tracks."""
+    """Length of a cell [m]: 0.25 m, more for very long tracks, less where details need it."""
     longest = max(CELL_LENGTH, (track.length + margin) / MOST_CELLS)
-    return min(longest, 0.25 * track.rounding)
+    return min(longest, 0.25 * track.rounding, shortest_length(track))
 
 
 def hermite(value: Array, rate: Array, ds: float) -> Array:
@@ -113,7 +116,18 @@ def _centre_line(alignment: Alignment, s: Array, origin: int) -> list[tuple[Arra
     return list(zip(position, _direction(alignment, s), strict=True))
 
 
-def _rails(track: Track, n_cells: int) -> Array:
-    rail = np.zeros((n_cells, 6, 4))
-    rail[:, 4, 0], rail[:, 5, 0] = track.friction
+def _rails(track: Track, moved: Displacement | None, s: Array) -> Array:
+    """Displacements and friction of both rails, float64[n_cells, 6, 4]."""
+    ds = s[1] - s[0]
+    rail = np.zeros((s.size - 1, 6, 4))
+    if moved is not None:
+        for row, (value, rate) in enumerate(zip(*moved(s), strict=True)):
+            rail[:, row] = hermite(value, rate, ds)
+    if track.friction_table is None:
+        rail[:, 4, 0], rail[:, 5, 0] = track.friction
+        return rail
+    table = np.array(track.friction_table)
+    for row in (4, 5):
+        mu = np.interp(s, table[:, 0], table[:, row - 3])
+        rail[:, row, 0], rail[:, row, 1] = mu[:-1], np.diff(mu) / ds
     return rail

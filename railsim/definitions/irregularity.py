@@ -1,0 +1,180 @@
+"""Irregularities of a track file: measured, single and random displacements of the rails.
+
+Each rail is displaced laterally (y, positive to the right) and vertically (z, positive downwards)
+from the place that plan, cant and vertical profile give it; several irregularities add up.  A
+disturbance that does not end at zero by itself is faded in and out over `fade`.
+"""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from railsim.definitions.base import (
+    Definition,
+    Finite,
+    Flag,
+    NonNegative,
+    Positive,
+    Text,
+    rising,
+)
+
+# Names of the columns of a measured irregularity, beside the arc length.
+COLUMNS = ("y_left", "z_left", "y_right", "z_right")
+Amplitude = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
+Rails = Literal["left", "right", "both"]
+Row = tuple[Finite, Amplitude, Amplitude, Amplitude, Amplitude]
+
+
+def _measured_rows(rows: tuple[Row, ...]) -> tuple[Row, ...]:
+    if not rising(rows):
+        raise ValueError("the arc length must increase from row to row")
+    return rows
+
+
+def _band(wavelengths: tuple[float, float]) -> tuple[float, float]:
+    if wavelengths[1] <= wavelengths[0]:
+        raise ValueError("[shortest, longest]: the second must be larger than the first")
+    return wavelengths
+
+
+Wavelengths = Annotated[
+    tuple[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.2)], Positive],
+    AfterValidator(_band),
+]
+
+
+class Measured(Definition):
+    """Displacements measured or computed elsewhere, smoothly interpolated (cubic spline)."""
+
+    type: Literal["measured"]
+    file: Text | None = None
+    """CSV with a header: `s` and any of `y_left`, `z_left`, `y_right`, `z_right` in m (`s_m`) or
+    mm (`y_left_mm`), or `y`, `z`, `cross_level`, `gauge`; read when the track is loaded"""
+    rows: Annotated[tuple[Row, ...], AfterValidator(_measured_rows)] | None = None
+    """What was read: rows [s, y_left, z_left, y_right, z_right] [m]"""
+    shift: Finite = 0.0
+    """Added to the arc lengths of the file [m]"""
+    scale: Finite = 1.0
+    """Factor on all displacements"""
+    fade: NonNegative = 10.0
+    """Length over which the data fade in and out at both ends [m]"""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.file is None) == (self.rows is None):
+            raise ValueError("either 'file' or 'rows' is needed")
+        if self.rows is not None and len(self.rows) < 4:
+            raise ValueError("four rows at least are needed")
+        return self
+
+
+class Dip(Definition):
+    """A single vertical disturbance: a dipped joint, a hump."""
+
+    type: Literal["dip"]
+    s: Finite
+    """Arc length of its middle [m]"""
+    length: Positive
+    """Length from begin to end [m]"""
+    depth: Amplitude
+    """Displacement in the middle, positive downwards [m]"""
+    rail: Rails = "both"
+    """Which rail"""
+    shape: Literal["cosine", "triangle"] = "cosine"
+    """`cosine`: one wave of 1 - cos; `triangle`: two straights, kinks rounded over length / 10"""
+
+
+class Kink(Definition):
+    """A single lateral disturbance: a kink of the alignment."""
+
+    type: Literal["kink"]
+    s: Finite
+    """Arc length of its middle [m]"""
+    length: Positive
+    """Length from begin to end [m]"""
+    offset: Amplitude
+    """Displacement in the middle, positive to the right [m]"""
+    rail: Rails = "both"
+    """Which rail"""
+    shape: Literal["cosine", "triangle"] = "triangle"
+    """As for a dip"""
+
+
+class Twist(Definition):
+    """A single disturbance of the cross level: one rail rises, the other sinks by half of it."""
+
+    type: Literal["twist"]
+    s: Finite
+    """Arc length of its middle [m]"""
+    length: Positive
+    """Length from begin to end [m]"""
+    height: Amplitude
+    """Change of cross level in the middle, positive = left rail higher [m]"""
+    shape: Literal["cosine", "triangle"] = "triangle"
+    """As for a dip"""
+
+
+class Coefficients(Definition):
+    """Coefficients of the spectra; form and meaning in the manual."""
+
+    lateral: NonNegative = 0.0
+    """A_a of the alignment [m rad]"""
+    vertical: NonNegative = 0.0
+    """A_v of the longitudinal level [m rad]"""
+    cross_level: NonNegative = 0.0
+    """Coefficient of the cross level in place of A_v [m rad]"""
+    gauge: NonNegative = 0.0
+    """A_g of the gauge [m rad]"""
+    omega_c: Positive = 0.8246
+    """[rad/m]"""
+    omega_r: Positive = 0.0206
+    """[rad/m]"""
+    omega_s: Positive = 0.4380
+    """[rad/m]"""
+    b: Positive = 0.75
+    """Half the distance of the rails that the cross level refers to [m]"""
+
+
+class Random(Definition):
+    """Stationary random irregularities from power spectral densities."""
+
+    type: Literal["random"]
+    spectrum: Literal["erri_b176_low", "erri_b176_high", "own"]
+    """Which spectra; `own` needs `coefficients`"""
+    coefficients: Coefficients | None = None
+    """Own coefficients"""
+    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    """Seed of the random phases: the same seed gives the same track"""
+    wavelengths: Wavelengths = (3.0, 70.0)
+    """Shortest and longest wavelength [m]; the variance is the integral of the spectrum between"""
+    channels: tuple[Literal["lateral", "vertical", "cross_level", "gauge"], ...] = (
+        "lateral",
+        "vertical",
+        "cross_level",
+        "gauge",
+    )
+    """Which of the four irregularities are generated"""
+    begin: Finite = 0.0
+    """Arc length where it begins [m]"""
+    end: Finite | None = None
+    """Arc length where it ends [m]; by default the end of the plan"""
+    scale: NonNegative = 1.0
+    """Factor on all displacements"""
+    fade: NonNegative = 10.0
+    """Length over which it fades in and out within its ends [m]"""
+    mirror: Flag = False
+    """The mirror image of the same realisation: left and right exchanged"""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if (self.spectrum == "own") != (self.coefficients is not None):
+            raise ValueError("'coefficients' belong to spectrum = \"own\" and only to it")
+        if self.end is not None and self.end <= self.begin:
+            raise ValueError("'end' must lie behind 'begin'")
+        if len(set(self.channels)) < len(self.channels):
+            raise ValueError("'channels' names one irregularity twice")
+        return self
+
+
+Irregularity = Annotated[Measured | Dip | Kink | Twist | Random, Field(discriminator="type")]

@@ -1,0 +1,319 @@
+"""Irregularities as displacements of the rails and their rates over arc length.
+
+A `Displacement` gives, for any arc lengths, the four displacements (y_left, z_left, y_right,
+z_right; y to the right, z down) [m] and their derivatives along the track [1].  The spectra are
+one-sided: the variance of a displacement is the integral of S over omega from 2 pi / longest to
+2 pi / shortest wavelength.
+
+Random irregularities are sums of cosines with random phases (Shinozuka and Deodatis 1991, Applied
+Mechanics Reviews 44): one cosine for each bin of a fine division of the band, with the amplitude
+sqrt(2 integral of S over the bin).  The variance over the whole period is thus exact for every
+seed.  The period is as long as the irregularity, and 20 of its longest wavelengths at least.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len
+from scipy.interpolate import CubicSpline
+
+from railsim.definitions.irregularity import (
+    Coefficients,
+    Dip,
+    Irregularity,
+    Kink,
+    Measured,
+    Random,
+    Twist,
+)
+from railsim.definitions.layout import Section
+from railsim.definitions.track import Track
+from railsim.track.alignment import RoundedProfile
+
+Array = NDArray[np.float64]
+Displacement = Callable[[Array], tuple[Array, Array]]
+
+# ERRI B176 (1993), as given in three agreeing re-entries; the form of the gauge's spectrum is that
+# of the cross level without 1/b^2, as in the German spectra (assumed).
+ERRI_B176 = {
+    "erri_b176_low": Coefficients(
+        lateral=2.119e-7, vertical=4.032e-7, cross_level=4.032e-7, gauge=5.32e-8
+    ),
+    "erri_b176_high": Coefficients(
+        lateral=6.125e-7, vertical=1.080e-6, cross_level=1.080e-6, gauge=1.032e-7
+    ),
+}
+# rails moved by one unit of each irregularity: y_left, z_left, y_right, z_right; the cross level is
+# an angle here, positive = left rail higher, and its unit moves the rails by b
+SHARES = {
+    "lateral": (1.0, 0.0, 1.0, 0.0),
+    "vertical": (0.0, 1.0, 0.0, 1.0),
+    "cross_level": (0.0, -1.0, 0.0, 1.0),
+    "gauge": (-0.5, 0.0, 0.5, 0.0),
+}
+# the same of the mirror image of the track
+MIRROR = {"lateral": -1.0, "vertical": 1.0, "cross_level": -1.0, "gauge": 1.0}
+RAILS = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}
+# Points of the lattice in the shortest wavelength: interpolation error 4e-6 of the amplitude.
+POINTS_PER_WAVE = 32
+PERIOD_IN_WAVES = 20.0
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+def spectral_density(coefficients: Coefficients, channel: str, omega: Array) -> Array:
+    """One-sided power spectral density of one irregularity.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Coefficients of the spectra.
+    channel : {'lateral', 'vertical', 'cross_level', 'gauge'}
+        Which irregularity; the cross level is an angle.
+    omega : ndarray
+        Angular wave number [rad/m].
+
+    Returns
+    -------
+    ndarray
+        S(omega) = A omega_c^2 / ((omega^2 + omega_r^2)(omega^2 + omega_c^2)) for lateral and
+        vertical [m2/(rad/m)]; the same times omega^2 / (omega^2 + omega_s^2) for the gauge, and
+        divided by b^2 for the cross level [rad2/(rad/m)].
+    """
+    c = coefficients
+    density: Array = (
+        getattr(c, channel) * c.omega_c**2 / ((omega**2 + c.omega_r**2) * (omega**2 + c.omega_c**2))
+    )
+    if channel in ("cross_level", "gauge"):
+        density = density * omega**2 / (omega**2 + c.omega_s**2)
+    return density / c.b**2 if channel == "cross_level" else density
+
+
+def band_variance(coefficients: Coefficients, channel: str, wavelengths: Sequence[float]) -> float:
+    """Variance of one irregularity: the integral of its spectrum over the band [m2 or rad2]."""
+    low, high = 2.0 * np.pi / wavelengths[1], 2.0 * np.pi / wavelengths[0]
+    edges = np.geomspace(low, high, 201)
+    return float(np.sum(_bin_integrals(coefficients, channel, edges[:-1], edges[1:])))
+
+
+def displacement(track: Track) -> Displacement | None:
+    """Sum of all displacements of a track's rails, None where there are none."""
+    parts = [_displacement(part, track) for part in track.irregularities]
+    if track.gauge_widening is not None:
+        parts.append(_widening(track))
+    if not parts:
+        return None
+
+    def total(s: Array) -> tuple[Array, Array]:
+        values, rates = zip(*(part(s) for part in parts), strict=True)
+        return np.sum(values, axis=0), np.sum(rates, axis=0)
+
+    return total
+
+
+def shortest_length(track: Track) -> float:
+    """Length that the tables must resolve: a sixteenth of the shortest wave, and so on [m]."""
+    lengths = [np.inf]
+    for part in track.irregularities:
+        if isinstance(part, Random):
+            lengths.append(part.wavelengths[0] / 16.0)
+        elif isinstance(part, Measured):
+            places = np.array([row[0] for row in part.rows or ()])
+            lengths.append(max(0.05, 0.5 * float(np.min(np.diff(places)))))
+        else:
+            lengths.append(part.length / (40.0 if part.shape == "triangle" else 16.0))
+    return float(min(lengths))
+
+
+def _displacement(part: Irregularity, track: Track) -> Displacement:
+    if isinstance(part, Random):
+        return _random(part, track)
+    if isinstance(part, Measured):
+        return _measured(part)
+    return _single(part)
+
+
+# single disturbances ------------------------------------------------------------------------------
+
+
+def _single(part: Dip | Kink | Twist) -> Displacement:
+    if isinstance(part, Dip):
+        left, right = RAILS[part.rail]
+        shares = part.depth * np.array([0.0, left, 0.0, right])
+    elif isinstance(part, Kink):
+        left, right = RAILS[part.rail]
+        shares = part.offset * np.array([left, 0.0, right, 0.0])
+    else:
+        shares = 0.5 * part.height * np.array([0.0, -1.0, 0.0, 1.0])
+    shape = _cosine if part.shape == "cosine" else _triangle
+    value_and_rate = shape(part.s, part.length)
+
+    def moved(s: Array) -> tuple[Array, Array]:
+        value, rate = value_and_rate(s)
+        return shares[:, None] * value, shares[:, None] * rate
+
+    return moved
+
+
+def _cosine(middle: float, length: float) -> Displacement:
+    wave = 2.0 * np.pi / length
+
+    def shape(s: Array) -> tuple[Array, Array]:
+        u = s - middle
+        inside = np.abs(u) < 0.5 * length
+        value = np.where(inside, 0.5 + 0.5 * np.cos(wave * u), 0.0)
+        return value, np.where(inside, -0.5 * wave * np.sin(wave * u), 0.0)
+
+    return shape
+
+
+def _triangle(middle: float, length: float) -> Displacement:
+    half = 0.5 * length
+    sections = [Section("", "", 0.0, half, 0.0, 1.0), Section("", "", half, length, 1.0, 0.0)]
+    profile = RoundedProfile(sections, length / 10.0)
+
+    def shape(s: Array) -> tuple[Array, Array]:
+        return profile(s - middle + half), profile.rate(s - middle + half)
+
+    return shape
+
+
+# measured and widening ----------------------------------------------------------------------------
+
+
+def _measured(part: Measured) -> Displacement:
+    rows = np.array(part.rows)
+    places = rows[:, 0] + part.shift
+    spline = CubicSpline(places, part.scale * rows[:, 1:].T, axis=1)
+    slope = spline.derivative()
+    window = _window(places[0], places[-1], part.fade)
+
+    def moved(s: Array) -> tuple[Array, Array]:
+        at = np.clip(s, places[0], places[-1])
+        return _windowed(spline(at), slope(at), *window(s))
+
+    return moved
+
+
+def _widening(track: Track) -> Displacement:
+    rows = track.gauge_widening or ()
+    left = _profile([(row[0], -row[1]) for row in rows], track.rounding)
+    right = _profile([(row[0], row[2]) for row in rows], track.rounding)
+
+    def moved(s: Array) -> tuple[Array, Array]:
+        zero = np.zeros_like(s)
+        return (
+            np.stack((left(s), zero, right(s), zero)),
+            np.stack((left.rate(s), zero, right.rate(s), zero)),
+        )
+
+    return moved
+
+
+def _profile(points: Sequence[tuple[float, float]], rounding: float) -> RoundedProfile:
+    """Rounded profile through points (s, value), constant beyond them."""
+    first, value = points[0]
+    sections = [
+        Section("", "", begin[0] - first, end[0] - first, begin[1], end[1])
+        for begin, end in pairwise(points)
+    ]
+    return RoundedProfile(sections or [Section("", "", 0.0, 1.0, value, value)], rounding, first)
+
+
+# random -------------------------------------------------------------------------------------------
+
+
+def _random(part: Random, track: Track) -> Displacement:
+    coefficients = part.coefficients or ERRI_B176[part.spectrum]
+    end = track.length if part.end is None else part.end
+    longest, shortest = part.wavelengths[1], part.wavelengths[0]
+    period = max(end - part.begin, PERIOD_IN_WAVES * longest)
+    n_points = next_fast_len(int(np.ceil(POINTS_PER_WAVE * period / shortest)), real=True)
+    lattice = np.zeros((2, 4, n_points))
+    for channel in part.channels:
+        shares = part.scale * np.array(SHARES[channel])
+        shares *= MIRROR[channel] if part.mirror else 1.0
+        shares *= coefficients.b if channel == "cross_level" else 1.0
+        amplitudes = _amplitudes(coefficients, channel, part.wavelengths, period)
+        waves = _waves(amplitudes, _phases(part.seed, channel, amplitudes.size), period, n_points)
+        lattice += shares[:, None] * waves[:, None, :]
+    window = _window(part.begin, end, part.fade)
+
+    def moved(s: Array) -> tuple[Array, Array]:
+        value, rate = _periodic(lattice, period, s - part.begin)
+        return _windowed(value, rate, *window(s))
+
+    return moved
+
+
+def _amplitudes(
+    coefficients: Coefficients, channel: str, wavelengths: Sequence[float], period: float
+) -> Array:
+    """Amplitude of each harmonic of the period, from the one of index 0 on."""
+    step = 2.0 * np.pi / period
+    low, high = 2.0 * np.pi / wavelengths[1], 2.0 * np.pi / wavelengths[0]
+    middle = step * np.arange(int(np.ceil(high / step)) + 1)
+    begin, end = np.clip([middle - 0.5 * step, middle + 0.5 * step], low, high)
+    return np.sqrt(2.0 * _bin_integrals(coefficients, channel, begin, end))
+
+
+def _bin_integrals(coefficients: Coefficients, channel: str, begin: Array, end: Array) -> Array:
+    half = 0.5 * (end - begin)
+    omega = (begin + half)[:, None] + half[:, None] * _NODES
+    integrals: Array = half * (spectral_density(coefficients, channel, omega) @ _WEIGHTS)
+    return integrals
+
+
+def _phases(seed: int, channel: str, number: int) -> Array:
+    """Random phases of a channel: the same for a seed whatever the other channels [rad]."""
+    generator = np.random.default_rng([seed, list(SHARES).index(channel)])
+    return generator.uniform(0.0, 2.0 * np.pi, number)
+
+
+def _waves(amplitudes: Array, phases: Array, period: float, n_points: int) -> Array:
+    """Sum of all harmonics and its rate on a lattice over the period, shape (2, n_points)."""
+    harmonics = np.zeros(n_points // 2 + 1, dtype=complex)
+    harmonics[: amplitudes.size] = 0.5 * n_points * amplitudes * np.exp(1j * phases)
+    omega = 2.0 * np.pi / period * np.arange(harmonics.size)
+    return np.stack((irfft(harmonics, n_points), irfft(1j * omega * harmonics, n_points)))
+
+
+def _periodic(lattice: Array, period: float, u: Array) -> tuple[Array, Array]:
+    """Hermite interpolation of values and rates on a periodic lattice, shapes (4, len(u))."""
+    n_points = lattice.shape[2]
+    h = period / n_points
+    cell = np.floor(u / h)
+    t = u / h - cell
+    i = cell.astype(np.int64) % n_points
+    j = (i + 1) % n_points
+    value0, value1 = lattice[0][:, i], lattice[0][:, j]
+    rate0, rate1 = h * lattice[1][:, i], h * lattice[1][:, j]
+    step = value1 - value0
+    c2, c3 = 3.0 * step - 2.0 * rate0 - rate1, rate0 + rate1 - 2.0 * step
+    value = value0 + t * (rate0 + t * (c2 + t * c3))
+    return value, (rate0 + t * (2.0 * c2 + 3.0 * t * c3)) / h
+
+
+# fading -------------------------------------------------------------------------------------------
+
+
+def _window(begin: float, end: float, fade: float) -> Displacement:
+    """Window that rises from 0 to 1 behind `begin` and falls to 0 before `end`, with its rate."""
+    length = min(fade, 0.5 * (end - begin))
+
+    def window(s: Array) -> tuple[Array, Array]:
+        inside = ((s >= begin) & (s < end)).astype(float)
+        if length == 0.0:
+            return inside, np.zeros_like(s)
+        depth = np.minimum(s - begin, end - s)
+        angle = np.pi * np.clip(depth / length, 0.0, 1.0)
+        side = np.where(s - begin < end - s, 1.0, -1.0)
+        rate = side * 0.5 * np.pi / length * np.sin(angle)
+        return inside * 0.5 * (1.0 - np.cos(angle)), inside * rate
+
+    return window
+
+
+def _windowed(value: Array, rate: Array, window: Array, slope: Array) -> tuple[Array, Array]:
+    return window * value, window * rate + slope * value
