@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from railsim.definitions.base import Remark
+from railsim.definitions.irregularity import Measured, Random
 from railsim.definitions.track import (
     CantElement,
     Circle,
@@ -119,7 +120,7 @@ def track_remarks(track: Track) -> list[Remark]:
                 f"({track.rounding:g} m), which flattens it"
             )
             remarks.append(Remark(section.key, text))
-    return remarks
+    return remarks + _beyond_the_track(track)
 
 
 # elements ---------------------------------------------------------------------------------------
@@ -240,6 +241,23 @@ def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -
         return []
     text = f"the list is longer ({sections[-1].end:g} m) than the plan ({plan[-1].end:g} m)"
     return [Remark(name, text)]
+
+
+def _beyond_the_track(track: Track) -> list[Remark]:
+    """Remark on irregularities of which the track sees nothing."""
+    remarks = []
+    for index, part in enumerate(track.irregularities):
+        if isinstance(part, Random):
+            begin, end = part.begin, track.length if part.end is None else part.end
+        elif isinstance(part, Measured):
+            rows = part.rows or ((0.0,), (track.length,))
+            begin, end = rows[0][0] + part.shift, rows[-1][0] + part.shift
+        else:
+            begin, end = part.s - 0.5 * part.length, part.s + 0.5 * part.length
+        if end <= 0.0 or begin >= track.length:
+            text = f"from {begin:g} to {end:g} m, beyond the track's {track.length:g} m"
+            remarks.append(Remark(f"irregularities.{index}", text))
+    return remarks
 
 
 def _cant_sizes(cant: Sequence[Section]) -> list[Remark]:

@@ -9,7 +9,7 @@ from railsim.definitions.layout import (
     track_faults,
     track_remarks,
 )
-from railsim.definitions.loading import load_track
+from railsim.definitions.loading import load_track, load_track_text
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.errors import InputError
@@ -21,6 +21,8 @@ CIRCLE = {"type": "CIR", "length": 80.0, "radius": 300.0}
 LEVEL = {"type": "CST", "length": 100.0, "cant": 0.0}
 RAMP = {"type": "LIR", "length": 50.0}
 CANTED = {"type": "CST", "length": 80.0, "cant": 0.1}
+DIP = {"type": "dip", "s": 500.0, "length": 4.0, "depth": 0.01}
+RANDOM = {"type": "random", "spectrum": "erri_b176_low"}
 
 
 def track(plan, cant=(), **more):
@@ -89,6 +91,8 @@ def test_contradicting_track_is_refused(plan, cant, expected):
             {"vertical": [{"type": "CST", "length": 50.0, "gradient": g} for g in (0.0, 0.01)]},
             "the gradient steps",
         ),
+        ([STRAIGHT], [], {"irregularities": [DIP]}, "irregularities.0: from 498 to 502 m"),
+        ([STRAIGHT], [], {"irregularities": [{**RANDOM, "begin": 100.0, "end": 200.0}]}, "beyond"),
     ],
 )
 def test_unusual_track_is_remarked_on(plan, cant, more, expected):
@@ -128,6 +132,32 @@ def test_cant_list_shorter_than_the_plan_is_usual():
         {"rounding": -1.0},
         {"cant_rotation": "outer"},
         {"vertical": [{"type": "CST", "length": 5.0, "gradient": 12.0}]},
+        {"friction_table": []},
+        {"friction_table": [[0.0]]},
+        {"friction_table": [[0.0, -0.1]]},
+        {"friction_table": [[10.0, 0.1], [10.0, 0.2]]},
+        {"friction_table": [["a", 0.1]]},
+        {"friction_table": 0.3},
+        {"gauge_widening": [[0.0, 15.0]]},
+        {"gauge_widening": [[0.0, 0.01, 0.02, 0.03]]},
+        {"irregularities": [{"type": "bump"}]},
+        {"irregularities": [{**DIP, "depth": 10.0}]},
+        {"irregularities": [{**DIP, "length": 0.0}]},
+        {"irregularities": [{**DIP, "rail": "middle"}]},
+        {"irregularities": [{"type": "kink", "s": 5.0, "length": 4.0}]},
+        {"irregularities": [{"type": "measured"}]},
+        {"irregularities": [{"type": "measured", "rows": [[0, 0, 0, 0, 0]]}]},
+        {"irregularities": [{"type": "measured", "rows": [[s, 0, 0, 0, 0] for s in (1, 2, 2, 3)]}]},
+        {"irregularities": [{**RANDOM, "spectrum": "erri"}]},
+        {"irregularities": [{**RANDOM, "spectrum": "own"}]},
+        {"irregularities": [{**RANDOM, "coefficients": {"lateral": 1e-7}}]},
+        {"irregularities": [{**RANDOM, "seed": -1}]},
+        {"irregularities": [{**RANDOM, "seed": 1.5}]},
+        {"irregularities": [{**RANDOM, "wavelengths": [70.0, 3.0]}]},
+        {"irregularities": [{**RANDOM, "wavelengths": [0.01, 3.0]}]},
+        {"irregularities": [{**RANDOM, "channels": ["lateral", "lateral"]}]},
+        {"irregularities": [{**RANDOM, "begin": 50.0, "end": 50.0}]},
+        {"irregularities": [{**RANDOM, "fade": -1.0}]},
     ],
 )
 def test_wrong_value_is_refused(change):
@@ -146,6 +176,14 @@ def test_wrong_value_is_refused(change):
         {"poisson": 0.5},
         {"contact_damping": -1.0},
         {"initial": {"frame": {"w": 1.0}}},
+        {"drive": {"mode": "table"}},
+        {"drive": {"speed_table": [[0.0, 20.0]]}},
+        {"drive": {"mode": "table", "speed_table": []}},
+        {"drive": {"mode": "table", "speed_table": [[0.0, 0.0]]}},
+        {"drive": {"mode": "table", "speed_table": [[10.0, 5.0], [0.0, 5.0]]}},
+        {"drive": {"resistance": [1.0, 0.0, 0.0]}},
+        {"drive": {"mode": "free", "resistance": [-1.0, 0.0, 0.0]}},
+        {"drive": {"mode": "free", "traction_table": [[-1.0, 5.0]]}},
     ],
 )
 def test_wrong_setting_is_refused(change):
@@ -156,6 +194,20 @@ def test_wrong_setting_is_refused(change):
 def test_settings_have_defaults_and_read_back():
     assert Settings().fastsim_grid == (10, 10)
     assert "fastsim_grid" in Settings().to_toml()
+
+
+def test_rows_given_for_both_sides_are_kept_as_pairs():
+    wide = track([STRAIGHT], friction_table=[[0.0, 0.3]], gauge_widening=[[0.0, 0.01]])
+    assert wide.friction_table == ((0.0, 0.3, 0.3),)
+    assert wide.gauge_widening == ((0.0, 0.005, 0.005),)
+    assert load_track_text(wide.to_toml()) == wide
+
+
+def test_settings_for_a_table_and_for_free_running():
+    ramp = {"mode": "table", "speed_table": [[0.0, 20.0], [500.0, 40.0]]}
+    assert Settings.model_validate({"drive": ramp}).drive.speed_table[1] == (500.0, 40.0)
+    free = {"mode": "free", "traction_table": [[0.0, 1e5]], "resistance": [1e3, 10.0, 5.0]}
+    assert Settings.model_validate({"drive": free}).drive.mode == "free"
 
 
 def test_replace_validates_the_copy():

@@ -1,5 +1,6 @@
 """Vehicle definitions: what is refused, how assemblies are placed, mirrored and named."""
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -202,6 +203,30 @@ def test_same_placement_name_in_two_assemblies_is_refused():
     assert any("'front.frame' is used twice" in fault for fault in faults_of(vehicle(**parts)))
 
 
+STOP = {
+    "kind": "bump_stop",
+    "bodies": ["frame", "front"],
+    "point": [0, 0, 0],
+    "axis": "x",
+    "table": [[-0.01, -5.0], [0.0, 0.0], [0.02, 8.0]],
+}
+PAD = {
+    "kind": "friction",
+    "bodies": ["frame", "front"],
+    "point": [0, 1, -0.5],
+    "friction_force": [0.0, 0.0, 3000.0],
+    "stick_stiffness": [0.0, 0.0, 1e7],
+}
+AIR = {
+    "kind": "airspring",
+    "bodies": ["frame", "front"],
+    "points": [[0, 1, -0.5], [0, 1, -0.9]],
+    "bellows_stiffness": 4e5,
+    "reservoir_stiffness": 2e5,
+    "orifice_damping": 1e4,
+    "horizontal_stiffness": [1.5e5, 1.5e5],
+}
+WIND = {"kind": "applied_force", "bodies": ["frame"], "force_table": [[0.0, 1.0, 2.0, 3.0]]}
 DAMPER = {"kind": "spring_damper", "bodies": ["a", "b"], "points": [[0, 0, 0], [0, 0, -1]]}
 
 
@@ -233,7 +258,21 @@ DAMPER = {"kind": "spring_damper", "bodies": ["a", "b"], "points": [[0, 0, 0], [
         bushing(series_stiffness=[1, 0, 0]),
         {"kind": "roll_bar", "bodies": ["a", "b"], "stiffness": 0.0},
         {"kind": "roll_bar", "bodies": ["a", "b"], "stiffness": 1.0, "sides": "both"},
-        {"kind": "bump_stop", "bodies": ["a", "b"], "point": [0, 0, 0], "axis": "w"},
+        {**STOP, "axis": "w"},
+        {**STOP, "table": [[0.0, 1.0], [1.0, 2.0]]},
+        {**STOP, "table": [[0.1, 0.0], [1.0, 2.0]]},
+        {"kind": "friction", "bodies": ["a", "b"], "point": [0, 0, 0]},
+        {**PAD, "stick_stiffness": [0.0, 0.0, 0.0]},
+        {**PAD, "friction_coefficient": [0.0, -0.1, 0.0]},
+        {**AIR, "bellows_stiffness": 0.0},
+        {**AIR, "orifice_damping": -1.0},
+        {**AIR, "horizontal_stiffness": [1.0, 1.0, 1.0]},
+        {"kind": "applied_force", "bodies": ["a"]},
+        {**WIND, "bodies": ["a", "b"]},
+        {**WIND, "axes": "rail"},
+        {**WIND, "force_table": [[0.0, 1.0]]},
+        {**WIND, "force_table": []},
+        {**WIND, "force_table": [[1.0, 0, 0, 0], [0.0, 0, 0, 0]]},
     ],
 )
 def test_element_with_a_wrong_value_is_refused(element):
@@ -241,6 +280,33 @@ def test_element_with_a_wrong_value_is_refused(element):
         element = {**element, "stifness": [1, 1, 1]}
     with pytest.raises(ValidationError):
         vehicle(wheelsets={"w": WHEELSET}, elements={"e": element})
+
+
+@pytest.mark.parametrize("element", [STOP, PAD, AIR, WIND])
+def test_further_elements_are_placed(element):
+    (flat,) = flatten(wagon(element)).elements
+    assert flat.body1 == "frame"
+    assert flat.body2 == ("" if element is WIND else "front")
+
+
+def test_stop_with_two_different_sides_turns_round_in_a_mirrored_place():
+    definition = flatten(wagon(STOP)).elements[0].definition
+    turned = definition.mirrored((-1.0, 1.0, 1.0))
+    assert turned.table == ((-0.02, -8.0), (-0.0, -0.0), (0.01, 5.0))
+    assert definition.mirrored((1.0, -1.0, 1.0)) == definition
+    symmetric = definition.model_copy(update={"table": ((0.0, 0.0), (1.0, 1.0))})
+    assert symmetric.mirrored((-1.0, 1.0, 1.0)) == symmetric
+
+
+@pytest.mark.parametrize("signs", [(-1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (-1.0, -1.0, 1.0)])
+def test_mirrored_load_has_the_mirrored_moment(signs):
+    """A torque r x F of a mirrored force at a mirrored point is the mirrored torque."""
+    lever, force = np.array([1.0, 2.0, 3.0]), np.array([5.0, -7.0, 11.0])
+    tables = {"force_table": [[0.0, *force]], "torque_table": [[0.0, *np.cross(lever, force)]]}
+    definition = flatten(wagon({**WIND, **tables})).elements[0].definition.mirrored(signs)
+    np.testing.assert_array_equal(definition.force_table[0][1:], signs * force)
+    moment = np.cross(signs * lever, signs * force)
+    np.testing.assert_array_equal(definition.torque_table[0][1:], moment)
 
 
 def test_two_sided_table_keeps_what_is_given_for_both_directions():
