@@ -1,0 +1,76 @@
+"""The JSON Schemas and the manual's key tables are those of the models."""
+
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from railsim.definitions import sources
+from railsim.definitions.loading import FORMATS, load_any, load_vehicle
+from railsim.definitions.schema import filled, json_schema, schema_name
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = {"vehicle_file.md", "track_file.md", "settings.md"}
+MENDED_BY = "python -m railsim.definitions.schema docs"
+SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.shipped_names(kind)]
+
+
+@pytest.mark.parametrize("format_name", FORMATS)
+def test_schema_file_is_up_to_date(format_name):
+    written = json.loads((DOCS / "schema" / schema_name(format_name)).read_text())
+    assert written == json_schema(format_name), MENDED_BY
+
+
+@pytest.mark.parametrize("format_name", FORMATS)
+def test_schema_is_a_schema(format_name):
+    jsonschema.Draft202012Validator.check_schema(json_schema(format_name))
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_key_tables_of_the_manual_are_up_to_date(page):
+    text = (DOCS / "user" / page).read_text()
+    assert filled(text) == text, MENDED_BY
+    assert "| `" in text
+
+
+@pytest.mark.parametrize("format_name", ["railsim-vehicle/1", "railsim-track/1"])
+def test_manual_shows_every_definition_of_a_format(format_name):
+    kind = FORMATS[format_name].kind
+    text = (DOCS / "user" / f"{kind}_file.md").read_text()
+    for name in json_schema(format_name)["$defs"]:
+        assert f"<!-- keys: {format_name} {name} -->" in text
+
+
+@pytest.mark.parametrize(("kind", "name"), SHIPPED)
+def test_shipped_file_satisfies_its_schema_as_written_and_resolved(kind, name):
+    path = sources.find_file(name, kind)
+    written, resolved = sources.read_toml(path), sources.read_source(path, kind).data
+    schema = json_schema(written["format"])
+    jsonschema.validate(written, schema)
+    jsonschema.validate(resolved, schema)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("mass", -1.0), ("mas", 1.0), ("mass", "x"), ("inertia", [1.0, 2.0])]
+)
+def test_schema_refuses_what_the_model_refuses(key, value):
+    data = load_vehicle("coach_manchester").model_dump(mode="json", exclude_none=True)
+    schema = json_schema("railsim-vehicle/1")
+    jsonschema.validate(data, schema)
+    data["bodies"]["carbody"][key] = value
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data, schema)
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_whole_files_in_the_manual_are_valid(page, tmp_path):
+    text = (DOCS / "user" / page).read_text()
+    blocks = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    whole = [block for block in blocks if block.startswith("format")]
+    assert whole
+    for block in whole:
+        path = tmp_path / "example.toml"
+        path.write_text(block)
+        load_any(path)
