@@ -98,7 +98,11 @@ def _default(schema: dict[str, Any]) -> str:
     value = schema["default"]
     if isinstance(value, list) and len(value) == 2 and value[0] == value[1] and "anyOf" in schema:
         value = value[0]
-    return f"`{json.dumps(value)}`" if value != [] else ""
+    if value in ([], None) or isinstance(value, dict):
+        return ""
+    if isinstance(value, float):
+        return f"`{value:g}`".replace("e+0", "e").replace("e+", "e")
+    return f"`{json.dumps(value)}`"
 
 
 def _words(schema: dict[str, Any]) -> str:
