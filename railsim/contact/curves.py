@@ -89,8 +89,7 @@ class RailCurve:
     @property
     def Y(self) -> Array:
         """Lateral places of the nodes [m], shape (n,)."""
-        places: Array = self.Y0 + self.dY * np.arange(self.z.size)
-        return places
+        return self.Y0 + self.dY * np.arange(self.z.size, dtype=np.float64)
 
 
 def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
@@ -309,17 +308,21 @@ def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float) -> list[tuple[str,
     corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
     slack = 0.5 * gauge - flank_place
     if corner - flank_place < 0.0:
-        return [(
-            f"the flange stands on the rail, {-1e3 * slack:.1f} mm beyond the gauge face, when the "
-            "wheelset is central",
-            remedy,
-        )]
+        return [
+            (
+                f"the flange stands on the rail, {-1e3 * slack:.1f} mm beyond the gauge face, when the "
+                "wheelset is central",
+                remedy,
+            )
+        ]
     if wheel.u[-1] - slack < corner:
-        return [(
-            "the wheelset falls between the rails: with one flange at its rail, the outer end of "
-            f"the other wheel is {1e3 * (corner + slack - wheel.u[-1]):.1f} mm short of the rail",
-            remedy,
-        )]
+        return [
+            (
+                "the wheelset falls between the rails: with one flange at its rail, the outer end of "
+                f"the other wheel is {1e3 * (corner + slack - wheel.u[-1]):.1f} mm short of the rail",
+                remedy,
+            )
+        ]
     height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
     if int(np.argmin(height)) <= flank:
         return [("the flange touches the rail when the wheelset is central", remedy)]

@@ -1,0 +1,199 @@
+"""Rigid contact geometry of a wheelset on straight track, without yaw.
+
+For each lateral displacement the wheelset rolls until both rigid wheels touch their rails; contact
+points, rolling radii and contact angles follow.  This is the geometry of EN 15302 and of every
+plot of "contact functions"; the simulation itself uses `railsim.contact.table`, which knows
+several contacts at once, yaw and elasticity.
+
+The search is exact (least vertical gap over candidates 0.03 mm apart, refined between them); it
+shares the prepared profiles with the table but nothing else.
+"""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from railsim.contact.conicity import equivalent_conicity
+from railsim.contact.curves import (
+    misfits,
+    rail_curve,
+    tape_circle_place,
+    wheel_curve,
+)
+from railsim.errors import Fault, InputError
+from railsim.kernels import contact_geometry as kernel
+from railsim.profiles.profile import Profile
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+SEARCH_SPACING = 3e-5
+"""Distance of the candidates on the wheel [m]."""
+
+LARGEST_ROLL = 0.03
+"""Largest roll of a wheelset that is tried [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactGeometry:
+    """Rigid contact functions of a wheelset; side axis in the order left, right.
+
+    Attributes
+    ----------
+    lateral : ndarray, shape (n,)
+        Lateral displacement of the wheelset, positive to the right [m].
+    roll : ndarray, shape (n,)
+        Roll of the wheelset [rad].
+    rolling_radius : ndarray, shape (n, 2)
+        Radius at the contact [m].
+    contact_angle : ndarray, shape (n, 2)
+        Angle of the contact plane to the track plane, positive for a normal cone, growing towards
+        the flange [rad].
+    contact_y : ndarray, shape (n, 2)
+        Lateral place of the contact, track axes [m].
+    wheel_y : ndarray, shape (n, 2)
+        Place of the contact on the wheel from the tape circle, positive to the field side [m].
+    centre_z : ndarray, shape (n,)
+        Vertical displacement of the wheelset's centre, positive down [m].
+    """
+
+    lateral: Array
+    roll: Array
+    rolling_radius: Array
+    contact_angle: Array
+    contact_y: Array
+    wheel_y: Array
+    centre_z: Array
+
+    @property
+    def delta_r(self) -> Array:
+        """Rolling radius difference, right minus left [m], shape (n,)."""
+        difference: Array = self.rolling_radius[:, 1] - self.rolling_radius[:, 0]
+        return difference
+
+    def equivalent_conicity(self, amplitudes: ArrayLike, track: float = 1.5) -> Array:
+        """Equivalent conicity by EN 15302, see `railsim.contact.equivalent_conicity`."""
+        known = np.isfinite(self.delta_r)
+        return equivalent_conicity(self.lateral[known], self.delta_r[known], amplitudes, track)
+
+    def jumps(self, least: float = 1e-3) -> list[tuple[float, str]]:
+        """Places at which a contact jumps on its wheel by more than `least` [m].
+
+        Returns
+        -------
+        list of (lateral [m], side)
+            Middle of the step in which the jump lies, and ``"left"`` or ``"right"``.
+        """
+        found = []
+        for side, name in enumerate(("left", "right")):
+            step = np.abs(np.diff(self.wheel_y[:, side]))
+            for i in np.flatnonzero(step > least):
+                found.append((float(0.5 * (self.lateral[i] + self.lateral[i + 1])), name))
+        return sorted(found)
+
+
+def _pair(value: T | tuple[T, T]) -> tuple[T, T]:
+    """Left and right of something given once or for each side."""
+    if isinstance(value, tuple):
+        return value
+    return value, value
+
+
+def contact_geometry(
+    wheel: Profile | tuple[Profile, Profile],
+    rail: Profile | tuple[Profile, Profile],
+    radius: float | tuple[float, float] = 0.46,
+    gauge: float = 1.435,
+    inclination: float = 0.025,
+    back_to_back: float = 1.360,
+    lateral: ArrayLike | None = None,
+) -> ContactGeometry:
+    """Rigid contact functions of a wheelset.
+
+    Parameters
+    ----------
+    wheel, rail : Profile or (left, right)
+        Profiles; a left one is given as a right one.
+    radius : float or (left, right)
+        Rolling radius at the tape circle [m].
+    gauge : float
+        Distance of the gauge faces within 14 mm below the rail tops [m].
+    inclination : float
+        Inclination of the rails, as tangent [1].
+    back_to_back : float
+        Distance of the wheel backs [m].
+    lateral : ndarray, shape (n,), optional
+        Lateral displacements, increasing; default -10 to 10 mm in steps of 0.05 mm [m].
+
+    Returns
+    -------
+    ContactGeometry
+        With nan where no roll up to 30 mrad lets both wheels touch.
+
+    Raises
+    ------
+    InputError
+        If the wheelset does not fit onto the rails: it falls between them or its flanges ride on
+        them in the middle of the track.
+    """
+    radii = _pair(radius)
+    tape_circle = tape_circle_place(back_to_back)
+    wheels = [
+        wheel_curve(w, r, tape_circle, SEARCH_SPACING)
+        for w, r in zip(_pair(wheel), radii, strict=True)
+    ]
+    rails = [rail_curve(r, gauge, inclination) for r in _pair(rail)]
+    places = (
+        np.linspace(-0.010, 0.010, 401)
+        if lateral is None
+        else np.atleast_1d(np.asarray(lateral, dtype=np.float64))
+    )
+    faults = [
+        Fault(f"gauge {1e3 * gauge:.1f} mm", f"{side} wheel", found, remedy)
+        for side, w, r in zip(("left", "right"), wheels, rails, strict=True)
+        for found, remedy in misfits(w, r, gauge)
+    ]
+    if faults:
+        raise InputError(faults)
+    mean_radius = 0.5 * (radii[0] + radii[1])
+    candidates = [np.ascontiguousarray((w.u, w.r, w.t)) for w in wheels]
+
+    def sweep(at: Array) -> tuple[Array, Array]:
+        roll = np.empty(at.size)
+        contacts = np.empty((at.size, 2, 6))
+        kernel.rigid_sweep(
+            np.ascontiguousarray(at),
+            candidates[1],
+            rails[1].Y0,
+            rails[1].z,
+            rails[1].slope,
+            candidates[0],
+            rails[0].Y0,
+            rails[0].z,
+            rails[0].slope,
+            rails[0].dY,
+            mean_radius,
+            LARGEST_ROLL,
+            roll,
+            contacts,
+        )
+        return roll, contacts
+
+    # from the middle outwards, so that the roll is followed from a good start
+    order = np.argsort(np.abs(places), kind="stable")
+    roll, contacts = np.empty(places.size), np.empty((places.size, 2, 6))
+    for part in (order[places[order] >= 0.0], order[places[order] < 0.0]):
+        roll[part], contacts[part] = sweep(places[part])
+    gap = contacts[..., kernel.R_GAP]
+    tape = np.array([wheels[0].u[0] - wheels[0].y[0], wheels[1].u[0] - wheels[1].y[0]])
+    return ContactGeometry(
+        lateral=places,
+        roll=roll,
+        rolling_radius=contacts[..., kernel.R_RADIUS],
+        contact_angle=np.arctan(-contacts[..., kernel.R_SLOPE]),
+        contact_y=contacts[..., kernel.R_PLACE] * np.array([-1.0, 1.0]),
+        wheel_y=contacts[..., kernel.R_U] - tape,
+        centre_z=0.5 * (gap[:, 0] + gap[:, 1]),
+    )

@@ -1,0 +1,88 @@
+"""Equivalent conicity where it is known in closed form."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from railsim.contact import equivalent_conicity
+from railsim.errors import ModelError
+
+Y = np.linspace(-0.008, 0.008, 321)
+
+
+def test_conical_wheelset_has_its_own_conicity_at_every_amplitude():
+    found = equivalent_conicity(Y, 2 * Y / 20, np.linspace(0.0005, 0.0075, 30))
+    np.testing.assert_allclose(found, 0.05, rtol=1e-12)  # exact by pieces: round-off
+
+
+def test_off_centre_wheelset_has_the_same_conicity():
+    found = equivalent_conicity(Y, 2 * (Y - 0.002) / 20, [0.001, 0.003])
+    np.testing.assert_allclose(found, 0.05, rtol=1e-10)
+
+
+def test_dead_zone_gives_the_closed_form():
+    gap, slope, amplitude = 0.003, 0.2, 0.005
+    delta_r = 2 * slope * np.sign(Y) * np.maximum(np.abs(Y) - gap, 0.0)
+    # quarter wave: harmonic over amplitude - gap, then straight across the gap
+    stroke, omega = amplitude - gap, np.sqrt(2 * slope)
+    quarter = 0.5 * np.pi / omega + gap / (stroke * omega)
+    expected = 0.5 * np.pi**2 / (2 * quarter) ** 2
+    assert equivalent_conicity(Y, delta_r, [amplitude])[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_within_the_dead_zone_it_is_zero():
+    delta_r = np.sign(Y) * np.maximum(np.abs(Y) - 0.003, 0.0)
+    assert equivalent_conicity(Y, delta_r, [0.002])[0] == 0.0
+
+
+def test_wave_of_a_curved_function_agrees_with_time_integration():
+    delta_r = 0.1 * Y + 3000.0 * Y**3 + 5.0 * Y**2
+    amplitude = 0.005
+    conicity = equivalent_conicity(Y, delta_r, [amplitude])[0]
+    e, r0 = 1.5, 0.46
+    wavelength = 2 * np.pi * np.sqrt(e * r0 / (2 * conicity))
+
+    # start at the end of the oscillation whose other end is 2 amplitudes away
+    def stroke(start):
+        def crossing(x, state):
+            return state[1]
+
+        crossing.terminal, crossing.direction = True, 1.0
+        solution = solve_ivp(
+            lambda x, s: (s[1], -np.interp(s[0], Y, delta_r) / (e * r0)),
+            (0, 100),
+            (start, 0.0),
+            events=crossing,
+            rtol=1e-10,
+            atol=1e-14,
+            max_step=0.05,
+        )
+        return start - solution.y[0, -1], solution.t[-1]
+
+    starts = np.array([0.0045, 0.0055])
+    strokes = [stroke(s)[0] for s in starts]
+    for _ in range(6):
+        slope = (strokes[1] - strokes[0]) / (starts[1] - starts[0])
+        starts = np.array([starts[1], starts[1] + (2 * amplitude - strokes[1]) / slope])
+        strokes = [strokes[1], stroke(starts[1])[0]]
+        if abs(strokes[1] - 2 * amplitude) < 1e-10:
+            break
+    # the integrator meets a kink at every node of the function
+    assert 2 * stroke(starts[1])[1] == pytest.approx(wavelength, rel=1e-5)
+
+
+def test_unstable_wheelset_has_no_conicity():
+    assert np.isnan(equivalent_conicity(Y, -0.1 * Y, [0.003])[0])
+
+
+def test_amplitude_beyond_the_function_is_not_invented():
+    assert np.isnan(equivalent_conicity(Y, 0.1 * Y, [0.009])[0])
+
+
+def test_nonsense_is_refused():
+    with pytest.raises(ModelError, match="increasing"):
+        equivalent_conicity([0.0, 0.0, 1.0], [0.0, 1.0, 2.0], [0.1])
+    with pytest.raises(ModelError, match="two or more"):
+        equivalent_conicity([0.0], [0.0], [0.1])
+    with pytest.raises(ModelError, match="positive"):
+        equivalent_conicity([0.0, 1.0], [0.0, 1.0], [-0.1])
