@@ -8,10 +8,17 @@ module         job
 base           the common base class and the number types
 elements       force elements of a vehicle
 vehicle        vehicle files: bodies, wheelsets, axleboxes, elements, assemblies
+names          which body a name means where it stands
 flatten        assemblies placed and mirrored, names resolved: the vehicle as plain lists
-track          track files: plan, cant, vertical profile; what an engineer would object to
+track          track files: plan, cant, vertical profile, rails, friction
+irregularity   track files: measured, single and random irregularities
+layout         track elements to values over arc length; what an engineer objects to
+measured       CSV files of measured irregularities
 settings       settings files: how to compute, not what
+spring         spring files: trailing-arm suspension
+mirror         mirror images of vehicles and tracks
 sources        finding files, TOML, `extends`, overrides; remembers which file each key came from
 loading        files to definitions with every fault at once
+schema         JSON Schemas and the manual's key tables
 =============  ==================================================================================
 """

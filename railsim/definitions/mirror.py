@@ -1,0 +1,130 @@
+"""The mirror images of vehicles and tracks: left and right exchanged.
+
+A right-hand curve becomes the left-hand one, a lopsided load changes sides.  Mirrored vehicle on
+mirrored track gives the mirrored result: the sharpest check of signs there is.
+"""
+
+from typing import TypeVar
+
+from railsim.definitions.base import Vector
+from railsim.definitions.elements import Element
+from railsim.definitions.irregularity import Dip, Irregularity, Kink, Measured, Random
+from railsim.definitions.track import (
+    CantElement,
+    Circle,
+    Clothoid,
+    ConstantCant,
+    PlanElement,
+    Track,
+)
+from railsim.definitions.vehicle import Assembly, Axlebox, Body, Placement, Vehicle, Wheelset
+
+SIGNS = (1.0, -1.0, 1.0)
+RAIL = {"left": "right", "right": "left", "both": "both"}
+
+Group = TypeVar("Group", Vehicle, Assembly)
+Part = TypeVar("Part", Body, Wheelset, Axlebox, Placement)
+Row = tuple[float, float, float]
+
+
+def mirrored_track(track: Track) -> Track:
+    """Return the mirror image of a track.
+
+    Examples
+    --------
+    >>> from railsim.definitions.loading import load_track
+    >>> mirrored_track(load_track("curve_r250")).plan[2].radius
+    -250.0
+    """
+    return track.model_copy(
+        update={
+            "plan": tuple(_mirrored_plan(element) for element in track.plan),
+            "cant": tuple(_mirrored_cant(element) for element in track.cant),
+            "rail": track.rail[::-1],
+            "friction": track.friction[::-1],
+            "friction_table": _sides_exchanged(track.friction_table),
+            "gauge_widening": _sides_exchanged(track.gauge_widening),
+            "irregularities": tuple(_mirrored_part(part) for part in track.irregularities),
+        }
+    )
+
+
+def _mirrored_plan(element: PlanElement) -> PlanElement:
+    if isinstance(element, Circle):
+        return element.model_copy(update={"radius": -element.radius})
+    if isinstance(element, Clothoid):
+        ends = {"radius_start": element.radius_start, "radius_end": element.radius_end}
+        update = {key: -radius for key, radius in ends.items() if radius is not None}
+        return element.model_copy(update=update)
+    return element
+
+
+def _mirrored_cant(element: CantElement) -> CantElement:
+    if isinstance(element, ConstantCant):
+        return element.model_copy(update={"cant": -element.cant})
+    ends = {"cant_start": element.cant_start, "cant_end": element.cant_end}
+    return element.model_copy(update={key: -cant for key, cant in ends.items() if cant is not None})
+
+
+def _sides_exchanged(rows: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
+    return None if rows is None else tuple((s, right, left) for s, left, right in rows)
+
+
+def _mirrored_part(part: Irregularity) -> Irregularity:
+    if isinstance(part, Random):
+        return part.model_copy(update={"mirror": not part.mirror})
+    if isinstance(part, Measured):
+        rows = tuple((s, -yr, zr, -yl, zl) for s, yl, zl, yr, zr in part.rows or ())
+        return part.model_copy(update={"rows": rows})
+    if isinstance(part, Dip):
+        return part.model_copy(update={"rail": RAIL[part.rail]})
+    if isinstance(part, Kink):
+        return part.model_copy(update={"rail": RAIL[part.rail], "offset": -part.offset})
+    return part.model_copy(update={"height": -part.height})
+
+
+def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:
+    """Return the mirror image of a vehicle; parts on both sides keep their names."""
+    return _mirrored_group(vehicle)
+
+
+def _mirrored_group(group: Group) -> Group:
+    update: dict[str, object] = {
+        "bodies": {name: _moved(body) for name, body in group.bodies.items()},
+        "wheelsets": {
+            name: _moved(w).model_copy(
+                update={"radius": w.radius[::-1], "profile": w.profile[::-1]}
+            )
+            for name, w in group.wheelsets.items()
+        },
+        "axleboxes": {name: _mirrored_box(box) for name, box in group.axleboxes.items()},
+        "elements": {name: _mirrored_element(e) for name, e in group.elements.items()},
+        "assemblies": {name: _mirrored_group(a) for name, a in group.assemblies.items()},
+    }
+    if isinstance(group, Assembly):
+        update["placements"] = tuple(_moved(placement) for placement in group.placements)
+    return group.model_copy(update=update)
+
+
+def _across(point: Vector) -> Vector:
+    return (point[0], -point[1], point[2])
+
+
+def _moved(part: Part) -> Part:
+    return part.model_copy(update={"position": _across(part.position)})
+
+
+def _mirrored_box(box: Axlebox) -> Axlebox:
+    return box if box.sides == "both" else _moved(box)
+
+
+def _mirrored_element(element: Element) -> Element:
+    if getattr(element, "sides", None) == "both":
+        return element
+    point, points = getattr(element, "point", None), getattr(element, "points", None)
+    update: dict[str, object] = {}
+    if point is not None:
+        update["point"] = _across(point)
+    if points is not None:
+        update["points"] = tuple(_across(end) for end in points)
+    return element.mirrored(SIGNS).model_copy(update=update)

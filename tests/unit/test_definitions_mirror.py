@@ -1,0 +1,90 @@
+"""Mirror images of tracks and vehicles: twice is the original, everything changes sides."""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.flatten import flatten
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.vehicle import Vehicle
+from railsim.track.tables import track_tables
+
+RICH = {
+    "rail": ("60E1", "54E1"),
+    "friction_table": [[0.0, 0.3, 0.4], [200.0, 0.1, 0.2]],
+    "gauge_widening": [[290.0, 0.0, 0.0], [310.0, 0.0, 0.01]],
+    "cant_rotation": "inner_rail",
+    "irregularities": [
+        {"type": "random", "spectrum": "erri_b176_high", "seed": 3},
+        {"type": "dip", "s": 100.0, "length": 3.0, "depth": 0.01, "rail": "left"},
+        {"type": "kink", "s": 100.0, "length": 9.0, "offset": 0.01, "rail": "right"},
+        {"type": "twist", "s": 200.0, "length": 9.0, "height": 0.01},
+        {
+            "type": "measured",
+            "rows": [[s, 0.001 * s, 0.002, 0.0, 0.0] for s in (0.0, 1.0, 2.0, 3.0, 4.0)],
+        },
+    ],
+}
+
+
+def test_mirrored_track_has_mirrored_tables_to_the_last_bit():
+    track = load_track("curve_r250").replace(**RICH)
+    plain, mirrored = track_tables(track), track_tables(mirrored_track(track))
+    signs = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # X, Y, Z, psi, theta, phi
+    np.testing.assert_array_equal(mirrored.coefficients, signs[:, None] * plain.coefficients)
+    # y_left, z_left, y_right, z_right, mu_left, mu_right
+    signs = np.array([-1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+    exchanged = plain.rail[:, [2, 3, 0, 1, 5, 4]]
+    np.testing.assert_array_equal(mirrored.rail, signs[:, None] * exchanged)
+
+
+@pytest.mark.parametrize("name", ["straight", "curve_r250"])
+def test_track_mirrored_twice_is_the_original(name):
+    track = load_track(name).replace(**RICH)
+    assert mirrored_track(mirrored_track(track)) == track
+    assert mirrored_track(track) != track
+
+
+def test_symmetric_vehicle_is_its_own_mirror_image():
+    coach = load_vehicle("coach_manchester")
+    assert flatten(mirrored_vehicle(coach)) == flatten(coach)
+
+
+def test_lopsided_vehicle_changes_sides():
+    wheelset = {
+        "mass": 1000.0,
+        "inertia": [600.0, 80.0, 600.0],
+        "position": [0.0, 0.0, -0.46],
+        "radius": [0.4601, 0.4599],
+        "profile": ["S1002", "worn.csv"],
+    }
+    body = {"mass": 5000.0, "inertia": [1.0, 1.0, 1.0], "position": [0.0, 0.1, -1.5]}
+    link = {
+        "kind": "bushing",
+        "bodies": ["car", "axle"],
+        "point": [0.0, 0.7, -0.46],
+        "preload": [0.0, 5.0, -100.0],
+    }
+    rod = {**link, "kind": "spring_damper", "points": [[0.0, 0.2, -1.0], [0.0, 0.8, -1.0]]}
+    del rod["point"], rod["preload"]
+    box = {"wheelset": "axle", "position": [0.0, 1.0, -0.46], "pitch_inertia": 10.0}
+    vehicle = Vehicle.model_validate(
+        {
+            "format": "railsim-vehicle/1",
+            "name": "lopsided",
+            "bodies": {"car": body},
+            "wheelsets": {"axle": wheelset},
+            "axleboxes": {"box": box},
+            "elements": {"link": link, "rod": rod},
+        }
+    )
+    mirrored = mirrored_vehicle(vehicle)
+    assert mirrored_vehicle(mirrored) == vehicle
+    flat = flatten(mirrored)
+    assert flat.body("car").position[1] == -0.1
+    assert flat.body("box").position[1] == -1.0
+    assert flat.body("axle").wheelset.radius == (0.4599, 0.4601)
+    assert flat.body("axle").wheelset.profile == ("worn.csv", "S1002")
+    assert flat.elements[0].point1[1] == -0.7
+    assert flat.elements[0].definition.preload == (0.0, -5.0, -100.0)
+    assert flat.elements[1].point2[1] == -0.8
