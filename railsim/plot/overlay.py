@@ -39,9 +39,11 @@ def overlay(
     """
     drawn = {label: panels(result, tuple(selections)) for label, result in results.items()}
     first = next(iter(results.values()))
-    sections = curvature_sections(first.track())
-    same_plan = all(curvature_sections(other.track()) == sections for other in results.values())
-    shown = spans(sections, first["distance"], first[over]) if same_plan else []
+    plans = [curvature_sections(result.track()) for result in results.values()]
+    ends = [[(section.type, section.begin, section.end) for section in plan] for plan in plans]
+    alike = all(other == ends[0] for other in ends)
+    shown = spans(plans[0], first["distance"], first[over]) if alike else []
+    same_radii = all(plan == plans[0] for plan in plans)
     count = max(len(found) for found in drawn.values())
     columns = 1 if count < 3 else 2
     rows = -(-count // columns)
@@ -59,7 +61,7 @@ def overlay(
                 if panel is not None:
                     _draw(axes, result[over], panel, DISTINCT[index % len(DISTINCT)])
             _label(axes, next(panel for panel in same if panel is not None))
-            shade(axes, shown, named=axes in cells[:columns])
+            shade(axes, shown, named=same_radii and axes in cells[:columns])
         for axes in cells[max(0, count - columns) : count]:
             axes.set_xlabel(first.quantities[over].label)
             axes.tick_params(labelbottom=True)

@@ -20,6 +20,7 @@ from railsim.profiles.profile import Profile
 if TYPE_CHECKING:
     import xarray
 
+    from railsim.definitions.settings import Settings
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
@@ -175,12 +176,6 @@ class Result:
         return str(self._attributes.get("status", ""))
 
     @property
-    def settings(self) -> dict[str, Any]:
-        """Settings of the run, as they were resolved."""
-        settings: dict[str, Any] = json.loads(str(self._attributes.get("settings_json", "{}")))
-        return settings
-
-    @property
     def speed(self) -> float:
         """Speed at the start of the run [m/s]."""
         return float(self._attributes["speed"])
@@ -196,6 +191,23 @@ class Result:
         from railsim.definitions.loading import load_track_text
 
         return load_track_text(str(self._attributes["track_toml"]))
+
+    def settings(self) -> "Settings":
+        """Rebuild the settings from what the result carries."""
+        from railsim.definitions.settings import Settings
+
+        return Settings.model_validate(json.loads(str(self._attributes["settings_json"])))
+
+    def inputs(self) -> dict[str, Any]:
+        """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
+        return {
+            "vehicle": self.vehicle(),
+            "track": self.track(),
+            "settings": self.settings(),
+            "speed": self.speed,
+            "duration": float(self._attributes["duration"]),
+            "profiles": self.profiles,
+        }
 
     # -- elsewhere ----------------------------------------------------------------------------
 

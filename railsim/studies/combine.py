@@ -97,13 +97,14 @@ def combinations(
 
     cases: list[Case] = []
     points = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
-    for point in points:
-        try:
-            split_overrides(_assigned(assignments, point))
-        except InputError as error:
-            raise InputError(dict.fromkeys(error.faults)) from None
     for vehicle, track, speed, point in product(vehicles, tracks, speeds, points):
-        own = split_overrides(_assigned(assignments, point))
+        own: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
+        for text in (*assignments, *(f"{key}={value}" for key, value in point.items())):
+            try:
+                for kind, texts in split_overrides([text]).items():
+                    own[kind].extend(texts)
+            except InputError as error:
+                faults.extend(error.faults)
         a_vehicle = loaded(load_vehicle, vehicle, tuple(own["vehicle"]))
         a_track = loaded(load_track, track, tuple(own["track"]))
         a_settings = loaded(load_settings, settings, tuple(own["settings"]))
@@ -126,10 +127,6 @@ def combinations(
     return cases
 
 
-def _assigned(assignments: Sequence[str], point: Mapping[str, str]) -> list[str]:
-    return [*assignments, *(f"{key}={value}" for key, value in point.items())]
-
-
 def _end_faults(
     track: Track, speed: float, duration: float | None, until: float | None
 ) -> list[Fault]:
@@ -145,7 +142,7 @@ def _suffix(point: Mapping[str, str]) -> str:
     last = {key: key.rpartition(".")[2] for key in point}
     unique = len(set(last.values())) == len(last)
     parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
-    return "".join("_" + re.sub(r"[^\w.+=-]+", "-", part).strip("-") for part in parts)
+    return "".join("_" + re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", p)) for p in parts)
 
 
 def _double_names(cases: Sequence[Case]) -> list[Fault]:

@@ -7,10 +7,12 @@ ended after a moment.
 
 import multiprocessing
 import signal
+import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -89,7 +91,8 @@ def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Itera
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(workers, context, _begin, (fractions, stop))
     try:
-        jobs_of = {pool.submit(_work, index, job): job for index, job in enumerate(jobs)}
+        with _deaf_to_interrupts():  # the processes inherit it
+            jobs_of = {pool.submit(_work, index, job): job for index, job in enumerate(jobs)}
         waiting: set[Future[Record]] = set(jobs_of)
         while waiting:
             done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
@@ -148,7 +151,6 @@ _shared: Any = None
 def _begin(fractions: Any, stop: Any) -> None:
     global _shared
     _shared = fractions, stop
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _work(index: int, job: Job) -> Record:
@@ -164,8 +166,7 @@ def _work(index: int, job: Job) -> Record:
 
 def _end(processes: set[BaseProcess], jobs: Sequence[Job]) -> None:
     """Wait a moment for processes to end, end the rest, and remove what they were writing."""
-    signal_handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
+    with _deaf_to_interrupts():
         for process in processes:
             process.join(GRACE / max(1, len(processes)))
         for process in processes:
@@ -174,5 +175,16 @@ def _end(processes: set[BaseProcess], jobs: Sequence[Job]) -> None:
                 process.join()
             for job in jobs:
                 partial_path(job.path, process.pid or 0).unlink(missing_ok=True)
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C within the block; in a thread other than the main one do nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
     finally:
-        signal.signal(signal.SIGINT, signal_handler)
+        signal.signal(signal.SIGINT, before)

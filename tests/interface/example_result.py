@@ -83,14 +83,14 @@ PROFILES = {
 }
 
 
-def feed(sink, chunks=7, extra=(), **how):
+def feed(sink, chunks=7, extra=(), status="complete", **how):
     """Feed a sink as a simulation does and return its result."""
     given = arrays(**how)
     sink.begin(COORDINATES, (*QUANTITIES.values(), *extra))
     timed = [name for name in given if name != "Q0"]
     for part in np.array_split(np.arange(given["time"].size), chunks):
         sink.append({name: given[name][part] for name in timed})
-    return sink.close(attributes(), {"Q0": given["Q0"]}, PROFILES)
+    return sink.close(attributes(how.get("speed", 20.0), status), {"Q0": given["Q0"]}, PROFILES)
 
 
 def example_result(**how) -> Result:

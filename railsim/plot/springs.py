@@ -1,0 +1,332 @@
+"""Pictures of a trailing-arm suspension: stiffness, deflection, coils, Goodman-Smith, the arm.
+
+Every function takes results of `railsim.springs` and returns a figure in the field's habits: kN,
+mm, N/mm, MPa, degrees.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from railsim.definitions.spring import TrailingArmSuspension
+from railsim.plot.style import DISTINCT, LIMIT
+from railsim.springs import arm as trailing_arm
+from railsim.springs import checks
+from railsim.springs.arm import Arm
+from railsim.springs.design import Design
+from railsim.springs.summary import coils_by_wire
+from railsim.springs.tolerance import RideHeight
+from railsim.springs.verification import Case, Fatigue, Verification, built, solid_heights
+
+if TYPE_CHECKING:
+    from railsim.springs.search import SearchResult
+
+Floats = NDArray[np.float64]
+
+MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
+SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
+
+
+def stiffness_figure(result: Verification) -> Figure:
+    """System stiffness, and the rate that small movements feel, over load and deflection."""
+    figure = Figure(figsize=(7.6, 3.2), layout="constrained")
+    over_load, over_deflection = figure.subplots(1, 2, sharey=True)
+    curve = _curve(result)
+    loads = [case.load * 1e-3 for case in result.cases]
+    deflections = [case.deflection * 1e3 for case in result.cases]
+    for axes, x, marks, label in (
+        (over_load, curve["load"] * 1e-3, loads, "load $P$ / kN"),
+        (over_deflection, curve["deflection"] * 1e3, deflections, "deflection $\\Delta z$ / mm"),
+    ):
+        axes.plot(x, curve["K_sys"] * 1e-3, color=MAIN, label="system stiffness $P/\\Delta z$")
+        axes.plot(x, curve["rate"] * 1e-3, color=SECOND, ls="--", label="rate of small movements")
+        stiffnesses = [(case.K_sys * 1e-3, case.name) for case in result.cases]
+        _mark(axes, [(mark, *point) for mark, point in zip(marks, stiffnesses, strict=True)])
+        axes.set_xlabel(label)
+    over_load.set_ylabel("stiffness / (N/mm)")
+    over_load.set_ylim(bottom=0.0)
+    over_load.legend(loc="lower right")
+    return figure
+
+
+def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
+    """Deflection, rotation of the arm and heights of the springs over the load."""
+    figure = Figure(figsize=(7.6, 5.2), layout="constrained")
+    grid = figure.add_gridspec(2, 2)
+    deflection, rotation = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
+    heights = figure.add_subplot(grid[1, :])
+    curve = _curve(result)
+    load = curve["load"] * 1e-3
+    deflection.plot(load, curve["deflection"] * 1e3, color=MAIN)
+    _mark(
+        deflection,
+        [(case.load * 1e-3, case.deflection * 1e3, case.name) for case in result.cases],
+    )
+    deflection.set_ylabel("deflection $\\Delta z$ / mm")
+    rotation.plot(load, np.degrees(curve["rotation"]), color=MAIN)
+    _mark(
+        rotation,
+        [(case.load * 1e-3, np.degrees(case.rotation), case.name) for case in result.cases],
+    )
+    rotation.axhline(0.0, color=FAINT, lw=0.8)
+    rotation.set_ylabel("rotation of the arm / °")
+    solid = solid_heights(suspension)
+    for i, name in enumerate(suspension.springs):
+        colour = SPRING_COLOURS[name]
+        dashes = (0, (5, 3)) if i else "-"
+        heights.plot(load, curve[f"height_{name}"] * 1e3, color=colour, ls=dashes, label=name)
+        heights.axhline(solid[name] * 1e3, color=colour, lw=0.9, ls=":")
+    heights.plot([], [], color="0.4", lw=0.9, ls=":", label="solid height")
+    for case in result.cases:
+        heights.axvline(case.load * 1e-3, color=FAINT, lw=0.7, zorder=0)
+        heights.annotate(
+            case.name,
+            (case.load * 1e-3, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            fontsize=7.5,
+            color="0.25",
+        )
+    heights.set_ylabel("height under load / mm")
+    heights.legend(ncols=3, loc="center right")
+    for axes in (deflection, rotation, heights):
+        axes.set_xlabel("load $P$ / kN")
+    return figure
+
+
+def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
+    """Active coils that give the designed stiffness, over the wire diameter."""
+    figure = Figure(figsize=(5.6, 3.4), layout="constrained")
+    axes = figure.subplots()
+    listed = coils_by_wire(suspension, result)
+    for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True):
+        colour = SPRING_COLOURS[name]
+        wires = [row["wire_diameter"] for row in listed[name] if row["active_coils"] < 12.0]
+        coils = [row["active_coils"] for row in listed[name] if row["active_coils"] < 12.0]
+        if wires:
+            d = np.linspace(0.95 * wires[0], 1.05 * wires[-1], 200)
+            n = suspension.material.G * d**4 / (8.0 * K_V * spring.mean_diameter**3)
+            label = f"{name}, $D$ {spring.mean_diameter * 1e3:.6g} mm, {K_V * 1e-3:.1f} N/mm"
+            axes.plot(d * 1e3, n, color=colour, label=label)
+            axes.plot(np.array(wires) * 1e3, coils, ".", color=colour, ms=5)
+        if spring.wire_diameter is not None and spring.active_coils is not None:
+            axes.plot(
+                spring.wire_diameter * 1e3, spring.active_coils, "o", mfc="w", mec=colour, ms=8
+            )
+    axes.plot([], [], "o", mfc="w", mec="0.3", ms=8, label="built")
+    axes.axhline(3.0, color=LIMIT, lw=0.9, ls=":", label="3 coils (EN 13906-1, hot coiled)")
+    axes.set(xlabel="wire diameter $d$ / mm", ylabel="active coils $n$", ylim=(0.0, 12.5))
+    figure.legend(loc="outside upper left", ncols=2, fontsize=8)
+    return figure
+
+
+def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatigue]) -> Figure:
+    """Goodman-Smith diagram with the stress range of each spring."""
+    if suspension.fatigue is None:
+        raise ValueError("the suspension has no fatigue table")
+    line = np.array(suspension.fatigue.goodman) * 1e-6
+    figure = Figure(figsize=(4.8, 4.4), layout="constrained")
+    axes = figure.subplots()
+    end = float(line[-1, 1])
+    axes.plot([0.0, end], [0.0, end], color="0.35", lw=1.0)
+    axes.plot(*line.T, color=LIMIT, lw=1.6, label="Goodman-Smith line")
+    for name, spring in result.items():
+        low, high = spring.tau_min * 1e-6, spring.tau_max * 1e-6
+        colour = SPRING_COLOURS[name]
+        axes.plot([low, low], [low, high], color=colour, lw=2.2, solid_capstyle="butt")
+        axes.plot([low, low], [high, spring.limit * 1e-6], color=colour, lw=1.0, ls=":")
+        axes.plot(low, high, "o", color=colour, ms=6, label=f"{name}, margin {spring.margin:.2f}")
+        axes.plot(low, low, "o", mfc="w", mec=colour, ms=5)
+    axes.set(
+        xlabel="lower stress $\\tau_{min}$ / MPa",
+        ylabel="stress $\\tau$ / MPa",
+        xlim=(0.0, 1.05 * end),
+        ylim=(0.0, 1.12 * end),
+        aspect="equal",
+    )
+    axes.legend(loc="lower right")
+    return figure
+
+
+def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
+    """The arm and its springs in every load case, to scale, from the lightest load on."""
+    cases = sorted(result.cases, key=lambda case: case.load)
+    columns = min(len(cases), 3)
+    rows = -(-len(cases) // columns)
+    figure = Figure(figsize=(2.75 * columns, 2.75 * rows), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
+    for axes, case in zip(panels, cases, strict=False):
+        _draw_arm(axes, suspension, result.arm, case)
+    for axes in panels[len(cases) :]:
+        axes.set_visible(False)
+    return figure
+
+
+def search_figure(result: "SearchResult") -> Figure:
+    """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
+    figure = Figure(figsize=(5.6, 3.6), layout="constrained")
+    axes = figure.subplots()
+    cloud = result.cloud[np.all(np.isfinite(result.cloud), axis=1)]
+    axes.plot(*cloud.T, ".", color=FAINT, ms=4, label="feasible candidates", zorder=1)
+    mass = [nest.mass for nest in result.nests]
+    margin = [nest.fatigue_margin for nest in result.nests]
+    axes.plot(mass, margin, "o", color=MAIN, ms=5, label="ranked nests, as built", zorder=2)
+    for rank, point in enumerate(zip(mass, margin, strict=True), start=1):
+        axes.annotate(
+            str(rank), point, xytext=(4, 3), textcoords="offset points", fontsize=8, color=MAIN
+        )
+    axes.set(xlabel="mass of the nest / kg", ylabel="fatigue margin")
+    axes.legend(loc="best")
+    return figure
+
+
+def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -> Figure:
+    """Ride height by single deviation under one load, and its range under every load."""
+    figure = Figure(figsize=(7.6, 3.4), layout="constrained")
+    single, every = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    shown = next((result for result in results if result.name == tare), results[0])
+    ends = sorted(shown.single.items(), key=lambda item: abs(item[1][1] - item[1][0]))
+    names = [name.replace("_", " ").replace(".", ": ") for name, _ in ends]
+    low = np.array([end[0] for _, end in ends]) * 1e3
+    high = np.array([end[1] for _, end in ends]) * 1e3
+    rows = np.arange(len(ends))
+    single.barh(rows, low, color=DISTINCT[4], height=0.6, label="at the lower limit")
+    single.barh(rows, high, color=DISTINCT[0], height=0.6, label="at the upper limit")
+    single.set_yticks(rows, names)
+    single.grid(axis="y", visible=False)
+    single.axvline(0.0, color="0.35", lw=0.8)
+    single.set_xlabel(f"change of the ride height at {shown.name} / mm")
+    single.legend(loc="lower right", fontsize=7.5)
+    ordered = sorted(results, key=lambda result: result.load)
+    places = np.arange(len(ordered))
+    for place, result in zip(places, ordered, strict=True):
+        every.plot(
+            [place] * 2,
+            [result.lowest * 1e3, result.highest * 1e3],
+            color=FAINT,
+            lw=7,
+            solid_capstyle="butt",
+        )
+        every.plot(
+            [place] * 2,
+            [-result.random * 1e3, result.random * 1e3],
+            color=MAIN,
+            lw=7,
+            solid_capstyle="butt",
+        )
+    every.plot([], [], color=FAINT, lw=5, label="worst case")
+    every.plot([], [], color=MAIN, lw=5, label="random")
+    every.set_xticks(places, [result.name for result in ordered], rotation=30, ha="right")
+    every.set_xlim(-0.6, len(ordered) - 0.4)
+    every.axhline(0.0, color="0.35", lw=0.8)
+    every.set_ylabel("ride height / mm")
+    top = max(result.highest for result in ordered) * 1e3
+    every.set_ylim(top=1.45 * top)
+    every.legend(loc="upper right", fontsize=7.5)
+    return figure
+
+
+def _curve(result: Verification) -> dict[str, Floats]:
+    """All quantities over a range of rotations somewhat wider than that of the cases."""
+    turned = [case.rotation for case in result.cases]
+    wider = 0.08 * (max(turned) - min(turned)) + 1e-4
+    lowest, highest = (float(end) for end in trailing_arm.rotation_range(result.arm))
+    phi = np.linspace(max(min(turned) - wider, lowest), min(max(turned) + wider, highest), 201)
+    load = trailing_arm.load(result.arm, phi)
+    states = [trailing_arm.coil_state(result.arm, coil, phi) for coil in result.arm.coils]
+    rise = result.arm.length * np.sin(phi)
+    return {
+        "rotation": phi,
+        "load": load,
+        "deflection": states[0].deflection,
+        "K_sys": load / states[0].deflection,
+        "rate": np.gradient(load, rise, edge_order=2),
+        **{
+            f"height_{name}": state.height
+            for name, state in zip(("outer", "inner"), states, strict=False)
+        },
+    }
+
+
+def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
+    """Mark the load cases on a rising curve, their names above and below it in turn."""
+    for i, (x, y, name) in enumerate(sorted(points)):
+        above = i % 2 == 0
+        axes.plot(x, y, "o", color=MAIN, ms=4)
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(-4, 3) if above else (4, -3),
+            textcoords="offset points",
+            ha="right" if above else "left",
+            va="bottom" if above else "top",
+            fontsize=7.5,
+            color="0.25",
+        )
+
+
+def _draw_arm(axes: Axes, suspension: TrailingArmSuspension, arm: Arm, case: Case) -> None:
+    """Side view: hinge at the origin, axle to the right, millimetres."""
+    phi, length = case.rotation, 1e3 * arm.length
+    along = np.array([np.cos(phi), np.sin(phi)])
+    across = np.array([-np.sin(phi), np.cos(phi)])
+    axle = length * along
+    axes.plot([0.0, length], [0.0, 0.0], color=FAINT, lw=0.9, ls=(0, (6, 3)), zorder=0)
+    axes.plot([0.0, axle[0]], [0.0, axle[1]], color="0.25", lw=4.5, solid_capstyle="round")
+    axes.add_patch(Circle((0.0, 0.0), 26.0, fc="0.82", ec="0.25", lw=1.0, zorder=3))
+    axes.add_patch(Circle((0.0, 0.0), 9.0, fc="w", ec="0.25", lw=1.0, zorder=4))
+    axes.add_patch(Circle(tuple(axle), 60.0, fc="0.92", ec="0.25", lw=1.0, zorder=1))
+    axes.add_patch(Circle(tuple(axle), 5.0, fc="0.25", ec="none", zorder=4))
+    tops = []
+    for (name, spring), coil in zip(suspension.springs.items(), arm.coils, strict=True):
+        seat = axle + 1e3 * float(coil.seat) * across
+        top = np.array([length, 1e3 * float(coil.seat + coil.H0 - coil.start)])
+        tops.append(float(top[1]))
+        d, n = built(spring)
+        turns = checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils)
+        reach = seat + (top - seat) * min(1.0, spring.free_height * 1e3 / float(top[1] - seat[1]))
+        wire = Circle((0.0, 0.0), 0.5e3 * d, fc=SPRING_COLOURS[name])
+        _draw_spring(axes, seat, reach, along, 1e3 * spring.mean_diameter, wire, float(turns))
+        half = 0.62e3 * spring.mean_diameter
+        axes.plot(*np.transpose([seat - half * along, seat + half * along]), color="0.25", lw=1.8)
+    lowest_seat = axle + 1e3 * float(arm.coils[0].seat) * across
+    axes.plot(*np.transpose([axle, lowest_seat]), color="0.25", lw=3.0, zorder=0)
+    top_edge = max(tops)
+    axes.plot([-60.0, length + 180.0], [top_edge, top_edge], color="0.25", lw=2.2)
+    axes.plot([0.0, 0.0], [0.0, top_edge], color="0.25", lw=2.2, zorder=0)
+    axes.annotate(
+        "",
+        xy=(axle[0], axle[1] - 62.0),
+        xytext=(axle[0], axle[1] - 62.0 - 110.0 * case.load / 8e4),
+        arrowprops={"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4},
+    )
+    degrees = f"{np.degrees(phi):+.2f}°" if case.theta > 1e-5 else "0°"
+    axes.set_title(
+        f"{case.name}  {case.load * 1e-3:.1f} kN\n{case.deflection * 1e3:.1f} mm, "
+        + degrees.replace("-", "−")
+    )
+    axes.set(xlim=(-90.0, length + 200.0), ylim=(-220.0, top_edge + 30.0), aspect="equal")
+    axes.set_axis_off()
+
+
+def _draw_spring(
+    axes: Axes, foot: Floats, head: Floats, along: Floats, D: float, wire: Circle, turns: float
+) -> None:
+    """A coil spring cut along its axis: the wire's sections on both sides, seat to frame."""
+    d = 2.0 * wire.radius
+    height = float(np.hypot(*(head - foot)))
+    pitch = (height - d) / max(turns - 1.0, 1.0)
+    for half in range(int(2.0 * (turns - 1.0)) + 1):
+        share = (0.5 * d + 0.5 * half * pitch) / height
+        # the coils turn from the seat's direction into the frame's
+        side = (1.0 - share) * along + share * np.array([1.0, 0.0])
+        edge = -0.5 if half % 2 == 0 else 0.5
+        place = foot + share * (head - foot) + edge * D * side
+        axes.add_patch(Circle(tuple(place), 0.5 * d, fc=wire.get_facecolor(), ec="w", lw=0.5))

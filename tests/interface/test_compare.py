@@ -1,0 +1,90 @@
+"""``railsim compare``: results side by side."""
+
+import csv
+import json
+
+import pytest
+from example_result import example_result
+
+from railsim.cli import main
+from railsim.compare import compare
+
+
+@pytest.fixture
+def files(tmp_path):
+    return [
+        str(example_result().to_hdf5(tmp_path / "base.h5")),
+        str(example_result(gain=0.9).to_hdf5(tmp_path / "lower.h5")),
+    ]
+
+
+def test_difference_is_that_of_the_magnitudes():
+    rows = compare({"base": example_result(), "lower": example_result(gain=0.9)})
+    yaw = next(r for r in rows if r.quantity.name == "wheelset_yaw" and r.where == "peak")
+    assert yaw.peaks["base"].value < 0.0
+    assert yaw.differences == {"base": 0.0, "lower": pytest.approx(-0.1)}
+
+
+def test_mirrored_run_differs_by_nothing():
+    rows = compare({"right": example_result(), "left": example_result(gain=-1.0)})
+    for row in rows:
+        if row.quantity.name in ("wheelset_yaw", "wheelset_lateral", "sum_Y"):
+            assert row.differences["left"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_difference_from_nothing_is_not_a_number():
+    (row, *_) = compare({"none": example_result(gain=0.0), "base": example_result()})[3:]
+    assert row.peaks["none"].value == 0.0
+    assert row.record()["values"]["base"]["difference"] is None
+
+
+def test_peaks_and_mid_curve_values_are_compared():
+    rows = compare({"base": example_result(), "short": example_result(duration=19.0)})
+    assert [row.where for row in rows].count("middle of curve 1") == 10
+    assert set(rows[-1].peaks) == {"base"}  # the short run ends before the middle
+
+
+def test_command_prints_value_place_time_and_difference(files, capsys):
+    assert main(["compare", *files]) == 0
+    printed = capsys.readouterr().out
+    line = next(each for each in printed.splitlines() if "lower" in each and "-5.58" in each)
+    assert "-10.00 %" in line
+    assert "middle of curve 1" in printed
+
+
+def test_folder_holds_table_record_and_picture(files, tmp_path):
+    folder = tmp_path / "comparison"
+    assert main(["compare", *files, "--out", str(folder)]) == 0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "compare.csv",
+        "compare.json",
+        "compare.png",
+    ]
+    rows = list(csv.DictReader((folder / "compare.csv").open(encoding="utf-8")))
+    assert float(rows[0]["difference"]) == 0.0
+    assert {row["result"] for row in rows} == {"base", "lower"}
+    assert json.loads((folder / "compare.json").read_text())["results"] == ["base", "lower"]
+
+
+def test_existing_comparison_is_kept_without_overwrite(files, tmp_path, capsys):
+    given = ["compare", *files, "--out", str(tmp_path / "comparison")]
+    assert main(given) == 0
+    assert main(given) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main([*given, "--overwrite"]) == 0
+
+
+def test_json_is_all_that_stdout_holds(files, capsys):
+    assert main(["compare", *files, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["rows"][0]["quantity"] == "Q"
+
+
+@pytest.mark.parametrize(
+    ("chosen", "words"),
+    [([0], "two results"), ([0, 0], "given twice"), ([0, "missing.h5"], "no such file")],
+)
+def test_bad_results_are_refused(files, chosen, words, capsys):
+    given = [files[each] if isinstance(each, int) else each for each in chosen]
+    assert main(["compare", *given]) == 2
+    assert words in capsys.readouterr().err

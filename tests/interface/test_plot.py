@@ -1,0 +1,194 @@
+"""``railsim plot``: what the lines, limits and shades of a figure are made from."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+from example_result import WHEELSETS, example_result
+from matplotlib.colors import to_hex
+
+from railsim.cli import main
+from railsim.definitions.loading import load_track
+from railsim.errors import InputError
+from railsim.plot.histories import STUDY, histories
+from railsim.plot.overlay import overlay
+from railsim.plot.style import HUES, SHADES, wheelset_colours
+from railsim.plot.track import track_figure
+
+
+@pytest.fixture(scope="module")
+def result():
+    return example_result()
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory, result):
+    return result.to_hdf5(tmp_path_factory.mktemp("plot") / "run.h5")
+
+
+def drawn(axes):
+    """Lines with data: neither the zero line nor a limit."""
+    return [line for line in axes.lines if len(line.get_xdata()) > 2]
+
+
+def shades(axes):
+    return [
+        (patch.get_x(), patch.get_x() + patch.get_width(), to_hex(patch.get_facecolor()))
+        for patch in axes.patches
+    ]
+
+
+def test_figures_of_the_study_are_the_default(result):
+    axes = histories(result).axes
+    assert len(axes) == len(STUDY)
+    labels = [each.get_ylabel() for each in axes]
+    units = ["(%)", "(kN)", "Y/Q", "(mrad)", "(mm)", "(mrad)"]
+    assert all(unit in label for unit, label in zip(units, labels, strict=True))
+
+
+def test_lines_are_the_arrays_in_shown_units(result):
+    (axes,) = histories(result, ["dQ_over_Q0"]).axes
+    lines = drawn(axes)
+    assert len(lines) == 8
+    np.testing.assert_array_equal(lines[1].get_xdata(), result.distance)
+    np.testing.assert_array_equal(lines[1].get_ydata(), 100.0 * result.dQ_over_Q0[:, 0, 1])
+
+
+def test_sides_and_wheelsets_are_told_apart(result):
+    (axes,) = histories(result, ["Y"]).axes
+    lines = drawn(axes)
+    assert {line.get_linestyle() for line in lines[0::2]} == {"-"}  # left
+    assert {line.get_linestyle() for line in lines[1::2]} == {"--"}  # right
+    assert len({to_hex(line.get_color()) for line in lines}) == 4
+
+
+def test_bogies_have_a_hue_and_their_leading_wheelsets_the_dark_shade():
+    colours = [to_hex(colour) for colour in wheelset_colours(WHEELSETS).values()]
+    assert colours == [HUES[0][0], HUES[0][1], HUES[1][0], HUES[1][1]]
+    single = wheelset_colours(["front", "rear"])
+    assert len(set(single.values())) == 2
+
+
+def test_curve_and_transitions_are_shaded_where_they_are(result):
+    (axes,) = histories(result, ["Y"]).axes
+    transition, curve = (to_hex(SHADES[kind]) for kind in ("CLO", "CIR"))
+    assert shades(axes) == [
+        (300.0, 360.0, transition),
+        (360.0, 420.0, curve),
+        (420.0, 480.0, transition),
+    ]
+    assert [text.get_text() for text in axes.texts][:3] == ["CLO", "R 250", "CLO"]
+
+
+def test_over_time_the_shades_are_where_the_reference_body_was(result):
+    (axes,) = histories(result, ["Y"], over="time").axes
+    places = [(low, high) for low, high, _ in shades(axes)]
+    np.testing.assert_allclose(places, [(15.0, 18.0), (18.0, 21.0), (21.0, 24.0)])
+    np.testing.assert_array_equal(drawn(axes)[0].get_xdata(), result.time)
+
+
+@pytest.mark.parametrize(("name", "value"), [("Y_over_Q", 0.8), ("dQ_over_Q0", -60.0)])
+def test_limits_are_drawn_where_they_exist(result, name, value):
+    (axes,) = histories(result, [name]).axes
+    levels = [line.get_ydata()[0] for line in axes.lines if len(line.get_xdata()) == 2]
+    assert value in levels
+    assert any("EN 14363" in text.get_text() for text in axes.texts)
+
+
+def test_part_of_the_axis(result):
+    (axes,) = histories(result, ["Y:1:left"], between=(300.0, 480.0)).axes
+    shown = drawn(axes)[0].get_xdata()
+    assert shown[0] >= 300.0
+    assert shown[-1] <= 480.0
+    with pytest.raises(InputError, match="goes from 0 to 980"):
+        histories(result, ["Y"], between=(2000.0, 3000.0))
+
+
+def test_places_are_chosen_by_name_or_number(result):
+    for selection in ("Y:2:right", "Y:front.inner.wheelset:right", "Y:right:2"):
+        (axes,) = histories(result, [selection]).axes
+        (line,) = drawn(axes)
+        np.testing.assert_array_equal(line.get_ydata(), 1e-3 * result.Y[:, 1, 1])
+
+
+def test_components_get_axes_with_their_own_units(result):
+    axes = histories(result, ["body_position:carbody"]).axes
+    assert [each.get_ylabel().split()[-1] for each in axes] == ["(mm)"] * 3 + ["(mrad)"] * 3
+    np.testing.assert_array_equal(
+        drawn(axes[5])[0].get_ydata(), 1e3 * result.body_position[:, 0, 5]
+    )
+
+
+def test_by_wheelset_every_wheelset_has_its_axes(result):
+    axes = histories(result, ["Y", "Q"], by="wheelset").axes
+    assert len(axes) == 8
+    assert all(len(drawn(each)) == 2 for each in axes)
+    assert "3 rear.inner" in axes[2].get_title(loc="left")
+
+
+@pytest.mark.parametrize(
+    ("selection", "words"),
+    [
+        ("wheelset_jaw", "did you mean 'wheelset_yaw'"),
+        ("Q:5", "no place '5'"),
+        ("Q:rigth", "did you mean 'right'"),
+        ("Q0", "no quantity 'Q0'"),
+        ("time", "no quantity 'time'"),
+    ],
+)
+def test_what_a_result_does_not_have_is_refused(file, tmp_path, selection, words, capsys):
+    out = tmp_path / "x.png"
+    assert main(["plot", str(file), selection, "--out", str(out)]) == 2
+    assert words in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_picture_has_the_format_of_its_ending(file, tmp_path, ending, capsys):
+    out = tmp_path / f"run.{ending}"
+    assert main(["plot", str(file), "Y", "--out", str(out)]) == 0
+    assert capsys.readouterr().out.strip() == str(out)
+    head = out.read_bytes()[:300]
+    assert {"png": b"PNG", "svg": b"<svg", "pdf": b"%PDF"}[ending] in head
+
+
+def test_default_picture_is_beside_the_result_and_not_overwritten(file, capsys):
+    assert main(["plot", str(file)]) == 0
+    assert main(["plot", str(file)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main(["plot", str(file), "--overwrite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"file": str(file.with_suffix(".png"))}
+
+
+def test_unknown_format_is_refused(file, tmp_path, capsys):
+    assert main(["plot", str(file), "--out", str(tmp_path / "run.xyz")]) == 2
+    assert ".png" in capsys.readouterr().err
+
+
+def test_track_is_drawn_by_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", "curve_r250"]) == 0
+    assert os.listdir() == ["curve_r250.png"]
+    assert main(["plot", "curve_r250", "Y", "--out", "other.png"]) == 2
+    assert "quantities belong to results" in capsys.readouterr().err
+
+
+def test_track_figure_shows_curvature_and_cant_as_they_act():
+    plan, curvature, cant = track_figure(load_track("curve_r250")).axes
+    s, kappa = drawn(curvature)[0].get_data()
+    np.testing.assert_allclose(np.interp([100.0, 390.0], s, kappa), [0.0, 4.0], atol=1e-9)
+    s, h = drawn(cant)[0].get_data()
+    np.testing.assert_allclose(np.interp([100.0, 390.0], s, h), [0.0, 150.0], atol=1e-9)
+    # a right-hand curve goes down on the page
+    last = plan.lines[-2].get_ydata()[-1]
+    assert last > 0.0
+    assert plan.yaxis_inverted()
+
+
+def test_overlay_has_a_colour_for_every_result(result):
+    other = example_result(gain=0.5)
+    axes = overlay({"one": result, "other": other}, ["Y:1:left"]).axes[0]
+    first, second = drawn(axes)
+    assert first.get_color() != second.get_color()
+    np.testing.assert_allclose(second.get_ydata(), 0.5 * first.get_ydata())

@@ -1,0 +1,170 @@
+"""``railsim run``: what it prints and writes, and how it ends."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+import railsim
+from railsim.cli import main
+
+COACH = ["run", "coach_manchester", "curve_r250"]
+# Ten metres of straight track: the shortest run that goes through everything.
+SHORT = [*COACH, "--speed", "20", "--until", "10"]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("run") / "run.h5"
+    assert main([*SHORT, "--out", str(path), "--set", "settings.output_rate=100"]) == 0
+    return path
+
+
+def test_run_writes_a_whole_result(written):
+    result = railsim.open_result(written)
+    assert result.status == "complete"
+    assert result.settings().output_rate == 100.0
+    np.testing.assert_allclose(np.diff(result.time), 0.01)
+    assert result.distance[-1] == pytest.approx(10.0)
+    assert set(result.profiles) == {"S1002", "60E1"}
+    assert os.listdir(written.parent) == ["run.h5"]
+
+
+def test_result_runs_again_from_itself_to_the_same_arrays(written):
+    result = railsim.open_result(written)
+    again = railsim.simulate(**result.inputs())
+    for name in result:
+        np.testing.assert_array_equal(again[name], result[name])
+
+
+def test_speed_of_the_computation_is_kept(written):
+    with h5py.File(written) as file:
+        facts = file.attrs
+        simulated = 0.5 + float(facts["step"])  # one step more, so that the end is recorded
+        assert facts["real_time_factor"] == pytest.approx(simulated / facts["cpu_time"])
+        assert facts["wall_time"] > facts["cpu_time"] > 0.0
+
+
+def test_default_name_and_printed_tables(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(SHORT) == 0
+    assert os.listdir() == ["coach_manchester_curve_r250_20.h5"]
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    for words in (
+        "S1002 on 60E1 inclined 1:40, gauge 1435 mm, friction 0.4",
+        "FASTSIM 10 x 10",
+        "x real time",
+        "wheel load change (%), largest",
+        "complete: ",
+    ):
+        assert words in printed.out
+
+
+def test_json_is_all_that_stdout_holds(tmp_path, capsys):
+    path = tmp_path / "run.h5"
+    assert main([*SHORT, "--out", str(path), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    result = railsim.open_result(path)
+    assert data["file"] == str(path)
+    largest = next(peak for peak in data["peaks"] if peak["quantity"] == "Q")
+    assert abs(largest["value"]) == np.abs(result.Q).max()
+    assert largest["unit"] == "N"
+    assert data["mid_curves"] == []
+
+
+def test_existing_result_is_kept_without_overwrite(written, capsys):
+    before = written.read_bytes()
+    assert main([*SHORT, "--out", str(written)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert written.read_bytes() == before
+
+
+def test_overwrite_replaces_the_result(tmp_path):
+    path = tmp_path / "run.h5"
+    path.write_text("something else")
+    assert main([*SHORT, "--out", str(path), "--overwrite", "--quiet"]) == 0
+    assert railsim.open_result(path).status == "complete"
+
+
+@pytest.mark.parametrize("speed", ["0", "-20", "nan", "inf", "1e9"])
+def test_impossible_speed_is_refused(tmp_path, speed, capsys):
+    assert main([*COACH, "--speed", speed, "--out", str(tmp_path / "run.h5")]) == 2
+    assert "--speed" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_faults_are_listed_at_once(tmp_path, capsys):
+    arguments = ["run", "coach_manchestr", "curve_r25", "--speed", "20"]
+    arguments += ["--set", "trak.friction=0.3", "--set", "settings.schema=rk4"]
+    arguments += ["--out", str(tmp_path / "missing" / "run.h5")]
+    assert main(arguments) == 2
+    lines = capsys.readouterr().err.splitlines()
+    for words in ("coach_manchester", "curve_r250", "trak.friction", "scheme", "--out"):
+        assert any(words in line for line in lines), words
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--duration", "0"), ("--until", "-1"), ("--until", "1e6")]
+)
+def test_impossible_end_is_refused(tmp_path, option, value, capsys):
+    arguments = [*COACH, "--speed", "20", option, value, "--out", str(tmp_path / "run.h5")]
+    assert main(arguments) == 2
+    assert option in capsys.readouterr().err
+
+
+def test_run_that_ends_early_keeps_its_file(tmp_path, capsys):
+    # 160 km/h in a curve for 70 km/h
+    path = tmp_path / "run.h5"
+    assert main([*COACH, "--speed", "45", "--out", str(path)]) == 3
+    result = railsim.open_result(path)
+    assert result.status in ("derailed", "stopped")
+    assert result.attributes["status_reason"] in capsys.readouterr().out
+    assert 300.0 < result.distance[-1] < 980.0
+    assert np.isfinite(result.Q).all()
+
+
+def test_pictures_are_drawn_beside_the_result(tmp_path):
+    path = tmp_path / "run.h5"
+    assert main([*SHORT, "--out", str(path), "--plots"]) == 0
+    assert sorted(os.listdir(tmp_path)) == ["run.h5", "run.png"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [1.0, 4.0])
+def test_interrupt_leaves_nothing(tmp_path, delay):
+    # RK4 at small steps runs for a minute: the interrupt comes early, while loading, or within it
+    arguments = [*COACH, "--speed", "2", "--set", "settings.scheme=rk4"]
+    arguments += ["--set", "settings.step=1e-4", "--out", str(tmp_path / "run.h5")]
+    call = "import sys; from railsim.cli import main; sys.exit(main())"
+    process = subprocess.Popen(
+        [sys.executable, "-c", call, *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.endswith("railsim: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["run", "study", "compare", "plot"])
+def test_help_loads_neither_numba_nor_matplotlib(command):
+    check = (
+        "import sys; from railsim.cli import main; status = main([sys.argv[1], '--help']);"
+        "assert status == 0; assert not {'numba', 'matplotlib', 'h5py'} & set(sys.modules)"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", check, command], capture_output=True, text=True, check=True
+    )
+    assert f"railsim {command}" in shown.stdout  # the example

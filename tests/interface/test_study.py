@@ -1,0 +1,307 @@
+"""``railsim study`` and `railsim.study`: combinations, what is kept, and what goes wrong.
+
+Most tests replace the simulation by a made-up one that takes no time; the ones that need processes
+run the real thing over ten metres.
+"""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from example_result import ROOT, feed
+
+import railsim
+import railsim.studies.run
+from railsim.cli import main
+from railsim.errors import InputError, ModelError
+from railsim.studies.combine import combinations, parse_grid
+
+COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Replace the simulation; the list holds the speed of every run that is made."""
+    speeds = []
+
+    def simulate(vehicle, track, *, speed, sink, progress, **how):
+        speeds.append(speed)
+        if speed == 13.0:
+            raise ModelError("there is no equilibrium at 13 m/s")
+        if speed == 14.0:
+            raise ZeroDivisionError("trouble")
+        if speed == 15.0:
+            raise KeyboardInterrupt
+        progress(0.5)
+        status = "derailed" if speed == 99.0 else "complete"
+        return feed(sink, speed=speed, duration=20.0, status=status)
+
+    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    return speeds
+
+
+def arguments(out, *speeds, tracks=(CURVE,), more=()):
+    given = ["study", "--vehicles", COACH, "--tracks", *tracks, "--speeds", *map(str, speeds)]
+    return [*given, "--out", str(out), "--workers", "1", *more]
+
+
+def rows(folder):
+    with open(folder / "summary.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def index(folder):
+    return json.loads((folder / "study.json").read_text(encoding="utf-8"))
+
+
+def test_every_combination_has_its_file_row_and_record(tmp_path, simulated):
+    folder = tmp_path / "curves"
+    grid = ["--grid", "track.friction=0.3,0.4"]
+    assert main(arguments(folder, 10, 20, tracks=[CURVE, STRAIGHT], more=grid)) == 0
+    names = [
+        f"{COACH}_{track}_{speed}_friction={mu}"
+        for track in (CURVE, STRAIGHT)
+        for speed in (10, 20)
+        for mu in (0.3, 0.4)
+    ]
+    assert [row["name"] for row in rows(folder)] == names
+    assert [record["name"] for record in index(folder)["runs"]] == names
+    files = {f"{name}.h5" for name in names}
+    assert set(os.listdir(folder)) == files | {"summary.csv", "study.json"}
+    row = rows(folder)[1]
+    assert (row["vehicle"], row["track"], row["speed"], row["track.friction"]) == (
+        COACH,
+        CURVE,
+        "10.0",
+        "0.4",
+    )
+
+
+def test_summary_repeats_the_peaks_of_the_files(tmp_path, simulated):
+    assert main(arguments(tmp_path, 20)) == 0
+    (row,) = rows(tmp_path)
+    result = railsim.open_result(tmp_path / row["file"])
+    assert float(row["Q_peak"]) == np.abs(result.Q).max()
+    assert float(row["dQ_over_Q0_min"]) == result.dQ_over_Q0.min()
+    assert row["Q_peak_wheelset"] in result.wheelsets
+    assert float(row["wheelset_yaw_mid"]) == pytest.approx(-9.6e-3)
+
+
+def test_finished_runs_are_not_computed_again(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 10, 20)) == 0
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+    table = (tmp_path / "summary.csv").read_bytes()
+    capsys.readouterr()
+    assert main(arguments(tmp_path, 10, 20)) == 0
+    assert simulated == [10.0, 20.0]
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")} == before
+    assert (tmp_path / "summary.csv").read_bytes() == table
+    assert "0 of 2 runs computed, 2 were there" in capsys.readouterr().out
+
+
+def test_overwrite_computes_everything_again(tmp_path, simulated):
+    assert main(arguments(tmp_path, 10)) == 0
+    assert main(arguments(tmp_path, 10, more=["--overwrite"])) == 0
+    assert simulated == [10.0, 10.0]
+
+
+def test_changed_inputs_are_refused_without_resume(tmp_path, simulated, capsys):
+    changed = ["--set", "track.friction=0.3"]
+    assert main(arguments(tmp_path, 10)) == 0
+    assert main(arguments(tmp_path, 10, more=changed)) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert main(arguments(tmp_path, 10, more=[*changed, "--resume"])) == 0
+    assert main(arguments(tmp_path, 10, more=changed)) == 0
+    assert simulated == [10.0, 10.0]
+
+
+def test_resume_computes_only_what_has_changed(tmp_path, simulated):
+    assert main(arguments(tmp_path, 10, 20)) == 0
+    assert main(arguments(tmp_path, 10, 20, 30, more=["--resume"])) == 0
+    assert simulated == [10.0, 20.0, 30.0]
+
+
+def test_change_of_a_file_is_noticed(tmp_path, simulated):
+    vehicle = tmp_path / "coach.toml"
+    text = (ROOT / "vehicles" / "coach_manchester.toml").read_text(encoding="utf-8")
+    vehicle.write_text(text, encoding="utf-8")
+    study = {"out": tmp_path / "study", "workers": 1, "resume": True}
+    railsim.study([vehicle], [CURVE], [20.0], **study)
+    vehicle.write_text(text.replace("mass = 43628.0", "mass = 43629.0"), encoding="utf-8")
+    railsim.study([vehicle], [CURVE], [20.0], **study)
+    railsim.study([vehicle], [CURVE], [20.0], **study)
+    assert simulated == [20.0, 20.0]
+
+
+def test_interrupted_study_goes_on_from_what_it_has(tmp_path, simulated, monkeypatch):
+    assert main(arguments(tmp_path, 10, 15, 20)) == 130
+    assert index(tmp_path)["status"] == "interrupted"
+    assert [row["status"] for row in rows(tmp_path)] == ["complete", "waiting", "waiting"]
+    assert len(list(tmp_path.iterdir())) == 3
+    whole = lambda *a, sink, speed, **how: simulated.append(speed) or feed(sink)  # noqa: E731
+    monkeypatch.setattr(railsim.studies.run, "simulate", whole)
+    assert main(["study", "--resume", "--out", str(tmp_path), "--workers", "1"]) == 0
+    assert simulated == [10.0, 15.0, 15.0, 20.0]
+    assert index(tmp_path)["status"] == "complete"
+
+
+def test_failed_run_is_recorded_and_the_others_go_on(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 13, 14, 20)) == 1
+    no_equilibrium, trouble, fine = index(tmp_path)["runs"]
+    assert no_equilibrium["status_reason"] == "there is no equilibrium at 13 m/s"
+    assert trouble["status_reason"] == "ZeroDivisionError: trouble"
+    assert "trouble" in trouble["traceback"]
+    assert fine["status"] == "complete"
+    assert [path.name for path in tmp_path.glob("*.h5")] == [f"{COACH}_{CURVE}_20.h5"]
+    assert "2 failed" in capsys.readouterr().err
+
+
+def test_failed_runs_are_tried_again(tmp_path, simulated):
+    assert main(arguments(tmp_path, 13)) == 1
+    assert main(arguments(tmp_path, 13)) == 1
+    assert simulated == [13.0, 13.0]
+
+
+def test_early_end_is_the_exit_status_of_the_study(tmp_path, simulated):
+    assert main(arguments(tmp_path, 20, 99)) == 3
+    assert [row["status"] for row in rows(tmp_path)] == ["complete", "derailed"]
+
+
+def test_pictures_of_runs_and_of_vehicles_against_each_other(tmp_path, simulated):
+    given = ["study", "--vehicles", COACH, "benchmark_vehicle1", "--tracks", CURVE]
+    given += ["--speeds", "20", "--out", str(tmp_path), "--workers", "1", "--plots"]
+    assert main(given) == 0
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == [
+        f"benchmark_vehicle1_{CURVE}_20.png",
+        f"{COACH}_{CURVE}_20.png",
+        f"compare_{CURVE}_20.png",
+    ]
+
+
+def test_json_holds_every_record(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 10, 20, more=["--json"])) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [run["status"] for run in data["runs"]] == ["complete", "complete"]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--tracks", CURVE, "--speeds", "20"], "--vehicles: not given"),
+        (["--vehicles", COACH, "--tracks", CURVE], "--speeds: not given"),
+        (["--resume"], "no study"),
+        (
+            ["--vehicles", "coach", COACH, "--tracks", "curve", "--speeds", "20", "-5"],
+            "no file 'curve'",
+        ),
+        (["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "-5"], "-5 m/s"),
+        (["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "20"], "2 runs of this name"),
+        (
+            ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--grid", "friction=0.3"],
+            "vehicle., track. or settings.",
+        ),
+        (
+            ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--grid", "track.friction"],
+            "key.path=a,b,c",
+        ),
+    ],
+)
+def test_bad_study_is_refused_and_nothing_is_written(tmp_path, simulated, given, words, capsys):
+    folder = tmp_path / "study"
+    assert main(["study", *given, "--out", str(folder)]) == 2
+    assert words in capsys.readouterr().err
+    assert simulated == []
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("place", ["file/study", "missing/study", "file"])
+def test_folder_that_cannot_be_written_is_refused(tmp_path, simulated, place, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(arguments(tmp_path / place, 20)) == 2
+    assert "--out" in capsys.readouterr().err
+    assert simulated == []
+
+
+def test_foreign_file_is_not_replaced(tmp_path, simulated, capsys):
+    foreign = tmp_path / f"{COACH}_{CURVE}_20.h5"
+    foreign.write_text("a letter")
+    assert main(arguments(tmp_path, 20, more=["--resume"])) == 2
+    assert foreign.read_text() == "a letter"
+
+
+def test_missing_dask_is_answered_with_the_install_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main(arguments(tmp_path, 20, more=["--scheduler", "tcp://localhost:1"])) == 2
+    assert "pip install 'railsim[distributed]'" in capsys.readouterr().err
+
+
+def test_grid_values_may_be_lists():
+    assert parse_grid("settings.fastsim_grid=[5,5],[10,10]")[1] == ("[5,5]", "[10,10]")
+    grid = {"settings.fastsim_grid": ["[5,5]", "[10,10]"]}
+    cases = combinations([COACH], [CURVE], [20.0], grid)
+    assert [case.settings.fastsim_grid for case in cases] == [(5, 5), (10, 10)]
+    assert cases[0].name == f"{COACH}_{CURVE}_20_fastsim_grid=5-5"
+
+
+def test_keys_tell_inputs_apart_and_nothing_else():
+    def key(*assignments, speed=20.0, **how):
+        (case,) = combinations([COACH], [CURVE], [speed], assignments=assignments, **how)
+        return case.key()
+
+    base = key()
+    assert key("track.friction=0.4") == base  # what the file says already
+    others = [
+        key("track.friction=0.3"),
+        key("settings.step=0.0005"),
+        key("vehicle.bodies.carbody.mass=43e3"),
+        key(speed=21.0),
+        key(until=100.0),
+        key(duration=5.0),
+    ]
+    assert len({base, *others}) == 1 + len(others)
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_arrays_as_one_run(tmp_path):
+    outcome = railsim.study([COACH], [CURVE, STRAIGHT], [20.0], until=10.0, out=tmp_path, workers=2)
+    assert [record["status"] for record in outcome.records] == ["complete", "complete"]
+    vehicle, track = railsim.load_vehicle(COACH), railsim.load_track(CURVE)
+    alone = railsim.simulate(vehicle, track, speed=20.0, until=10.0)
+    shared = outcome.results()[f"{COACH}_{CURVE}_20"]
+    for name in alone:
+        np.testing.assert_array_equal(shared[name], alone[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("everyone", [False, True], ids=["parent only", "whole group"])
+def test_interrupt_leaves_only_whole_files(tmp_path, everyone):
+    given = arguments(tmp_path / "study", 2, 3, 4, 5)[:-2]
+    given += ["--set", "settings.scheme=rk4", "--set", "settings.step=1e-4", "--workers", "2"]
+    call = "import sys; from railsim.cli import main; sys.exit(main())"
+    process = subprocess.Popen(
+        [sys.executable, "-c", call, *given],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    time.sleep(5.0)
+    (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert sorted(os.listdir(tmp_path / "study")) == ["study.json", "summary.csv"]
+    assert index(tmp_path / "study")["status"] == "interrupted"
+
+
+def test_python_raises_what_the_command_prints(tmp_path):
+    with pytest.raises(InputError) as caught:
+        railsim.study(["no_such_coach"], [CURVE], [20.0], out=tmp_path)
+    assert "no_such_coach" in caught.value.faults[0].file
+    assert list(tmp_path.iterdir()) == []
