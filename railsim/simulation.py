@@ -209,8 +209,9 @@ def output_interval(settings: Settings, speed: float) -> float:
 def _start(model: Model, balance: Equilibrium, settings: Settings) -> Floats:
     """Initial state: steady rolling at s = 0 with the disturbances of the settings."""
     work = work_arrays(model.system)
-    if locate_frames(model.system.track, model.system.frame_offset, 0.0, work.frames,
-                     work.cell, work.cell_u) != RUNNING:
+    bodies = model.system.bodies
+    if locate_frames(model.system.track, model.system.frame_offset, bodies.frame[bodies.reference],
+                     0.0, work.frames, work.cell, work.cell_u) != RUNNING:
         raise ModelError("the vehicle is longer than the track's table allows")
     state = initial_state(model, balance, 0.0, work.frames)
     n = model.index.n_bodies

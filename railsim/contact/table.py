@@ -26,12 +26,17 @@ same weights.  l makes g agree with the hard minimum in the zone's typical conta
 share W = <omega> multiplies the stiffness: a contact on the border of two zones is shared, not
 counted twice.
 
-Place of contact under load.  Lowered without load, a wheel in its flange root would touch first on
-the steep flank, where a given normal distance is the longest vertical one; under load the patch is
-where the *normal* approach is greatest.  The minimum is therefore taken of h + delta_r/cos(gamma),
-the gap of surfaces that already overlap by delta_r along the normal (80 um, the approach under
-some 60 kN), and delta_r/cos(gamma) is taken off g again.  At that approach the gradient of U, with
-the change of K, is exactly the rail's slope at the place of contact.
+Place of contact under load.  Pressed down by p, wheel and rail overlap, and the patch lies where
+the *normal* approach is greatest: between the points of rail and wheel with a common normal, p
+sin(gamma) apart.  Both move along their profiles; to first order their middle is where
+
+    h + delta_r L,   L = (1/cos(gamma_rail) + 1/cos(gamma_wheel))/2,
+
+is least, with the approach delta_r = 80 um under some 60 kN.  The minimum is taken of this, delta_r
+L is taken off g again, and p = delta L.  The common normal's angle follows from the rail's slope
+there and its change over half the distance, tan(gamma) = -z' (1 + delta_r kappa (1 + z'^2)/2): on a
+straight flank exactly the flank's.  At that approach it is the direction of the gradient of U where
+the ellipse does not change.
 
 Frame: right wheel and rail, track axes (x forward, y right, z down), forces and places relative to
 the wheelset's centre.  The left wheel is the mirror image (y and roll change sign); where left and

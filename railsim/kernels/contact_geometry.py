@@ -31,7 +31,7 @@ def _jit(function):
 
 
 @_jit
-def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, usable):
+def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
     """Trace line of a wheel relative to the wheelset's centre, in track axes.
 
     Parameters
@@ -42,8 +42,9 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, usable):
         Attitude of the wheelset, C = Rz(yaw) Rx(roll) [rad].
     c_x, c_y, c_z : ndarray, shape (n,)
         Points of the line (output) [m].
-    usable : ndarray of bool, shape (n,)
-        False where the profile is so steep against the yaw that no trace point exists (output).
+    stretch : ndarray, shape (n,)
+        1/cos of the angle between the wheel's surface there and the track plane, 0 where the
+        profile is so steep against the yaw that no trace point exists (output) [1].
     """
     l_x = -math.sin(yaw) * math.cos(roll)
     l_y = math.cos(yaw) * math.cos(roll)
@@ -53,8 +54,9 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, usable):
         e_x = t[k] * l_x
         along = -e_x * l_x / m
         rest = 1.0 - e_x * e_x - along * along
-        usable[k] = rest > 0.0
         across = math.sqrt(max(rest, 0.0))
+        n_z = (along * l_z + across * l_y) / m - t[k] * l_z
+        stretch[k] = math.sqrt(1.0 + t[k] * t[k]) / n_z if rest > 0.0 and n_z > 0.0 else 0.0
         c_x[k] = u[k] * l_x + r[k] * e_x
         c_y[k] = u[k] * l_y + r[k] * (along * l_y - across * l_z) / m
         c_z[k] = u[k] * l_z + r[k] * (along * l_z + across * l_y) / m
@@ -184,10 +186,11 @@ def fill_table_slice(
     h = np.empty(n_u)
     slope = np.empty(n_u)
     lift = np.empty(n_u)
+    tangent = np.empty(n_u)
     node = np.empty(n_u, np.int64)
-    usable = np.empty(n_u, np.bool_)
+    stretch = np.empty(n_u)
     curvature = np.empty(n_width)
-    trace_line(wheel_u, wheel_r, wheel_t, roll, yaw, c_x, c_y, c_z, usable)
+    trace_line(wheel_u, wheel_r, wheel_t, roll, yaw, c_x, c_y, c_z, stretch)
     # c_x is odd in yaw: its ratio to yaw has a limit, taken at a yaw that is small but not zero
     yaw_for_x = yaw if abs(yaw) > 1e-6 else 1e-6
     sine = math.sin(yaw_for_x) / yaw_for_x * math.cos(roll)
@@ -198,16 +201,19 @@ def fill_table_slice(
             h[k], slope[k], node[k] = rail_height(
                 y_nodes[i] + c_y[k], rail_Y0, rail_dY, rail_z, rail_slope
             )
-            lift[k] = approach * math.sqrt(1.0 + slope[k] * slope[k])
+            rail_stretch = math.sqrt(1.0 + slope[k] * slope[k])
+            lift[k] = 0.5 * approach * (stretch[k] + rail_stretch)
             h[k] += centre_height - c_z[k] + lift[k]
-            if not usable[k]:
+            bend = approach * rail_curvature[0, node[k]] * rail_stretch * rail_stretch
+            tangent[k] = -slope[k] * (1.0 + 0.5 * bend)
+            if not stretch[k] > 0.0:
                 h[k] = 1.0
         for p in range(n_patch):
             least = 1e9
             for k in range(first[p], last[p]):
                 least = min(least, h[k] - eps * log_window[p, k])
             total = 0.0
-            s_window = s_y = s_z = s_x = s_slope = s_r = s_lift = 0.0
+            s_window = s_y = s_z = s_x = s_tangent = s_r = s_lift = 0.0
             for m in range(n_width):
                 curvature[m] = 0.0
             for k in range(first[p], last[p]):
@@ -219,7 +225,7 @@ def fill_table_slice(
                     s_y += weight * c_y[k]
                     s_z += weight * c_z[k]
                     s_x += weight * c_x[k]
-                    s_slope += weight * slope[k]
+                    s_tangent += weight * tangent[k]
                     s_r += weight * wheel_r[k]
                     s_lift += weight * lift[k]
                     for m in range(n_width):
@@ -229,7 +235,7 @@ def fill_table_slice(
             inverse = 1.0 / total
             for m in range(n_width):
                 curvature[m] *= inverse
-            tan_gamma = s_slope * inverse
+            tan_gamma = s_tangent * inverse
             cos_gamma = 1.0 / math.sqrt(1.0 + tan_gamma * tan_gamma)
             A = 0.5 * cos_gamma / (s_r * inverse)
             a1, b1, d1 = averaged_ellipse(
@@ -250,7 +256,7 @@ def fill_table_slice(
             out[C_X] = s_x * inverse
             out[A1] = a1
             out[B1] = b1
-            out[TAN_GAMMA] = -tan_gamma
+            out[TAN_GAMMA] = tan_gamma
 
 
 @_jit

@@ -32,12 +32,21 @@ from railsim.kernels.wheel_rail import wheel_rail
 
 
 @jit
-def locate_frames(track, offset, s, frames, cell, cell_u):
-    """Evaluate all track frames; END_OF_TRACK where one lies outside the table."""
+def locate_frames(track, offset, origin, s, frames, cell, cell_u):
+    """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
+
+    Origins are taken relative to that of frame `origin`: elements are stiff, and the round-off of
+    coordinates counted from the start of the track would be forces of micronewtons.
+    """
     for f in range(offset.shape[0]):
         cell[f], cell_u[f] = track_frame(track, s + offset[f], frames, f)
         if cell[f] < 0:
             return END_OF_TRACK
+    x, y, z = frames[origin, 0], frames[origin, 1], frames[origin, 2]
+    for f in range(offset.shape[0]):
+        frames[f, 0] -= x
+        frames[f, 1] -= y
+        frames[f, 2] -= z
     return RUNNING
 
 
@@ -279,8 +288,8 @@ def right_hand_side(system, work, state, driving, speed_rate, derivative):
     bodies = system.bodies
     n = bodies.kind.shape[0]
     s, speed = state[-2], state[-1]
-    status = locate_frames(system.track, system.frame_offset, s, work.frames, work.cell,
-                           work.cell_u)
+    status = locate_frames(system.track, system.frame_offset, bodies.frame[bodies.reference],
+                           s, work.frames, work.cell, work.cell_u)
     if status != RUNNING:
         return status, 0, 0
     kinematics(bodies, work.frames, speed, state, work.S, work.C, work.R, work.X, work.V, work.W,

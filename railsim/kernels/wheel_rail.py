@@ -116,6 +116,7 @@ def normal_contact(system, work, speed, state):
                 vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
                 stretch = 0.4 * p * p * root
                 q_y = sign * (vertical * t[G_Y] - stretch * t[K_Y])
+                force[b, 0] -= q_y * work.rail[2] - vertical * work.rail[3]
                 force[b, 1] += q_y
                 force[b, 2] -= vertical
                 force[b, 3] += sign * (vertical * t[G_ROLL] - stretch * t[K_ROLL])
@@ -185,7 +186,7 @@ def creepages(system, work, n, speed, state):
         b = system.contact.body[w]
         f = system.bodies.frame[b]
         w1, w2, w3 = speed * frames[f, OMEGA], speed * frames[f, OMEGA + 1], speed * frames[f, OMEGA + 2]
-        x, y = state[6 * b], state[6 * b + 1] + system.bodies.nominal[b, 0]
+        y = state[6 * b + 1] + system.bodies.nominal[b, 0]
         z = state[6 * b + 2] + system.bodies.nominal[b, 1]
         v = 6 * n_bodies + 6 * b
         u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
@@ -193,9 +194,11 @@ def creepages(system, work, n, speed, state):
         a2 = C[b, 3] * u1 + C[b, 4] * u2 + C[b, 5] * u3
         a3 = C[b, 6] * u1 + C[b, 7] * u2 + C[b, 8] * u3
         cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
+        # along the rail the wheel's material moves with the rail's own direction, e_x + omega x rho:
+        # on curved and twisted track only what it moves relative to the frame is slip across it
         vx = speed + w2 * z - w3 * y + state[v] + a2 * cz - a3 * cy
-        vy = w3 * x - w1 * z + state[v + 1] + a3 * cx - a1 * cz
-        vz = w1 * y - w2 * x + state[v + 2] + a1 * cy - a2 * cx
+        vy = state[v + 1] + (a3 - w3) * cx - (a1 - w1) * cz
+        vz = state[v + 2] + (a1 - w1) * cy - (a2 - w2) * cx
         if system.track.has_irregularity:
             rail_state(system.track, work.cell[f], work.cell_u[f], work.patch_index[k, 1],
                        work.rail)
@@ -249,8 +252,7 @@ def add_creep_forces(system, work, n, speed):
 def wheel_rail(system, work, speed, state):
     """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
 
-    Row b of `rail_force`: force (3) and moment about the wheelset's centre (3), where the moment's
-    normal part is the generalised force of roll and yaw (see `rhs`), the creep part a vector.
+    Row b of `rail_force`: force (3) and moment about the wheelset's centre (3).
 
     Returns
     -------
@@ -260,11 +262,9 @@ def wheel_rail(system, work, speed, state):
     status, w, n = normal_contact(system, work, speed, state)
     if status != RUNNING:
         return status, w, n
-    # the normal part is generalised (about the wheelset's roll axis and the track's normal):
-    # turn it into a moment vector that does no work on the spin
     for k in range(system.contact.body.shape[0]):
         b = system.contact.body[k]
-        generalised_to_vector(b, work.C, work.S[b, 1], work.rail_force)
+        complete_normal_force(b, system.bodies, work.frames, work.C, work.S, state, work.rail_force)
     patch = work.patch
     creepages(system, work, n, speed, state)
     kalker_lookup(n, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
@@ -277,14 +277,31 @@ def wheel_rail(system, work, speed, state):
 
 
 @jit
-def generalised_to_vector(b, C, cos_roll, force):
-    """Moment vector (track axes) from the generalised moments of roll and yaw, none on the spin.
+def complete_normal_force(b, bodies, frames, C, S, state, force):
+    """Moment vector from the generalised moments, and the force along the track.
 
     The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
-    track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and M_2 = 0.
+    track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and the normal force does no
+    work on the spin, M_2 = 0.
+
+    The potential does not depend on the place along a smooth track.  Moving along it with all
+    relative coordinates held, v = e_x + omega x r and u = omega per metre, the contact does no
+    work; hence F_x (1 + (omega x r)_x) = -F_y (omega x r)_y - F_z (omega x r)_z - M omega: on a
+    twisted track the wheels climb the rails.  `force[b, 0]` brings the share of irregular rails.
     """
     m1 = force[b, 3]
-    m3 = force[b, 5] / cos_roll
-    force[b, 3] = C[b, 0] * m1 + C[b, 2] * m3
-    force[b, 4] = C[b, 3] * m1 + C[b, 5] * m3
-    force[b, 5] = C[b, 6] * m1 + C[b, 8] * m3
+    m3 = force[b, 5] / S[b, 1]
+    mx = C[b, 0] * m1 + C[b, 2] * m3
+    my = C[b, 3] * m1 + C[b, 5] * m3
+    mz = C[b, 6] * m1 + C[b, 8] * m3
+    f = bodies.frame[b]
+    w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+    x = state[6 * b]
+    y = state[6 * b + 1] + bodies.nominal[b, 0]
+    z = state[6 * b + 2] + bodies.nominal[b, 1]
+    along = (force[b, 1] * (w3 * x - w1 * z) + force[b, 2] * (w1 * y - w2 * x)
+             + mx * w1 + my * w2 + mz * w3)
+    force[b, 0] = (force[b, 0] - along) / (1.0 + w2 * z - w3 * y)
+    force[b, 3] = mx
+    force[b, 4] = my
+    force[b, 5] = mz

@@ -1,0 +1,175 @@
+"""What the verification tests of the simulator share: model variants and an independent energy."""
+
+import numpy as np
+from railsim.assembly import assemble, work_arrays
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.definitions.vehicle import Vehicle
+from railsim.equilibrium import equilibrium
+from railsim.kernels.contact_table import LOOK_UP_SIZE, locate, look_up
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.system import AXLEBOX, PRESCRIBED, WHEELSET
+from railsim.kernels.time_loop import time_loop
+from railsim.kernels.track_frame import FRAME_SIZE, track_frame
+from railsim.time_step import SCHEMES, empty_recorder
+
+NEVER = 1 << 40
+
+
+def changed(vehicle, change):
+    """Vehicle with `change(kind_of_table, name, table)` applied to every part of its file."""
+    data = vehicle.model_dump(exclude_none=True)
+
+    def walk(group):
+        for kind in ("bodies", "wheelsets", "axleboxes", "elements"):
+            for name, table in group.get(kind, {}).items():
+                change(kind, name, table)
+        for assembly in group.get("assemblies", {}).values():
+            walk(assembly)
+
+    walk(data)
+    return Vehicle.model_validate(data)
+
+
+def undamped(vehicle):
+    """Vehicle without any damping."""
+
+    def change(kind, _name, table):
+        for key in ("damping", "series_stiffness", "rotational_damping"):
+            if kind == "elements" and key in table:
+                table[key] = [0.0] * 3 if isinstance(table[key], list | tuple) else 0.0
+        table.pop("damper_table", None)
+
+    return changed(vehicle, change)
+
+
+def steady(vehicle, track, settings, speed):
+    """Equilibrium of a vehicle on a track."""
+    return equilibrium(assemble(vehicle, track, settings), speed)
+
+
+def advance(system, state, h, n_steps, scheme="rk4", driving=PRESCRIBED, model=None):
+    """State after `n_steps` steps; asserts that the run went through."""
+    after = state.copy()
+    status, _, steps, _ = time_loop(
+        system, work_arrays(system), after, np.zeros_like(state), np.zeros((3, len(state))),
+        empty_recorder(model, 1), SCHEMES[scheme], driving, 0.0, h, 1, n_steps, NEVER,
+    )
+    assert (status, steps) == (0, n_steps)
+    return after
+
+
+def evaluate(system, state, driving=PRESCRIBED):
+    """Work arrays and derivative of one state."""
+    work, derivative = work_arrays(system), np.zeros_like(state)
+    status, *_ = right_hand_side(system, work, state, driving, 0.0, derivative)
+    assert status == 0
+    return work, derivative
+
+
+def absolute_frame(system, s):
+    """Track frame with its origin in global axes."""
+    frames = np.zeros((1, FRAME_SIZE))
+    track_frame(system.track, s, frames, 0)
+    return frames[0]
+
+
+def rotation(angle, axis):
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = c
+    matrix[i, j], matrix[j, i] = -s, s
+    return matrix
+
+
+def energy(system, state):
+    """Kinetic and potential energy [J] in the inertial frame, written anew with matrices.
+
+    The springs' potentials are evaluated from their definitions, not from their forces.
+    """
+    work, _ = evaluate(system, state)
+    n = len(system.bodies.kind)
+    total = 0.0
+    pose = {}
+    for b, kind in enumerate(system.bodies.kind):
+        frame = absolute_frame(system, state[-2] + system.frame_offset[system.bodies.frame[b]])
+        A = frame[3:12].reshape(3, 3)
+        q = state[6 * b : 6 * b + 6]
+        v = state[6 * n + 6 * b : 6 * n + 6 * b + 6]
+        if kind == AXLEBOX:
+            p = system.bodies.parent[b]
+            pose[b] = (pose[p][0], pose[p][1] @ rotation(q[4], 1))
+            total += 0.5 * system.bodies.inertia[b, 1] * v[4] ** 2
+            continue
+        omega = state[-1] * frame[12:15]
+        r = q[:3] + np.array([0.0, *system.bodies.nominal[b]])
+        C = rotation(q[5], 2) @ rotation(q[3], 0)
+        if kind != WHEELSET:
+            C = C @ rotation(q[4], 1)
+        pose[b] = (frame[:3] + A @ r, A @ C)
+        velocity = np.array([state[-1], 0, 0]) + v[:3] + np.cross(omega, r)
+        mass = system.bodies.mass[b]
+        total += 0.5 * mass * velocity @ velocity
+        total += 0.5 * np.sum(system.bodies.inertia[b] * v[3:] ** 2)
+        total -= mass * system.gravity * pose[b][0][2]
+    return total + _link_energy(system, pose) + _mount_energy(system, pose) + _contact_energy(
+        system, work, state)
+
+
+def _curve_energy(curves, index, x):
+    """Integral of a piecewise linear table from 0 to x."""
+    if index < 0:
+        return 0.0
+    part = slice(curves.start[index], curves.start[index + 1])
+    grid = np.unique(np.concatenate([np.linspace(0.0, x, 3), curves.x[part].clip(min(0, x), max(0, x))]))
+    values = np.interp(grid, curves.x[part], curves.f[part])
+    return np.sign(x) * np.trapezoid(values, grid)
+
+
+def _link_energy(system, pose):
+    total = 0.0
+    for e, (i, j) in enumerate(system.links.body):
+        p, q = system.links.point[e]
+        length = np.linalg.norm(pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p)
+        x = length - system.links.length[e]
+        k, _, preload = system.links.spring[e]
+        total += preload * x + 0.5 * k * x * x
+        total += _curve_energy(system.curves, system.links.curve[e, 0], x)
+    return total
+
+
+def _mount_energy(system, pose):
+    mounts = system.mounts
+    total = 0.0
+    for e, (i, j) in enumerate(mounts.body):
+        p, q = mounts.point[e]
+        gap = pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p
+        axes = [pose[i][1], pose[j][1]] if mounts.flags[e, 1] else [pose[i][1]]
+        for R in axes if mounts.flags[e, 0] else []:
+            d = R.T @ gap
+            law = mounts.preload[e] @ d + 0.5 * mounts.stiffness[e] @ d**2
+            law += sum(_curve_energy(system.curves, mounts.curve[e, k], d[k]) for k in range(3))
+            total += law / len(axes)
+        if mounts.flags[e, 2]:
+            R = pose[i][1].T @ pose[j][1]
+            total += np.trace(np.diag(mounts.rotation[e]) @ (np.eye(3) - R))
+    return total
+
+
+def _contact_energy(system, work, state):
+    contact = system.contact
+    total = 0.0
+    out = np.zeros(LOOK_UP_SIZE)
+    for w, b in enumerate(contact.body):
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            y, z, roll, _, yaw = state[6 * b + 1 : 6 * b + 6]
+            table = contact.table[w, side]
+            _, iy, ir, iw, ty, tr, tw = locate(contact, table, sign * y, sign * roll, yaw**2)
+            for patch in range(3):
+                look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out)
+                total += 0.4 * out[1] * max(0.0, z - out[0]) ** 2.5
+    return total
+
+
+__all__ = ["Settings", "load_track", "load_vehicle"]

@@ -1,0 +1,26 @@
+"""Guidance on straight track: Klingel's wavelength and the onset of hunting."""
+
+import numpy as np
+import pytest
+from dynamics import Settings, load_track, load_vehicle
+from railsim.simulation import simulate
+
+WHEELSETS = ("front.outer.wheelset", "front.inner.wheelset",
+             "rear.inner.wheelset", "rear.outer.wheelset")
+
+
+def lateral_at_the_end(vehicle, speed, offset=0.003, until=900.0):
+    """Largest lateral displacement in the last 100 m after all wheelsets started off centre [m]."""
+    initial = {name: {"y": offset} for name in WHEELSETS}
+    result = simulate(vehicle, load_track("straight"), speed=speed, until=until,
+                      settings=Settings(initial=initial))
+    assert result.status == "complete"
+    return np.max(np.abs(result.wheelset_lateral[result.distance > until - 100.0]))
+
+
+def test_manchester_coach_is_stable_at_30_m_s():
+    assert lateral_at_the_end(load_vehicle("coach_manchester"), 30.0) < 0.2e-3
+
+
+def test_manchester_coach_hunts_at_40_m_s():
+    assert lateral_at_the_end(load_vehicle("coach_manchester"), 40.0) > 1.0e-3
