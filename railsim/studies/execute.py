@@ -108,24 +108,30 @@ def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Itera
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def on_cluster(jobs: Sequence[Job], address: str, progress: Progress) -> Iterator[Record]:
-    """Do jobs on the workers of a dask scheduler, which must see the folder under the same path.
+def cluster(address: str) -> Any:
+    """Return a client of the dask scheduler at an address.
 
     Raises
     ------
     InputError : dask is not installed, or no scheduler answers.
     """
     try:
-        from distributed import Client, as_completed
+        from distributed import Client
     except ImportError:
         found = "the package 'distributed' is not installed"
         allowed = "install it with: pip install 'railsim[distributed]'"
         raise InputError([Fault("--scheduler", "", found, allowed)]) from None
     try:
-        client = Client(address)
+        return Client(address)
     except (OSError, ValueError) as error:
         found = f"no scheduler answers at {address} ({error})"
         raise InputError([Fault("--scheduler", "", found, "such as tcp://host:8786")]) from None
+
+
+def on_cluster(jobs: Sequence[Job], client: Any, progress: Progress) -> Iterator[Record]:
+    """Do jobs on the workers of a dask cluster, which must see the folder under the same path."""
+    from distributed import as_completed
+
     with client:
         futures = client.map(perform, list(jobs), pure=False)
         jobs_of = dict(zip((future.key for future in futures), jobs, strict=True))

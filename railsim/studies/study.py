@@ -9,12 +9,13 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from railsim.errors import Fault, InputError
 from railsim.result import Result, open_result
 from railsim.studies.case import Case
 from railsim.studies.combine import combinations
-from railsim.studies.execute import Job, in_processes, in_this_process, on_cluster
+from railsim.studies.execute import Job, cluster, in_processes, in_this_process, on_cluster
 from railsim.studies.summary import Record, finished_record, waiting_record, write_index
 from railsim.version import __version__
 
@@ -155,6 +156,7 @@ def study(
     if not (resume or overwrite):
         _refuse_another_study(folder, inputs)
     finished = {} if overwrite else _finished(cases, folder, resume=resume)
+    client = None if scheduler is None else cluster(scheduler)
     _prepare(folder)
     tell = on_record or (lambda _: None)
     records = {case.name: waiting_record(case) for case in cases}
@@ -166,7 +168,7 @@ def study(
     write_index(folder, inputs, "running", list(records.values()))
     status = "interrupted"
     try:
-        for record in _executed(jobs, workers, scheduler, progress or (lambda _: None)):
+        for record in _executed(jobs, workers, client, progress or (lambda _: None)):
             records[record["name"]] = record
             write_index(folder, inputs, "running", list(records.values()))
             tell(record)
@@ -189,11 +191,11 @@ def _job(case: Case, folder: Path, plots: bool) -> Job:
 def _executed(
     jobs: Sequence[Job],
     workers: int | None,
-    scheduler: str | None,
+    client: Any,
     progress: Callable[[float], None],
 ) -> Iterable[Record]:
-    if scheduler is not None:
-        return on_cluster(jobs, scheduler, progress)
+    if client is not None:
+        return on_cluster(jobs, client, progress)
     count = min(workers or cores(), len(jobs))
     return in_processes(jobs, count, progress) if count > 1 else in_this_process(jobs, progress)
 

@@ -239,6 +239,7 @@ def test_missing_dask_is_answered_with_the_install_command(tmp_path, monkeypatch
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert main(arguments(tmp_path, 20, more=["--scheduler", "tcp://localhost:1"])) == 2
     assert "pip install 'railsim[distributed]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_grid_values_may_be_lists():
