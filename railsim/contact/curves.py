@@ -303,26 +303,25 @@ def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float) -> list[tuple[str,
         side until the flange touches, the other wheel still has the rail under it.
     """
     remedy = "check gauge, back-to-back distance and both profiles"
-    flank = int(np.argmin(wheel.t))
+    steepest = float(wheel.t.min())
+    # a wheel without flange has none to be in the way
+    flank = int(np.flatnonzero(wheel.t < 0.9 * steepest)[-1]) if steepest < -0.5 else 0
     flank_place = wheel.u[flank]
     corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
     slack = 0.5 * gauge - flank_place
     if corner - flank_place < 0.0:
-        return [
-            (
-                f"the flange stands on the rail, {-1e3 * slack:.1f} mm beyond the gauge face, when the "
-                "wheelset is central",
-                remedy,
-            )
-        ]
+        found = (
+            f"the flange stands on the rail, {-1e3 * slack:.1f} mm beyond the gauge face, when "
+            "the wheelset is central"
+        )
+        return [(found, remedy)]
     if wheel.u[-1] - slack < corner:
-        return [
-            (
-                "the wheelset falls between the rails: with one flange at its rail, the outer end of "
-                f"the other wheel is {1e3 * (corner + slack - wheel.u[-1]):.1f} mm short of the rail",
-                remedy,
-            )
-        ]
+        short = 1e3 * (corner + slack - wheel.u[-1])
+        found = (
+            "the wheelset falls between the rails: with one flange at its rail, the outer end of "
+            f"the other wheel is {short:.1f} mm short of the rail"
+        )
+        return [(found, remedy)]
     height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
     if int(np.argmin(height)) <= flank:
         return [("the flange touches the rail when the wheelset is central", remedy)]

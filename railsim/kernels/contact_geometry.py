@@ -411,11 +411,9 @@ def rigid_sweep(
         a = b = previous
         f_a = f_b = 0.0
         for trial in range(-1, 64):
-            if trial < 0:
-                x = previous
-            else:
-                # away from the previous roll, in growing steps to both sides
-                x = previous + (step if trial % 2 == 0 else -step)
+            # away from the previous roll, in growing steps to both sides
+            away = 0.0 if trial < 0 else step
+            x = previous + (away if trial % 2 == 0 else -away)
             rigid_contact(
                 wheel_right, right_Y0, rail_dY, right_z, right_slope, centre_height, y, x, right
             )

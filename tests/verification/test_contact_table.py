@@ -1,0 +1,260 @@
+"""The contact table against an independent search, and the laws that it must keep."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from independent_contact import evaluate, forces, lowest_gap, potential, rail_points
+
+from railsim.contact import build_contact_table, cached_contact_table, hertz
+from railsim.contact.table import TableGrid
+from railsim.profiles import Profile, load_profile
+from railsim.profiles.builtin import s1002_height
+
+WHEEL_Y = np.arange(-60.0, 60.0, 0.02)
+WHEEL = 1e-3 * WHEEL_Y, 1e-3 * s1002_height(WHEEL_Y)
+
+
+NARROW = TableGrid(roll_max=0.012)
+# softness far below what is compared
+SHARP = TableGrid(roll_max=0.012, eps=1.5e-6)
+
+
+@cache
+def standard_table():
+    return build_contact_table(load_profile("S1002"), load_profile("60E1"), grid=NARROW)
+
+
+def worn(seed):
+    """S1002 with random smooth wear: hollows and ridges up to some tenths of a millimetre."""
+    rng = np.random.default_rng(seed)
+    profile = load_profile("S1002")
+    change = np.zeros(profile.y.size)
+    for wave in (60.0, 25.0, 12.0):
+        phase, size = rng.uniform(0, 2 * np.pi), rng.normal() * 1.5e-6 * wave
+        change += size * np.sin(2e3 * np.pi * profile.y / wave + phase)
+    fade = np.clip((profile.y + 0.045) / 0.015, 0.0, 1.0)  # the flange stays
+    return Profile(f"worn {seed}", "wheel", profile.y, profile.z + fade * change)
+
+
+def random_places(n, seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        roll = rng.uniform(-0.010, 0.010)
+        yaw = rng.choice([0.0, rng.uniform(-0.03, 0.03)])
+        yield rng.uniform(-0.011, 0.009) + 0.46 * roll, roll, yaw
+
+
+def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
+    table = build_contact_table(
+        load_profile("S1002"), load_profile("60E1"), grid=replace(SHARP, approach=0.0)
+    )
+    rail = rail_points()
+    errors = []
+    for y, roll, yaw in random_places(30, seed=1):
+        height = lowest_gap(*WHEEL, *rail, y, roll, yaw, 0.46)[0]
+        errors.append(evaluate(table, y, roll, yaw**2)[0][:, 0].min() - height)
+    # the soft minimum of 1.5 um, which shares a contact between two places
+    assert np.max(np.abs(errors)) < 6e-6
+    assert np.median(np.abs(errors)) < 1.2e-6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_heights_of_worn_profiles_agree_too(seed):
+    wheel, rail = worn(seed), rail_points(inclination=0.05)
+    table = build_contact_table(
+        wheel, load_profile("60E1"), inclination=0.05, grid=replace(SHARP, approach=0.0)
+    )
+    errors = []
+    for y, roll, yaw in random_places(12, seed):
+        height = lowest_gap(wheel.y, wheel.z, *rail, y, roll, yaw, 0.46)[0]
+        errors.append(evaluate(table, y, roll, yaw**2)[0][:, 0].min() - height)
+    assert np.max(np.abs(errors)) < 6e-6
+
+
+@pytest.mark.parametrize("wheel", [None, 0, 1])
+def test_normal_force_is_the_gradient_of_one_potential_over_the_whole_table(wheel):
+    table = (
+        standard_table()
+        if wheel is None
+        else build_contact_table(worn(wheel), load_profile("60E1"), grid=NARROW)
+    )
+    step = np.diag([1e-8, 1e-8, 1e-8, 1e-9])
+    for y, roll, yaw in random_places(40, seed=5):
+        w = yaw**2 + 1e-6
+        z = evaluate(table, y, roll, w)[0][:, 0].min() + 70e-6
+        at = np.array([y, z, roll, w])
+        difference = np.array(
+            [
+                (potential(table, *(at + d)) - potential(table, *(at - d))) / (2 * d.max())
+                for d in step
+            ]
+        )
+        found = forces(table, *at)
+        # cubic pieces: the difference quotient's own round-off and truncation
+        assert difference == pytest.approx(found, rel=1e-4, abs=0.2)
+
+
+def test_work_around_a_closed_path_through_root_and_flange_is_zero():
+    table = standard_table()
+    t = np.linspace(0.0, 2 * np.pi, 8001)
+    y, roll = 0.0062 + 0.0010 * np.cos(t), 3e-4 * np.sin(2 * t)
+    lowest = np.array([evaluate(table, a, b)[0][:, 0].min() for a, b in zip(y, roll, strict=True)])
+    z = lowest + 60e-6 + 20e-6 * np.sin(t)
+    f = np.array([forces(table, *point) for point in zip(y, z, roll, strict=True)])
+    steps = np.diff(np.column_stack((y, z, roll)), axis=0)
+    parts = 0.5 * (f[1:, :3] + f[:-1, :3]) * steps
+    # the trapezoid's own error over 8000 steps
+    assert abs(parts.sum()) < 1e-4 * np.abs(parts).sum()
+
+
+@pytest.mark.parametrize("place", [0.0002, 0.0052, 0.0066])
+def test_force_has_no_jump_where_the_contact_jumps(place):
+    # through the jumps within the tread, to the root and to the flange, with the wheel pressed
+    # down by the same amount: a quarter of the step gives a quarter of the change
+    table = standard_table()
+
+    def largest_change(step):
+        y = np.arange(place - 3e-4, place + 3e-4, step)
+        lowest = np.array([evaluate(table, a, 0.0)[0][:, 0].min() for a in y])
+        f = [forces(table, a, b + 80e-6, 0.0)[:2] for a, b in zip(y, lowest, strict=True)]
+        return np.abs(np.diff(f, axis=0)).max()
+
+    assert largest_change(2.5e-6) == pytest.approx(0.25 * largest_change(1e-5), rel=0.1)
+
+
+@pytest.mark.parametrize("degrees", [15.0, 30.0, 45.0])
+def test_patch_under_load_lies_on_the_common_normal_of_two_circles(degrees):
+    # concave wheel on convex rail, both circles in the cross-section: the line through the
+    # centres is the common normal, whatever the load
+    R_wheel, R_rail, delta = 0.035, 0.020, 80e-6
+    y = 1e-3 * np.arange(-60.0, 60.01, 0.02)
+    centre = -0.004  # of the wheel's circle; tread and flank go on along tangents
+    sine = np.clip((y - centre) / R_wheel, -np.sin(np.radians(65)), -np.sin(np.radians(3)))
+    slope = np.tan(np.arcsin(sine))
+    z = np.concatenate(([0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(y))))
+    wheel = Profile("arcs", "wheel", y, z - np.interp(0.0, y, z))
+    angle = np.linspace(-1.45, 1.45, 20_001)
+    rail = Profile("round", "rail", R_rail * np.sin(angle), R_rail * (1 - np.cos(angle)))
+    face = R_rail * np.sin(np.arccos(1 - 0.014 / R_rail))
+    offset = R_wheel - R_rail
+    theta = np.radians(degrees)
+    shift = 0.7175 + face - 0.75 - centre + offset * np.sin(theta)
+
+    fields = {}
+    for approach in (0.0, delta):
+        grid = TableGrid(eps=0.3e-6, roll_max=0.003, n_w=2, approach=approach)
+        table = build_contact_table(wheel, rail, inclination=0.0, grid=grid)
+        all_fields = evaluate(table, shift, 0.0)[0]
+        fields[approach] = all_fields[np.argmin(all_fields[:, 0])]
+    assert np.arctan(fields[0.0][7]) == pytest.approx(theta, abs=1e-4)
+    loaded = np.arcsin(offset * np.sin(theta) / (offset + delta))
+    # first order in delta over the difference of the radii
+    turn = loaded - theta
+    assert np.arctan(fields[delta][7]) - theta == pytest.approx(turn, rel=0.03, abs=2e-5)
+    pressed = (offset + delta) * np.cos(loaded) - offset * np.cos(theta)
+    found = fields[delta][0] + delta / np.cos(loaded) - fields[0.0][0]
+    assert found == pytest.approx(pressed, abs=3e-7)
+
+
+def test_flange_contact_has_the_flanks_angle_under_load():
+    for y in (0.0070, 0.0075):
+        fields = evaluate(standard_table(), y, 0.0)[0]
+        assert np.degrees(np.arctan(fields[2, 7])) == pytest.approx(70.0, abs=0.01)
+
+
+def test_longitudinal_offset_is_that_of_the_silhouette():
+    table = standard_table()
+    for y, yaw, theta_sign in ((0.0, 0.02, -1), (0.0072, 0.015, 1)):
+        fields = evaluate(table, y, 0.0, yaw**2)[0]
+        patch = int(np.argmin(fields[:, 0]))
+        # a wheel yawed to the right leads with the outer part of its right wheel moved back, and
+        # its flange touches ahead of the axle by about r tan(delta) yaw
+        offset = fields[patch, 4] * yaw
+        expected = (fields[patch, 3] * fields[patch, 7] - fields[patch, 2]) * yaw
+        assert offset == pytest.approx(expected, abs=0.005 * yaw)
+        assert np.sign(offset) == theta_sign
+
+
+def test_landmarks_of_the_zones():
+    # with the roll that both wheels allow: PHYSICS.md, section 6
+    table = standard_table()
+    roll = {0.0045: -0.29e-3, 0.0056: -0.49e-3, 0.0067: -5.3e-3}
+    patches = [int(np.argmin(evaluate(table, y, angle)[0][:, 0])) for y, angle in roll.items()]
+    assert patches == [0, 1, 2]
+
+
+def test_zones_share_a_contact_on_their_border_instead_of_counting_it_twice():
+    # a cone without flange root in contact: moving the wheel so that the contact crosses the
+    # border of two zones must leave the vertical force nearly constant
+    y = 1e-3 * np.arange(-60.0, 60.01, 0.05)
+    angle = np.radians(np.where(y < 0, np.minimum(-1.0 * 1e3 * y, 70.0), 0.0))
+    slope = -np.tan(np.clip(angle, 0, np.radians(70)))
+    z = np.concatenate(([0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(y))))
+    z -= np.interp(0.0, y, z)
+    arc = Profile("arc", "wheel", y, z)
+    rail_angle = np.linspace(-1.45, 1.45, 4001)
+    rail = Profile("round rail", "rail", 0.02 * np.sin(rail_angle), 0.02 * (1 - np.cos(rail_angle)))
+    table = build_contact_table(
+        arc, rail, gauge=1.42, inclination=0.0, grid=TableGrid(roll_max=0.003, eps=1e-6)
+    )
+    places = np.arange(-0.018, -0.005, 1e-4)
+    totals, shares = [], []
+    for place in places:
+        fields = evaluate(table, place, 0.0)[0]
+        p = np.maximum(fields[:, 0].min() + 60e-6 - fields[:, 0], 0.0)
+        vertical = fields[:, 1] * p**1.5 * np.hypot(1.0, fields[:, 7]) ** 2.5
+        totals.append(vertical.sum())
+        shares.append(vertical.max() / vertical.sum())
+    assert min(shares) < 0.7  # a border was crossed
+    assert np.max(totals) < 1.25 * np.min(totals)
+
+
+def test_ellipses_are_those_of_hertz_where_curvatures_are_constant():
+    y = 1e-3 * np.arange(-50.0, 60.01, 0.05)
+    z = np.where(y > -0.04, -y / 40, 0.04 / 40 - 2.7 * (y + 0.04))
+    cone = Profile("cone", "wheel", y, z)
+    angle = np.linspace(-1.45, 1.45, 4001)
+    rail = Profile("round rail", "rail", 0.05 * np.sin(angle), 0.05 * (1 - np.cos(angle)))
+    table = build_contact_table(cone, rail, inclination=0.0, grid=NARROW)
+    fields = evaluate(table, 0.0, 0.0)[0][0]
+    G, nu, N = 82e9, 0.28, 60e3
+    cosine = np.cos(np.arctan(1 / 40))
+    exact = hertz(0.5 * cosine / fields[3], 10.0, N, 2 * G * (1 + nu), nu)
+    assert fields[5] * N ** (1 / 3) == pytest.approx(exact.a, rel=2e-3)
+    assert fields[6] * N ** (1 / 3) == pytest.approx(exact.b, rel=2e-3)
+    p = (N / fields[1]) ** (2 / 3)
+    assert p * cosine == pytest.approx(exact.approach, rel=2e-3)
+
+
+def test_every_value_of_the_table_is_finite_with_positive_stiffness_and_axes():
+    for table in (
+        standard_table(),
+        build_contact_table(worn(7), load_profile("benchmark"), grid=NARROW),
+    ):
+        assert np.all(np.isfinite(table.values))
+        assert np.all(table.values[..., [1, 5, 6]] >= 0.0)
+
+
+def test_stored_table_is_the_built_one_and_any_input_makes_another(tmp_path, monkeypatch):
+    monkeypatch.setenv("RAILSIM_CACHE_DIR", str(tmp_path))
+    wheel, rail = load_profile("S1002"), load_profile("60E1")
+    grid = TableGrid(ds=1e-3, droll=5e-3, n_w=2)
+    built = build_contact_table(wheel, rail, grid=grid)
+    first = cached_contact_table(wheel, rail, grid=grid)
+    again = cached_contact_table(wheel, rail, grid=grid)
+    np.testing.assert_array_equal(first.values, built.values)
+    np.testing.assert_array_equal(again.values, built.values)
+    assert again.shear == built.shear
+    assert again.description == built.description
+    files = set(tmp_path.rglob("*.npy"))
+    assert len(files) == 1
+    cached_contact_table(wheel, rail, gauge=1.436, grid=grid)
+    assert len(set(tmp_path.rglob("*.npy"))) == 2
+    assert not list(tmp_path.rglob("*.part"))
+    # a damaged file is built anew
+    for file in files:
+        file.write_bytes(b"not an array")
+    mended = cached_contact_table(wheel, rail, grid=grid)
+    np.testing.assert_array_equal(mended.values, built.values)
