@@ -20,6 +20,7 @@ Vehicle System Dynamics 11, 1-13; three flexibilities and signs as in docs/theor
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import fastsim_simd, jit
 
@@ -32,7 +33,7 @@ _TINY = 1e-30
 _GROWTH_MAX = 1e9
 
 
-def fastsim_workspace(n_patch, ny, nx=0):
+def fastsim_workspace(n_patch: int, ny: int, nx: int = 0) -> NDArray[np.float64]:
     """Work array of `fastsim` for up to n_patch patches of ny strips and nx <= 128 or nx cells.
 
     Returns
