@@ -18,6 +18,8 @@ GRAVITY = 9.81
 CANT_BASE = 1.5
 # Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
 USUAL_CANT_DEFICIENCY = 0.150
+# Speed at which the static state is found: steady rolling needs one [m/s].
+SLOW = 10.0
 
 
 def _point(point: Sequence[float]) -> str:
@@ -143,11 +145,47 @@ def _assumption_lines(vehicle: "Vehicle") -> list[str]:
     from railsim.definitions.flatten import flatten
 
     flat = flatten(vehicle)
-    found = [e.name for e in flat.elements if getattr(e.definition, "preload", 0) == "auto"]
+    found = [e.name for e in flat.elements if _finds_its_preload(e.definition)]
     if not found:
         return []
     text = f"preload of {len(found)} elements found so that the nominal position is in equilibrium"
     return ["", f"assumed: {text}"]
+
+
+def _finds_its_preload(element: "Element") -> bool:
+    stiffness = getattr(element, "stiffness", 1.0)
+    vertical = stiffness[2] if isinstance(stiffness, tuple) else stiffness
+    return getattr(element, "preload", None) == "auto" and vertical > 0.0
+
+
+def static_data(vehicle: "Vehicle") -> dict[str, Any]:
+    """Return static wheel loads and preloads on straight level track [N]."""
+    from railsim.assembly import assemble
+    from railsim.definitions.loading import load_track
+    from railsim.definitions.settings import Settings
+    from railsim.equilibrium import equilibrium
+
+    balance = equilibrium(assemble(vehicle, load_track("straight"), Settings()), SLOW)
+    model = balance.model
+    loads = dict(zip(model.index.wheelsets, balance.Q0.tolist(), strict=True))
+    tensions = model.system.links.spring[:, 2:].tolist()
+    preloads = dict(zip(model.index.links, tensions, strict=True))
+    preloads |= dict(zip(model.index.mounts, model.system.mounts.preload.tolist(), strict=True))
+    return {"Q0": loads, "preload": {k: v for k, v in preloads.items() if any(v)}}
+
+
+def static_lines(static: dict[str, Any]) -> list[str]:
+    """Return static wheel loads and preloads as tables."""
+    rows = [
+        [name, f"{left / 1e3:.3f}", f"{right / 1e3:.3f}", f"{(left + right) / 1e3:.3f}"]
+        for name, (left, right) in static["Q0"].items()
+    ]
+    lines = table(["static loads, kN", "Q0 left", "Q0 right", "axle load"], rows)
+    rows = [
+        [name, " ".join(f"{value / 1e3:10.3f}" for value in preload)]
+        for name, preload in static["preload"].items()
+    ]
+    return [*lines, "", *table(["preload, kN", "tension, or x y z on body 1"], rows)]
 
 
 # tracks -------------------------------------------------------------------------------------------

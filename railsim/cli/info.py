@@ -1,11 +1,15 @@
 """``railsim info``: what a vehicle, track or result file holds, in a screenful."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import json_option, print_json, set_option
+from railsim.cli.common import json_option, overwrite_option, print_json, set_option
 from railsim.cli.validate import RESULT_SUFFIXES
+
+if TYPE_CHECKING:
+    from railsim.definitions.base import FileDefinition
 
 
 @click.command()
@@ -18,22 +22,44 @@ from railsim.cli.validate import RESULT_SUFFIXES
     metavar="V",
     help="Speed for the cant deficiency of a track's curves, m/s; may be given several times.",
 )
+@click.option(
+    "--static", is_flag=True, help="Also find static wheel loads and preloads of a vehicle."
+)
+@click.option("--draw", metavar="F.png", help="Draw a vehicle in three views, or a track.")
+@overwrite_option
 @set_option
 @json_option
 def command(
-    file: str, speeds: tuple[float, ...], assignments: tuple[str, ...], as_json: bool
+    file: str,
+    speeds: tuple[float, ...],
+    static: bool,
+    draw: str | None,
+    overwrite: bool,
+    assignments: tuple[str, ...],
+    as_json: bool,
 ) -> None:
     r"""Show what a vehicle, track, settings or result file holds.
 
     \b
     Example:
-      railsim info coach_manchester
+      railsim info coach_manchester --draw coach.png --overwrite
       railsim info curve_r250 --speed 20 --speed 25
     """
     if Path(file).suffix.lower() in RESULT_SUFFIXES:
         _show_result(file, as_json)
-    else:
-        _show_definition(file, speeds, assignments, as_json)
+        return
+    from railsim.definitions.loading import load_any
+
+    definition, known = load_any(file, assignments)
+    if draw is not None:
+        _draw(definition, Path(draw), overwrite)
+    data, lines = _description(definition, known.kind, speeds, static)
+    if as_json:
+        print_json(data)
+        return
+    click.echo("\n".join(lines))
+    for remark in known.remarks(definition):
+        click.echo(f"remark: {remark}")
 
 
 def _show_result(file: str, as_json: bool) -> None:
@@ -47,26 +73,40 @@ def _show_result(file: str, as_json: bool) -> None:
         click.echo("\n".join(describe.result_lines(result)))
 
 
-def _show_definition(
-    file: str, speeds: tuple[float, ...], assignments: tuple[str, ...], as_json: bool
-) -> None:
+def _description(
+    definition: "FileDefinition", kind: str, speeds: tuple[float, ...], static: bool
+) -> tuple[dict[str, Any], list[str]]:
+    """Return a definition as data and as lines."""
     from railsim.cli import describe
-    from railsim.definitions.loading import load_any
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
-    definition, known = load_any(file, assignments)
-    if isinstance(definition, Vehicle):
-        data, lines = describe.vehicle_data(definition), describe.vehicle_lines(definition)
-    elif isinstance(definition, Track):
+    if isinstance(definition, Track):
         data = describe.track_data(definition, speeds)
-        lines = describe.track_lines(definition, speeds)
+        return data, describe.track_lines(definition, speeds)
+    if not isinstance(definition, Vehicle):
+        data = {"kind": kind, **definition.model_dump()}
+        return data, definition.to_toml().splitlines()
+    data, lines = describe.vehicle_data(definition), describe.vehicle_lines(definition)
+    if static:
+        data["static"] = describe.static_data(definition)
+        lines += ["", *describe.static_lines(data["static"])]
+    return data, lines
+
+
+def _draw(definition: "FileDefinition", path: Path, overwrite: bool) -> None:
+    from railsim.definitions.track import Track
+    from railsim.definitions.vehicle import Vehicle
+    from railsim.plot.style import check_picture, save
+
+    check_picture(path, overwrite=overwrite)
+    if isinstance(definition, Vehicle):
+        from railsim.plot.vehicle import vehicle_figure
+
+        save(vehicle_figure(definition), path, overwrite=overwrite)
+    elif isinstance(definition, Track):
+        from railsim.plot.track import track_figure
+
+        save(track_figure(definition), path, overwrite=overwrite)
     else:
-        data = {"kind": known.kind, **definition.model_dump()}
-        lines = definition.to_toml().splitlines()
-    if as_json:
-        print_json(data)
-        return
-    click.echo("\n".join(lines))
-    for remark in known.remarks(definition):
-        click.echo(f"remark: {remark}")
+        raise click.UsageError("--draw is for vehicles and tracks")

@@ -6,6 +6,7 @@
 `histories.py`     quantities over time or distance
 `overlay.py`       the same quantities of several results in one picture
 `track.py`         a track: plan, curvature and cant
+`vehicle.py`       a vehicle: side, top and front view with its elements
 =================  ==========================================================================
 
 Every function returns a `matplotlib.figure.Figure` that is not shown anywhere; `save` writes it.

@@ -7,6 +7,8 @@ import pytest
 from example_result import example_result
 
 from railsim import cli
+from railsim.definitions.loading import load_vehicle
+from railsim.plot.vehicle import vehicle_figure
 
 
 def lines_of(capsys, *arguments):
@@ -77,6 +79,40 @@ def test_remarks_are_shown(capsys):
 
 def test_spring_file_is_shown(capsys):
     assert "railsim-spring/1" in lines_of(capsys, "turasas_axlebox")[0]
+
+
+@pytest.mark.parametrize("name", ["coach_manchester", "curve_r250"])
+def test_vehicles_and_tracks_can_be_drawn(capsys, tmp_path, name):
+    path = tmp_path / "drawing.png"
+    lines_of(capsys, name, "--draw", str(path))
+    assert path.read_bytes().startswith(b"\x89PNG")
+    assert cli.main(["info", name, "--draw", str(path)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_drawing_of_a_spring_is_refused(capsys, tmp_path):
+    path = tmp_path / "drawing.png"
+    assert cli.main(["info", "turasas_axlebox", "--draw", str(path)]) == 2
+    assert not path.exists()
+
+
+def test_vehicle_drawing_shows_every_body_and_kind_of_element():
+    figure = vehicle_figure(load_vehicle("coach_manchester"))
+    texts = {text.get_text() for axes in figure.axes for text in axes.texts}
+    assert {"carbody", "front.frame", "rear.frame"} <= texts
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "bushing (8)" in labels
+    assert "shear spring (4)" in labels
+
+
+def test_static_loads_add_up_to_the_weight(capsys):
+    static = data_of(capsys, "coach_manchester", "--static")["static"]
+    total = sum(sum(pair) for pair in static["Q0"].values())
+    assert total == pytest.approx(56110.0 * 9.81, rel=1e-9)
+    # the car on four springs
+    assert static["preload"]["front.secondary_spring.left"][2] == pytest.approx(
+        43628.0 * 9.81 / 4.0
+    )
 
 
 def test_wrong_file_is_status_2(capsys, tmp_path):

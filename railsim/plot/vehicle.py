@@ -1,0 +1,144 @@
+"""A vehicle as a picture: side, top and front view with every element, to see wrong coordinates."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+
+from railsim.definitions.base import Vector
+from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
+from railsim.definitions.vehicle import Vehicle
+from railsim.plot.style import DISTINCT, styled
+
+SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
+TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
+LABELS = ("$x$ (m), forward", "$y$ (m), to the right", "$z$ (m), down")
+BODY, WHEEL, LEVER = "0.25", "0.55", "0.78"
+# The leading wheelset and those as near to it as this are shown once more in detail [m].
+BOGIE = 4.0
+
+
+def vehicle_figure(vehicle: Vehicle) -> Figure:
+    """Draw a vehicle in three views with its elements.
+
+    Bodies are crosses at their centres of gravity, wheels circles or lines; every element is drawn
+    between its points, with a thin line from each point to the body that it holds on to.
+
+    Returns
+    -------
+    Figure
+        Side and top view of the whole, then of the leading end, and the view from behind; equal
+        scales within each.
+    """
+    flat = flatten(vehicle)
+    kinds = list(dict.fromkeys(_kind(element) for element in flat.elements))
+    colours = {kind: DISTINCT[i % len(DISTINCT)] for i, kind in enumerate(kinds)}
+    with styled():
+        figure = Figure(figsize=(11.0, 9.0), layout="constrained")
+        figure.suptitle(vehicle.name, x=0.012, ha="left")
+        grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
+        end = _leading_end(flat)
+        for place, view, limits in (
+            (grid[0, :], SIDE, None),
+            (grid[1, :], TOP, None),
+            (grid[2, 0], SIDE, end),
+            (grid[2, 1], TOP, end),
+            (grid[2, 2], BEHIND, None),
+        ):
+            _draw_view(figure.add_subplot(place), view, flat, colours, limits)
+        figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
+        return figure
+
+
+def _leading_end(flat: FlatVehicle) -> tuple[float, float]:
+    """Range of x around the leading wheelset and its neighbours [m]."""
+    leader, *others = flat.of_kind("wheelset")
+    first = leader.position[0]
+    near = [first, *(w.position[0] for w in others if first - w.position[0] < BOGIE)]
+    return min(near) - 0.8, first + 0.8
+
+
+def _kind(element: FlatElement) -> str:
+    return str(getattr(element.definition, "kind", "element"))
+
+
+def _draw_view(
+    axes: Axes,
+    view: tuple[int, int],
+    flat: FlatVehicle,
+    colours: dict[str, str],
+    limits: tuple[float, float] | None,
+) -> None:
+    across, upright = view
+    if upright == 2:
+        axes.axhline(0.0, color="0.6", lw=0.8)
+    for body in flat.of_kind("wheelset"):
+        _draw_wheelset(axes, body, across, upright)
+    for element in flat.elements:
+        _draw_element(axes, element, flat, view, colours[_kind(element)])
+    for body in flat.of_kind("body"):
+        x, y = body.position[across], body.position[upright]
+        axes.plot(x, y, marker="+", ms=10, mew=1.8, color=BODY, zorder=4)
+        if across == 0 and (limits is None or limits[0] < x < limits[1]):
+            axes.annotate(
+                body.name, (x, y), (5, 5), textcoords="offset points", fontsize=7, color=BODY
+            )
+    axes.set_title(TITLES[view] + (", leading end" if limits else ""))
+    axes.set_xlabel(LABELS[across])
+    axes.set_ylabel(LABELS[upright])
+    axes.margins(0.06)
+    if limits:
+        axes.set_xlim(*limits)
+        axes.set_ylim(*((-2.5, 0.5) if upright == 2 else (-1.7, 1.7)))
+    axes.set_aspect("equal", adjustable="box" if limits else "datalim")
+    axes.invert_yaxis()
+
+
+def _draw_element(
+    axes: Axes, element: FlatElement, flat: FlatVehicle, view: tuple[int, int], colour: str
+) -> None:
+    """Draw an element; a ring is one whose points coincide, a dotted line one without points."""
+    for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
+        if name:
+            _line(axes, (flat.body(name).position, point), *view, color=LEVER, lw=0.5)
+    ends = (element.point1, element.point2)
+    if element.definition.end_points() is None:
+        _line(axes, ends, *view, color=colour, lw=1.2, ls=":", zorder=3)
+    elif element.point1 == element.point2:
+        x, y = element.point1[view[0]], element.point1[view[1]]
+        axes.plot(x, y, ls="", marker="o", ms=8, mfc="none", mew=1.4, color=colour, zorder=3)
+    else:
+        _line(axes, ends, *view, color=colour, lw=1.6, marker="o", ms=2.5, zorder=3)
+
+
+def _draw_wheelset(axes: Axes, body: FlatBody, across: int, upright: int) -> None:
+    assert body.wheelset is not None  # of its kind
+    x, y, z = body.position
+    half = 0.5 * body.wheelset.tape_circle_distance
+    if (across, upright) == SIDE:
+        radius = body.wheelset.radius[1]
+        axes.add_patch(Circle((x, z), radius, fill=False, color=WHEEL, lw=0.9))
+        axes.plot(x, z, marker=".", color=WHEEL)
+        return
+    ends = ((x, y - half, z), (x, y + half, z))
+    _line(axes, ends, across, upright, color=WHEEL, lw=2.0)
+    for end, radius in zip(ends, body.wheelset.radius, strict=True):
+        tread = np.array([[-radius, 0.0, -radius], [radius, 0.0, radius]]) + end
+        _line(axes, [tuple(point) for point in tread], across, upright, color=WHEEL, lw=2.0)
+
+
+def _line(axes: Axes, points: Sequence[Vector], across: int, upright: int, **style: object) -> None:
+    axes.plot([p[across] for p in points], [p[upright] for p in points], **style)  # type: ignore[arg-type]
+
+
+def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D]:
+    yield Line2D([], [], ls="", marker="+", ms=9, mew=1.8, color=BODY, label="centre of gravity")
+    yield Line2D([], [], color=WHEEL, lw=2.0, label="wheelset")
+    yield Line2D([], [], color=LEVER, lw=0.8, label="holds on to")
+    for kind, colour in colours.items():
+        number = sum(_kind(element) == kind for element in flat.elements)
+        label = f"{kind.replace('_', ' ')} ({number})"
+        yield Line2D([], [], color=colour, lw=1.6, marker="o", ms=3, label=label)
