@@ -5,11 +5,12 @@ mm, N/mm, MPa, degrees.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
@@ -34,8 +35,9 @@ SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 def stiffness_figure(result: Verification) -> Figure:
     """System stiffness, and the rate that small movements feel, over load and deflection."""
-    figure = Figure(figsize=(7.6, 3.2), layout="constrained")
+    figure = Figure(figsize=(7.6, 3.2))
     over_load, over_deflection = figure.subplots(1, 2, sharey=True)
+    figure.subplots_adjust(left=0.085, right=0.985, bottom=0.15, top=0.97, wspace=0.06)
     curve = _curve(result)
     loads = [case.load * 1e-3 for case in result.cases]
     deflections = [case.deflection * 1e3 for case in result.cases]
@@ -56,8 +58,10 @@ def stiffness_figure(result: Verification) -> Figure:
 
 def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """Deflection, rotation of the arm and heights of the springs over the load."""
-    figure = Figure(figsize=(7.6, 5.2), layout="constrained")
-    grid = figure.add_gridspec(2, 2)
+    figure = Figure(figsize=(7.6, 5.4))
+    grid = figure.add_gridspec(
+        2, 2, left=0.085, right=0.985, bottom=0.09, top=0.98, wspace=0.2, hspace=0.38
+    )
     deflection, rotation = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
     heights = figure.add_subplot(grid[1, :])
     curve = _curve(result)
@@ -103,8 +107,9 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
 
 def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     """Active coils that give the designed stiffness, over the wire diameter."""
-    figure = Figure(figsize=(5.6, 3.4), layout="constrained")
+    figure = Figure(figsize=(5.6, 3.7))
     axes = figure.subplots()
+    figure.subplots_adjust(left=0.1, right=0.98, bottom=0.13, top=0.85)
     listed = coils_by_wire(suspension, result)
     for (name, spring), K_V in zip(suspension.springs.items(), result.K_V, strict=True):
         colour = SPRING_COLOURS[name]
@@ -123,7 +128,7 @@ def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     axes.plot([], [], "o", mfc="w", mec="0.3", ms=8, label="built")
     axes.axhline(3.0, color=LIMIT, lw=0.9, ls=":", label="3 coils (EN 13906-1, hot coiled)")
     axes.set(xlabel="wire diameter $d$ / mm", ylabel="active coils $n$", ylim=(0.0, 12.5))
-    figure.legend(loc="outside upper left", ncols=2, fontsize=8)
+    figure.legend(loc="upper left", ncols=2, fontsize=8, borderaxespad=0.2)
     return figure
 
 
@@ -132,8 +137,9 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
     if suspension.fatigue is None:
         raise ValueError("the suspension has no fatigue table")
     line = np.array(suspension.fatigue.goodman) * 1e-6
-    figure = Figure(figsize=(4.8, 4.4), layout="constrained")
+    figure = Figure(figsize=(4.8, 4.9))
     axes = figure.subplots()
+    figure.subplots_adjust(left=0.13, right=0.97, bottom=0.1, top=0.98)
     end = float(line[-1, 1])
     axes.plot([0.0, end], [0.0, end], color="0.35", lw=1.0)
     axes.plot(*line.T, color=LIMIT, lw=1.6, label="Goodman-Smith line")
@@ -160,19 +166,31 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
     cases = sorted(result.cases, key=lambda case: case.load)
     columns = min(len(cases), 3)
     rows = -(-len(cases) // columns)
-    figure = Figure(figsize=(2.75 * columns, 2.75 * rows), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
-    for axes, case in zip(panels, cases, strict=False):
-        _draw_arm(axes, suspension, result.arm, case)
-    for axes in panels[len(cases) :]:
-        axes.set_visible(False)
+    arm = result.arm
+    tops = [1e3 * float(coil.seat + coil.H0 - coil.start) for coil in arm.coils]
+    half_spring = 0.62e3 * suspension.outer.mean_diameter
+    # one pair of axes for all cases, each at its own origin: far quicker than many axes
+    wide = 1e3 * arm.length + half_spring + 170.0
+    high = max(tops) + 420.0
+    figure = Figure(figsize=(7.6, 7.6 * rows * high / (columns * wide)))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    for i, case in enumerate(cases):
+        origin = np.array([(i % columns) * wide, -(i // columns) * high])
+        _draw_arm(axes, suspension, arm, case, origin, max(tops))
+    axes.set(
+        xlim=(-90.0, columns * wide - 90.0),
+        ylim=(max(tops) + 150.0 - rows * high, max(tops) + 150.0),
+        aspect="equal",
+    )
+    axes.set_axis_off()
     return figure
 
 
 def search_figure(result: "SearchResult") -> Figure:
     """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
-    figure = Figure(figsize=(5.6, 3.6), layout="constrained")
+    figure = Figure(figsize=(5.6, 3.6))
     axes = figure.subplots()
+    figure.subplots_adjust(left=0.11, right=0.98, bottom=0.13, top=0.97)
     cloud = result.cloud[np.all(np.isfinite(result.cloud), axis=1)]
     axes.plot(*cloud.T, ".", color=FAINT, ms=4, label="feasible candidates", zorder=1)
     mass = [nest.mass for nest in result.nests]
@@ -189,8 +207,9 @@ def search_figure(result: "SearchResult") -> Figure:
 
 def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -> Figure:
     """Ride height by single deviation under one load, and its range under every load."""
-    figure = Figure(figsize=(7.6, 3.4), layout="constrained")
-    single, every = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    figure = Figure(figsize=(7.6, 3.5))
+    single, every = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+    figure.subplots_adjust(left=0.235, right=0.985, bottom=0.19, top=0.97, wspace=0.22)
     shown = next((result for result in results if result.name == tare), results[0])
     ends = sorted(shown.single.items(), key=lambda item: abs(item[1][1] - item[1][0]))
     names = [name.replace("_", " ").replace(".", ": ") for name, _ in ends]
@@ -272,48 +291,66 @@ def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
         )
 
 
-def _draw_arm(axes: Axes, suspension: TrailingArmSuspension, arm: Arm, case: Case) -> None:
-    """Side view: hinge at the origin, axle to the right, millimetres."""
+def _draw_arm(
+    axes: Axes,
+    suspension: TrailingArmSuspension,
+    arm: Arm,
+    case: Case,
+    hinge: Floats,
+    top_edge: float,
+) -> None:
+    """Side view in millimetres, the axle to the right of the hinge."""
     phi, length = case.rotation, 1e3 * arm.length
     along = np.array([np.cos(phi), np.sin(phi)])
     across = np.array([-np.sin(phi), np.cos(phi)])
-    axle = length * along
-    axes.plot([0.0, length], [0.0, 0.0], color=FAINT, lw=0.9, ls=(0, (6, 3)), zorder=0)
-    axes.plot([0.0, axle[0]], [0.0, axle[1]], color="0.25", lw=4.5, solid_capstyle="round")
-    axes.add_patch(Circle((0.0, 0.0), 26.0, fc="0.82", ec="0.25", lw=1.0, zorder=3))
-    axes.add_patch(Circle((0.0, 0.0), 9.0, fc="w", ec="0.25", lw=1.0, zorder=4))
-    axes.add_patch(Circle(tuple(axle), 60.0, fc="0.92", ec="0.25", lw=1.0, zorder=1))
-    axes.add_patch(Circle(tuple(axle), 5.0, fc="0.25", ec="none", zorder=4))
-    tops = []
-    for (name, spring), coil in zip(suspension.springs.items(), arm.coils, strict=True):
-        seat = axle + 1e3 * float(coil.seat) * across
-        top = np.array([length, 1e3 * float(coil.seat + coil.H0 - coil.start)])
-        tops.append(float(top[1]))
+    axle = hinge + length * along
+    frame = _moved(hinge, 0.0, top_edge)
+    half = 0.62e3 * suspension.outer.mean_diameter
+    seats = [axle + 1e3 * float(coil.seat) * across for coil in arm.coils]
+    steel = {"color": "0.25", "solid_capstyle": "butt"}
+    _line(axes, hinge, _moved(hinge, length, 0.0), color=FAINT, lw=0.9, ls=(0, (6, 3)))
+    _line(axes, hinge, frame, lw=2.2, **steel)
+    _line(axes, _moved(frame, -60.0, 0.0), _moved(frame, length + half, 0.0), lw=2.2, **steel)
+    _line(axes, axle, seats[0], lw=3.0, **steel)
+    for seat in seats:
+        _line(axes, seat - half * along, seat + half * along, lw=1.8, **steel)
+    _line(axes, hinge, axle, lw=4.5, **steel)
+    for spring, coil, seat in zip(suspension.springs.values(), arm.coils, seats, strict=True):
+        top = _moved(hinge, length, 1e3 * float(coil.seat + coil.H0 - coil.start))
         d, n = built(spring)
         turns = checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils)
-        reach = seat + (top - seat) * min(1.0, spring.free_height * 1e3 / float(top[1] - seat[1]))
-        wire = Circle((0.0, 0.0), 0.5e3 * d, fc=SPRING_COLOURS[name])
-        _draw_spring(axes, seat, reach, along, 1e3 * spring.mean_diameter, wire, float(turns))
-        half = 0.62e3 * spring.mean_diameter
-        axes.plot(*np.transpose([seat - half * along, seat + half * along]), color="0.25", lw=1.8)
-    lowest_seat = axle + 1e3 * float(arm.coils[0].seat) * across
-    axes.plot(*np.transpose([axle, lowest_seat]), color="0.25", lw=3.0, zorder=0)
-    top_edge = max(tops)
-    axes.plot([-60.0, length + 180.0], [top_edge, top_edge], color="0.25", lw=2.2)
-    axes.plot([0.0, 0.0], [0.0, top_edge], color="0.25", lw=2.2, zorder=0)
+        # a spring that does not work yet stands on its seat with its free height
+        share = min(1.0, 1e3 * spring.free_height / float(np.hypot(*(top - seat))))
+        colour = SPRING_COLOURS["inner" if spring is suspension.inner else "outer"]
+        wire = Circle((0.0, 0.0), 0.5e3 * d, fc=colour)
+        head = seat + share * (top - seat)
+        _draw_spring(axes, seat, head, along, 1e3 * spring.mean_diameter, wire, float(turns))
+    for place, radius, face in ((hinge, 26.0, "0.82"), (hinge, 9.0, "w"), (axle, 60.0, "0.92")):
+        axes.add_patch(Circle(tuple(place), radius, fc=face, ec="0.25", lw=1.0, zorder=3))
     axes.annotate(
         "",
-        xy=(axle[0], axle[1] - 62.0),
-        xytext=(axle[0], axle[1] - 62.0 - 110.0 * case.load / 8e4),
+        xy=tuple(_moved(axle, 0.0, -62.0)),
+        xytext=tuple(_moved(axle, 0.0, -62.0 - 110.0 * case.load / 8e4)),
         arrowprops={"arrowstyle": "-|>", "color": LIMIT, "lw": 1.4},
     )
-    degrees = f"{np.degrees(phi):+.2f}°" if case.theta > 1e-5 else "0°"
-    axes.set_title(
-        f"{case.name}  {case.load * 1e-3:.1f} kN\n{case.deflection * 1e3:.1f} mm, "
-        + degrees.replace("-", "−")
+    degrees = f"{np.degrees(phi):+.2f}°".replace("-", "−") if case.theta > 1e-5 else "0°"
+    x, y = _moved(frame, -60.0, 30.0)
+    axes.text(
+        x,
+        y,
+        f"{case.name}  {case.load * 1e-3:.1f} kN\n{case.deflection * 1e3:.1f} mm, {degrees}",
+        fontsize=9,
+        va="bottom",
     )
-    axes.set(xlim=(-90.0, length + 200.0), ylim=(-220.0, top_edge + 30.0), aspect="equal")
-    axes.set_axis_off()
+
+
+def _moved(place: Floats, right: float, up: float) -> Floats:
+    moved: Floats = place + np.array([right, up])
+    return moved
+
+
+def _line(axes: Axes, start: Floats, end: Floats, **style: Any) -> None:
+    axes.add_line(Line2D(*np.transpose([start, end]), zorder=2, **style))
 
 
 def _draw_spring(
@@ -329,4 +366,6 @@ def _draw_spring(
         side = (1.0 - share) * along + share * np.array([1.0, 0.0])
         edge = -0.5 if half % 2 == 0 else 0.5
         place = foot + share * (head - foot) + edge * D * side
-        axes.add_patch(Circle(tuple(place), 0.5 * d, fc=wire.get_facecolor(), ec="w", lw=0.5))
+        axes.add_patch(
+            Circle(tuple(place), 0.5 * d, fc=wire.get_facecolor(), ec="w", lw=0.5, zorder=4)
+        )

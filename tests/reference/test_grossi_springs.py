@@ -38,10 +38,10 @@ def cases(suspension):
 @pytest.mark.parametrize("spring", ["outer", "inner"])
 def test_design_stiffness(suspension, spring):
     result = design(suspension)
-    K_V = dict(zip(result.names, result.K_V, strict=True))[spring] / KG_PER_MM
+    stiffness = dict(zip(result.names, result.K_V, strict=True))[spring] / KG_PER_MM
     printed, independent = DESIGN[spring]
-    assert K_V == pytest.approx(printed, abs=0.6e-4)  # last printed digit, rounded or cut
-    assert K_V == pytest.approx(independent, abs=0.5e-5 * 1.01)  # half of the last digit
+    assert stiffness == pytest.approx(printed, abs=0.6e-4)  # last printed digit, rounded or cut
+    assert stiffness == pytest.approx(independent, abs=0.5e-5 * 1.01)  # half of the last digit
 
 
 @pytest.mark.parametrize("spring", ["outer", "inner"])
@@ -78,15 +78,20 @@ def test_system_stiffness(cases, name):
 
 def test_vertical_stiffness_of_the_built_nest(cases):
     state = cases["MOUNTING"].springs
-    K_V = [s.force / s.deflection / KG_PER_MM for s in state.values()]
-    assert K_V == pytest.approx([64.5133, 30.9342], abs=0.5e-4 * 1.01)
-    assert sum(K_V) * KG_PER_MM == pytest.approx(936340.0, abs=5.0)  # SPRINGS.md, last section
+    stiffness = [s.force / s.deflection / KG_PER_MM for s in state.values()]
+    assert stiffness == pytest.approx([64.5133, 30.9342], abs=0.5e-4 * 1.01)
+    assert sum(stiffness) * KG_PER_MM == pytest.approx(
+        936340.0, abs=5.0
+    )  # SPRINGS.md, last section
 
 
 def test_lateral_stiffness_of_the_coach_models(cases):
     # PHYSICS.md section 2: the Manchester coach has the value at the mounting load, 884 665 N/m
     # (difference 2e-5: the source's own rounding), the flexicoil coach that at tare, 851 kN/m
-    assert cases["MOUNTING"].K_L == pytest.approx(884665.0, rel=3e-5)
-    assert cases["ODM"].K_L == pytest.approx(851e3, abs=0.5e3)
-    bending = cases["ODM"].K_C - cases["ODM"].K_L * cases["ODM"].springs["outer"].height ** 2 / 4
+    mounting, tare = cases["MOUNTING"], cases["ODM"]
+    lateral = mounting.K_L
+    assert lateral == pytest.approx(884665.0, rel=3e-5)
+    lateral = tare.K_L
+    assert lateral == pytest.approx(851e3, abs=0.5e3)
+    bending = tare.K_C - tare.K_L * tare.springs["outer"].height ** 2 / 4
     assert bending == pytest.approx(9e3, abs=0.5e3)

@@ -1,0 +1,493 @@
+"""``railsim spring``: dimension and verify a trailing-arm primary suspension."""
+
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from railsim.cli.common import (
+    json_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+    table,
+)
+
+if TYPE_CHECKING:
+    from railsim.definitions.spring import TrailingArmSuspension
+    from railsim.springs.design import Design
+    from railsim.springs.search import SearchResult
+    from railsim.springs.tolerance import RideHeight
+    from railsim.springs.verification import Check, Fatigue, Verification
+
+REPORT = "report.html"
+
+
+@click.group()
+def command() -> None:
+    """Dimension and verify the coil springs of a trailing-arm primary suspension.
+
+    Each command takes a spring file (format railsim-spring/1) or the name of a shipped one.
+
+    \b
+    Example:
+      railsim spring design turasas_axlebox --search
+      railsim spring verify turasas_axlebox --out suspension --overwrite
+      railsim spring fatigue turasas_axlebox --json
+      railsim spring vehicle turasas_axlebox --out my_coach.toml --overwrite
+    """  # noqa: D301 - click reads the escape
+
+
+def _pages_option(function: Any) -> Any:
+    return click.option(
+        "--out", metavar="DIR", help=f"Folder for the pictures and the page {REPORT}."
+    )(function)
+
+
+@command.command()
+@click.argument("file", metavar="FILE")
+@click.option("--search", is_flag=True, help="Also search the nests that fit the table [search].")
+@_pages_option
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def design(
+    file: str,
+    search: bool,
+    out: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Find the springs' stiffnesses, and coils, from two wanted deflections.
+
+    With --search, also find the nests of standard wires that fit the space and the stresses,
+    ranked by mass or by fatigue margin (search.objective), with the limits that are active.
+
+    \b
+    Example:
+      railsim spring design turasas_axlebox
+      railsim spring design turasas_axlebox --search --set search.objective=fatigue
+    """  # noqa: D301 - click reads the escape
+    from railsim.springs.design import design as designed
+    from railsim.springs.summary import design_data, search_data
+
+    suspension = _loaded(file, assignments)
+    with _faults_in(file, suspension):
+        result = designed(suspension)
+        found = None
+        if search:
+            from railsim.springs.search import search as searched
+
+            found = searched(suspension)
+        written = _write_pages(suspension, out, overwrite, found) if out else []
+    if as_json:
+        data = design_data(suspension, result)
+        if found is not None:
+            data["search"] = search_data(found)
+        print_json(data)
+        return
+    for line in _design_lines(suspension, result):
+        click.echo(line)
+    if found is not None:
+        click.echo()
+        for line in _search_lines(found):
+            click.echo(line)
+    _tell(suspension, written, quiet)
+
+
+@command.command()
+@click.argument("file", metavar="FILE")
+@_pages_option
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def verify(
+    file: str,
+    out: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Verify a suspension under all its loads: equilibrium, heights, stresses, buckling.
+
+    A check that is not met is a result: the exit status stays 0.  A load that the nest cannot
+    carry (solid, buckled, lifted off) is a fault of the input: exit status 2.
+
+    \b
+    Example:
+      railsim spring verify turasas_axlebox --out suspension --overwrite
+      railsim spring verify turasas_axlebox --set inner.wire_diameter=0.028 --json
+    """  # noqa: D301 - click reads the escape
+    from railsim.springs.summary import ride_height_data, verification_data
+    from railsim.springs.tolerance import ride_heights
+    from railsim.springs.verification import verify as verified
+
+    suspension = _loaded(file, assignments)
+    with _faults_in(file, suspension):
+        result = verified(suspension)
+        heights = ride_heights(suspension) if suspension.tolerances is not None else ()
+        written = _write_pages(suspension, out, overwrite) if out else []
+    if as_json:
+        data = verification_data(suspension, result)
+        if heights:
+            data["ride_height"] = ride_height_data(heights)
+        print_json(data)
+        return
+    for line in _verification_lines(result):
+        click.echo(line)
+    for line in _ride_height_lines(heights):
+        click.echo(line)
+    _tell(suspension, written, quiet)
+
+
+@command.command()
+@click.argument("file", metavar="FILE")
+@_pages_option
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def fatigue(
+    file: str,
+    out: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Stress range of each spring against the Goodman-Smith line of the material.
+
+    \b
+    Example:
+      railsim spring fatigue turasas_axlebox
+      railsim spring fatigue turasas_axlebox --set fatigue.max_load=80e3 --json
+    """  # noqa: D301 - click reads the escape
+    from railsim.springs.summary import fatigue_data
+    from railsim.springs.verification import dynamic_loads
+    from railsim.springs.verification import fatigue as fatigue_of
+
+    suspension = _loaded(file, assignments)
+    with _faults_in(file, suspension):
+        result = fatigue_of(suspension)
+        loads = dynamic_loads(suspension)
+        written = _write_pages(suspension, out, overwrite) if out else []
+    if as_json:
+        print_json(fatigue_data(suspension, result, loads))
+        return
+    for line in _fatigue_lines(result, loads):
+        click.echo(line)
+    _tell(suspension, written, quiet)
+
+
+@command.command()
+@click.argument("file", metavar="FILE")
+@click.option("--out", metavar="F.toml", help="Vehicle file to write; by default to stdout.")
+@click.option("--load", metavar="NAME", help="Load at which the springs are taken.")
+@click.option("--extends", metavar="VEHICLE", help="Vehicle to extend instead of vehicle.extends.")
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def vehicle(
+    file: str,
+    out: str | None,
+    load: str | None,
+    extends: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Write the suspension as a vehicle file that replaces the primary of another one.
+
+    \b
+    Example:
+      railsim spring vehicle turasas_axlebox --out my_coach.toml --overwrite
+      railsim run my_coach.toml curve_r250 --speed 20 --overwrite
+    """  # noqa: D301 - click reads the escape
+    from railsim.springs.vehicle_table import vehicle_part, vehicle_text
+
+    suspension = _loaded(file, assignments)
+    with _faults_in(file, suspension):
+        if load is not None and load not in suspension.loads:
+            _refuse("--load", f"no load '{load}' in [loads]", load, suspension.loads)
+        part = vehicle_part(suspension, load)
+        base, removed = _base(suspension, extends, out)
+        text = vehicle_text(suspension, part, base, removed)
+        if out:
+            _write_text(Path(out), text, overwrite)
+    if as_json:
+        print_json(
+            {
+                "file": out,
+                "assembly": part.assembly,
+                "axleboxes": part.axleboxes,
+                "elements": part.elements,
+                "load": part.case.name,
+            }
+        )
+    elif not out:
+        click.echo(text, nl=False)
+    if not quiet:
+        for remark in part.remarks:
+            click.echo(remark, err=True)
+        if out and not as_json:
+            click.echo(out)
+
+
+def _loaded(file: str, assignments: Sequence[str]) -> "TrailingArmSuspension":
+    from railsim.definitions.loading import load_spring
+
+    return load_spring(file, assignments)
+
+
+@contextmanager
+def _faults_in(file: str, suspension: "TrailingArmSuspension") -> Iterator[None]:
+    """Let faults that computing finds name the file instead of the suspension."""
+    from railsim.errors import InputError
+
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            replace(fault, file=file) if fault.file == suspension.name else fault
+            for fault in error.faults
+        ) from None
+
+
+def _refuse(option: str, found: str, name: str, valid: Iterable[str]) -> NoReturn:
+    from railsim.errors import Fault, InputError, nearest
+
+    raise InputError([Fault(option, "", found, nearest(name, valid))])
+
+
+def _write_pages(
+    suspension: "TrailingArmSuspension",
+    out: str,
+    overwrite: bool,
+    search: "SearchResult | None" = None,
+) -> list[Path]:
+    """Write pictures and page into a folder, which is made if need be; nothing on a fault."""
+    from railsim.report.springs import as_png, collected, figures, page
+
+    results = collected(suspension, search)
+    drawn = {name: as_png(figure) for name, figure in figures(results).items()}
+    folder = Path(out)
+    files = {folder / f"{name}.png": png for name, png in drawn.items()}
+    files[folder / REPORT] = page(results, drawn).encode()
+    _check_folder(folder, files, overwrite)
+    for path, content in files.items():
+        path.write_bytes(content)
+    return list(files)
+
+
+def _check_folder(folder: Path, files: Iterable[Path], overwrite: bool) -> None:
+    from railsim.errors import Fault, InputError
+
+    there = [path.name for path in files if path.exists()]
+    fault = None
+    if folder.exists() and not folder.is_dir():
+        fault = Fault("--out", "", f"{folder} is a file", "give the name of a folder")
+    elif there and not overwrite:
+        found = f"{folder} already holds {', '.join(there)}"
+        fault = Fault("--out", "", found, "give --overwrite or another folder")
+    if fault is None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            fault = Fault("--out", "", f"{folder} cannot be made ({error.strerror})", "another")
+    if fault is None and not os.access(folder, os.W_OK):
+        fault = Fault("--out", "", f"{folder} cannot be written to", "choose another folder")
+    if fault is not None:
+        raise InputError([fault])
+
+
+def _write_text(path: Path, text: str, overwrite: bool) -> None:
+    from railsim.result.hdf5 import check_target
+
+    check_target(path, overwrite=overwrite, option="--out")
+    path.write_text(text, encoding="utf-8")
+
+
+def _base(
+    suspension: "TrailingArmSuspension", extends: str | None, out: str | None
+) -> tuple[str | None, list[str] | None]:
+    """The vehicle to extend as the written file must name it, and what to remove there."""
+    if extends is None or suspension.vehicle is None:
+        return None, None
+    from railsim.definitions.sources import find_file, key_path, read_source
+
+    base = find_file(extends, "vehicle")
+    data = read_source(base, "vehicle").data
+    removed = [key for key in suspension.vehicle.remove if _holds(data, key_path(key))]
+    if Path(extends).is_file():
+        folder = Path(out).parent if out else Path()
+        extends = Path(os.path.relpath(base, folder)).as_posix()
+    return extends, removed
+
+
+def _holds(data: Any, path: Sequence[str]) -> bool:
+    for part in path:
+        if not isinstance(data, dict) or part not in data:
+            return False
+        data = data[part]
+    return True
+
+
+def _tell(suspension: "TrailingArmSuspension", written: Sequence[Path], quiet: bool) -> None:
+    from railsim.definitions.spring import spring_remarks
+
+    if quiet:
+        return
+    for remark in spring_remarks(suspension):
+        click.echo(f"remark: {remark}", err=True)
+    for path in written:
+        click.echo(str(path))
+
+
+def _design_lines(suspension: "TrailingArmSuspension", result: "Design") -> list[str]:
+    low, high = (load * 1e-3 for load in result.load_range)
+    rows = []
+    for (name, spring), K_V, n in zip(
+        suspension.springs.items(), result.K_V, result.n, strict=True
+    ):
+        wire = "-" if spring.wire_diameter is None else f"{spring.wire_diameter * 1e3:.6g}"
+        coils = "-" if n is None else f"{n:.4f}"
+        rows.append([name, f"{spring.mean_diameter * 1e3:.6g}", f"{K_V * 1e-3:.3f}", wire, coils])
+    header = ["spring", "D / mm", "K_V / (N/mm)", "d / mm", "n"]
+    return [
+        *table(header, rows),
+        f"arm at the target: {math.degrees(result.rotation):.4f} deg; "
+        f"target load possible there: {low:.3f} to {high:.3f} kN",
+    ]
+
+
+def _search_lines(result: "SearchResult") -> list[str]:
+    rows = []
+    for rank, nest in enumerate(result.nests, start=1):
+        springs = [
+            f"{spring.wire_diameter * 1e3:.6g} x {spring.mean_diameter * 1e3:.6g}, "
+            f"{spring.active_coils:.6g}"
+            for spring in (nest.outer, nest.inner)
+        ]
+        errors = (nest.mounting_error * 1e3, nest.target_error * 1e3)
+        rows.append(
+            [
+                str(rank),
+                *springs,
+                f"{nest.outer.free_height * 1e3:.6g}/{nest.inner.free_height * 1e3:.6g}",
+                f"{nest.mass:.2f}",
+                f"{nest.fatigue_margin:.3f}",
+                f"{errors[0]:+.2f}/{errors[1]:+.2f}",
+            ]
+        )
+    header = [
+        "rank",
+        "outer d x D, n",
+        "inner d x D, n",
+        "H0 / mm",
+        "kg",
+        "fatigue",
+        "error / mm",
+    ]
+    active = ["active limits", *(", ".join(nest.active) or "none" for nest in result.nests)]
+    lines = table(header, rows)
+    return [
+        f"{result.tried} nests tried, {result.feasible} within all limits before refinement; "
+        f"ranked by {result.objective}",
+        *(f"{line}  {limits}" for line, limits in zip(lines, active, strict=True)),
+    ]
+
+
+def _verification_lines(result: "Verification") -> list[str]:
+    springs = list(result.cases[0].springs)
+    header = [
+        "load case",
+        "P / kN",
+        "theta / deg",
+        "dz / mm",
+        "K_sys / (N/mm)",
+        "rate / (N/mm)",
+        *(f"H {name} / mm" for name in springs),
+        "dx / mm",
+        "K_L / (N/mm)",
+        "K_C / (kNm/rad)",
+    ]
+    rows = [
+        [
+            case.name,
+            f"{case.load * 1e-3:.3f}",
+            f"{math.degrees(case.rotation) + 0.0:.4f}".replace("-0.0000", "0.0000"),
+            f"{case.deflection * 1e3:.3f}",
+            f"{case.K_sys * 1e-3:.3f}",
+            f"{case.rate * 1e-3:.1f}",
+            *(f"{float(state.height) * 1e3:.2f}" for state in case.springs.values()),
+            f"{case.lateral('outer') * 1e3:.3f}",
+            f"{case.K_L * 1e-3:.2f}",
+            f"{case.K_C * 1e-3:.3f}",
+        ]
+        for case in result.cases
+    ]
+    checks = [_check_cells(check) for check in result.checks]
+    return [
+        *table(header, rows),
+        "",
+        *table(["check", "value", "must be", "unit", "met"], checks),
+    ]
+
+
+def _check_cells(check: "Check") -> list[str]:
+    unit, scale = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}[check.unit]
+    digits = 3 if check.unit == "1" else 1
+    sign = ">" if check.sense == "above" else "<"
+    return [
+        check.name,
+        f"{check.value * scale:.{digits}f}",
+        f"{sign} {check.limit * scale:.{digits}f}",
+        unit,
+        "yes" if check.ok else "NO",
+    ]
+
+
+def _ride_height_lines(results: Sequence["RideHeight"]) -> list[str]:
+    if not results:
+        return []
+    rows = [
+        [
+            result.name,
+            f"{result.load * 1e-3:.3f}",
+            f"+-{result.random * 1e3:.2f}",
+            f"{result.lowest * 1e3:+.2f} to {result.highest * 1e3:+.2f}",
+        ]
+        for result in results
+    ]
+    return ["", *table(["ride height", "P / kN", "random / mm", "worst case / mm"], rows)]
+
+
+def _fatigue_lines(result: Mapping[str, "Fatigue"], loads: Mapping[str, float]) -> list[str]:
+    rows = [
+        [
+            name,
+            f"{spring.tau_min * 1e-6:.1f}",
+            f"{spring.tau_max * 1e-6:.1f}",
+            f"{spring.limit * 1e-6:.1f}",
+            f"{spring.margin:.3f}",
+        ]
+        for name, spring in result.items()
+    ]
+    header = ["spring", "tau_min / MPa", "tau_max / MPa", "allowable / MPa", "margin"]
+    return [
+        f"between {loads['min_load'] * 1e-3:.3f} and {loads['max_load'] * 1e-3:.3f} kN",
+        *table(header, rows),
+    ]

@@ -1,0 +1,193 @@
+"""A suspension as the part of a vehicle file: axlebox arm, rubber bush, coil nest.
+
+The springs' stiffnesses are taken at one load, normally tare, about which the vehicle moves.  The
+nest becomes one `shear_spring` from the arm to the bogie frame: its lateral force acts half-way
+between the seats, which already is `K_L H_s^2 / 4` of tilting stiffness; the element's own bending
+stiffness is the rest of `K_C`.  The hinge lies where the turned arm puts it; preloads are left to
+the vehicle's equilibrium (`auto`).
+
+Numbers are rounded to seven significant digits, so that a file made today equals one made later.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
+from railsim.errors import Fault, InputError
+from railsim.springs.verification import Case, load_cases
+
+_DIGITS = 7
+_INNERMOST_ARRAY = re.compile(r"\[\n([^\[\]]+)\]")
+
+
+@dataclass(frozen=True)
+class VehiclePart:
+    """The parts of a vehicle file that a suspension gives.
+
+    Attributes
+    ----------
+    assembly : str
+        Dotted key of the assembly that holds them.
+    axleboxes, elements : dict
+        Tables of the assembly.
+    case : Case
+        The load at which the springs are taken.
+    remarks : tuple of str
+        What the vehicle model cannot carry over.
+    """
+
+    assembly: str
+    axleboxes: dict[str, Any]
+    elements: dict[str, Any]
+    case: Case
+    remarks: tuple[str, ...]
+
+
+def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> VehiclePart:
+    """Return a suspension's parts of a vehicle file.
+
+    Parameters
+    ----------
+    suspension : TrailingArmSuspension
+        The file's content, with a table `[vehicle]`.
+    load : str, optional
+        Name of the load at which the springs are taken; by default that of the table.
+
+    Raises
+    ------
+    InputError : no table `[vehicle]`, or a load that the nest cannot carry.
+    """
+    place = suspension.vehicle
+    if place is None:
+        raise InputError([Fault(suspension.name, "vehicle", "missing", "needed: where it goes")])
+    name = place.load if load is None else load
+    _, (case,) = load_cases(suspension, {name: suspension.loads[name]})
+    nest, remarks = _nest(suspension, place, case)
+    return VehiclePart(
+        assembly=place.assembly,
+        axleboxes={"arm": _axlebox(place)},
+        elements={"arm_bush": _bush(suspension, place, case), "coil_nest": nest},
+        case=case,
+        remarks=remarks,
+    )
+
+
+def vehicle_text(
+    suspension: TrailingArmSuspension,
+    part: VehiclePart,
+    extends: str | None = None,
+    remove: Sequence[str] | None = None,
+) -> str:
+    """Return the text of a vehicle file that replaces the primary suspension of another one.
+
+    Parameters
+    ----------
+    suspension : TrailingArmSuspension
+        The file's content.
+    part : VehiclePart
+        Its parts of the vehicle.
+    extends : str, optional
+        Vehicle file to extend; by default that of the table `[vehicle]`.
+    remove : sequence of str, optional
+        Parts of that vehicle to remove; by default those of the table.
+    """
+    place = suspension.vehicle
+    if place is None:
+        raise ValueError("the suspension has no vehicle table")
+    extends = place.extends if extends is None else extends
+    remove = place.remove if remove is None else remove
+    head: dict[str, Any] = {
+        "format": "railsim-vehicle/1",
+        "name": f"{Path(extends).stem} on {suspension.name}",
+        "extends": extends,
+    }
+    if suspension.source is not None:
+        head["source"] = suspension.source
+    if remove:
+        head["remove"] = list(remove)
+    tables: dict[str, Any] = {"axleboxes": part.axleboxes, "elements": part.elements}
+    for key in reversed(part.assembly.split(".")):
+        tables = {key: tables}
+    case = part.case
+    heading = (
+        f"# Primary suspension '{suspension.name}', written by `railsim spring vehicle`.\n"
+        f"# Coil springs at load {case.name}, {case.load * 1e-3:.3f} kN: deflection "
+        f"{case.deflection * 1e3:.2f} mm, arm turned by {np.degrees(case.rotation):.3f} degrees.\n"
+    )
+    notes = "".join(f"# {remark}\n" for remark in part.remarks)
+    text: str = tomli_w.dumps(head) + "\n" + tomli_w.dumps(tables)
+    return heading + notes + _INNERMOST_ARRAY.sub(_on_one_line, text)
+
+
+def _axlebox(place: VehicleTable) -> dict[str, Any]:
+    return {
+        "wheelset": place.wheelset,
+        "position": _rounded([0.0, place.lateral_position, -place.wheel_radius]),
+        "pitch_inertia": place.pitch_inertia,
+        "sides": "both",
+    }
+
+
+def _bush(suspension: TrailingArmSuspension, place: VehicleTable, case: Case) -> dict[str, Any]:
+    length = suspension.arm.length
+    hinge = [
+        -length * np.cos(case.rotation),
+        place.lateral_position,
+        -place.wheel_radius + length * np.sin(case.rotation),
+    ]
+    return {
+        "kind": "bushing",
+        "bodies": [place.frame, "arm"],
+        "point": _rounded(hinge),
+        "sides": "both",
+        "stiffness": list(place.bush.stiffness),
+        "damping": list(place.bush.damping),
+        "rotational_stiffness": list(place.bush.rotational_stiffness),
+        "rotational_damping": list(place.bush.rotational_damping),
+    }
+
+
+def _nest(
+    suspension: TrailingArmSuspension, place: VehicleTable, case: Case
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    outer = case.springs["outer"]
+    height = float(outer.height)
+    seat = -place.wheel_radius - suspension.arm.seat_height
+    touching = [state for state in case.springs.values() if state.deflection > 0.0]
+    K_V = sum(float(state.force / state.deflection) for state in touching)
+    bending = case.K_C - case.K_L * height**2 / 4.0
+    remarks = []
+    if bending < 0.0:
+        remarks.append(
+            f"The tilting stiffness {case.K_C:.0f} Nm/rad is less than that of the lateral force "
+            f"at mid-height, {case.K_C - bending:.0f} Nm/rad: the element's bending stiffness is 0."
+        )
+    if len(case.springs) > 1 and case.springs["inner"] not in touching:
+        remarks.append("The inner spring does not work at this load and is left out.")
+    nest = {
+        "kind": "shear_spring",
+        "bodies": [place.frame, "arm"],
+        "points": [
+            _rounded([0.0, place.lateral_position, seat - height]),
+            _rounded([0.0, place.lateral_position, seat]),
+        ],
+        "sides": "both",
+        "stiffness": _rounded([case.K_L, case.K_L, K_V]),
+        "bending_stiffness": _rounded([max(bending, 0.0)] * 2),
+    }
+    return nest, tuple(remarks)
+
+
+def _on_one_line(array: re.Match[str]) -> str:
+    members = (line.strip().removesuffix(",") for line in array[1].splitlines())
+    return "[" + ", ".join(member for member in members if member) + "]"
+
+
+def _rounded(values: Sequence[float]) -> list[float]:
+    return [float(f"{value:.{_DIGITS}g}") for value in values]
