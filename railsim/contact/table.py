@@ -107,9 +107,9 @@ class TableGrid:
     s_max: float = 0.014
     ds: float = 5e-5
     roll_max: float = 0.030
-    droll: float = 1.0e-3
+    droll: float = 3.0e-3
     yaw_max: float = 0.040
-    n_w: int = 5
+    n_w: int = 17
     eps: float = 10.0e-6
     load: float = 60e3
     floor_ratio: float = 0.02

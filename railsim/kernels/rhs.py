@@ -310,7 +310,11 @@ def right_hand_side(system, work, state, driving, speed_rate, derivative):
     derivative[-1] = apply_speed_change(bodies, work.frames, state, driving, speed_rate,
                                         derivative)
     derivative[-2] = speed
+    # the force that holds the reference body's x is part of its absolute acceleration
     held = 6 * bodies.reference
+    for i in range(3):
+        work.acceleration[bodies.reference, i] -= (derivative[6 * n + held]
+                                                   * work.C[bodies.reference, i])
     derivative[held] = 0.0
     derivative[6 * n + held] = 0.0
     for i in range(m):
