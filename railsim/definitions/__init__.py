@@ -19,6 +19,7 @@ spring         spring files: trailing-arm suspension
 mirror         mirror images of vehicles and tracks
 sources        finding files, TOML, `extends`, overrides; remembers which file each key came from
 loading        files to definitions with every fault at once
+faults         wrong values in the words of a user
 schema         JSON Schemas and the manual's key tables
 =============  ==================================================================================
 """

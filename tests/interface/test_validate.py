@@ -8,6 +8,7 @@ import time
 
 import click
 import pytest
+from example_result import example_result
 
 from railsim import cli
 from railsim.errors import ModelError
@@ -73,6 +74,20 @@ def test_wheel_profile_on_the_rail_is_a_fault(write, capsys):
     path = write("t.toml", text + 'plan = [{type="STR", length=50.0}]\n')
     assert cli.main(["validate", path]) == 2
     assert f"{path}: rail: profile 'S1002'" in capsys.readouterr().err
+
+
+def test_result_file_is_recognised(capsys, tmp_path):
+    path = str(example_result().to_hdf5(tmp_path / "example.h5"))
+    assert cli.main(["validate", path]) == 0
+    assert capsys.readouterr().out == f"{path}: result, complete, no faults\n"
+    broken = write_bytes(tmp_path / "broken.h5", b"nothing")
+    assert cli.main(["validate", broken]) == 2
+    assert broken in capsys.readouterr().err
+
+
+def write_bytes(path, content):
+    path.write_bytes(content)
+    return str(path)
 
 
 def test_missing_file_is_a_fault(capsys):

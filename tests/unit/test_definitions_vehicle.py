@@ -162,6 +162,35 @@ def test_element_without_side_must_say_which_axlebox():
     assert "box.left" in fault
 
 
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"wheelset": "fromt"}, "axleboxes.box.wheelset: no wheelset 'fromt'"),
+        ({"wheelset": "frame"}, "axleboxes.box.wheelset: no wheelset 'frame'"),
+        ({"position": [2.1, 1.0, -0.46]}, "off its axle by more than 1 mm"),
+        ({"position": [2.0, -1.0, -0.46]}, "not on the right"),
+    ],
+)
+def test_axlebox_that_does_not_fit_is_refused(change, expected):
+    box = {
+        "wheelset": "front",
+        "position": [2.0, 1.0, -0.46],
+        "pitch_inertia": 10.0,
+        "sides": "both",
+        **change,
+    }
+    assert any(expected in fault for fault in faults_of(wagon(axleboxes={"box": box})))
+
+
+def test_same_name_of_two_elements_is_refused():
+    group = {
+        "placements": [{"name": "end"}],
+        "elements": {"link": {**bushing(), "bodies": ["frame", "front"]}},
+    }
+    parts = wagon(assemblies={"one": group, "two": group})
+    assert any("'end.link' is used twice" in fault for fault in faults_of(parts))
+
+
 def test_element_without_points_stands_at_its_bodies():
     bar = {"kind": "roll_bar", "bodies": ["frame", "front"], "stiffness": 1.0}
     (element,) = flatten(wagon(bar)).elements

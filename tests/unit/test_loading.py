@@ -157,6 +157,29 @@ def test_short_vector_says_how_many_numbers_are_needed(write):
     assert str(inertia).endswith("bodies.carbody.inertia: 5.0; a list of 3")
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("bodies = 3", "bodies: 3; must be a table"),
+        ("[bodies]\ncarbody = 5.0", "bodies.carbody: 5.0; must be a table"),
+        (f"[{PRIMARY}]\nkind = 7", "primary: unknown 'kind' '7'; allowed:"),
+        (f"[{PRIMARY}]\npreload = [1.0, 2.0]", "primary.preload: 2 values; a list of 3"),
+        (f"[{PRIMARY}]\npreload = 'later'", "primary.preload: 'later'; must be 'auto'"),
+        (f"[{PRIMARY}]\npreload = 1.0", "primary.preload: 1.0; a list of 3"),
+        (f"[{PRIMARY}]\nstiffness = [1, 2, 3, 4]", "primary.stiffness: 4 values; a list of 3"),
+        (f"[{PRIMARY}]\nbodies = ['frame']", "primary.bodies: 1 value; a list of 2"),
+        (f"[{PRIMARY}]\nbodies = 'frame'", "primary.bodies: 'frame'; a list of 2"),
+        ("[bodies.x]\nmass = 'heavy'", "bodies.x.mass: 'heavy'; must be a valid number"),
+        ("[elements.new]\nbodies = ['carbody', 'front.frame']", "new: no key 'kind'"),
+        ("[assemblies.bogie]\nplacements = []", "placements: 0 values; a list"),
+        ("[assemblies.bogie]\nplacements = ['front']", "placements.0: 'front'; must be a table"),
+    ],
+)
+def test_value_of_the_wrong_kind_is_told_in_words(write, text, expected):
+    texts = [str(fault) for fault in faults(load_vehicle, write("mine.toml", COACH + text + "\n"))]
+    assert any(expected in text for text in texts), texts
+
+
 def test_wheelset_without_profile_is_named(write):
     text = COACH + 'remove = ["assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile"]\n'
     (fault,) = faults(load_vehicle, write("mine.toml", text))
