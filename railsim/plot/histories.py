@@ -169,19 +169,22 @@ def _draw(
         place = places.pop()
         number = result.wheelsets.index(place) + 1
         heading = f"{heading}: {number} {short_names(result.wheelsets)[place]}"
+    names = [" ".join(v for k, v in line.labels.items() if k != "component") for line in others]
+    if len(names) > 1:
+        axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
+    elif names and names[0]:
+        heading = f"{heading}: {names[0]}"
     axes.set_title(heading)
     axes.set_ylabel(unit_label(quantity))
     axes.margins(x=0.0)
     draw_limit(axes, quantity)
-    if others and len(panel.lines) > 1:
-        names = [" ".join(v for k, v in line.labels.items() if k != "component") for line in others]
-        axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
 
 
 def unit_label(quantity: Quantity) -> str:
     """Return symbol and shown unit, for a vertical axis."""
     symbol = f"${quantity.symbol}$ " if quantity.symbol else ""
-    return f"{symbol}({quantity.shown_unit})" if quantity.shown_unit != "-" else symbol.strip()
+    unit = quantity.shown_unit.replace("s2", "s²")
+    return f"{symbol}({unit})" if unit != "-" else symbol.strip()
 
 
 def draw_limit(axes: Axes, quantity: Quantity) -> None:
