@@ -209,6 +209,9 @@ def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
         "plan": [_plan_row(section, cant, speeds) for section in plan],
         "cant": [_row(section) for section in cant],
         "vertical": [_row(section) for section in gradient_sections(track)],
+        "irregularities": [
+            part.model_dump(exclude_none=True, exclude={"rows"}) for part in track.irregularities
+        ],
     }
 
 
@@ -273,6 +276,12 @@ def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
     ]
     if vertical:
         lines += ["", *table(["vertical", "from m", "to m", "gradient per mille"], vertical)]
+    irregular = [
+        [str(part.pop("type")), ", ".join(f"{key} {_short(value)}" for key, value in part.items())]
+        for part in data["irregularities"]
+    ]
+    if irregular:
+        lines += ["", *table(["irregularity", "values"], irregular, numbers=2)]
     return lines
 
 

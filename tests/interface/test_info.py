@@ -72,6 +72,13 @@ def test_gradients_are_shown(capsys, tmp_path):
     assert any("0 to 10" in line for line in lines_of(capsys, str(path)))
 
 
+def test_irregularities_are_shown(capsys):
+    option = 'irregularities=[{type="random", spectrum="erri_b176_low", seed=7}]'
+    lines = lines_of(capsys, "straight", "--set", option)
+    assert lines[-1].startswith("random")
+    assert "seed 7" in lines[-1]
+
+
 def test_remarks_are_shown(capsys):
     lines = lines_of(capsys, "curve_r250", "--set", "rounding=80.0")
     assert any(line.startswith("remark: plan.1") for line in lines)
