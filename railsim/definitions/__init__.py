@@ -17,7 +17,9 @@ measured       CSV files of measured irregularities
 settings       settings files: how to compute, not what
 spring         spring files: trailing-arm suspension
 mirror         mirror images of vehicles and tracks
-sources        finding files, TOML, `extends`, overrides; remembers which file each key came from
+paths          dotted paths into nested tables
+sources        finding files, TOML, `extends`; remembers which file each key came from
+overrides      ``--set key.path=value``
 loading        files to definitions with every fault at once
 faults         wrong values in the words of a user
 schema         JSON Schemas and the manual's key tables

@@ -17,6 +17,7 @@ from railsim.definitions.faults import validation_faults
 from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.measured import embed_measured
+from railsim.definitions.overrides import apply_overrides
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
 from railsim.definitions.spring import (
@@ -157,7 +158,7 @@ def _loaded(model: type[D], source: Source, overrides: Iterable[str]) -> D:
     if source.data.get("format") != format_name:
         file = source.file_of(("format",))
         raise InputError([_format_fault(file, source.data.get("format"), [format_name])])
-    source = sources.apply_overrides(source, overrides, known.free)
+    source = apply_overrides(source, overrides, known.free)
     faults = [*known.prepare(source.data), *known.raw_faults(source.data)]
     faults = [_placed(fault, source) for fault in faults]
     try:

@@ -1,4 +1,4 @@
-"""Finding and reading definition files: TOML, `extends`, `remove` and overrides.
+"""Finding and reading definition files: TOML, `extends` and `remove`.
 
 The result is one nested table of plain values with its provenance: for each key the file that it
 came from, so that a fault can be reported where it was written.
@@ -6,19 +6,18 @@ came from, so that a fault can be reported where it was written.
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
-from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from railsim.definitions.paths import descend, key_path
 from railsim.errors import Fault, InputError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
 FOLDERS = {"vehicle": "vehicles", "track": "tracks", "spring": "vehicles/springs"}
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
-OVERRIDE = "--set"
 
 KeyPath = tuple[str, ...]
 
@@ -241,10 +240,11 @@ def _merge(
             _merge(old, value, path, origin, file)
         else:
             table[key] = value
-            _replace_origin(origin, path, value, file)
+            replace_origin(origin, path, value, file)
 
 
-def _replace_origin(origin: dict[KeyPath, str], path: KeyPath, value: Any, file: str) -> None:
+def replace_origin(origin: dict[KeyPath, str], path: KeyPath, value: Any, file: str) -> None:
+    """Note that the value at a path, with everything in it, came from a file."""
     for known in [known for known in origin if known[: len(path)] == path]:
         del origin[known]
     origin[path] = file
@@ -258,7 +258,7 @@ def _other_kind(old: dict[str, Any], new: dict[str, Any]) -> bool:
 def _remove(base: Source, key: str, file: str) -> list[Fault]:
     try:
         path = key_path(key)
-        parent, last = _descend(base.data, path)
+        parent, last = descend(base.data, path)
         del parent[last]
     except KeyError as missing:
         found = f"no key '{key}' in {base.file}"
@@ -282,148 +282,3 @@ def _anchored(value: Any, folder: Path) -> Any:
     if isinstance(value, str) and value and (folder / value).is_file():
         return str((folder / value).resolve())
     return value
-
-
-def key_path(key: str) -> list[str]:
-    """Return the parts of a dotted key; parts may be quoted as in TOML.
-
-    Examples
-    --------
-    >>> key_path('initial."front.frame".y')
-    ['initial', 'front.frame', 'y']
-
-    Raises
-    ------
-    KeyError : it is no key.
-    """
-    try:
-        node = tomllib.loads(f"{key} = 0")
-    except tomllib.TOMLDecodeError:
-        raise KeyError("a dotted path of keys such as bodies.carbody.mass") from None
-    parts = []
-    while isinstance(node, dict):
-        ((part, node),) = node.items()
-        parts.append(part)
-    return parts
-
-
-def _descend(data: Any, path: Sequence[str], create: bool = False) -> tuple[Any, Any]:
-    """Return the table or list that holds the last part of the path, and its key or index."""
-    node = data
-    for depth, part in enumerate(path):
-        key = _member(node, part)
-        last = depth == len(path) - 1
-        if last and (isinstance(node, dict) or key is not None):
-            return node, part if isinstance(node, dict) else key
-        if key is None and create and isinstance(node, dict):
-            node[part] = {}
-            key = part
-        if key is None:
-            raise KeyError(_no_member(node, part, path[:depth]))
-        node = node[key]
-    raise KeyError("a dotted path of keys")
-
-
-def _member(node: Any, part: str) -> str | int | None:
-    """Return the key or index of a member: by key, in a list by its `name`, else by its index."""
-    if isinstance(node, dict):
-        return part if part in node else None
-    if isinstance(node, list):
-        for index, member in enumerate(node):
-            if isinstance(member, dict) and member.get("name") == part:
-                return index
-        if part.isdecimal() and int(part) < len(node):
-            return int(part)
-    return None
-
-
-def _no_member(node: Any, part: str, before: Sequence[str]) -> str:
-    place = ".".join(before) or "the file"
-    if isinstance(node, dict):
-        return f"no '{part}' in {place}; {nearest(part, node)}"
-    if isinstance(node, list):
-        names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
-        known = [str(name) for name in names] or [f"0 to {len(node) - 1}"]
-        return f"no member '{part}' in {place}; {nearest(part, known)}"
-    return f"'{place}' is a value and has no members"
-
-
-def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str] = ()) -> Source:
-    """Return the source with `key.path=value` texts applied in their order.
-
-    Parameters
-    ----------
-    source : Source
-        What to change; it stays as it is.
-    overrides : iterable of str
-        Assignments with TOML values; members of lists are named by their `name`, else by index.
-    free : sequence of str
-        Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
-
-    Raises
-    ------
-    InputError : an assignment that means nothing; all of them at once.
-    """
-    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
-    faults = []
-    for text in overrides:
-        try:
-            _apply(changed, text, free)
-        except KeyError as problem:
-            key = text.partition("=")[0].strip()
-            faults.append(Fault(OVERRIDE, key, str(problem.args[0]), ""))
-    if faults:
-        raise InputError(faults)
-    return changed
-
-
-def _apply(source: Source, text: str, free: Sequence[str]) -> None:
-    key, equals, written = text.partition("=")
-    if not equals:
-        raise KeyError("an assignment key.path=value is needed")
-    path = key_path(key.strip())
-    if path[0] in free and len(path) > 2:
-        path = [path[0], ".".join(path[1:-1]), path[-1]]
-    parent, last = _descend(source.data, path, create=path[0] in free)
-    present = parent[last] if not isinstance(parent, dict) or last in parent else None
-    parent[last] = _value(written.strip(), isinstance(present, str))
-    place = tuple(str(_descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
-    _replace_origin(source.origin, place, parent[last], OVERRIDE)
-
-
-def _value(written: str, text_expected: bool) -> Any:
-    """Return a written value: TOML, and what is no TOML is text without its quotes."""
-    try:
-        value = tomllib.loads(f"value = {written}")["value"]
-    except tomllib.TOMLDecodeError:
-        if not written or written[0] in "[{\"'":
-            raise KeyError(f"the value '{written}' is no TOML") from None
-        return written
-    return written if text_expected and not isinstance(value, str | list | dict) else value
-
-
-def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
-    """Sort `vehicle.`, `track.` and `settings.` assignments; the prefixes are taken off.
-
-    Examples
-    --------
-    >>> split_overrides(["track.friction=0.3", "settings.scheme=rk4"])
-    {'vehicle': [], 'track': ['friction=0.3'], 'settings': ['scheme=rk4']}
-
-    Raises
-    ------
-    InputError : an assignment with another beginning.
-    """
-    sorted_ones: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
-    faults = []
-    for text in overrides:
-        prefix, _, rest = text.partition(".")
-        if prefix in sorted_ones:
-            sorted_ones[prefix].append(rest)
-        else:
-            key = text.partition("=")[0]
-            allowed = "a path that begins with vehicle., track. or settings."
-            faults.append(Fault(OVERRIDE, key, "unknown beginning", allowed))
-    if faults:
-        raise InputError(faults)
-    return sorted_ones

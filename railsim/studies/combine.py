@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.sources import split_overrides
+from railsim.definitions.overrides import split_overrides
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.simulation import run_length

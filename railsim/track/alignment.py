@@ -111,7 +111,7 @@ class Alignment:
     --------
     >>> from railsim.definitions.loading import load_track
     >>> alignment = Alignment(load_track("curve_r250"))
-    >>> float(1.0 / alignment.curvature(390.0))
+    >>> round(float(1.0 / alignment.curvature(390.0)), 6)
     250.0
     """
 

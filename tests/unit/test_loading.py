@@ -14,6 +14,7 @@ from railsim.definitions.loading import (
     load_track_text,
     load_vehicle,
 )
+from railsim.definitions.overrides import split_overrides
 from railsim.errors import InputError
 
 HEAD = 'format = "railsim-vehicle/1"\nname = "mine"\n'
@@ -324,12 +325,12 @@ def test_fault_of_an_overridden_value_names_the_option():
 
 def test_overrides_are_sorted_by_their_beginning():
     texts = ["vehicle.name=x", "track.friction=0.3", "settings.step=1e-3"]
-    assert sources.split_overrides(texts) == {
+    assert split_overrides(texts) == {
         "vehicle": ["name=x"],
         "track": ["friction=0.3"],
         "settings": ["step=1e-3"],
     }
-    (fault,) = faults(sources.split_overrides, ["friction=0.3"])
+    (fault,) = faults(split_overrides, ["friction=0.3"])
     assert "vehicle., track. or settings." in fault.allowed
 
 

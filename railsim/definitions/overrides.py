@@ -1,0 +1,97 @@
+"""Overrides ``key.path=value``, as ``--set`` gives them.
+
+Values are TOML; what is no TOML is taken as text, so that ``rail=60E1`` needs no quotes.
+"""
+
+import tomllib
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any
+
+from railsim.definitions.paths import descend, key_path
+from railsim.definitions.sources import Source, replace_origin
+from railsim.errors import Fault, InputError
+
+OVERRIDE = "--set"
+
+
+def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str] = ()) -> Source:
+    """Return the source with `key.path=value` texts applied in their order.
+
+    Parameters
+    ----------
+    source : Source
+        What to change; it stays as it is.
+    overrides : iterable of str
+        Assignments with TOML values; members of lists are named by their `name`, else by index.
+    free : sequence of str
+        Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
+
+    Raises
+    ------
+    InputError : an assignment that means nothing; all of them at once.
+    """
+    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
+    faults = []
+    for text in overrides:
+        try:
+            _apply(changed, text, free)
+        except KeyError as problem:
+            key = text.partition("=")[0].strip()
+            faults.append(Fault(OVERRIDE, key, str(problem.args[0]), ""))
+    if faults:
+        raise InputError(faults)
+    return changed
+
+
+def _apply(source: Source, text: str, free: Sequence[str]) -> None:
+    key, equals, written = text.partition("=")
+    if not equals:
+        raise KeyError("an assignment key.path=value is needed")
+    path = key_path(key.strip())
+    if path[0] in free and len(path) > 2:
+        path = [path[0], ".".join(path[1:-1]), path[-1]]
+    parent, last = descend(source.data, path, create=path[0] in free)
+    present = parent[last] if not isinstance(parent, dict) or last in parent else None
+    parent[last] = _value(written.strip(), isinstance(present, str))
+    place = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
+    replace_origin(source.origin, place, parent[last], OVERRIDE)
+
+
+def _value(written: str, text_expected: bool) -> Any:
+    """Return a written value: TOML, and what is no TOML is text without its quotes."""
+    try:
+        value = tomllib.loads(f"value = {written}")["value"]
+    except tomllib.TOMLDecodeError:
+        if not written or written[0] in "[{\"'":
+            raise KeyError(f"the value '{written}' is no TOML") from None
+        return written
+    return written if text_expected and not isinstance(value, str | list | dict) else value
+
+
+def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
+    """Sort `vehicle.`, `track.` and `settings.` assignments; the prefixes are taken off.
+
+    Examples
+    --------
+    >>> split_overrides(["track.friction=0.3", "settings.scheme=rk4"])
+    {'vehicle': [], 'track': ['friction=0.3'], 'settings': ['scheme=rk4']}
+
+    Raises
+    ------
+    InputError : an assignment with another beginning.
+    """
+    sorted_ones: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
+    faults = []
+    for text in overrides:
+        prefix, _, rest = text.partition(".")
+        if prefix in sorted_ones:
+            sorted_ones[prefix].append(rest)
+        else:
+            key = text.partition("=")[0]
+            allowed = "a path that begins with vehicle., track. or settings."
+            faults.append(Fault(OVERRIDE, key, "unknown beginning", allowed))
+    if faults:
+        raise InputError(faults)
+    return sorted_ones
