@@ -37,6 +37,11 @@ def manchester(track):
     return simulate(load_vehicle("coach_manchester"), track, speed=20.0)
 
 
+@pytest.fixture(scope="module")
+def flexicoil(track):
+    return simulate(load_vehicle("coach_flexicoil"), track, speed=20.0)
+
+
 def measured(result, quantity):
     """Value of the leading wheelset as the study reads it."""
     middle = int(np.argmin(np.abs(result.time - 19.8)))
@@ -48,10 +53,23 @@ def measured(result, quantity):
 
 
 @pytest.mark.parametrize("quantity", list(TOLERANCE))
-def test_manchester_coach_agrees_with_the_published_study(published, manchester, quantity):
+@pytest.mark.parametrize("coach", ["manchester", "flexicoil"])
+def test_coach_agrees_with_the_published_study(published, coach, quantity, request):
     row = published[quantity]
-    expected = SIGN.get(quantity, 1.0) * float(row["manchester"]) * UNIT[row["unit"]]
-    assert measured(manchester, quantity) == pytest.approx(expected, rel=TOLERANCE[quantity])
+    expected = SIGN.get(quantity, 1.0) * float(row[coach]) * UNIT[row["unit"]]
+    result = request.getfixturevalue(coach)
+    assert measured(result, quantity) == pytest.approx(expected, rel=TOLERANCE[quantity])
+
+
+@pytest.mark.parametrize("quantity", list(TOLERANCE))
+def test_difference_between_the_suspensions_agrees(published, manchester, flexicoil, quantity):
+    """Flexicoil minus Manchester in per cent: within 2 points, and right in sign above 0.5 %."""
+    row = published[quantity]
+    expected = 100.0 * (float(row["flexicoil"]) / float(row["manchester"]) - 1.0)
+    found = 100.0 * (measured(flexicoil, quantity) / measured(manchester, quantity) - 1.0)
+    assert found == pytest.approx(expected, abs=2.0)
+    if abs(expected) > 0.5:
+        assert found * expected > 0.0
 
 
 def test_peak_of_dQ_lies_near_the_end_of_the_entry_transition(manchester):

@@ -23,7 +23,7 @@ def disturbed(model, state):
     return state
 
 
-@pytest.fixture(scope="module", params=["coach_manchester"])
+@pytest.fixture(scope="module", params=["coach_manchester", "coach_flexicoil"])
 def setting(request):
     vehicle = undamped(load_vehicle(request.param))
     track = load_track("straight").replace(**FRICTIONLESS)

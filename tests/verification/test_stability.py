@@ -1,7 +1,6 @@
 """Guidance on straight track: Klingel's wavelength and the onset of hunting."""
 
 import numpy as np
-import pytest
 from dynamics import Settings, load_track, load_vehicle
 from railsim.simulation import simulate
 
@@ -24,3 +23,7 @@ def test_manchester_coach_is_stable_at_30_m_s():
 
 def test_manchester_coach_hunts_at_40_m_s():
     assert lateral_at_the_end(load_vehicle("coach_manchester"), 40.0) > 1.0e-3
+
+
+def test_flexicoil_coach_is_stable_at_50_m_s():
+    assert lateral_at_the_end(load_vehicle("coach_flexicoil"), 50.0) < 0.2e-3
