@@ -60,6 +60,7 @@ def command(
       railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.3 --out dry.h5
     """
     from railsim.cli import DONE, ENDED_EARLY
+    from railsim.definitions.layout import track_remarks
     from railsim.studies.case import run_name
     from railsim.studies.run import run_case
 
@@ -76,6 +77,9 @@ def command(
         [path, *([picture] if picture else [])],
         overwrite,
     )
+    if not quiet:
+        for remark in track_remarks(case.track):
+            click.echo(f"{track}: {remark}", err=True)
     if not (quiet or as_json):
         click.echo("\n".join(_assumption_lines(case)))
     with progress_bar(case.name, quiet=quiet) as progress:

@@ -75,6 +75,9 @@ class Result:
         )
         self._attributes = MappingProxyType(dict(attributes))
         self._profiles = MappingProxyType(dict(profiles))
+        # read when they are first asked for
+        self._vehicle: Vehicle | None = None
+        self._track: Track | None = None
 
     # -- the arrays ---------------------------------------------------------------------------
 
@@ -184,13 +187,17 @@ class Result:
         """Rebuild the vehicle's definition from the text that the result carries."""
         from railsim.definitions.loading import load_vehicle_text
 
-        return load_vehicle_text(str(self._attributes["vehicle_toml"]))
+        if self._vehicle is None:
+            self._vehicle = load_vehicle_text(str(self._attributes["vehicle_toml"]))
+        return self._vehicle
 
     def track(self) -> "Track":
         """Rebuild the track's definition from the text that the result carries."""
         from railsim.definitions.loading import load_track_text
 
-        return load_track_text(str(self._attributes["track_toml"]))
+        if self._track is None:
+            self._track = load_track_text(str(self._attributes["track_toml"]))
+        return self._track
 
     def settings(self) -> "Settings":
         """Rebuild the settings from what the result carries."""

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from railsim.definitions.flatten import flatten
@@ -46,6 +47,7 @@ class Case:
         """Name of the result file."""
         return f"{self.name}.h5"
 
+    @cached_property
     def key(self) -> str:
         """Hash of everything that the numbers of the run depend on.
 

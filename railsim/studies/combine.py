@@ -121,10 +121,20 @@ def combinations(
             case = Case(name, a_vehicle, a_track, a_settings, speed, duration, until, labels)
             cases.append(case)
     if not faults:
-        faults += _double_names(cases)
+        faults += _profile_faults(cases) + _double_names(cases)
     if faults:
         raise InputError(dict.fromkeys(faults))
     return cases
+
+
+def _profile_faults(cases: Sequence[Case]) -> list[Fault]:
+    faults: list[Fault] = []
+    for case in cases:
+        try:
+            _ = case.key  # reads every profile
+        except InputError as error:
+            faults.extend(error.faults)
+    return faults
 
 
 def _end_faults(

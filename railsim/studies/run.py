@@ -32,7 +32,7 @@ def run_case(
     ------
     InputError, ModelError : as `railsim.simulate`; the file cannot be written.
     """
-    facts = {"run": case.name, "inputs_hash": case.key()}
+    facts = {"run": case.name, "inputs_hash": case.key}
     with Hdf5Sink(path, overwrite=overwrite, attributes=facts) as sink:
         return simulate(
             case.vehicle,

@@ -220,7 +220,7 @@ def _finished(cases: Sequence[Case], folder: Path, *, resume: bool) -> dict[str,
         except InputError as error:
             faults.extend(error.faults)
             continue
-        if result.attributes.get("inputs_hash") == case.key():
+        if result.attributes.get("inputs_hash") == case.key:
             finished[case.name] = result
         elif not resume:
             allowed = "--resume computes what has changed, --overwrite everything; or another --out"

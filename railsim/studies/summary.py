@@ -27,7 +27,7 @@ def waiting_record(case: Case) -> Record:
         "name": case.name,
         "file": case.file_name,
         "labels": dict(case.labels),
-        "inputs_hash": case.key(),
+        "inputs_hash": case.key,
         "status": "waiting",
         "status_reason": "",
     }

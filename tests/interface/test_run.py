@@ -111,6 +111,13 @@ def test_all_faults_are_listed_at_once(tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_is_unusual_in_the_track_is_remarked(tmp_path, capsys):
+    steep = ["--set", "track.cant.1.length=10", "--set", "track.plan.1.length=5"]
+    arguments = [*SHORT, *steep, "--out", str(tmp_path / "run.h5")]
+    assert main(arguments) == 0
+    assert "curve_r250: " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("option", "value"), [("--duration", "0"), ("--until", "-1"), ("--until", "1e6")]
 )

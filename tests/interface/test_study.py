@@ -197,6 +197,10 @@ def test_json_holds_every_record(tmp_path, simulated, capsys):
         (["--vehicles", COACH, "--tracks", CURVE], "--speeds: not given"),
         (["--resume"], "no study"),
         (
+            ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--set", "track.rail=worn"],
+            "worn: no such profile",
+        ),
+        (
             ["--vehicles", "coach", COACH, "--tracks", "curve", "--speeds", "20", "-5"],
             "no file 'curve'",
         ),
@@ -253,7 +257,7 @@ def test_grid_values_may_be_lists():
 def test_keys_tell_inputs_apart_and_nothing_else():
     def key(*assignments, speed=20.0, **how):
         (case,) = combinations([COACH], [CURVE], [speed], assignments=assignments, **how)
-        return case.key()
+        return case.key
 
     base = key()
     assert key("track.friction=0.4") == base  # what the file says already
