@@ -317,6 +317,8 @@ def build_contact_table(
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         list(pool.map(fill, tasks[1:]))
     values[..., kernel.G] -= gap_offsets(wheel_points, grid.eps)[:, None, None, None]
+    # as from the cache: the time loop is compiled once, not for both kinds of arrays
+    values.setflags(write=False)
     description = {
         "format": FORMAT,
         "wheel": wheel.name,
