@@ -1,14 +1,18 @@
 """Wheel and rail profiles.
 
-========== =====================================================================
-module     job
-========== =====================================================================
-`profile`  `Profile`: the points, their frame and where they come from
-`builtin`  the built-in profiles, generated from their definitions
-========== =====================================================================
+============= ==================================================================
+module        job
+============= ==================================================================
+`profile`     `Profile`: the points, their frame and where they come from
+`builtin`     the built-in profiles, generated from their definitions
+`readers`     CSV, SIMPACK and MiniProf files as they are
+`recognition` what a file's points mean: recognised, put right, or refused
+============= ==================================================================
 
 Read `profile` first: it states the frames.
 """
+
+from pathlib import Path
 
 from railsim.errors import Fault, InputError, nearest
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
@@ -18,29 +22,51 @@ __all__ = ["Profile", "load_profile"]
 
 
 def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
-    """Built-in profile by name.
+    """Profile by its built-in name or from a file.
 
     Parameters
     ----------
     name_or_path : str
-        Name of a built-in profile.
+        Path of a file (CSV, SIMPACK ``.prw``/``.prr``, MiniProf ``.whl``/``.ban``) or name of a
+        built-in profile; a file wins over a name.
     kind : "wheel", "rail" or None
         What the profile must be; None accepts both.
 
     Returns
     -------
     Profile
+        Its `notes` say what was recognised and put right.
 
     Raises
     ------
     InputError
-        If there is no such profile or it is of the other kind.
+        If there is no such profile, it is of the other kind, or the file holds none.
+
+    Examples
+    --------
+    >>> load_profile("S1002").kind
+    'wheel'
     """
-    if name_or_path not in DEFINITIONS:
+    path = Path(name_or_path)
+    if name_or_path in DEFINITIONS and not path.is_file():
+        profile = builtin_profile(name_or_path)
+    elif path.suffix or path.exists():
+        # reading is rare and needs scipy: not imported for built-in profiles
+        from railsim.profiles.readers import read_profile_file
+        from railsim.profiles.recognition import recognised_profile
+
+        return recognised_profile(read_profile_file(path), name_or_path, kind)
+    else:
         raise InputError(
-            [Fault(name_or_path, "", "no such profile", nearest(name_or_path, DEFINITIONS))]
+            [
+                Fault(
+                    name_or_path,
+                    "",
+                    "no such profile",
+                    nearest(name_or_path, DEFINITIONS) + " or the path of a file",
+                )
+            ]
         )
-    profile = builtin_profile(name_or_path)
     if kind is not None and profile.kind != kind:
         raise InputError(
             [Fault(name_or_path, "", f"this is a {profile.kind} profile", f"give a {kind} profile")]

@@ -5,7 +5,7 @@ that its source states, sampled densely enough (0.05 mm) for cubic interpolation
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ S1002_SECTIONS = (
 )
 
 S1002_OUTER = (1.364323640, -0.066666667)
+S1002_FLANK_END = -39.764473993
 S1002_FLANK = (-93.576667419, -2.747477419)
 S1002_TREAD = (
     0.0,
@@ -104,21 +105,56 @@ def s1002() -> Profile:
     return Profile("S1002", "wheel", 1e-3 * y, 1e-3 * s1002_height(y), "EN 13715, profile S1002")
 
 
-def arc_chain_rail(
-    half_width_crown: float,
-    half_width_shoulder: float,
-    radii: tuple[float, float, float] = (300.0, 80.0, 13.0),
-    flank_slope: float = 0.05,
-    depth: float = 38.0,
-) -> tuple[Array, Array]:
-    """Rail head of three tangent arcs and a straight flank, symmetric about its axis.
+def cone(taper: float) -> Profile:
+    """Straight cone with the flange of S1002.
+
+    The tread is a cone of the given taper; flank, tip and back are those of S1002, the fillet of
+    13 mm between them is tangent to both, as S1002's own.
 
     Parameters
     ----------
-    half_width_crown, half_width_shoulder : float
-        Distance from the axis at which the first arc meets the second, the second the third [mm].
+    taper : float
+        Taper, 0.05 for 1:20 [1].
+    """
+    radius, (level, slope) = 13.0, S1002_FLANK
+    # centre of the fillet: its radius away from cone and flank, on the rail's side
+    lines = np.array([[taper, 1.0], [-slope, 1.0]])
+    right_side = np.array([0.0, level]) + radius * np.hypot(lines[:, 0], 1.0)
+    centre_y, centre_z = np.linalg.solve(lines, right_side)
+    start = centre_y - radius * taper / np.hypot(taper, 1.0)
+    end = centre_y + radius * slope / np.hypot(slope, 1.0)
+    fine = -70.0 + 130.0 * np.linspace(0.0, 1.0, 400_001) ** 1.5
+
+    def height(y: Array) -> Array:
+        fillet = centre_z - np.sqrt(np.maximum(radius**2 - (y - centre_y) ** 2, 0.0))
+        # S1002's own fillet ends farther down: its flank goes on along the same line
+        flange = np.where(y > S1002_FLANK_END, level + slope * y, s1002_height(y))
+        return np.where(y > start, -taper * y, np.where(y > end, fillet, flange))
+
+    y = even_points(fine, height(fine), SPACING)
+    return Profile(
+        f"cone 1:{1.0 / taper:.0f}",
+        "wheel",
+        1e-3 * y,
+        1e-3 * height(y),
+        f"cone of 1:{1.0 / taper:.0f}, flank, tip and back of S1002, fillet of 13 mm",
+    )
+
+
+def arc_chain_rail(
+    half_widths: tuple[float, ...],
+    radii: tuple[float, ...],
+    flank_slope: float = 0.05,
+    depth: float = 38.0,
+) -> tuple[Array, Array]:
+    """Rail head of tangent arcs and a straight flank, symmetric about its axis.
+
+    Parameters
+    ----------
+    half_widths : tuple of float
+        Distances from the axis at which each arc but the last meets the next one [mm].
     radii : tuple of float
-        Radii of crown, shoulder and gauge corner [mm].
+        Radii from the crown to the gauge corner [mm].
     flank_slope : float
         Flank's inclination to the vertical [1].
     depth : float
@@ -130,7 +166,7 @@ def arc_chain_rail(
         Contour from the left flank to the right one, z down from the crown [mm].
     """
     angles, centre = [0.0], [(0.0, radii[0])]
-    for i, half_width in enumerate((half_width_crown, half_width_shoulder)):
+    for i, half_width in enumerate(half_widths):
         angle = float(np.arcsin((half_width - centre[i][0]) / radii[i]))
         # the next centre lies on the normal through the joint
         offset = radii[i] - radii[i + 1]
@@ -154,15 +190,34 @@ def arc_chain_rail(
     return np.concatenate((-y[:0:-1], y)), np.concatenate((z[:0:-1], z))
 
 
-def rail_60e1() -> Profile:
-    """Rail 60E1 of EN 13674-1, upright."""
-    y, z = arc_chain_rail(10.228, 26.0265)
-    return Profile("60E1", "rail", 1e-3 * y, 1e-3 * z, "EN 13674-1, profile 60E1, tangent arcs")
+RAIL_HEADS: dict[str, tuple[tuple[float, ...], tuple[float, ...], float]] = {
+    # joints [mm] as halves of the widths in EN 13674-1, radii [mm], flank's slope
+    "60E1": ((20.456 / 2, 52.053 / 2), (300.0, 80.0, 13.0), 1 / 20),
+    "60E2": ((23.778 / 2, 48.913 / 2, 70.774 / 2), (200.0, 70.0, 16.0, 8.0), 1 / 20),
+    "54E1": ((20.024 / 2, 49.727 / 2), (300.0, 80.0, 13.0), 1 / 20),
+    "49E1": ((15.267 / 2, 46.835 / 2), (300.0, 80.0, 13.0), 1 / 17.2),
+}
+"""Rail heads of EN 13674-1:2017.
+
+The numbers are those of the standard as the open package EN13674 (A. Rohrbeck, 2022) gives them,
+whose tests demand that all elements join tangentially.  Second evidence, which the tests repeat:
+each chain closes on the head's width of the standard without using it.
+"""
+
+
+def en_rail(name: str) -> Profile:
+    """Rail of EN 13674-1, upright: a name of `RAIL_HEADS`."""
+    half_widths, radii, flank = RAIL_HEADS[name]
+    y, z = arc_chain_rail(half_widths, radii, flank)
+    chain = "/".join(f"{radius:.0f}" for radius in radii)
+    return Profile(
+        name, "rail", 1e-3 * y, 1e-3 * z, f"EN 13674-1, profile {name}, tangent arcs {chain} mm"
+    )
 
 
 def rail_benchmark() -> Profile:
     """The Manchester contact benchmark's UIC 60 rail, canted 1:40, from its arcs."""
-    y, z = arc_chain_rail(10.49979, 25.98803)
+    y, z = arc_chain_rail((10.49979, 25.98803), (300.0, 80.0, 13.0))
     angle = np.arctan(1.0 / 40.0)
     y_turned = y * np.cos(angle) + z * np.sin(angle)
     z_turned = -y * np.sin(angle) + z * np.cos(angle)
@@ -179,7 +234,12 @@ def rail_benchmark() -> Profile:
 
 DEFINITIONS: dict[str, Callable[[], Profile]] = {
     "S1002": s1002,
-    "60E1": rail_60e1,
+    "cone_1in20": partial(cone, 1 / 20),
+    "cone_1in40": partial(cone, 1 / 40),
+    "60E1": partial(en_rail, "60E1"),
+    "60E2": partial(en_rail, "60E2"),
+    "54E1": partial(en_rail, "54E1"),
+    "49E1": partial(en_rail, "49E1"),
     "benchmark": rail_benchmark,
 }
 

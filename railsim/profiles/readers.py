@@ -1,0 +1,317 @@
+"""Profile files as they are: numbers, unit and what the file says about itself.
+
+Four formats are read: CSV, SIMPACK ``.prw``/``.prr``, MiniProf ``.whl``/``.ban`` with a header of
+``Key=Value`` lines, and the older MiniProf text with a title block.  Nothing is judged here; that
+is the job of `railsim.profiles.recognition`.  Every refusal names the file and the line.
+
+Sources: the SIMPACK format from the comments that its own example files carry (order of the
+processing steps, meaning of the unit factors); the MiniProf format from files published with the
+CONTACT program (``examples`` and ``testbank/profiles`` of github.com/eve70a/CONTACT).
+"""
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import Fault, InputError
+from railsim.profiles.profile import Kind
+
+Array = NDArray[np.float64]
+
+LARGEST_FILE = 20_000_000
+"""Larger files are refused unread [bytes]; a profile of 10 000 points has some 0.5 MB."""
+
+FORMATS = "CSV (header y_mm,z_mm or y,z), SIMPACK .prw/.prr, MiniProf .whl/.ban"
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
+
+
+@dataclass
+class RawProfile:
+    """What a file holds.
+
+    Attributes
+    ----------
+    y, z : ndarray, shape (n,)
+        Points in the file's order and axes [m, or the file's unit if `unit` is None].
+    line : ndarray of int, shape (n,)
+        Line of each point in the file, from 1.
+    unit : float or None
+        Metres per unit of the file; None if the file does not say.
+    kind : "wheel", "rail" or None
+        What the file says that it is.
+    name : str
+        Title.
+    notes : list of str
+        What was done on the file's own request.
+    """
+
+    y: Array
+    z: Array
+    line: NDArray[np.int64]
+    unit: float | None = None
+    kind: Kind | None = None
+    name: str = ""
+    notes: list[str] = field(default_factory=list)
+
+
+class _Points:
+    """Collects points line by line; the first fault ends the reading."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.y: list[float] = []
+        self.z: list[float] = []
+        self.line: list[int] = []
+
+    def add(self, texts: list[str], line: int) -> None:
+        if len(texts) < 2:
+            raise _fault(self.file, line, f"one number instead of two: {_shown(texts)}")
+        values = [_number(text) for text in texts[:2]]
+        if values[0] is None or values[1] is None:
+            raise _fault(self.file, line, f"not a pair of numbers: {_shown(texts)}")
+        self.y.append(values[0])
+        self.z.append(values[1])
+        self.line.append(line)
+
+    def raw(self) -> RawProfile:
+        return RawProfile(np.array(self.y), np.array(self.z), np.array(self.line, dtype=np.int64))
+
+
+def _shown(texts: list[str]) -> str:
+    text = " ".join(texts)
+    return repr(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _fault(file: str, line: int, found: str, remedy: str = "") -> InputError:
+    return InputError([Fault(file, f"line {line}", found, remedy or "give y and z on each line")])
+
+
+def _number(text: str) -> float | None:
+    """A finite number, or None."""
+    if not NUMBER.match(text):
+        return None
+    value = float(text.lower().replace("d", "e"))
+    return value if math.isfinite(value) else None
+
+
+def read_profile_file(path: str | Path) -> RawProfile:
+    """Read a profile file.
+
+    Parameters
+    ----------
+    path : str or Path
+        File; its suffix decides about the format.
+
+    Returns
+    -------
+    RawProfile
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or a line is not what its format wants.
+    """
+    path = Path(path)
+    file = str(path)
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise InputError([Fault(file, "", f"{size / 1e6:.0f} MB", "a profile has less")])
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            [Fault(file, "", f"cannot be read: {error.strerror}", f"formats: {FORMATS}")]
+        ) from None
+    if b"\0" in content:
+        raise InputError([Fault(file, "", "not a text file", f"formats: {FORMATS}")])
+    # titles may hold any character; numbers are ASCII in every one of these encodings
+    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    suffix = path.suffix.lower()
+    if suffix in (".prw", ".prr"):
+        raw = _simpack(file, lines)
+        told: Kind = "wheel" if suffix == ".prw" else "rail"
+        raw.kind = raw.kind or told
+    elif suffix in (".whl", ".ban"):
+        raw = _miniprof(file, lines)
+        raw.kind = "wheel" if suffix == ".whl" else "rail"
+        raw.unit = raw.unit or 1e-3
+    elif suffix in (".csv", ".txt", ".dat"):
+        raw = _csv(file, lines)
+    else:
+        raise InputError(
+            [Fault(file, "", f"unknown kind of file '{suffix}'", f"formats: {FORMATS}")]
+        )
+    raw.name = raw.name or path.stem
+    return raw
+
+
+def _csv(file: str, lines: list[str]) -> RawProfile:
+    """Columns y, z with an optional header that gives the unit; further columns are left out."""
+    points = _Points(file)
+    unit: float | None = None
+    columns = (0, 1)
+    for number, line in enumerate(lines, start=1):
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        cells = _cells(text)
+        if not points.y and _number(cells[0]) is None:
+            names = [cell.strip().strip('"').lower() for cell in cells]
+            columns, unit = _header(file, number, names)
+            continue
+        if len(cells) <= max(columns):
+            raise _fault(file, number, f"{len(cells)} columns: {_shown(cells)}")
+        points.add([cells[columns[0]], cells[columns[1]]], number)
+    raw = points.raw()
+    raw.unit = unit
+    return raw
+
+
+def _cells(text: str) -> list[str]:
+    """Split a line at its separator: semicolon or tab (then a comma is decimal), comma, blanks."""
+    for separator in (";", "\t"):
+        if separator in text:
+            return [cell.strip().replace(",", ".") for cell in text.split(separator)]
+    if "," in text:
+        return [cell.strip() for cell in text.split(",")]
+    return text.split()
+
+
+def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], float | None]:
+    """Columns of y and z and metres per unit, from a header line."""
+    units = {"y": 1.0, "y_m": 1.0, "y_mm": 1e-3, "y [m]": 1.0, "y [mm]": 1e-3}
+    for i, name in enumerate(names):
+        partner = "z" + name[1:]
+        if name in units and partner in names:
+            return (i, names.index(partner)), units[name]
+    raise InputError(
+        [
+            Fault(
+                file,
+                f"line {line}",
+                f"unknown columns {_shown(names)}",
+                "the header is y_mm,z_mm for millimetres or y,z for metres",
+            )
+        ]
+    )
+
+
+def _simpack(file: str, lines: list[str]) -> RawProfile:
+    """SIMPACK: keys of a spline section, then points; processing in the file's numbered order."""
+    points = _Points(file)
+    values: dict[str, float] = {}
+    title, inside, kind_flag = "", False, None
+    for number, line in enumerate(lines, start=1):
+        text = line.split("!")[0].strip()
+        lower = text.lower()
+        if not text:
+            continue
+        if lower in ("point.begin", "point.end"):
+            inside = lower == "point.begin"
+            continue
+        if inside:
+            points.add(text.split(), number)
+            continue
+        key, _, value = (part.strip() for part in text.partition("="))
+        if key.lower() == "comment":
+            title = value.strip("'\" ")
+        parsed = _number(value)
+        if parsed is not None:
+            if key.lower() == "type" and kind_flag is None:
+                kind_flag = parsed
+            values[key.lower()] = parsed
+        elif key.lower() in NUMERIC_KEYS:
+            raise _fault(file, number, f"{key} is not a number: {value!r}", "give a number")
+    if not points.y:
+        raise InputError(
+            [Fault(file, "", "no points", "SIMPACK files hold them from point.begin to point.end")]
+        )
+    raw = points.raw()
+    raw.name = title
+    if kind_flag is not None:
+        raw.kind = "wheel" if kind_flag == 1.0 else "rail"
+    per_metre = values.get("units.len.f", 1.0)
+    if per_metre <= 0.0:
+        raise InputError(
+            [Fault(file, "units.len.f", f"{per_metre:g}", "units per metre, 1000 for millimetres")]
+        )
+    raw.unit = 1.0 / per_metre
+    _process_simpack(raw, values)
+    return raw
+
+
+NUMERIC_KEYS = (
+    "units.len.f",
+    "units.ang.f",
+    "shift.y",
+    "shift.z",
+    "rotate",
+    "mirror.y",
+    "mirror.z",
+    "inversion",
+)
+
+
+def _process_simpack(raw: RawProfile, values: dict[str, float]) -> None:
+    """Shift, rotate, cut and mirror as the file asks, in its order."""
+    raw.y = raw.y + values.get("shift.y", 0.0)
+    raw.z = raw.z + values.get("shift.z", 0.0)
+    angle = values.get("rotate", 0.0) / (values.get("units.ang.f", 1.0) or 1.0)
+    if angle != 0.0:
+        cosine, sine = math.cos(angle), math.sin(angle)
+        raw.y, raw.z = raw.y * cosine - raw.z * sine, raw.y * sine + raw.z * cosine
+        raw.notes.append(f"rotated by {1e3 * angle:.3f} mrad as the file asks")
+    keep = np.ones(raw.y.size, dtype=bool)
+    for axis, points in (("y", raw.y), ("z", raw.z)):
+        lower, upper = values.get(f"bound.{axis}.min", 1.0), values.get(f"bound.{axis}.max", 0.0)
+        if lower < upper:  # the default 1, 0 means no bounds
+            keep &= (points >= lower) & (points <= upper)
+    if not keep.all():
+        raw.notes.append(f"{np.sum(~keep)} points beyond the file's own bounds left out")
+        raw.y, raw.z, raw.line = raw.y[keep], raw.z[keep], raw.line[keep]
+    if values.get("mirror.y", 0.0) == 1.0:
+        raw.y = -raw.y
+    if values.get("mirror.z", 0.0) == 1.0:
+        raw.z = -raw.z
+    if values.get("inversion", 0.0) == 1.0:
+        raw.y, raw.z, raw.line = raw.y[::-1].copy(), raw.z[::-1].copy(), raw.line[::-1].copy()
+
+
+def _miniprof(file: str, lines: list[str]) -> RawProfile:
+    """MiniProf: header of Key=Value lines or a title block, an empty line, columns X Y."""
+    points = _Points(file)
+    columns = [0, 1]
+    facts: dict[str, str] = {}
+    for number, line in enumerate(lines, start=1):
+        text = line.strip()
+        if not text or text.startswith('"'):
+            continue  # a quotation mark begins a remark
+        words = text.replace(",", " ").split()
+        numeric = len(words) > 1 and _number(words[0]) is not None and _number(words[1]) is not None
+        if "=" in text or (not points.y and not numeric):
+            key, _, value = text.partition("=")
+            facts[key.strip().lower()] = value.strip()
+            if key.strip().lower() == "columndef" and value:
+                columns = _miniprof_columns(file, number, value)
+            continue
+        if len(words) <= max(columns):
+            raise _fault(file, number, f"{len(words)} columns: {_shown(words)}")
+        points.add([words[columns[0]], words[columns[1]]], number)
+    raw = points.raw()
+    if facts.get("columndef"):
+        stated = facts.get("xypoints", "")
+        if stated.isdigit() and int(stated) != raw.y.size:
+            raw.notes.append(f"the header announces {stated} points, the file holds {raw.y.size}")
+    return raw
+
+
+def _miniprof_columns(file: str, line: int, value: str) -> list[int]:
+    """Places of X and Y in a column definition such as ``X,Y,A,C``."""
+    names = [name.strip().upper() for name in value.split(",")]
+    if "X" not in names or "Y" not in names:
+        raise _fault(file, line, f"ColumnDef={value}", "the columns X and Y are needed")
+    return [names.index("X"), names.index("Y")]

@@ -1,0 +1,289 @@
+"""Built-in profiles and profile files: what is recognised, put right and refused."""
+
+import numpy as np
+import pytest
+from profile_files import bare, csv_m, csv_mm, miniprof, points, simpack
+
+from railsim.contact import build_contact_table, contact_geometry
+from railsim.contact.table import TableGrid
+from railsim.errors import InputError
+from railsim.profiles import Profile, load_profile
+from railsim.profiles.builtin import DEFINITIONS, RAIL_HEADS
+
+WHEEL, RAIL = points("S1002"), points("60E1")
+LATERAL = np.linspace(-0.005, 0.005, 21)
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def same_contact(profile, builtin):
+    """Largest difference of the rolling radius difference to the built-in profile's [m]."""
+    partner = load_profile("60E1" if profile.kind == "wheel" else "S1002")
+
+    def delta_r(p):
+        pair = (p, partner) if p.kind == "wheel" else (partner, p)
+        return contact_geometry(*pair, lateral=LATERAL).delta_r
+
+    return np.max(np.abs(delta_r(profile) - delta_r(load_profile(builtin))))
+
+
+@pytest.mark.parametrize(
+    ("name", "half_width", "depth"),
+    [("60E1", 36.0, 14.3), ("60E2", 36.0, 14.3), ("54E1", 35.0, 14.1), ("49E1", 33.5, 14.0)],
+)
+def test_arcs_of_a_rail_close_on_the_standards_head(name, half_width, depth):
+    # EN 13674-1 gives the head's width in round numbers; the arcs were not made from it.
+    # Their joints are printed to 0.001 mm.
+    half_widths, radii, flank = RAIL_HEADS[name]
+    centre, angle = np.array([0.0, radii[0]]), 0.0
+    for i, place in enumerate(half_widths):
+        angle = np.arcsin((place - centre[0]) / radii[i])
+        centre = centre + (radii[i] - radii[i + 1]) * np.array([np.sin(angle), -np.cos(angle)])
+    end = np.arctan2(1.0, flank)
+    closing = centre + radii[-1] * np.array([np.sin(end), -np.cos(end)])
+    assert closing == pytest.approx([half_width, depth], abs=5e-4)
+    profile = load_profile(name)
+    assert 1e3 * np.interp(1e-3 * depth, profile.z[profile.y > 0], profile.y[profile.y > 0]) == (
+        pytest.approx(half_width, abs=2e-3)
+    )
+
+
+@pytest.mark.parametrize("name", DEFINITIONS)
+def test_built_in_profile_is_smooth_and_usable(name):
+    profile = load_profile(name)
+    assert profile.source
+    assert np.all(np.diff(profile.y) > 0) or profile.inclination
+    # 0.05 mm along the contour
+    assert np.hypot(np.diff(profile.y), np.diff(profile.z)).max() < 6e-5
+    turn = np.abs(np.diff(np.arctan2(np.diff(profile.z), np.diff(profile.y))))
+    assert np.max(turn[:-20]) < 0.01 or profile.kind == "wheel"
+    pair = (
+        (profile, load_profile("60E1"))
+        if profile.kind == "wheel"
+        else (load_profile("S1002"), profile)
+    )
+    table = build_contact_table(*pair, grid=TableGrid(ds=1e-3, droll=5e-3, n_w=2))
+    assert np.all(np.isfinite(table.values))
+
+
+@pytest.mark.parametrize(("name", "taper"), [("cone_1in20", 1 / 20), ("cone_1in40", 1 / 40)])
+def test_cone_on_a_rail_has_wickens_conicity(name, taper):
+    # Wickens (2003), Fundamentals of rail vehicle dynamics, eq. 2.14: for a cone on a circular
+    # rail head the contact moves on the rail only through roll
+    geometry = contact_geometry(load_profile(name), load_profile("60E1"), lateral=LATERAL)
+    angle = np.arctan(taper)
+    b, R, r = 0.75, 0.300, 0.46
+    expected = taper * (b + R * np.sin(angle)) / (b - r * np.sin(angle))
+    found = np.polyfit(geometry.lateral, geometry.delta_r, 1)[0] / 2
+    # the contact's distance from the track's centre differs from b by a few millimetres
+    assert found == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "writer"),
+    [(".csv", csv_mm), (".csv", csv_m), (".txt", bare), ("", simpack), ("", miniprof)],
+)
+@pytest.mark.parametrize("kind", ["wheel", "rail"])
+def test_file_of_each_format_gives_the_profile_it_was_made_of(tmp_path, suffix, writer, kind):
+    own = {simpack: {"wheel": ".prw", "rail": ".prr"}, miniprof: {"wheel": ".whl", "rail": ".ban"}}
+    suffix = suffix or own[writer][kind]
+    text = writer(*(WHEEL if kind == "wheel" else RAIL), kind=kind)
+    profile = load_profile(written(tmp_path, "p" + suffix, text), kind)
+    assert profile.kind == kind
+    # points every 0.2 mm, printed to 1e-6 mm, by MiniProf to 1e-4 mm: slopes within 5e-4
+    print_error = 1e-5 if writer is miniprof else 1.5e-6
+    assert same_contact(profile, "S1002" if kind == "wheel" else "60E1") < print_error
+
+
+def changed_wheel(how):
+    y, z = WHEEL
+    rng = np.random.default_rng(1)
+    back = y - y.min()
+    return {
+        "mirrored": (-y, z),
+        "upside down": (y, -z),
+        "turned by 180 degrees": (-y, -z),
+        "reversed": (y[::-1], z[::-1]),
+        "shuffled": tuple(np.array([y, z])[:, rng.permutation(y.size)]),
+        "double points": (np.repeat(y, 2), np.repeat(z, 2)),
+        "origin at the wheel back": (back, z),
+        "origin at the wheel back, z up": (back, -z),
+        "z from the flange tip": (y, z - z.max()),
+        "one outlier": (y, z + 5.0 * (np.arange(y.size) == 400)),
+    }[how]
+
+
+@pytest.mark.parametrize(
+    ("how", "note"),
+    [
+        ("mirrored", "mirrored"),
+        ("upside down", "z pointed to the axle"),
+        ("turned by 180 degrees", "mirrored"),
+        ("reversed", None),
+        ("shuffled", "not in order"),
+        ("double points", "double points"),
+        ("origin at the wheel back", "tape circle, 70 mm from the wheel back"),
+        ("origin at the wheel back, z up", "tape circle"),
+        ("z from the flange tip", "zero at the tape circle"),
+        ("one outlier", "outliers left out"),
+    ],
+)
+def test_wheel_is_put_right_and_the_note_says_so(tmp_path, how, note):
+    path = written(tmp_path, "wheel.csv", csv_mm(*changed_wheel(how)))
+    profile = load_profile(path, "wheel")
+    assert note is None or any(note in line for line in profile.notes), profile.notes
+    # sorting by y confuses the nearly vertical wheel back, nothing that touches the rail
+    assert same_contact(profile, "S1002") < (5e-6 if how == "one outlier" else 1.5e-6)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_units_are_told_by_the_size_when_the_header_is_wrong(tmp_path, scale):
+    y, z = WHEEL
+    rows = "".join(f"{a * scale:.9f},{b * scale:.9f}\n" for a, b in zip(y, z, strict=True))
+    header = "y,z\n" if scale == 1.0 else "y_mm,z_mm\n"
+    profile = load_profile(written(tmp_path, "wheel.csv", header + rows), "wheel")
+    assert any("its width says" in line for line in profile.notes)
+    assert same_contact(profile, "S1002") < 1.5e-6
+
+
+@pytest.mark.parametrize("inclination", [1 / 20, 1 / 40])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_inclined_rail_is_recognised_and_not_inclined_twice(tmp_path, inclination, side):
+    y, z = RAIL
+    angle = np.arctan(inclination)
+    turned = y * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - y * np.sin(angle)
+    path = written(tmp_path, "rail.csv", csv_mm(side * turned[0], turned[1]))
+    profile = load_profile(path, "rail")
+    assert profile.inclination == pytest.approx(inclination, abs=1e-12)
+    assert any("already inclined" in line for line in profile.notes)
+    assert same_contact(profile, "60E1") < 1.5e-6
+
+
+def test_rail_measured_on_the_gauge_side_only_is_turned_to_it(tmp_path):
+    y, z = RAIL
+    part = (y > -20.0) & (z < 20.0)  # crown and right flank, here the gauge side
+    profile = load_profile(written(tmp_path, "rail.csv", csv_mm(y[part], -z[part])), "rail")
+    assert any("deeper side" in line for line in profile.notes)
+    assert any("taken as upright" in line for line in profile.notes)
+    assert same_contact(profile, "60E1") < 1.5e-6
+
+
+def test_simpack_file_is_processed_in_its_own_order(tmp_path):
+    y, z = WHEEL
+    turned = np.radians(3.0)
+    there = y * np.cos(turned) + z * np.sin(turned), -y * np.sin(turned) + z * np.cos(turned)
+    keys = {
+        "shift.y": -2.0,
+        "shift.z": 1.0,
+        "rotate": 3.0,
+        "units.ang.f": 57.29577951308232,
+        "mirror.y": 1,
+        "inversion": 1,
+    }
+    text = simpack(there[0] + 2.0, there[1] - 1.0, **keys)
+    profile = load_profile(written(tmp_path, "p.prw", text), "wheel")
+    assert any("rotated" in line for line in profile.notes)
+    assert same_contact(profile, "S1002") < 2e-6
+
+
+@pytest.mark.parametrize("noise", [2e-3, 10e-3])
+def test_measuring_noise_is_smoothed_and_the_effect_is_told(tmp_path, noise):
+    rng = np.random.default_rng(3)
+    y, z = WHEEL
+    text = csv_mm(y + noise * rng.normal(size=y.size), z + noise * rng.normal(size=y.size))
+    profile = load_profile(written(tmp_path, "wheel.csv", text), "wheel")
+    note = next(line for line in profile.notes if "smoothed" in line)
+    assert "um rms" in note
+    # a contact angle's noise after smoothing moves the contact by some tenths of a millimetre
+    geometry = contact_geometry(profile, load_profile("60E1"))
+    exact = contact_geometry(load_profile("S1002"), load_profile("60E1"))
+    found = geometry.equivalent_conicity([0.003])[0]
+    assert found == pytest.approx(exact.equivalent_conicity([0.003])[0], abs=0.01)
+
+
+def test_clean_points_are_not_smoothed(tmp_path):
+    profile = load_profile(written(tmp_path, "w.csv", csv_mm(*WHEEL)), "wheel")
+    assert not any("smoothed" in line for line in profile.notes)
+
+
+def refused(tmp_path, text, kind="wheel", name="profile.csv"):
+    path = written(tmp_path, name, text)
+    with pytest.raises(InputError) as caught:
+        load_profile(path, kind)
+    (fault,) = caught.value.faults
+    assert fault.file == path
+    assert fault.allowed, "no remedy"
+    return fault
+
+
+def test_hole_is_refused_with_its_line(tmp_path):
+    y, z = WHEEL
+    keep = (y < 5.0) | (y > 15.0)
+    fault = refused(tmp_path, csv_mm(y[keep], z[keep]))
+    assert "hole of 10" in fault.found
+    assert fault.key == f"line {int(np.argmax(y[keep] > 15.0)) + 1}"
+
+
+def test_vertical_step_is_refused_with_its_line(tmp_path):
+    y, z = WHEEL
+    fault = refused(tmp_path, csv_mm(y, z + 1.5 * (y > 10.0)))
+    assert "vertical step of 1.5" in fault.found
+    assert fault.key == f"line {int(np.argmax(y > 10.0)) + 1}"
+
+
+def test_two_points_are_refused(tmp_path):
+    assert "2 points" in refused(tmp_path, "y_mm,z_mm\n0,0\n100,-3\n").found
+
+
+def test_letters_are_refused_with_their_line(tmp_path):
+    lines = csv_mm(*WHEEL).split("\n")
+    lines[99] = "12.0,abc"
+    fault = refused(tmp_path, "\n".join(lines))
+    assert fault.key == "line 100"
+    assert "abc" in fault.found
+
+
+def test_rail_given_as_wheel_and_wheel_given_as_rail_are_refused(tmp_path):
+    assert "looks like a rail" in refused(tmp_path, csv_mm(*RAIL), "wheel").found
+    assert "like a wheel's flange" in refused(tmp_path, csv_mm(*WHEEL), "rail").found
+    text = simpack(*RAIL, kind="rail")
+    assert "rail profile" in refused(tmp_path, text, "wheel", "x.prr").found
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "0 points"),
+        ("a,b\n1,2\n", "unknown columns"),
+        ("y_mm,z_mm\n1\n", "columns"),
+        ("\x00\x01", "not a text file"),
+    ],
+)
+def test_what_is_no_profile_is_refused(tmp_path, text, words):
+    assert words in refused(tmp_path, text).found
+
+
+def test_unknown_names_suffixes_and_missing_files_are_refused(tmp_path):
+    for name, words in (
+        ("S1003", "did you mean 'S1002'"),
+        ("none.csv", "cannot be read"),
+        ("60E1", "rail profile"),
+        (str(tmp_path), "cannot be read"),
+    ):
+        with pytest.raises(InputError, match=words):
+            load_profile(name, "wheel")
+    with pytest.raises(InputError, match="unknown kind of file"):
+        load_profile(written(tmp_path, "p.xyz", "1 2"), "wheel")
+
+
+def test_profiles_compare_by_their_points():
+    one, other = load_profile("S1002"), load_profile("60E1")
+    assert one == Profile("S1002", "wheel", one.y.copy(), one.z.copy())
+    assert one != other
+    assert hash(one) == hash(Profile("S1002", "wheel", one.y, one.z))
+    with pytest.raises(ValueError, match="read-only"):
+        one.y[0] = 0.0
