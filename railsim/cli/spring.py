@@ -415,7 +415,7 @@ def _verification_lines(result: "Verification") -> list[str]:
     header = [
         "load case",
         "P / kN",
-        "theta / deg",
+        "rotation / deg",
         "dz / mm",
         "K_sys / (N/mm)",
         "rate / (N/mm)",
@@ -428,12 +428,12 @@ def _verification_lines(result: "Verification") -> list[str]:
         [
             case.name,
             f"{case.load * 1e-3:.3f}",
-            f"{math.degrees(case.rotation) + 0.0:.4f}".replace("-0.0000", "0.0000"),
+            _without_minus_zero(f"{math.degrees(case.rotation):.4f}"),
             f"{case.deflection * 1e3:.3f}",
             f"{case.K_sys * 1e-3:.3f}",
             f"{case.rate * 1e-3:.1f}",
             *(f"{float(state.height) * 1e3:.2f}" for state in case.springs.values()),
-            f"{case.lateral('outer') * 1e3:.3f}",
+            _without_minus_zero(f"{float(case.springs['outer'].lateral) * 1e3:.3f}"),
             f"{case.K_L * 1e-3:.2f}",
             f"{case.K_C * 1e-3:.3f}",
         ]
@@ -445,6 +445,10 @@ def _verification_lines(result: "Verification") -> list[str]:
         "",
         *table(["check", "value", "must be", "unit", "met"], checks),
     ]
+
+
+def _without_minus_zero(text: str) -> str:
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def _check_cells(check: "Check") -> list[str]:

@@ -205,7 +205,7 @@ class Search(Definition):
     """Largest stress of the solid spring over the allowable one"""
     buckling_ratio_max: Positive = 0.9
     """Largest deflection over the buckling deflection"""
-    candidates: Annotated[int, Field(strict=True, ge=64, le=2**20)] = 8192
+    candidates: Annotated[int, Field(strict=True, ge=64, le=1_000_000)] = 10_000
     """Number of nests that are tried before the best are refined"""
     results: Annotated[int, Field(strict=True, ge=1, le=100)] = 10
     """Number of nests that are returned"""

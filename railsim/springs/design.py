@@ -151,7 +151,7 @@ def design(suspension: TrailingArmSuspension) -> Design:
     >>> [round(K_V / 9810, 3) for K_V in result.K_V]
     [64.699, 30.748]
     """
-    wanted, frame = _task(suspension)
+    wanted, frame = design_task(suspension)
     gap = suspension.engagement
     K_outer, K_inner, phi = (float(value) for value in stiffnesses(frame, gap, wanted))
     if not (K_outer > 0.0 and K_inner > 0.0):
@@ -179,8 +179,13 @@ def design(suspension: TrailingArmSuspension) -> Design:
     )
 
 
-def _task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
-    """The wanted deflections, and the arm with springs at their mounting deflection."""
+def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
+    """Return the wanted deflections, and the arm with springs at their mounting deflection.
+
+    Raises
+    ------
+    InputError : no target, no inner spring, or deflections that springs or arm cannot reach.
+    """
     target, mounting, inner = suspension.target, suspension.mounting, suspension.inner
     faults = []
     if target is None:

@@ -5,7 +5,7 @@ from the design equations, the numbers of coils from the stiffnesses.  In four s
 
 1. `candidates`: thousands of nests from a Sobol sequence, all evaluated in one call;
 2. the best nest of each pair of wires is bettered by samples around it; the best pairs go to their
-   optimum (SLSQP of scipy, gradients by differences that are evaluated in the same call);
+   optimum (linear programs of scipy, slopes by differences evaluated in the same call);
 3. diameters, height and coils are rounded to what is made, and the nest is verified again *as
    built*, with the deflections that rounding leaves;
 4. ranked by mass or by fatigue margin; `active` names the limits that hold each optimum in place.
@@ -15,12 +15,10 @@ Every limit is a slack, relative and positive when it is kept (`LIMITS` says wha
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import linprog
 from scipy.stats import qmc
 
 from railsim.definitions.spring import Search, TrailingArmSuspension
@@ -54,9 +52,12 @@ LIMITS = {
 }
 ACTIVE = 2e-3  # relative slack below which a limit counts as active at an optimum
 _SEED = 20260
-_ROUNDS, _AROUND, _CLOSER = 12, 48, 0.7  # samples around the best nest of each pair of wires
+_ROUNDS, _AROUND, _CLOSER = 8, 32, 0.65  # samples around the best nest of each pair of wires
 _DIFFERENCE = 1e-7  # of the scaled dimensions: error of the slopes 1e-7 by cut and by round-off
 _MASS = 50.0  # kg: makes the masses of nests numbers of order one
+_PRICE = 10.0  # of a violation, against aims of order one
+_PROGRAMS, _FIRST_BOX, _CONVERGED = 40, 0.03, 1e-6  # linear programs, over the scaled dimensions
+_NEARLY = -2e-3  # slack at which an optimum is good enough to be rounded: rounding decides
 _SPARE = 10  # pairs refined beyond those asked for: some do not survive rounding
 
 
@@ -240,8 +241,10 @@ def _optimum(
 ) -> tuple[Dimensions, tuple[str, ...]] | None:
     """Best mean diameters and free height for one pair of wires, or None where none fit.
 
-    Variables are (D_outer, D_inner, H0) over the size of the space, and a bound t that is made as
-    small as the aims allow: one aim for the mass, two for the springs' inverse margins.
+    Variables are (D_outer, D_inner, H0) over the size of the space.  Sequential linear programming:
+    aims and slacks are linearised, the program is solved within a box that shrinks when the step
+    disappoints (Fletcher and Maza 1989).  As a rule as many limits are active as there are
+    variables, and at such a corner the method converges quadratically.
     """
     d_outer, d_inner = float(sample.d_outer[start]), float(sample.d_inner[start])
     largest, longest = task.limits.outer_diameter_max, task.limits.free_height[1]
@@ -253,65 +256,78 @@ def _optimum(
         ones = np.ones_like(H0)
         return Dimensions(d_outer * ones, d_inner * ones, D_outer, D_inner, H0)
 
-    def values(points: Floats) -> tuple[Floats, Floats, list[str]]:
-        """Aims and slacks of each point, with the limits' names."""
-        found = evaluate(task, at(points))
+    def linearised(x: Floats) -> _Linearised:
+        found = evaluate(task, at(x + neighbours))
         aims = np.stack(_aims(task, found), axis=-1)
         slack = np.stack(list(found.slack.values()), axis=-1)
         # far outside the model's range: finite, and clearly wrong
         aims = np.nan_to_num(aims, nan=1e3, posinf=1e3)
-        return aims, np.clip(np.nan_to_num(slack, nan=-1.0), -10.0, 10.0), list(found.slack)
+        slack = np.clip(np.nan_to_num(slack, nan=-1.0), -10.0, 10.0)
+        slopes = [(block[1:] - block[0]).T / _DIFFERENCE for block in (aims, slack)]
+        return _Linearised(aims[0], slack[0], slopes[0], slopes[1], tuple(found.slack))
 
-    @lru_cache(maxsize=8)
-    def linearised(point: bytes) -> tuple[Floats, Floats]:
-        """Constraints (aims under the bound, slacks) and their slopes; without the bound t."""
-        aims, slack, _ = values(np.frombuffer(point)[:3] + neighbours)
-        block = np.hstack([-aims, slack])
-        slopes = (block[1:] - block[0]).T / _DIFFERENCE
-        bound = np.concatenate([np.ones(aims.shape[1]), np.zeros(slack.shape[1])])
-        return block[0], np.column_stack([slopes, bound])
-
-    def constraints(x: Floats) -> Floats:
-        value, slope = linearised(np.ascontiguousarray(x).tobytes())
-        at_bound: Floats = value + slope[:, 3] * x[3]
-        return at_bound
-
-    def slopes(x: Floats) -> Floats:
-        _, slope = linearised(np.ascontiguousarray(x).tobytes())
-        return slope
-
-    first = np.array([sample.D_outer[start], sample.D_inner[start], sample.H0[start]]) / scale
-    t = float(np.max(values(first[None, :])[0]))
     w_min, w_max = task.limits.spring_index
-    shortest = task.limits.free_height[0]
-    all_above_zero: Any = {"type": "ineq", "fun": constraints, "jac": slopes}
-    solution = minimize(
-        _bound,
-        np.append(first, t),
-        jac=_bound_slope,
-        bounds=[
-            (w_min * d_outer / largest, w_max * d_outer / largest),
-            (w_min * d_inner / largest, w_max * d_inner / largest),
-            (shortest / longest, 1.0),
-            (None, None),
-        ],
-        constraints=all_above_zero,
-        method="SLSQP",
-        options={"maxiter": 40, "ftol": 1e-6},
-    )
-    _, slack, names = values(solution.x[None, :3])
-    if not np.all(slack[0] >= -1e-4):
+    low = np.array([w_min * d_outer, w_min * d_inner, task.limits.free_height[0]]) / scale
+    high = np.array([w_max * d_outer, w_max * d_inner, longest]) / scale
+    x = np.array([sample.D_outer[start], sample.D_inner[start], sample.H0[start]]) / scale
+    here, reach = linearised(x), _FIRST_BOX
+    for _ in range(_PROGRAMS):
+        step, promised = _linear_step(
+            here, np.maximum(low - x, -reach), np.minimum(high - x, reach)
+        )
+        gain = here.merit - promised
+        if gain < _CONVERGED or reach < _CONVERGED:
+            break
+        there = linearised(x + step)
+        kept = (here.merit - there.merit) / gain
+        if kept > 0.1:
+            x, here = x + step, there
+        reach = 1.5 * reach if kept > 0.7 else 0.35 * float(np.max(np.abs(step)))
+    if np.min(here.slack) < _NEARLY:
         return None
-    active = tuple(name for name, value in zip(names, slack[0], strict=True) if value < ACTIVE)
-    return at(solution.x[None, :3]), active
+    active = tuple(
+        name for name, value in zip(here.names, here.slack, strict=True) if value < ACTIVE
+    )
+    return at(x[None, :]), active
 
 
-def _bound(x: Floats) -> float:
-    return float(x[3])
+@dataclass(frozen=True)
+class _Linearised:
+    """Aims and slacks of a nest, their slopes by variable, and the names of the limits."""
+
+    aims: Floats
+    slack: Floats
+    aim_slopes: Floats
+    slack_slopes: Floats
+    names: tuple[str, ...]
+
+    @property
+    def merit(self) -> float:
+        """The worst aim, and the worst violation at a price."""
+        return float(np.max(self.aims) + _PRICE * max(0.0, -np.min(self.slack)))
 
 
-def _bound_slope(x: Floats) -> Floats:
-    return np.array([0.0, 0.0, 0.0, 1.0])
+def _linear_step(here: _Linearised, low: Floats, high: Floats) -> tuple[Floats, float]:
+    """Solve the linearised task in a box: the step, and the merit that it promises.
+
+    Unknowns are the step, the bound t of the aims and the violation v; `min t + price v`.
+    """
+    aims, slacks = len(here.aims), len(here.slack)
+    rows = np.block(
+        [
+            [here.aim_slopes, -np.ones((aims, 1)), np.zeros((aims, 1))],
+            [-here.slack_slopes, np.zeros((slacks, 1)), -np.ones((slacks, 1))],
+        ]
+    )
+    solution = linprog(
+        [0.0, 0.0, 0.0, 1.0, _PRICE],
+        A_ub=rows,
+        b_ub=np.concatenate([-here.aims, here.slack]),
+        bounds=[*zip(low, np.maximum(low, high), strict=True), (None, None), (0.0, None)],
+    )
+    if solution.x is None:
+        return np.zeros(3), here.merit
+    return solution.x[:3], float(solution.fun or 0.0)
 
 
 def _aims(task: Task, found: Evaluation) -> list[Floats]:

@@ -70,8 +70,8 @@ def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
         """Deviation of the height, shape (combination, load), for shares -1 to 1 of the limits."""
         deviation = {name: shares[:, i, None] * limits[name] for i, name in enumerate(names)}
         phi = trailing_arm.rotation(_deviating(suspension, frame, deviation), loads)
-        result: Floats = -frame.length * np.sin(phi) - nominal
-        return result
+        height: Floats = -frame.length * np.sin(phi) - nominal
+        return np.broadcast_to(height, (len(shares), len(loads)))
 
     alone = np.eye(len(names))
     lower, upper = heights(-alone), heights(alone)

@@ -150,7 +150,7 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
 
     Raises
     ------
-    InputError : a wire diameter or a number of coils is missing.
+    InputError : a wire diameter or a number of coils is missing, or a spring is solid unloaded.
     """
     faults = [
         Fault(suspension.name, f"{name}.{key}", "missing", f"needed: {meaning}")
@@ -161,6 +161,18 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
         )
         if value is None
     ]
+    if not faults:
+        faults = [
+            Fault(
+                suspension.name,
+                f"{name}.free_height",
+                f"{suspension.springs[name].free_height * 1e3:.1f} mm, but the spring is solid at "
+                f"{solid * 1e3:.1f} mm",
+                f"raise it, or reduce {name}.active_coils or {name}.wire_diameter",
+            )
+            for name, solid in solid_heights(suspension).items()
+            if solid >= suspension.springs[name].free_height
+        ]
     if faults:
         raise InputError(faults)
     springs = list(suspension.springs.values())
@@ -399,12 +411,15 @@ def _obstacle(
         turned = highest_phi if np.isnan(phi) else phi
         rise, _ = trailing_arm.displacement(frame.length, coil.seat, turned)
         deflection = float(coil.start + rise)
-        for limit, obstacle in (
-            _buckled(suspension, frame, name, coil, given),
-            _solid(frame, name, coil, solid[name], given),
-        ):
-            if deflection >= limit:
-                met.append((limit / float(coil.H0), obstacle))
+        seating = suspension.checks.seating
+        buckling = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, seating))
+        if deflection >= buckling:
+            obstacle = _buckled(name, given, buckling, _load_at(frame, coil, buckling))
+            met.append((buckling / float(coil.H0), obstacle))
+        travel = float(coil.H0) - solid[name]
+        if deflection >= travel:
+            obstacle = _solid(name, given, solid[name], _load_at(frame, coil, travel))
+            met.append((travel / float(coil.H0), obstacle))
     if met:
         return min(met, key=lambda item: item[0])[1]
     if np.isnan(phi):
@@ -416,13 +431,8 @@ def _obstacle(
     return None
 
 
-def _buckled(
-    suspension: TrailingArmSuspension, frame: Arm, name: str, coil: Coil, given: str
-) -> tuple[float, _Obstacle]:
-    seating = suspension.checks.seating
-    limit = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, seating))
-    reached = _load_at(frame, coil, limit) if np.isfinite(limit) else np.inf
-    return limit, _Obstacle(
+def _buckled(name: str, given: str, limit: float, reached: float) -> _Obstacle:
+    return _Obstacle(
         f"{name} buckled",
         f"{given} buckles the {name} spring: it buckles at {limit * 1e3:.1f} mm, under "
         f"{reached * 1e-3:.1f} kN",
@@ -431,12 +441,11 @@ def _buckled(
     )
 
 
-def _solid(frame: Arm, name: str, coil: Coil, solid: float, given: str) -> tuple[float, _Obstacle]:
-    limit = float(coil.H0) - solid
-    return limit, _Obstacle(
+def _solid(name: str, given: str, solid: float, reached: float) -> _Obstacle:
+    return _Obstacle(
         f"{name} solid",
         f"{given} is beyond the solid height of the {name} spring: {solid * 1e3:.1f} mm is "
-        f"reached under {_load_at(frame, coil, limit) * 1e-3:.1f} kN",
+        f"reached under {reached * 1e-3:.1f} kN",
         f"reduce this load, {name}.active_coils or {name}.wire_diameter, or raise "
         f"{name}.free_height",
     )

@@ -8,7 +8,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
 from railsim.kernels.contact_table import LOOK_UP_SIZE, locate, look_up
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.system import AXLEBOX, PRESCRIBED, WHEELSET
+from railsim.kernels.system import AXLEBOX, WHEELSET
 from railsim.kernels.time_loop import time_loop
 from railsim.kernels.track_frame import FRAME_SIZE, track_frame
 from railsim.time_step import SCHEMES, empty_recorder
@@ -48,21 +48,21 @@ def steady(vehicle, track, settings, speed):
     return equilibrium(assemble(vehicle, track, settings), speed)
 
 
-def advance(system, state, h, n_steps, scheme="rk4", driving=PRESCRIBED, model=None):
+def advance(system, state, h, n_steps, scheme="rk4", model=None):
     """State after `n_steps` steps; asserts that the run went through."""
     after = state.copy()
     status, _, steps, _ = time_loop(
         system, work_arrays(system), after, np.zeros_like(state), np.zeros((3, len(state))),
-        empty_recorder(model, 1), SCHEMES[scheme], driving, 0.0, h, 1, n_steps, NEVER,
+        empty_recorder(model, 1), SCHEMES[scheme], h, 1, n_steps, NEVER,
     )
     assert (status, steps) == (0, n_steps)
     return after
 
 
-def evaluate(system, state, driving=PRESCRIBED):
+def evaluate(system, state):
     """Work arrays and derivative of one state."""
     work, derivative = work_arrays(system), np.zeros_like(state)
-    status, *_ = right_hand_side(system, work, state, driving, 0.0, derivative)
+    status, *_ = right_hand_side(system, work, state, derivative)
     assert status == 0
     return work, derivative
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from dynamics import Settings, advance, energy, load_track, load_vehicle, steady, undamped
-from railsim.kernels.system import FREE
 
 FRICTIONLESS = {"friction": (0.0, 0.0)}
+FREE = Settings(contact_damping=0.0, drive={"mode": "free"})
 
 
 def disturbed(model, state):
@@ -27,26 +27,26 @@ def disturbed(model, state):
 def setting(request):
     vehicle = undamped(load_vehicle(request.param))
     track = load_track("straight").replace(**FRICTIONLESS)
-    balance = steady(vehicle, track, Settings(contact_damping=0.0), 20.0)
+    balance = steady(vehicle, track, FREE, 20.0)
     return balance.model, disturbed(balance.model, balance.state)
 
 
-def drift(model, state, h, driving, duration=0.5):
-    after = advance(model.system, state, h, round(duration / h), driving=driving, model=model)
+def drift(model, state, h, duration=0.5):
+    after = advance(model.system, state, h, round(duration / h), model=model)
     return energy(model.system, after) - energy(model.system, state)
 
 
 def test_energy_of_an_undamped_frictionless_coach_is_constant(setting):
     """Exchanged: some 2 kJ.  Left: the step's error and round-off of the 11 MJ total (1e-8)."""
     model, state = setting
-    assert abs(drift(model, state, 0.125e-3, FREE)) < 1.0
+    assert abs(drift(model, state, 0.125e-3)) < 1.0
 
 
 def test_energy_error_falls_with_the_integrators_order(setting):
     """RK4 is of order 4 on smooth forces; p^1.5 at touch-down lowers it, hence 8 and not 16."""
     model, state = setting
-    coarse = abs(drift(model, state, 0.5e-3, FREE))
-    fine = abs(drift(model, state, 0.25e-3, FREE))
+    coarse = abs(drift(model, state, 0.5e-3))
+    fine = abs(drift(model, state, 0.25e-3))
     assert fine < coarse / 8.0
 
 
@@ -54,19 +54,19 @@ def test_energy_is_constant_through_a_curve_when_the_coach_runs_free():
     """On curved and canted track, gravity, frames and gyroscopic terms must balance as well."""
     vehicle = undamped(load_vehicle("coach_manchester"))
     track = load_track("curve_r250").replace(**FRICTIONLESS)
-    balance = steady(vehicle, track, Settings(contact_damping=0.0), 20.0)
+    balance = steady(vehicle, track, FREE, 20.0)
     model = balance.model
     state = disturbed(model, balance.state)
     state[-2] = 285.0
-    assert abs(drift(model, state, 0.125e-3, FREE, duration=2.0)) < 5.0
+    assert abs(drift(model, state, 0.125e-3, duration=2.0)) < 5.0
 
 
 def test_forces_are_gradients_of_the_energy(setting):
     """Power of all forces = rate of kinetic energy: dE/dt = 0 by central difference of E."""
     model, state = setting
     h = 1e-5
-    ahead = advance(model.system, state, h, 1, driving=FREE, model=model)
-    behind = advance(model.system, state, -h, 1, driving=FREE, model=model)
+    ahead = advance(model.system, state, h, 1, model=model)
+    behind = advance(model.system, state, -h, 1, model=model)
     rate = (energy(model.system, ahead) - energy(model.system, behind)) / (2 * h)
     # energies of 1.1e7 J in double precision over 2e-5 s leave 1e-9 * 1.1e7 / 2e-5 = some 1e-1 W
     assert abs(rate) < 2.0

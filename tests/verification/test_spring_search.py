@@ -1,0 +1,148 @@
+"""Search and tolerances: what is returned holds up when it is verified another way."""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.loading import load_spring
+from railsim.errors import InputError
+from railsim.springs.search import LIMITS, search
+from railsim.springs.tolerance import ride_heights
+from railsim.springs.verification import fatigue, verify
+
+WIRES = "[0.022, 0.024, 0.027, 0.028, 0.038, 0.040, 0.041, 0.043]"
+QUICK = ["search.candidates=1024", "search.results=3", f"search.wire_diameters={WIRES}"]
+
+
+@pytest.fixture(scope="module", params=["mass", "fatigue"])
+def found(request):
+    suspension = load_spring("turasas_axlebox", [*QUICK, f"search.objective={request.param}"])
+    return suspension, search(suspension)
+
+
+def built(suspension, nest):
+    """The suspension with the nest of the search in place of its own."""
+    changes = {}
+    for name, spring in (("outer", nest.outer), ("inner", nest.inner)):
+        table = suspension.springs[name].model_dump(exclude_none=True)
+        changes[name] = table | vars(spring)
+    return suspension.replace(**changes)
+
+
+def test_every_nest_meets_all_checks_of_the_verification(found):
+    suspension, result = found
+    assert result.nests
+    for nest in result.nests:
+        verification = verify(built(suspension, nest))
+        assert all(check.ok for check in verification.checks)
+
+
+def test_nests_have_the_stated_margins_and_deflections(found):
+    suspension, result = found
+    for nest in result.nests:
+        own = built(suspension, nest)
+        margins = [spring.margin for spring in fatigue(own).values()]
+        # the same formulas on the same numbers: round-off only
+        assert nest.fatigue_margin == pytest.approx(min(margins), rel=1e-9)
+        verification = verify(own)
+        deflection = float(verification.arm.coils[0].start)
+        wanted = suspension.mounting.deflection
+        assert deflection - wanted == pytest.approx(nest.mounting_error, abs=1e-9)
+        (target,) = [case for case in verification.cases if case.name == "CUM"]
+        error = target.deflection - suspension.target.deflection
+        assert error == pytest.approx(nest.target_error, abs=1e-9)
+        assert abs(error) <= suspension.search.height_error_max
+
+
+def test_nests_keep_to_the_space(found):
+    suspension, result = found
+    limits = suspension.search
+    for nest in result.nests:
+        outer, inner = nest.outer, nest.inner
+        assert outer.mean_diameter + outer.wire_diameter <= limits.outer_diameter_max + 1e-9
+        assert inner.mean_diameter - inner.wire_diameter >= limits.inner_diameter_min - 1e-9
+        wires = outer.wire_diameter + inner.wire_diameter
+        clearance = 0.5 * (outer.mean_diameter - inner.mean_diameter - wires)
+        assert clearance >= limits.clearance_min - 1e-9
+        assert limits.free_height[0] - 1e-9 <= outer.free_height <= limits.free_height[1] + 1e-9
+        assert {outer.wire_diameter, inner.wire_diameter} <= set(limits.wire_diameters)
+
+
+def test_nests_are_ranked_and_name_their_active_limits(found):
+    _, result = found
+    if result.objective == "mass":
+        values = [nest.mass for nest in result.nests]
+    else:
+        values = [-nest.fatigue_margin for nest in result.nests]
+    assert values == sorted(values)
+    for nest in result.nests:
+        # three dimensions are free: an optimum of a smooth aim is held by limits
+        assert nest.active
+        assert set(nest.active) <= set(LIMITS)
+
+
+def test_search_gives_the_same_twice():
+    suspension = load_spring("turasas_axlebox", QUICK)
+    assert search(suspension).nests == search(suspension).nests
+
+
+def test_a_wider_space_never_gives_a_heavier_nest():
+    best = []
+    for widest in (0.255, 0.285):
+        changes = [*QUICK, f"search.outer_diameter_max={widest}"]
+        best.append(search(load_spring("turasas_axlebox", changes)).nests[0].mass)
+    assert best[1] <= best[0] * 1.002  # rounding to whole mm moves the mass by a few tenths %
+
+
+def test_no_nest_names_the_limits_in_the_way():
+    cramped = load_spring("turasas_axlebox", [*QUICK, "search.outer_diameter_max=0.2"])
+    with pytest.raises(InputError) as error:
+        search(cramped)
+    assert 1 <= len(error.value.faults) <= 3
+    for fault in error.value.faults:
+        assert "no nest fits" in fault.found
+        assert fault.allowed
+
+
+def test_height_rises_with_stiffer_and_taller_springs():
+    for result in ride_heights(load_spring("turasas_axlebox")):
+        for name in (
+            "outer.free_height",
+            "outer.wire_diameter",
+            "inner.wire_diameter",
+            "material.G",
+        ):
+            lower, upper = result.single[name]
+            assert lower < 0.0 < upper
+        for name in ("outer.mean_diameter", "outer.active_coils"):
+            lower, upper = result.single[name]
+            assert upper < 0.0 < lower
+
+
+def test_taller_springs_alone_lift_by_their_share_of_the_stiffness():
+    # both springs taller by the same: the frame rises by K_V dH times the lever, over the rate
+    changes = [
+        f"tolerances.{key}=0.0"
+        for key in ("wire_diameter", "mean_diameter", "active_coils", "G", "bush")
+    ]
+    suspension = load_spring("turasas_axlebox", [*changes, "tolerances.free_height=1e-4"])
+    (mounting,) = [r for r in ride_heights(suspension) if r.name == "MOUNTING"]
+    (case,) = [c for c in verify(suspension).cases if c.name == "MOUNTING"]
+    K_V = sum(float(coil.K_V) for coil in verify(suspension).arm.coils)
+    # at the mounting load the arm is horizontal and nothing is sheared: K_V dH / rate, to first
+    # order in dH/H0 (3e-4)
+    assert mounting.highest == pytest.approx(K_V * 1e-4 / case.rate, rel=2e-3)
+    assert mounting.lowest == pytest.approx(-K_V * 1e-4 / case.rate, rel=2e-3)
+
+
+def test_random_range_lies_within_the_worst_case():
+    for result in ride_heights(load_spring("turasas_axlebox")):
+        assert result.lowest < -result.random < 0.0 < result.random < result.highest
+        single = [0.5 * abs(upper - lower) for lower, upper in result.single.values()]
+        assert result.random == pytest.approx(float(np.hypot.reduce(single)), rel=1e-12)
+
+
+def test_no_scatter_no_range():
+    keys = ("wire_diameter", "mean_diameter", "active_coils", "free_height", "G", "bush")
+    exact = load_spring("turasas_axlebox", [f"tolerances.{key}=0.0" for key in keys])
+    for result in ride_heights(exact):
+        assert result.lowest == result.highest == result.random == 0.0
