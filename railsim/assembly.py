@@ -5,7 +5,7 @@ and what the kernels read (arrays with indices).  `Index` keeps the way back.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,31 +13,26 @@ from numpy.typing import NDArray
 
 from railsim.contact.kalker import creep_tables
 from railsim.contact.table import ContactTable, cached_contact_table
-from railsim.definitions.elements import (
-    Bushing,
-    BumpStop,
-    Element,
-    RollBar,
-    ShearSpring,
-    SpringDamper,
-    two_sided,
-)
-from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
+from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
+from railsim.definitions.settings import Drive as DriveDefinition
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.element_arrays import ElementArrays
 from railsim.errors import ModelError
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.system import (
     AXLEBOX,
+    CONSTANT,
+    FREE,
+    N_SCALARS,
     RIGID,
+    TABLE,
     WHEELSET,
     Bodies,
     Contact,
-    Curves,
-    Links,
-    Mounts,
+    Drive,
     System,
     Work,
 )
@@ -105,7 +100,7 @@ class Model:
     @property
     def n_state(self) -> int:
         """Length of the state vector."""
-        return 12 * self.index.n_bodies + self.system.maxwell.shape[0] + 2
+        return 12 * self.index.n_bodies + len(self.system.internal.kind) + N_SCALARS
 
 
 def assemble(
@@ -138,7 +133,7 @@ def assemble(
     flat = flatten(vehicle)
     book = _ProfileBook(dict(profiles or {}))
     contact, tables = _contact(flat, track, settings, book)
-    elements = _Elements({body.name: body for body in flat.bodies}, _names(flat.bodies))
+    elements = ElementArrays({body.name: body for body in flat.bodies})
     for element in flat.elements:
         elements.add(element)
     bodies, offsets = _bodies(flat)
@@ -150,7 +145,9 @@ def assemble(
         links=elements.links(),
         mounts=elements.mounts(),
         curves=elements.curves(),
-        maxwell=np.array(elements.maxwell_rows, dtype=float).reshape(-1, 2),
+        internal=elements.internal(),
+        loads=elements.loads(),
+        drive=drive_arrays(settings.drive),
         gravity=GRAVITY,
     )
     index = Index(
@@ -182,7 +179,7 @@ def work_arrays(system: System) -> Work:
         C=np.zeros((n, 9)),
         rail_force=np.zeros((n, 6)),
         acceleration=np.zeros((n, 6)),
-        maxwell_rate=np.zeros(len(system.maxwell)),
+        drive=np.zeros((len(system.internal.kind), 2)),
         spin_damping=np.zeros(n),
         look_up=np.zeros(LOOK_UP_SIZE),
         rail=np.zeros(4),
@@ -194,7 +191,7 @@ def work_arrays(system: System) -> Work:
 
 
 def level_track(system: System) -> System:
-    """Return the same system on straight, level, smooth and frictionless track."""
+    """Return the same system on straight, level, smooth, frictionless track, no given loads."""
     cells = 4
     length = float(np.ptp(system.frame_offset)) + 100.0
     coefficients = np.zeros((cells, 6, 4))
@@ -204,7 +201,21 @@ def level_track(system: System) -> System:
     start = float(np.min(system.frame_offset)) - length / 2.0
     coefficients[:, 0, 0] += start + length
     track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0)
-    return system._replace(track=track)
+    still = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
+    nothing = system.loads._replace(
+        body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
+    )
+    return system._replace(track=track, drive=still, loads=nothing)
+
+
+def drive_arrays(drive: DriveDefinition) -> Drive:
+    """Arrays of the way the speed goes along the track."""
+    if drive.mode == "table":
+        return Drive(TABLE, np.array(drive.speed_table, dtype=float), np.zeros(3))
+    if drive.mode == "free":
+        traction = drive.traction_table or ((0.0, 0.0),)
+        return Drive(FREE, np.array(traction, dtype=float), np.array(drive.resistance))
+    return Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
 
 
 def _names(bodies: Sequence[FlatBody]) -> list[str]:
@@ -305,167 +316,3 @@ def _contact(
         n_y=settings.fastsim_grid[1],
     )
     return contact, tuple(tables)
-
-
-@dataclass
-class _Elements:
-    """Collects elements row by row until the arrays are made."""
-
-    bodies: Mapping[str, FlatBody]
-    names: Sequence[str]
-    link_rows: list[dict[str, Any]] = field(default_factory=list)
-    mount_rows: list[dict[str, Any]] = field(default_factory=list)
-    maxwell_rows: list[tuple[float, float]] = field(default_factory=list)
-    curve_rows: list[Floats] = field(default_factory=list)
-
-    def add(self, element: FlatElement) -> None:
-        """Append one element to the rows of its group."""
-        definition = element.definition
-        if isinstance(definition, SpringDamper):
-            self._add_link(element, definition)
-        else:
-            self.mount_rows.append(self._mount(element, definition))
-
-    def _add_link(self, element: FlatElement, law: SpringDamper) -> None:
-        point1, point2 = np.array(element.point1), np.array(element.point2)
-        in_series = law.series_stiffness > 0.0
-        preload = 0.0 if law.preload == "auto" else law.preload
-        self.link_rows.append({
-            "name": element.name,
-            "body": self._pair(element),
-            "point": self._levers(element, point1, point2),
-            "length": float(np.linalg.norm(point2 - point1)),
-            "spring": (law.stiffness, 0.0 if in_series else law.damping, preload),
-            "maxwell": self._maxwell(law.damping, law.series_stiffness),
-            "curve": (self._curve(law.spring_table), self._curve(law.damper_table)),
-        })
-
-    def _mount(self, element: FlatElement, law: Element) -> dict[str, Any]:
-        point1, point2 = np.array(element.point1), np.array(element.point2)
-        row: dict[str, Any] = {
-            "name": element.name,
-            "body": self._pair(element),
-            # body 1 reaches rigidly to the point on body 2, where the deflection is measured
-            "point": self._levers(element, point2, point2),
-            "stiffness": (0.0, 0.0, 0.0), "damping": (0.0, 0.0, 0.0), "preload": (0.0, 0.0, 0.0),
-            "rotation": (0.0, 0.0, 0.0), "rotation_damping": (0.0, 0.0, 0.0),
-            "maxwell": (-1, -1, -1), "curve": (-1, -1, -1), "flags": (1, 0, 0),
-        }
-        if isinstance(law, Bushing):
-            pairs = list(zip(law.damping, law.series_stiffness, strict=True))
-            row["stiffness"] = law.stiffness
-            row["damping"] = tuple(c if k_s == 0.0 else 0.0 for c, k_s in pairs)
-            row["maxwell"] = tuple(self._maxwell(c, k_s) for c, k_s in pairs)
-            row["rotation"] = rotation_potential(law.rotational_stiffness)
-            row["rotation_damping"] = law.rotational_damping
-            row["flags"] = (1, 0, int(any(law.rotational_stiffness + law.rotational_damping)))
-            row["preload"] = _given(law.preload)
-        elif isinstance(law, ShearSpring):
-            middle = 0.5 * (point1 + point2)
-            bending = (*law.bending_stiffness, law.torsional_stiffness)
-            row["point"] = self._levers(element, middle, middle)
-            row["stiffness"] = law.stiffness
-            row["damping"] = law.damping
-            row["rotation"] = rotation_potential(bending)
-            row["flags"] = (1, 1, int(any(bending)))
-            row["preload"] = _given(law.preload)
-        elif isinstance(law, RollBar):
-            row["rotation"] = rotation_potential((law.stiffness, 0.0, 0.0))
-            row["rotation_damping"] = (law.damping, 0.0, 0.0)
-            row["flags"] = (0, 0, 1)
-        elif isinstance(law, BumpStop):
-            curve = [-1, -1, -1]
-            curve["xyz".index(law.axis)] = self._curve(law.table)
-            row["curve"] = tuple(curve)
-        else:
-            raise ModelError(f"{element.name}: no force law for '{type(law).__name__}'")
-        return row
-
-    def _pair(self, element: FlatElement) -> tuple[int, int]:
-        return self.names.index(element.body1), self.names.index(element.body2)
-
-    def _levers(self, element: FlatElement, point1: Floats, point2: Floats) -> Floats:
-        centre1 = np.array(self.bodies[element.body1].position)
-        centre2 = np.array(self.bodies[element.body2].position)
-        # an axlebox turns about its axle: its levers count from the wheelset's centre
-        return np.array([point1 - self._centre(element.body1, centre1),
-                         point2 - self._centre(element.body2, centre2)])
-
-    def _centre(self, name: str, own: Floats) -> Floats:
-        parent = self.bodies[name].parent
-        return np.array(self.bodies[parent].position) if parent else own
-
-    def _maxwell(self, damping: float, series_stiffness: float) -> int:
-        if series_stiffness == 0.0 or damping == 0.0:
-            return -1
-        self.maxwell_rows.append((damping, series_stiffness))
-        return len(self.maxwell_rows) - 1
-
-    def _curve(self, table: tuple[tuple[float, float], ...] | None) -> int:
-        if table is None:
-            return -1
-        self.curve_rows.append(np.array(two_sided(table)))
-        return len(self.curve_rows) - 1
-
-    def links(self) -> Links:
-        """Arrays of all point-to-point elements."""
-        rows = self.link_rows
-        return Links(
-            body=_column(rows, "body", (2,), np.int64),
-            point=_column(rows, "point", (2, 3)),
-            length=_column(rows, "length", ()),
-            spring=_column(rows, "spring", (3,)),
-            maxwell=_column(rows, "maxwell", (), np.int64),
-            curve=_column(rows, "curve", (2,), np.int64),
-        )
-
-    def mounts(self) -> Mounts:
-        """Arrays of all three-axis elements."""
-        rows = self.mount_rows
-        floats = ("stiffness", "damping", "preload", "rotation", "rotation_damping")
-        integers = ("maxwell", "curve", "flags")
-        return Mounts(
-            body=_column(rows, "body", (2,), np.int64),
-            point=_column(rows, "point", (2, 3)),
-            **{key: _column(rows, key, (3,)) for key in floats},
-            **{key: _column(rows, key, (3,), np.int64) for key in integers},
-        )
-
-    def curves(self) -> Curves:
-        """All tables, one after the other."""
-        lengths = [len(rows) for rows in self.curve_rows]
-        points = np.concatenate(self.curve_rows) if self.curve_rows else np.zeros((0, 2))
-        return Curves(
-            start=np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-            x=np.ascontiguousarray(points[:, 0]),
-            f=np.ascontiguousarray(points[:, 1]),
-        )
-
-
-def rotation_potential(stiffness: Sequence[float]) -> tuple[float, float, float]:
-    """K_d of U = tr(K_d (1 - R)) that gives the stiffnesses about x, y, z for small angles.
-
-    The moment about axis i is (sum(K_d) - K_d,i) theta_i, hence K_d,i = sum(k)/2 - k_i.
-
-    Parameters
-    ----------
-    stiffness : sequence of 3 floats
-        k_x, k_y, k_z [N m/rad].
-
-    Returns
-    -------
-    tuple of 3 floats
-        K_d [N m]; negative entries are in order.
-    """
-    half = 0.5 * sum(stiffness)
-    return half - stiffness[0], half - stiffness[1], half - stiffness[2]
-
-
-def _given(preload: Any) -> tuple[float, float, float]:
-    return (0.0, 0.0, 0.0) if preload == "auto" else preload
-
-
-def _column(
-    rows: list[dict[str, Any]], key: str, shape: tuple[int, ...], dtype: type = np.float64
-) -> NDArray[Any]:
-    return np.array([row[key] for row in rows], dtype=dtype).reshape(len(rows), *shape)

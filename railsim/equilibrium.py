@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.assembly import Model, level_track, work_arrays
+from railsim.element_arrays import vertical_support
 from railsim.errors import ModelError
+from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
-from railsim.kernels.system import AXLEBOX, PRESCRIBED, RIGID, WHEELSET, Links, Mounts, System
+from railsim.kernels.system import AXLEBOX, RIGID, WHEELSET, Links, Mounts, System
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.kernels.wheel_rail import W_Q
 from railsim.notation import COMPONENTS
@@ -81,7 +83,8 @@ def with_preloads(model: Model) -> Model:
     axlebox, with the preloads given by the user and gravity as loads.
     """
     system = model.system
-    unknowns = _auto_preloads(model)
+    support = _auto_preloads(model)
+    unknowns = list(support)
     conditions = _conditions(system)
     loads = np.array([_load(system, body, component) for body, component in conditions])
     fixed = _preload_forces(system, system.links, system.mounts, conditions)
@@ -91,7 +94,7 @@ def with_preloads(model: Model) -> Model:
         columns.append(_preload_forces(system, links, mounts, conditions))
     matrix = np.array(columns).T.reshape(len(conditions), len(unknowns))
     # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
-    scale = np.sqrt(np.array([_stiffness(system, *unknown) for unknown in unknowns]))
+    scale = np.sqrt(np.array([support[unknown] for unknown in unknowns]))
     right_side = -(loads + fixed)
     scaled, *_ = np.linalg.lstsq(matrix * scale, right_side, rcond=1e-10)
     values = scaled * scale
@@ -109,18 +112,20 @@ def with_preloads(model: Model) -> Model:
     return Model(filled, model.index, model.flat, model.tables, model.profiles)
 
 
-def _auto_preloads(model: Model) -> list[tuple[str, int]]:
-    auto = {e.name for e in model.flat.elements
-            if getattr(e.definition, "preload", None) == "auto"}
-    links = [("links", i) for i, name in enumerate(model.index.links) if name in auto]
-    mounts = [("mounts", i) for i, name in enumerate(model.index.mounts) if name in auto]
-    return [unknown for unknown in links + mounts if _stiffness(model.system, *unknown) > 0.0]
-
-
-def _stiffness(system: System, group: str, element: int) -> float:
-    if group == "links":
-        return float(system.links.spring[element, 0])
-    return float(system.mounts.stiffness[element, 2])
+def _auto_preloads(model: Model) -> dict[tuple[str, int], float]:
+    """Elements whose preload is to be found, with the stiffness by which they share the weight."""
+    auto = {
+        element.name: vertical_support(element.definition)
+        for element in model.flat.elements
+        if getattr(element.definition, "preload", None) == "auto"
+    }
+    groups = {"links": model.index.links, "mounts": model.index.mounts}
+    return {
+        (group, i): auto[name]
+        for group, names in groups.items()
+        for i, name in enumerate(names)
+        if auto.get(name, 0.0) > 0.0
+    }
 
 
 def _conditions(system: System) -> list[tuple[int, int]]:
@@ -240,6 +245,9 @@ class _Balance:
                 # the unknown of a wheelset's spin is its rate, of all others the position
                 self._unknowns.append((6 * n if spin else 0) + 6 * body + component)
                 self._equations.append(6 * n + 6 * body + component)
+        for i in np.flatnonzero(system.internal.kind == AIR):
+            self._unknowns.append(12 * n + int(i))
+            self._equations.append(12 * n + int(i))
 
     def solve(self, guess: Floats) -> Floats:
         """Return the balanced state; raise ModelError with the unbalanced components."""
@@ -268,9 +276,7 @@ class _Balance:
             state[6 * n + 6 * body + 4] = -self.speed / bodies.radius[body]
 
     def _accelerations(self, state: Floats) -> Floats:
-        status, where, _ = right_hand_side(
-            self.system, self.work, state, PRESCRIBED, 0.0, self._derivative
-        )
+        status, where, _ = right_hand_side(self.system, self.work, state, self._derivative)
         if status != RUNNING:
             sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
             raise ModelError(f"no static equilibrium: {sentence}")
@@ -305,6 +311,8 @@ class _Balance:
         worst = np.argsort(-np.abs(rest))[:5]
         parts = []
         for k in worst:
+            if self._equations[k] >= 12 * n:
+                continue
             body, component = divmod(self._equations[k] - 6 * n, 6)
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")

@@ -33,7 +33,8 @@ class Fault:
 
     def __str__(self) -> str:
         place = f"{self.file}: {self.key}" if self.key else self.file
-        return f"{place}: {self.found}; {self.allowed}" if self.allowed else f"{place}: {self.found}"
+        remedy = f"; {self.allowed}" if self.allowed else ""
+        return f"{place}: {self.found}{remedy}"
 
 
 class RailsimError(Exception):

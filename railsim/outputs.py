@@ -38,7 +38,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     loaded = np.where(Q > 0.0, Q, np.nan)
     places = model.system.frame_offset[model.system.bodies.frame[axles]]
     return {
-        "time": recorder.time[:rows],
+        "time": state[:, -3],
         "distance": state[:, -2],
         "Q": Q,
         "Y": Y,

@@ -22,8 +22,7 @@ from railsim.equilibrium import Equilibrium, equilibrium, initial_state
 from railsim.errors import Fault, InputError, ModelError, nearest
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
-from railsim.kernels.system import PRESCRIBED
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import record_state, time_loop
 from railsim.outputs import quantities
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
@@ -46,31 +45,33 @@ class Preparation:
         The assembled vehicle on its track; its rest and steady rolling.
     state : float64[n_state]
         Initial state.
-    step, every : float, int
-        Time step [s]; steps per output.
-    n_steps : int
-        Steps of the whole run.
+    end_time, end_distance : float
+        Where the run ends, whichever comes first [s], [m].
+    pace : Pace
+        Step and output interval at any speed.
     """
 
     model: Model
     balance: Equilibrium
     state: Floats
-    step: float
-    every: int
-    n_steps: int
+    end_time: float
+    end_distance: float
+    pace: "Pace"
 
 
 def simulate(
     vehicle: Vehicle,
     track: Track,
     *,
-    speed: float,
+    speed: float | None = None,
+    start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
     settings: Settings | None = None,
     sink: Sink | None = None,
     progress: Progress | None = None,
     profiles: Mapping[str, Profile] | None = None,
+    resume: Result | None = None,
 ) -> Result:
     """Run one vehicle over one track.
 
@@ -79,10 +80,13 @@ def simulate(
     vehicle, track : Vehicle, Track
         Definitions, see `load_vehicle`, `load_track`.
     speed : float
-        Constant speed of the reference body [m/s].
+        Speed of the reference body [m/s]: constant, or at the start of a free run; not needed
+        where the settings have a speed table or with `resume`.
+    start : float
+        Arc length at which the reference body starts [m].
     duration, until : float, optional
-        End of the run: time [s] or arc length of the reference body [m]; by default the end of the
-        track's plan.
+        End of the run: time from its start [s] or arc length of the reference body [m]; by default
+        the end of the track's plan.
     settings : Settings, optional
         How the run is computed.
     sink : Sink, optional
@@ -91,6 +95,8 @@ def simulate(
         Called with the finished fraction now and then.
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
+    resume : Result, optional
+        A result of the same vehicle, track and settings whose end is the beginning of this run.
 
     Returns
     -------
@@ -115,14 +121,20 @@ def simulate(
     """
     started = time.perf_counter()
     settings = settings or Settings()
-    length = run_length(track, speed, duration, until)
-    prepared = prepare(vehicle, track, settings, speed, length, profiles)
+    if resume is not None:
+        speed, start = float(resume.groups["state"]["state"][-1]), resume_place(resume)
+    speed = initial_speed(settings, speed, start)
+    check_range(track, speed, start, duration, until)
+    prepared = prepare(vehicle, track, settings, speed, start, duration, until, profiles)
+    if resume is not None:
+        take_up(prepared, resume, duration)
     sink = sink or MemorySink()
     sink.begin({
         "wheelset": prepared.model.index.wheelsets, "body": prepared.model.index.bodies,
     })
-    status, where, steps, cpu_time = _loop(prepared, settings, sink, progress)
-    simulated = steps * prepared.step
+    begin_time = float(prepared.state[-3])
+    status, where, state, cpu_time = _loop(prepared, settings, sink, progress)
+    simulated = float(state[-3]) - begin_time
     attributes = {
         "status": STATUS[status][0],
         "status_reason": _sentence(prepared.model, status, where),
@@ -130,44 +142,55 @@ def simulate(
         "track_toml": track.to_toml(),
         "settings_json": json.dumps(settings.model_dump(mode="json")),
         "speed": float(speed),
-        "duration": length / speed,
-        "step": prepared.step,
+        "start": float(start),
+        "duration": simulated,
+        "step": prepared.pace.smallest,
         "scheme": settings.scheme,
         "wall_time": time.perf_counter() - started,
         "cpu_time": cpu_time,
         "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
     }
-    return sink.close(attributes, {"Q0": prepared.balance.Q0}, prepared.model.profiles)
+    groups = {
+        "profiles": {
+            name: np.column_stack([p.y, p.z]) for name, p in prepared.model.profiles.items()
+        },
+        "state": {"state": state},
+    }
+    return sink.close(attributes, {"Q0": prepared.balance.Q0}, groups)
 
 
-def run_length(
-    track: Track, speed: float, duration: float | None, until: float | None
-) -> float:
-    """Arc length to run [m] from speed and either end; all faults at once."""
+def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
+    """Speed at the start: as given, or from the settings' speed table [m/s]."""
+    if settings.drive.speed_table is not None:
+        place, value = np.array(settings.drive.speed_table).T
+        return float(np.interp(start, place, value))
+    if speed is None:
+        raise InputError([Fault("--speed", "", "no speed is given", "a speed in m/s, e.g. 20")])
+    return speed
+
+
+def check_range(
+    track: Track, speed: float, start: float, duration: float | None, until: float | None
+) -> None:
+    """Raise InputError with all faults of speed, start and end of a run."""
     faults = []
     low, high = SPEED_RANGE
     if not (math.isfinite(speed) and low <= speed <= high):
         faults.append(Fault("--speed", "", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s"))
+    if not (math.isfinite(start) and 0.0 <= start < track.length):
+        faults.append(Fault("--start", "", f"found {start:g} m", f"0 to {track.length:g} m"))
     for option, value in (("--duration", duration), ("--until", until)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             faults.append(Fault(option, "", f"found {value:g}", "a positive number"))
     if duration is not None and until is not None:
         faults.append(Fault("--duration", "", "given together with --until", "one of the two"))
-    if not faults and (length := _end(track, speed, duration, until)) > track.length:
+    if until is not None and not start < until <= track.length:
         faults.append(Fault(
-            "--duration" if duration else "--until", "",
-            f"the run would end at s = {length:g} m",
-            f"at most {track.length:g} m, the end of the track's plan",
+            "--until", "", f"found {until:g} m",
+            f"more than the start, {start:g} m, and at most {track.length:g} m, the track's plan",
         ))
     if faults:
         raise InputError(faults)
-    return _end(track, speed, duration, until)
-
-
-def _end(track: Track, speed: float, duration: float | None, until: float | None) -> float:
-    if duration is not None:
-        return duration * speed
-    return track.length if until is None else until
 
 
 def prepare(
@@ -175,28 +198,83 @@ def prepare(
     track: Track,
     settings: Settings,
     speed: float,
-    length: float,
+    start: float = 0.0,
+    duration: float | None = None,
+    until: float | None = None,
     profiles: Mapping[str, Profile] | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles), speed)
     model = balance.model
-    interval = output_interval(settings, speed)
-    state = _start(model, balance, settings)
-    if settings.step is None:
-        level = level_track(model.system)
-        step = choose_step(model, level, balance.state, settings.scheme, interval)
-        every = round(interval / step)
-    else:
-        every = max(1, round(interval / settings.step))
-        step = settings.step
-        if abs(every * step - interval) > 1e-9 * interval:
+    pace = Pace(model, settings, {speed: balance.state})
+    pace.at(speed)
+    return Preparation(
+        model, balance, _start(model, balance, settings, start),
+        end_time=math.inf if duration is None else duration,
+        end_distance=track.length if until is None else until,
+        pace=pace,
+    )
+
+
+def resume_place(resume: Result) -> float:
+    """Arc length at which a result ended [m]."""
+    return float(resume.groups["state"]["state"][-2])
+
+
+def take_up(prepared: Preparation, resume: Result, duration: float | None) -> None:
+    """Let a prepared run begin where `resume` ended."""
+    state = resume.groups["state"]["state"]
+    if len(state) != len(prepared.state):
+        raise InputError([Fault(
+            "--continue", "", "the result is of another vehicle", "the same vehicle and track",
+        )])
+    prepared.state = np.array(state)
+    if duration is not None:
+        prepared.end_time = float(state[-3]) + duration
+
+
+class Pace:
+    """Step and output interval of a run, chosen once for each class of speeds.
+
+    Creep forces stiffen as 1/V: the step of a class is that of its lowest speed.
+    """
+
+    CLASS = 1.2  # ratio of a class's speeds
+
+    def __init__(self, model: Model, settings: Settings, states: dict[float, Floats]) -> None:
+        self._model = model
+        self._settings = settings
+        self._known: dict[tuple[float, float], float] = {}
+        self._states = states
+        self.varies = settings.drive.mode != "constant"
+        self.smallest = math.inf
+
+    def at(self, speed: float) -> tuple[float, int]:
+        """Step [s] at `speed` and number of steps to the next output."""
+        interval = output_interval(self._settings, speed)
+        key = speed
+        if self.varies:
+            key = self.CLASS ** math.floor(math.log(speed, self.CLASS))
+        longest = self._known.get((key, 0.0)) or self._choose(key, interval)
+        self._known[key, 0.0] = longest
+        every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
+        self.smallest = min(self.smallest, interval / every)
+        return interval / every, every
+
+    def _choose(self, speed: float, interval: float) -> float:
+        given = self._settings.step
+        if given is None:
+            state = self._states.get(speed)
+            if state is None:
+                state = equilibrium(self._model, speed).state
+            level = level_track(self._model.system)
+            return choose_step(self._model, level, state, self._settings.scheme, interval)
+        if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
             raise InputError([Fault(
-                "settings", "step", f"found {step:g} s",
+                "settings", "step", f"found {given:g} s",
                 f"a whole part of the output interval {interval:g} s",
             )])
-    n_steps = math.ceil(length / speed / step * (1.0 - 1e-12))
-    return Preparation(model, balance, state, step, every, n_steps)
+        return given
 
 
 def output_interval(settings: Settings, speed: float) -> float:
@@ -206,14 +284,14 @@ def output_interval(settings: Settings, speed: float) -> float:
     return 1.0 / settings.output_rate
 
 
-def _start(model: Model, balance: Equilibrium, settings: Settings) -> Floats:
-    """Initial state: steady rolling at s = 0 with the disturbances of the settings."""
+def _start(model: Model, balance: Equilibrium, settings: Settings, start: float) -> Floats:
+    """Initial state: steady rolling at `start` with the disturbances of the settings."""
     work = work_arrays(model.system)
     bodies = model.system.bodies
     if locate_frames(model.system.track, model.system.frame_offset, bodies.frame[bodies.reference],
-                     0.0, work.frames, work.cell, work.cell_u) != RUNNING:
+                     start, work.frames, work.cell, work.cell_u) != RUNNING:
         raise ModelError("the vehicle is longer than the track's table allows")
-    state = initial_state(model, balance, 0.0, work.frames)
+    state = initial_state(model, balance, start, work.frames)
     n = model.index.n_bodies
     for name, change in settings.initial.items():
         if name not in model.index.bodies:
@@ -233,31 +311,41 @@ def _start(model: Model, balance: Equilibrium, settings: Settings) -> Floats:
 
 def _loop(
     prepared: Preparation, settings: Settings, sink: Sink, progress: Progress | None
-) -> tuple[int, int, int, float]:
-    """Run the time loop chunk by chunk: status, where, steps taken, CPU seconds."""
+) -> tuple[int, int, Floats, float]:
+    """Run the time loop chunk by chunk: status, where, last state, CPU seconds."""
     model = prepared.model
     work = work_arrays(model.system)
     state = prepared.state.copy()
     derivative = np.zeros_like(state)
     stages = np.zeros((3, len(state)))
     recorder = empty_recorder(model, ROWS)
-    chunk = ROWS * prepared.every
-    done, status, where, cpu_time = 0, RUNNING, 0, 0.0
-    # one step more than the run is long, so that its end is recorded
-    total = prepared.n_steps + 1
-    while done < total and status == RUNNING:
+    scheme = SCHEMES[settings.scheme]
+    status, where, cpu_time, every = RUNNING, 0, 0.0, 1
+    whole = _left(prepared, prepared.state)
+    while status == RUNNING and (left := _left(prepared, state)) > 1e-9:
+        step, every = prepared.pace.at(state[-1])
+        intervals = 1 if prepared.pace.varies else ROWS
+        n_steps = min(intervals * every, math.ceil(left / step * (1.0 - 1e-9)))
         begin = time.process_time()
         status, where, steps, rows = time_loop(
-            model.system, work, state, derivative, stages, recorder, SCHEMES[settings.scheme],
-            PRESCRIBED, 0.0, prepared.step, done, min(chunk, total - done), prepared.every,
+            model.system, work, state, derivative, stages, recorder, scheme, step, 0, n_steps,
+            every,
         )
         cpu_time += time.process_time() - begin
-        done += steps
         if rows:
             sink.append(quantities(model, recorder, rows, prepared.balance.Q0))
         if progress is not None:
-            progress(min(1.0, done / total))
-    return status, where, done, cpu_time
+            progress(min(1.0, 1.0 - _left(prepared, state) / whole))
+    if status == RUNNING and steps % every == 0:
+        status, where = record_state(model.system, work, state, derivative, recorder)
+        sink.append(quantities(model, recorder, 1, prepared.balance.Q0))
+    return status, where, state, cpu_time
+
+
+def _left(prepared: Preparation, state: Floats) -> float:
+    """Time to the end of the run at the present speed [s]."""
+    by_distance = (prepared.end_distance - state[-2]) / state[-1]
+    return float(min(prepared.end_time - state[-3], by_distance))
 
 
 def _sentence(model: Model, status: int, where: int) -> str:

@@ -12,7 +12,7 @@ from railsim.assembly import Model, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import PRESCRIBED, System
+from railsim.kernels.system import N_SCALARS, System
 from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
 from railsim.kernels.wheel_rail import WHEEL_COLUMNS
 
@@ -31,7 +31,6 @@ def empty_recorder(model: Model, rows: int) -> Recorder:
     n = model.index.n_bodies
     wheelsets = len(model.index.wheelsets)
     return Recorder(
-        time=np.zeros(rows),
         state=np.zeros((rows, model.n_state)),
         rates=np.zeros((rows, 6 * n)),
         acceleration=np.zeros((rows, n, 6)),
@@ -79,7 +78,7 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
     derivative = np.zeros_like(state)
 
     def rate(trial: Floats) -> Floats:
-        status, _, _ = right_hand_side(system, work, trial, PRESCRIBED, 0.0, derivative)
+        status, _, _ = right_hand_side(system, work, trial, derivative)
         if status != RUNNING:
             raise ModelError("the state of steady rolling lies outside the contact table")
         return derivative.copy()
@@ -96,8 +95,8 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
 
     def step(trial: Floats) -> Floats:
         after = trial.copy()
-        time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme], PRESCRIBED,
-                  0.0, h, 1, 1, _NEVER)
+        time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme], h, 1, 1,
+                  _NEVER)
         return after
 
     radius = np.max(np.abs(np.linalg.eigvals(_jacobian(step, state))))
@@ -107,7 +106,7 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
 def _jacobian(function, state: Floats) -> Floats:  # type: ignore[no-untyped-def]
     """Jacobian by forward differences; the place along the track and the speed stay as they are."""
     base = function(state)
-    size = len(state) - 2
+    size = len(state) - N_SCALARS
     columns = np.empty((size, size))
     for k in range(size):
         trial = state.copy()

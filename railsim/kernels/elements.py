@@ -12,29 +12,18 @@ energy exactly:
   k_i theta_i for small angles.
 
 Rates are those of d itself, v_2 - v_1 - omega_1 x (P_2 - P_1), so that a damper's power is
-force times rate.  A damper with a series stiffness k_s is a Maxwell element, F' = k_s (v - F/c)
-(Maxwell 1867); its force is an internal state.
+force times rate.  Dampers with a series stiffness, friction pads and air springs have internal
+states (see `internal`).
 """
 
 from math import sqrt
 
 from railsim.kernels import jit
+from railsim.kernels.internal import AIR, PAD, curve_value
 
 
 @jit
-def curve_value(curves, index, x):
-    """Piecewise linear table, continued linearly beyond its ends."""
-    first = curves.start[index]
-    last = curves.start[index + 1] - 2
-    i = first
-    while i < last and x > curves.x[i + 1]:
-        i += 1
-    slope = (curves.f[i + 1] - curves.f[i]) / (curves.x[i + 1] - curves.x[i])
-    return curves.f[i] + slope * (x - curves.x[i])
-
-
-@jit
-def link_forces(links, curves, maxwell_force, maxwell_rate, R, X, V, W, F, M):
+def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all point-to-point elements to `F`, `M`."""
     for e in range(links.body.shape[0]):
         i, j = links.body[e, 0], links.body[e, 1]
@@ -58,10 +47,10 @@ def link_forces(links, curves, maxwell_force, maxwell_rate, R, X, V, W, F, M):
         )
         elongation = length - links.length[e]
         force = (links.spring[e, 2] + links.spring[e, 0] * elongation + links.spring[e, 1] * rate)
-        m = links.maxwell[e]
+        m = links.internal[e]
         if m >= 0:
-            force += maxwell_force[m]
-            maxwell_rate[m] = rate
+            force += inner[m]
+            drive[m, 0] = rate
         if links.curve[e, 0] >= 0:
             force += curve_value(curves, links.curve[e, 0], elongation)
         if links.curve[e, 1] >= 0:
@@ -82,7 +71,28 @@ def link_forces(links, curves, maxwell_force, maxwell_rate, R, X, V, W, F, M):
 
 
 @jit
-def translation_force(mounts, curves, e, i, j, p, scale, maxwell_force, maxwell_rate,
+def axis_force(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
+    """Force along axis `k` of mount `e` at deflection `d` and its rate; `normal` loads a pad."""
+    force = mounts.preload[e, k] + mounts.stiffness[e, k] * d + mounts.damping[e, k] * rate
+    if mounts.curve[e, k] >= 0:
+        force += curve_value(curves, mounts.curve[e, k], d)
+    m = mounts.internal[e, k]
+    if m >= 0:
+        if internal.kind[m] == PAD:
+            limit = mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * abs(normal)
+            drive[m, 0], drive[m, 1] = rate, limit
+            force += min(limit, max(-limit, inner[m]))
+        elif internal.kind[m] == AIR:
+            drive[m, 0] = d
+            force += internal.parameter[m, 0] * (d - inner[m])
+        else:
+            drive[m, 0] = rate
+            force += inner[m]
+    return force
+
+
+@jit
+def translation_force(mounts, internal, curves, e, i, j, p, scale, inner, drive,
                       R, X, V, W, F, M):
     """Force of a mount in the axes of body `i` (its point `p` first), at the point of body `j`.
 
@@ -98,29 +108,28 @@ def translation_force(mounts, curves, e, i, j, p, scale, maxwell_force, maxwell_
     bz = R[j, 6] * px + R[j, 7] * py + R[j, 8] * pz
     # lever of the point of body j from the centre of body i
     lx, ly, lz = X[j, 0] - X[i, 0] + bx, X[j, 1] - X[i, 1] + by, X[j, 2] - X[i, 2] + bz
-    gx, gy, gz = lx - ax, ly - ay, lz - az
-    vx = V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * lz + W[i, 2] * ly
-    vy = V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * lx + W[i, 0] * lz
-    vz = V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ly + W[i, 1] * lx
-    fx = 0.0
-    fy = 0.0
-    fz = 0.0
-    # seen from body j the deflection is -d: preload and odd tables keep their sign through `sign`
+    # seen from body 2 the deflection is -d: preload and odd tables keep their sign through `sign`
     sign = 1.0 if p == 0 else -1.0
-    for k in range(3):
-        d = sign * (R[i, k] * gx + R[i, 3 + k] * gy + R[i, 6 + k] * gz)
-        rate = sign * (R[i, k] * vx + R[i, 3 + k] * vy + R[i, 6 + k] * vz)
-        force = mounts.preload[e, k] + mounts.stiffness[e, k] * d + mounts.damping[e, k] * rate
-        m = mounts.maxwell[e, k]
-        if m >= 0:
-            force += maxwell_force[m]
-            maxwell_rate[m] = rate
-        if mounts.curve[e, k] >= 0:
-            force += curve_value(curves, mounts.curve[e, k], d)
-        force *= scale * sign
-        fx += R[i, k] * force
-        fy += R[i, 3 + k] * force
-        fz += R[i, 6 + k] * force
+    gx, gy, gz = sign * (lx - ax), sign * (ly - ay), sign * (lz - az)
+    vx = sign * (V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * lz + W[i, 2] * ly)
+    vy = sign * (V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * lx + W[i, 0] * lz)
+    vz = sign * (V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ly + W[i, 1] * lx)
+    dx = R[i, 0] * gx + R[i, 3] * gy + R[i, 6] * gz
+    dy = R[i, 1] * gx + R[i, 4] * gy + R[i, 7] * gz
+    dz = R[i, 2] * gx + R[i, 5] * gy + R[i, 8] * gz
+    rx = R[i, 0] * vx + R[i, 3] * vy + R[i, 6] * vz
+    ry = R[i, 1] * vx + R[i, 4] * vy + R[i, 7] * vz
+    rz = R[i, 2] * vx + R[i, 5] * vy + R[i, 8] * vz
+    normal = 0.0
+    if mounts.flags[e, 3]:
+        normal = mounts.preload[e, 2] + mounts.stiffness[e, 2] * dz
+    share = scale * sign
+    tx = share * axis_force(mounts, internal, curves, e, 0, dx, rx, normal, inner, drive)
+    ty = share * axis_force(mounts, internal, curves, e, 1, dy, ry, normal, inner, drive)
+    tz = share * axis_force(mounts, internal, curves, e, 2, dz, rz, normal, inner, drive)
+    fx = R[i, 0] * tx + R[i, 1] * ty + R[i, 2] * tz
+    fy = R[i, 3] * tx + R[i, 4] * ty + R[i, 5] * tz
+    fz = R[i, 6] * tx + R[i, 7] * ty + R[i, 8] * tz
     F[i, 0] += fx
     F[i, 1] += fy
     F[i, 2] += fz
@@ -166,16 +175,70 @@ def rotation_moment(mounts, e, i, j, R, W, M):
 
 
 @jit
-def mount_forces(mounts, curves, maxwell_force, maxwell_rate, R, X, V, W, F, M):
+def mount_forces(mounts, internal, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all three-axis elements to `F`, `M`."""
     for e in range(mounts.body.shape[0]):
         i, j = mounts.body[e, 0], mounts.body[e, 1]
         if mounts.flags[e, 0]:
             both = mounts.flags[e, 1]
-            translation_force(mounts, curves, e, i, j, 0, 0.5 if both else 1.0, maxwell_force,
-                              maxwell_rate, R, X, V, W, F, M)
+            translation_force(mounts, internal, curves, e, i, j, 0, 0.5 if both else 1.0, inner,
+                              drive, R, X, V, W, F, M)
             if both:
-                translation_force(mounts, curves, e, j, i, 1, 0.5, maxwell_force, maxwell_rate,
+                translation_force(mounts, internal, curves, e, j, i, 1, 0.5, inner, drive,
                                   R, X, V, W, F, M)
         if mounts.flags[e, 2]:
             rotation_moment(mounts, e, i, j, R, W, M)
+
+
+@jit
+def load_component(table, first, last, time, k):
+    """Component `k` of a load at `time`: linear between its rows, constant beyond them."""
+    if time <= table[first, 0]:
+        return table[first, k]
+    i = first
+    while i < last - 1 and time > table[i + 1, 0]:
+        i += 1
+    if i == last - 1:
+        return table[i, k]
+    share = (time - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
+    return table[i, k] + share * (table[i + 1, k] - table[i, k])
+
+
+@jit
+def load_forces(loads, time, bodies, frames, R, F, M):
+    """Add the given forces and torques at `time` to `F`, `M`."""
+    for e in range(loads.body.shape[0]):
+        b = loads.body[e]
+        first, last = loads.start[e], loads.start[e + 1]
+        c1 = load_component(loads.table, first, last, time, 1)
+        c2 = load_component(loads.table, first, last, time, 2)
+        c3 = load_component(loads.table, first, last, time, 3)
+        in_track = loads.flags[e, 1]
+        f = bodies.frame[b]
+        x, y, z = 0.0, 0.0, 0.0
+        for k in range(3):
+            a1 = frames[f, 3 + k * 3] if in_track else R[b, 3 * k]
+            a2 = frames[f, 4 + k * 3] if in_track else R[b, 3 * k + 1]
+            a3 = frames[f, 5 + k * 3] if in_track else R[b, 3 * k + 2]
+            value = a1 * c1 + a2 * c2 + a3 * c3
+            if k == 0:
+                x = value
+            elif k == 1:
+                y = value
+            else:
+                z = value
+        if loads.flags[e, 0]:
+            M[b, 0] += x
+            M[b, 1] += y
+            M[b, 2] += z
+            continue
+        p1, p2, p3 = loads.point[e, 0], loads.point[e, 1], loads.point[e, 2]
+        lx = R[b, 0] * p1 + R[b, 1] * p2 + R[b, 2] * p3
+        ly = R[b, 3] * p1 + R[b, 4] * p2 + R[b, 5] * p3
+        lz = R[b, 6] * p1 + R[b, 7] * p2 + R[b, 8] * p3
+        F[b, 0] += x
+        F[b, 1] += y
+        F[b, 2] += z
+        M[b, 0] += ly * z - lz * y
+        M[b, 1] += lz * x - lx * z
+        M[b, 2] += lx * y - ly * x

@@ -21,7 +21,8 @@ from . import jit
 CONVERGED = 0
 NOT_CONVERGED = 1
 _MAX_TURN = 0.7  # largest turn of a traction's direction in one iteration [rad]
-_MAX_RETURNS = 3  # a cell may go back from slip to stick so often; then it stays in slip
+_SETTLED = 15  # most cases need 5 to 11 iterations; after this many, cells that still
+_MAX_RETURNS = 2  # go to and fro are kept in stick at their next return but one
 
 
 @jit
@@ -201,7 +202,9 @@ def rolling_traction(
     A cell either sticks (no slip at its point in `middle`) or slides (traction at the bound,
     along the slip at its centre).  Each iteration solves the linearised equations of both sets,
     then moves cells whose traction exceeds the bound to the sliding ones and those whose slip
-    opposes the traction to the sticking ones.
+    opposes the traction to the sticking ones.  A few cells at the border may satisfy neither (the
+    two conditions are asked for at points half a cell apart) and would go to and fro: in the
+    end they are kept in stick, and their traction is cut back to the bound.
 
     Parameters
     ----------
@@ -260,18 +263,30 @@ def rolling_traction(
         for i in range(n):
             if sticks[i] == 1:
                 size = math.sqrt(p[0, i] * p[0, i] + p[1, i] * p[1, i])
-                if size > bound[i] * (1.0 + 1e-9):
+                if size > bound[i] * (1.0 + 1e-9) and returns[i] < _MAX_RETURNS:
                     sticks[i] = 0
                     p[0, i] *= bound[i] / size
                     p[1, i] *= bound[i] / size
                     moved += 1
-            elif p[0, i] * slip[0, i] + p[1, i] * slip[1, i] < 0.0 and returns[i] < _MAX_RETURNS:
+            elif p[0, i] * slip[0, i] + p[1, i] * slip[1, i] < 0.0:
                 sticks[i] = 1
-                returns[i] += 1
+                returns[i] += 1 if count > _SETTLED else 0
                 moved += 1
         if moved == 0 and largest < tolerance:
+            _cut_back(p, bound)
             return CONVERGED, count
         if moved > 0:
             _slips(middle, p, rigid_middle, slip_middle)
             _slips(centre, p, rigid_centre, slip)
+    _cut_back(p, bound)
     return NOT_CONVERGED, iterations
+
+
+@jit
+def _cut_back(p, bound):
+    """Shorten tractions that exceed the bound."""
+    for i in range(bound.size):
+        size = math.sqrt(p[0, i] * p[0, i] + p[1, i] * p[1, i])
+        if size > bound[i]:
+            p[0, i] *= bound[i] / size
+            p[1, i] *= bound[i] / size

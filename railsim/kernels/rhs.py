@@ -24,11 +24,14 @@ Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 from math import cos, sin
 
 from railsim.kernels import jit
-from railsim.kernels.elements import link_forces, mount_forces
-from railsim.kernels.status import END_OF_TRACK, RUNNING
-from railsim.kernels.system import AXLEBOX, FREE, WHEELSET
+from railsim.kernels.elements import link_forces, load_forces, mount_forces
+from railsim.kernels.internal import internal_rate
+from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
+from railsim.kernels.system import AXLEBOX, FREE, TABLE, WHEELSET
 from railsim.kernels.track_frame import GRAVITY, OMEGA, OMEGA_S, track_frame
 from railsim.kernels.wheel_rail import wheel_rail
+
+STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
 @jit
@@ -241,34 +244,80 @@ def dynamics(bodies, frames, speed, gravity, state, C, R, F, M, rail_force, rate
 
 
 @jit
-def apply_speed_change(bodies, frames, state, driving, speed_rate, derivative):
-    """Subtract V' (e_x + omega x r) from all bodies; in free running find V' first.  Return V'."""
-    n = bodies.kind.shape[0]
-    if driving == FREE:
+def table_value_slope(table, x):
+    """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
+    last = table.shape[0] - 1
+    if x < table[0, 0] or last == 0:
+        return table[0, 1], 0.0
+    if x >= table[last, 0]:
+        return table[last, 1], 0.0
+    i = 0
+    while x >= table[i + 1, 0]:
+        i += 1
+    slope = (table[i + 1, 1] - table[i, 1]) / (table[i + 1, 0] - table[i, 0])
+    return table[i, 1] + slope * (x - table[i, 0]), slope
+
+
+@jit
+def add_traction(drive, bodies, frames, speed, F):
+    """Traction less running resistance of a free-running vehicle, on the reference body."""
+    force, _ = table_value_slope(drive.table, speed)
+    force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
+    b = bodies.reference
+    f = bodies.frame[b]
+    for k in range(3):
+        F[b, k] += force * frames[f, 3 + 3 * k]
+
+
+@jit
+def speed_change(drive, bodies, frames, state, derivative):
+    """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
+    if drive.mode == TABLE:
+        # V(s) gives V' = V dV/ds
+        _, slope = table_value_slope(drive.table, state[-2])
+        return state[-1] * slope
+    if drive.mode == FREE:
         b = bodies.reference
         f = bodies.frame[b]
         y = state[6 * b + 1] + bodies.nominal[b, 0]
         z = state[6 * b + 2] + bodies.nominal[b, 1]
-        speed_rate = derivative[6 * n + 6 * b] / (
+        return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
             1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y)
-    if speed_rate != 0.0:
-        for b in range(n):
-            if bodies.kind[b] == AXLEBOX:
-                continue
-            f = bodies.frame[b]
-            w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
-            x = state[6 * b]
-            y = state[6 * b + 1] + bodies.nominal[b, 0]
-            z = state[6 * b + 2] + bodies.nominal[b, 1]
-            v = 6 * n + 6 * b
-            derivative[v] -= speed_rate * (1.0 + w2 * z - w3 * y)
-            derivative[v + 1] -= speed_rate * (w3 * x - w1 * z)
-            derivative[v + 2] -= speed_rate * (w1 * y - w2 * x)
-    return speed_rate
+    return 0.0
 
 
 @jit
-def right_hand_side(system, work, state, driving, speed_rate, derivative):
+def apply_speed_change(bodies, frames, state, rate, derivative):
+    """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
+    n = bodies.kind.shape[0]
+    for b in range(n):
+        if bodies.kind[b] == AXLEBOX:
+            continue
+        f = bodies.frame[b]
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        x = state[6 * b]
+        y = state[6 * b + 1] + bodies.nominal[b, 0]
+        z = state[6 * b + 2] + bodies.nominal[b, 1]
+        v = 6 * n + 6 * b
+        derivative[v] -= rate * (1.0 + w2 * z - w3 * y)
+        derivative[v + 1] -= rate * (w3 * x - w1 * z)
+        derivative[v + 2] -= rate * (w1 * y - w2 * x)
+
+
+@jit
+def hold_reference(bodies, C, acceleration, derivative):
+    """Keep the reference body's x; the force that holds it is part of its acceleration."""
+    n = bodies.kind.shape[0]
+    b = bodies.reference
+    held = 6 * n + 6 * b
+    for i in range(3):
+        acceleration[b, i] -= derivative[held] * C[b, i]
+    derivative[6 * b] = 0.0
+    derivative[held] = 0.0
+
+
+@jit
+def right_hand_side(system, work, state, derivative):
     """Derivative of the whole state.
 
     Parameters
@@ -276,10 +325,6 @@ def right_hand_side(system, work, state, driving, speed_rate, derivative):
     system : System;  work : Work
     state, derivative : float64[n_state]
         See `railsim.kernels.system`.
-    driving : int
-        PRESCRIBED: the speed changes by `speed_rate`; FREE: as the forces have it.
-    speed_rate : float
-        V' [m/s2], with PRESCRIBED.
 
     Returns
     -------
@@ -287,7 +332,9 @@ def right_hand_side(system, work, state, driving, speed_rate, derivative):
     """
     bodies = system.bodies
     n = bodies.kind.shape[0]
-    s, speed = state[-2], state[-1]
+    time, s, speed = state[-3], state[-2], state[-1]
+    if not speed > STANDSTILL_SPEED:
+        return STANDSTILL, 0, 0
     status = locate_frames(system.track, system.frame_offset, bodies.frame[bodies.reference],
                            s, work.frames, work.cell, work.cell_u)
     if status != RUNNING:
@@ -296,28 +343,29 @@ def right_hand_side(system, work, state, driving, speed_rate, derivative):
                work.acceleration)
     work.F[:, :] = 0.0
     work.M[:, :] = 0.0
-    m = system.maxwell.shape[0]
-    force = state[12 * n:12 * n + m]
-    link_forces(system.links, system.curves, force, work.maxwell_rate, work.R, work.X, work.V,
-                work.W, work.F, work.M)
-    mount_forces(system.mounts, system.curves, force, work.maxwell_rate, work.R, work.X, work.V,
-                 work.W, work.F, work.M)
+    m = system.internal.kind.shape[0]
+    inner = state[12 * n:12 * n + m]
+    link_forces(system.links, system.curves, inner, work.drive, work.R, work.X, work.V, work.W,
+                work.F, work.M)
+    mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.R, work.X,
+                 work.V, work.W, work.F, work.M)
+    if system.loads.body.shape[0] > 0:
+        load_forces(system.loads, time, bodies, work.frames, work.R, work.F, work.M)
+    if system.drive.mode == FREE:
+        add_traction(system.drive, bodies, work.frames, speed, work.F)
     status, where, n_patches = wheel_rail(system, work, speed, state)
     if status != RUNNING:
         return status, where, n_patches
     dynamics(bodies, work.frames, speed, system.gravity, state, work.C, work.R, work.F, work.M,
              work.rail_force, work.acceleration, derivative)
-    derivative[-1] = apply_speed_change(bodies, work.frames, state, driving, speed_rate,
-                                        derivative)
+    rate = speed_change(system.drive, bodies, work.frames, state, derivative)
+    if rate != 0.0:
+        apply_speed_change(bodies, work.frames, state, rate, derivative)
+    hold_reference(bodies, work.C, work.acceleration, derivative)
+    derivative[-3] = 1.0
     derivative[-2] = speed
-    # the force that holds the reference body's x is part of its absolute acceleration
-    held = 6 * bodies.reference
-    for i in range(3):
-        work.acceleration[bodies.reference, i] -= (derivative[6 * n + held]
-                                                   * work.C[bodies.reference, i])
-    derivative[held] = 0.0
-    derivative[6 * n + held] = 0.0
+    derivative[-1] = rate
     for i in range(m):
-        c, k_s = system.maxwell[i, 0], system.maxwell[i, 1]
-        derivative[12 * n + i] = k_s * (work.maxwell_rate[i] - force[i] / c)
+        derivative[12 * n + i] = internal_rate(system.internal, system.curves, i, inner[i],
+                                               work.drive[i, 0], work.drive[i, 1])
     return RUNNING, 0, n_patches

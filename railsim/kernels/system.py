@@ -6,8 +6,8 @@ State vector (float64[n_state]), for n bodies and m internal element states:
                   gravity relative to its nominal place, in the axes of its own track frame (m, rad)
     6n .. 12n     velocities: x', y', z' in the axes of the track frame (m/s), then the absolute
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
-    12n .. 12n+m  internal states of elements: forces of Maxwell dampers (N), and so on
-    -2, -1        arc length s of the reference body's frame (m), speed V = s' (m/s)
+    12n .. 12n+m  internal states of elements, see `internal`
+    -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
 (here the pitch rate relative to the wheelset's axes) are used.
@@ -17,13 +17,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from railsim.kernels.internal import Internal
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
 RIGID, WHEELSET, AXLEBOX = range(3)
 
 # ways of driving
-PRESCRIBED, FREE = range(2)
+CONSTANT, TABLE, FREE = range(3)
+N_SCALARS = 3  # t, s, V at the end of the state
 
 
 class Bodies(NamedTuple):
@@ -91,7 +93,7 @@ class Links(NamedTuple):
     point : float64[e, 2, 3]  attachment points in body axes from the centre of gravity [m]
     length : float64[e]       nominal length [m]
     spring : float64[e, 3]    stiffness [N/m], parallel damping [N s/m], preload [N]
-    maxwell : int64[e]        internal state of a damper with series stiffness, else -1
+    internal : int64[e]       internal state, else -1
     curve : int64[e, 2]       tables of force over elongation and over its rate, else -1
     """
 
@@ -99,7 +101,7 @@ class Links(NamedTuple):
     point: np.ndarray
     length: np.ndarray
     spring: np.ndarray
-    maxwell: np.ndarray
+    internal: np.ndarray
     curve: np.ndarray
 
 
@@ -113,9 +115,12 @@ class Mounts(NamedTuple):
     stiffness, damping, preload : float64[e, 3]   [N/m], [N s/m], [N]
     rotation : float64[e, 3]     K_d of the rotational potential tr(K_d (1 - R)) [N m]
     rotation_damping : float64[e, 3]   [N m s]
-    maxwell : int64[e, 3]        internal states, else -1
+    friction : float64[e, 3, 2]  limit of a friction pad: constant [N], share of the vertical
+                                 spring force [1]
+    internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
-    flags : int64[e, 3]          1 if: translational part, both-ended axes (shear), rotational part
+    flags : int64[e, 4]          1 if: translational part, both-ended axes (shear), rotational part,
+                                 friction pads
     """
 
     body: np.ndarray
@@ -125,7 +130,8 @@ class Mounts(NamedTuple):
     preload: np.ndarray
     rotation: np.ndarray
     rotation_damping: np.ndarray
-    maxwell: np.ndarray
+    friction: np.ndarray
+    internal: np.ndarray
     curve: np.ndarray
     flags: np.ndarray
 
@@ -144,13 +150,46 @@ class Curves(NamedTuple):
     f: np.ndarray
 
 
+class Loads(NamedTuple):
+    """Given forces and torques over time.
+
+    Attributes
+    ----------
+    body : int64[l]
+    point : float64[l, 3]    where a force acts, body axes [m]
+    flags : int64[l, 2]      1 if: torque, axes of the track
+    start : int64[l + 1]     first row of each load
+    table : float64[..., 4]  time [s], three components [N or N m]; linear, constant beyond
+    """
+
+    body: np.ndarray
+    point: np.ndarray
+    flags: np.ndarray
+    start: np.ndarray
+    table: np.ndarray
+
+
+class Drive(NamedTuple):
+    """How the speed goes along the track.
+
+    Attributes
+    ----------
+    mode : int                CONSTANT, TABLE or FREE
+    table : float64[k, 2]     TABLE: arc length [m], speed [m/s]; FREE: speed [m/s], traction [N]
+    resistance : float64[3]   FREE: a + b V + c V^2 on the reference body [N, N s/m, N s2/m2]
+    """
+
+    mode: int
+    table: np.ndarray
+    resistance: np.ndarray
+
+
 class System(NamedTuple):
     """Everything the time loop reads.
 
     Attributes
     ----------
     frame_offset : float64[f]     arc length of each frame relative to the reference [m]
-    maxwell : float64[m, 2]       damping [N s/m] and series stiffness [N/m] of each Maxwell state
     """
 
     bodies: Bodies
@@ -160,7 +199,9 @@ class System(NamedTuple):
     links: Links
     mounts: Mounts
     curves: Curves
-    maxwell: np.ndarray
+    internal: Internal
+    loads: Loads
+    drive: Drive
     gravity: float
 
 
@@ -177,7 +218,7 @@ class Work(NamedTuple):
     C : float64[n, 9]       attitude relative to the track frame
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
-    maxwell_rate : float64[m]   velocity that drives each Maxwell state [m/s]
+    drive : float64[m, 2]       what drives each internal state, and its limit
     spin_damping : float64[n]   estimate of -d(u_2')/d(u_2) of each wheelset [1/s]
     patch_* : per active patch, see `wheel_rail`
     """
@@ -195,7 +236,7 @@ class Work(NamedTuple):
     C: np.ndarray
     rail_force: np.ndarray
     acceleration: np.ndarray
-    maxwell_rate: np.ndarray
+    drive: np.ndarray
     spin_damping: np.ndarray
     look_up: np.ndarray
     rail: np.ndarray

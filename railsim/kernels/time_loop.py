@@ -1,23 +1,22 @@
 """The time loop: integrators and recording, one compiled call per chunk of steps.
 
 `fast`: semi-implicit (symplectic) Euler; velocities first, positions with the new velocities.
-Forces of Maxwell dampers are integrated exactly over the step for a constant velocity,
-F <- F e^(-h/tau) + c (1 - e^(-h/tau)) v, tau = c/k_s, so that their short time constants do not
-limit the step; the spin of each wheelset is taken linearly implicit (its creep force is the
-stiffest mode of the vehicle), which changes no other mode.
+Internal states of elements are advanced exactly for a constant drive (see `internal`), so that
+their short time constants do not limit the step; the spin of each wheelset is taken linearly
+implicit (its creep force is the stiffest mode of the vehicle), which changes no other mode.
 
 `rk4`: the classical Runge-Kutta method of order four on the whole state; the reference.
 """
 
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
 
 from railsim.kernels import jit
-from railsim.kernels.rhs import euler_rates, right_hand_side
+from railsim.kernels.internal import PAD, advanced, constant_decays
+from railsim.kernels.rhs import euler_rates, right_hand_side, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING
-from railsim.kernels.system import AXLEBOX, WHEELSET
+from railsim.kernels.system import AXLEBOX, TABLE, WHEELSET
 
 FAST, RK4 = range(2)
 
@@ -27,14 +26,12 @@ class Recorder(NamedTuple):
 
     Attributes
     ----------
-    time : float64[r]                 [s]
     state : float64[r, n_state]
     rates : float64[r, 6 n]           rates of the coordinates
     acceleration : float64[r, n, 6]   absolute, in body axes
     wheel : float64[r, w, 2, 8]       see `wheel_rail`
     """
 
-    time: np.ndarray
     state: np.ndarray
     rates: np.ndarray
     acceleration: np.ndarray
@@ -42,10 +39,9 @@ class Recorder(NamedTuple):
 
 
 @jit
-def record(recorder, row, time, state, derivative, work):
+def record(recorder, row, state, derivative, work):
     """Copy the state and the by-products of its evaluation into row `row`."""
     n_coordinates = recorder.rates.shape[1]
-    recorder.time[row] = time
     recorder.state[row, :] = state
     recorder.rates[row, :] = derivative[:n_coordinates]
     recorder.acceleration[row, :, :] = work.acceleration
@@ -78,16 +74,34 @@ def step_fast(system, work, state, derivative, decay, h):
         state[q + 3] += h * (derivative[q + 3] + r1)
         state[q + 4] += h * (derivative[q + 4] + r2)
         state[q + 5] += h * (derivative[q + 5] + r3)
-    for i in range(system.maxwell.shape[0]):
+    for i in range(system.internal.kind.shape[0]):
         k = 12 * n + i
-        c = system.maxwell[i, 0]
-        state[k] = state[k] * decay[i] + c * (1.0 - decay[i]) * work.maxwell_rate[i]
-    state[-1] += h * derivative[-1]
-    state[-2] += h * state[-1]
+        state[k] = advanced(system.internal, system.curves, i, state[k], work.drive[i, 0],
+                            work.drive[i, 1], h, decay[i])
+    advance_place(system.drive, state, derivative, h)
 
 
 @jit
-def step_rk4(system, work, state, derivative, stages, driving, speed_rate, h):
+def advance_place(drive, state, derivative, h):
+    """Time, place and speed after a step; a speed table is met exactly."""
+    state[-1] += h * derivative[-1]
+    state[-2] += h * state[-1]
+    state[-3] += h
+    if drive.mode == TABLE:
+        state[-1], _ = table_value_slope(drive.table, state[-2])
+
+
+@jit
+def settle_pads(internal, first, drive, state):
+    """Bring the forces of friction pads back within their limits."""
+    for i in range(internal.kind.shape[0]):
+        if internal.kind[i] == PAD:
+            k = first + i
+            state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
+
+
+@jit
+def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total = stages[0]
     trial = stages[1]
@@ -98,7 +112,7 @@ def step_rk4(system, work, state, derivative, stages, driving, speed_rate, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = right_hand_side(system, work, trial, driving, speed_rate, rate)
+        status, where, _ = right_hand_side(system, work, trial, rate)
         if status != RUNNING:
             return status, where
         weight = 2.0 if stage < 3 else 1.0
@@ -106,6 +120,7 @@ def step_rk4(system, work, state, derivative, stages, driving, speed_rate, h):
             total[k] += weight * rate[k]
     for k in range(state.shape[0]):
         state[k] += h / 6.0 * total[k]
+    settle_pads(system.internal, 12 * system.bodies.kind.shape[0], work.drive, state)
     return RUNNING, 0
 
 
@@ -119,8 +134,8 @@ def all_finite(state):
 
 
 @jit
-def time_loop(system, work, state, derivative, stages, recorder, scheme, driving, speed_rate, h,
-              first_step, n_steps, every):
+def time_loop(system, work, state, derivative, stages, recorder, scheme, h, first_step, n_steps,
+              every):
     """Advance by `n_steps` steps of length `h` [s], recording every `every`-th state.
 
     Parameters
@@ -130,29 +145,27 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, driving
     derivative : float64[n_state];  stages : float64[3, n_state]
         Work arrays.
     first_step : int
-        Number of steps already taken: time is `first_step` h at the beginning.
+        Number of steps already taken; states are recorded where the count is a multiple of
+        `every`, before the step.
 
     Returns
     -------
     status, where, steps, rows : int
         Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
     """
-    n_maxwell = system.maxwell.shape[0]
-    decay = np.empty(n_maxwell)
-    for i in range(n_maxwell):
-        decay[i] = exp(-h * system.maxwell[i, 1] / system.maxwell[i, 0])
+    decay = np.empty(system.internal.kind.shape[0])
+    constant_decays(system.internal, system.curves, h, decay)
     rows = 0
     for step in range(first_step, first_step + n_steps):
-        status, where, _ = right_hand_side(system, work, state, driving, speed_rate, derivative)
+        status, where, _ = right_hand_side(system, work, state, derivative)
         if status == RUNNING:
             if step % every == 0:
-                record(recorder, rows, step * h, state, derivative, work)
+                record(recorder, rows, state, derivative, work)
                 rows += 1
             if scheme == FAST:
                 step_fast(system, work, state, derivative, decay, h)
             else:
-                status, where = step_rk4(system, work, state, derivative, stages, driving,
-                                         speed_rate, h)
+                status, where = step_rk4(system, work, state, derivative, stages, h)
         if status != RUNNING or step % every == 0:
             bad = all_finite(state)
             if bad >= 0:
@@ -160,3 +173,12 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, driving
         if status != RUNNING:
             return status, where, step - first_step, rows
     return RUNNING, 0, n_steps, rows
+
+
+@jit
+def record_state(system, work, state, derivative, recorder):
+    """Evaluate and record a state without a step: the end of a run.  Status and wheelset."""
+    status, where, _ = right_hand_side(system, work, state, derivative)
+    if status == RUNNING:
+        record(recorder, 0, state, derivative, work)
+    return status, where

@@ -135,8 +135,9 @@ def rail_state(track, cell, u, side, out):
     if track.has_irregularity:
         for k in range(2):
             row = 2 * side + k
-            out[k] = c[cell, row, 0] + u * (c[cell, row, 1] + u * (c[cell, row, 2] + u * c[cell, row, 3]))
-            out[2 + k] = c[cell, row, 1] + u * (2.0 * c[cell, row, 2] + u * 3.0 * c[cell, row, 3])
+            c1, c2, c3 = c[cell, row, 1], c[cell, row, 2], c[cell, row, 3]
+            out[k] = c[cell, row, 0] + u * (c1 + u * (c2 + u * c3))
+            out[2 + k] = c1 + u * (2.0 * c2 + u * 3.0 * c3)
     else:
         for k in range(4):
             out[k] = 0.0
