@@ -46,6 +46,8 @@ class Result:
         Facts about the run, the root attributes of the result file.
     profiles : mapping of str to Profile
         Every wheel and rail profile that was used, by its name in the vehicle or track.
+    groups : mapping of str to mapping of str to ndarray
+        Further arrays by group, such as the state at the end in ``state``.
 
     Examples
     --------
@@ -67,6 +69,7 @@ class Result:
         coordinates: Mapping[str, Any],
         attributes: Attributes,
         profiles: Mapping[str, Profile] = MappingProxyType({}),
+        groups: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
     ) -> None:
         self._arrays = arrays if isinstance(arrays, FrozenArrays) else FrozenArrays(arrays)
         self._quantities = MappingProxyType(dict(quantities))
@@ -75,6 +78,9 @@ class Result:
         )
         self._attributes = MappingProxyType(dict(attributes))
         self._profiles = MappingProxyType(dict(profiles))
+        self._groups = MappingProxyType(
+            {group: FrozenArrays(arrays) for group, arrays in groups.items()}
+        )
         # read when they are first asked for
         self._vehicle: Vehicle | None = None
         self._track: Track | None = None
@@ -107,7 +113,7 @@ class Result:
         return f"<Result: {self.status}, {steps} instants, {len(self._arrays)} quantities>"
 
     def _names(self) -> tuple[str, ...]:
-        return (*self._arrays, "attributes", "coordinates", "quantities", "profiles")
+        return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
 
     def series(self, name: str, **labels: str | int) -> Array:
         """Return one quantity at named places along its dimensions.
@@ -172,6 +178,11 @@ class Result:
     def profiles(self) -> Mapping[str, Profile]:
         """Wheel and rail profiles that were used, by their names in the vehicle or track."""
         return self._profiles
+
+    @property
+    def groups(self) -> Mapping[str, Mapping[str, Array]]:
+        """Further arrays by group, such as the state at the end in ``state``."""
+        return self._groups
 
     @property
     def status(self) -> str:

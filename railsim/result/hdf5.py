@@ -3,7 +3,8 @@
 Layout: one dataset a quantity at the root, with dimension scales attached and the attributes
 ``units``, ``long_name`` and ``comment`` (the sign convention); names of wheelsets, sides, bodies
 and components are dimension scales themselves; facts about the run are root attributes; the
-group ``profiles`` holds the points of every profile that was used.
+group ``profiles`` holds the points of every profile that was used, further groups hold arrays
+without dimensions of their own, such as the state at the end.
 
 Names are stored as fixed-length UTF-8 with the attribute ``_Encoding``: h5py, MATLAB's h5read and
 HDFView read them as they are, and xarray decodes them.  Attributes are variable-length UTF-8
@@ -108,6 +109,7 @@ class Hdf5Sink(SinkContext):
         attributes: Attributes,
         statics: Mapping[str, Any] = NOTHING,
         profiles: Mapping[str, Profile] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`; the file now has its name."""
         for name, quantity in self._quantities.items():
@@ -116,6 +118,9 @@ class Hdf5Sink(SinkContext):
                 _describe(dataset, quantity)
         for name, profile in profiles.items():
             _write_profile(self._file, name, profile)
+        for group, arrays in groups.items():
+            for name, array in arrays.items():
+                self._file.create_dataset(f"{group}/{name}", data=frozen(array))
         self._file.attrs.update(root_attributes(self._attributes, attributes))
         self._file.close()
         os.replace(self._partial, self.path)
@@ -140,7 +145,7 @@ def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
         statics = {
             name: result[name] for name in result if "time" not in result.quantities[name].dims
         }
-        sink.close(result.attributes, statics, result.profiles)
+        sink.close(result.attributes, statics, result.profiles, result.groups)
     return sink.path
 
 
@@ -200,15 +205,18 @@ def _read(file: h5py.File, path: Path) -> Result:
     quantities: dict[str, Quantity] = {}
     coordinates: dict[str, tuple[str, ...]] = {}
     profiles: dict[str, Profile] = {}
+    groups: dict[str, Mapping[str, Array]] = {}
     for name, member in file.items():
-        if isinstance(member, h5py.Group):
+        if isinstance(member, h5py.Group) and name != "profiles":
+            groups[name] = {key: array[()] for key, array in member.items()}
+        elif isinstance(member, h5py.Group):
             profiles |= {unquote(key): _profile(dataset) for key, dataset in member.items()}
         elif h5py.check_string_dtype(member.dtype):
             coordinates[name] = tuple(member.asstr()[()])
         else:
             quantities[name] = _quantity(name, member)
     return Result(
-        StoredArrays(path, quantities), quantities, coordinates, dict(file.attrs), profiles
+        StoredArrays(path, quantities), quantities, coordinates, dict(file.attrs), profiles, groups
     )
 
 

@@ -54,6 +54,7 @@ class Sink(Protocol):
         attributes: Attributes,
         statics: Mapping[str, Any] = NOTHING,
         profiles: Mapping[str, Profile] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """End the run and return its result.
 
@@ -66,6 +67,8 @@ class Sink(Protocol):
             The quantities without time.
         profiles : mapping of str to Profile
             Every profile that was used, by its name in the vehicle or track.
+        groups : mapping of str to mapping of str to ndarray
+            Further arrays, such as the state at the end in the group ``state``.
         """
 
     def abort(self) -> None:
@@ -123,6 +126,7 @@ class MemorySink(SinkContext):
         attributes: Attributes,
         statics: Mapping[str, Any] = NOTHING,
         profiles: Mapping[str, Profile] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`."""
         arrays = {
@@ -136,6 +140,7 @@ class MemorySink(SinkContext):
             self._coordinates,
             root_attributes(self._attributes, attributes),
             profiles,
+            groups,
         )
 
     def _shape(self, name: str) -> tuple[int, ...]:

@@ -107,6 +107,16 @@ def test_profiles_keep_names_that_are_paths(tmp_path):
     assert list(open_result(tmp_path / "run.h5").profiles) == ["../wheels/worn é.csv"]
 
 
+def test_further_groups_survive_the_file(tmp_path):
+    with Hdf5Sink(tmp_path / "run.h5") as sink:
+        sink.begin(COORDINATES, [QUANTITIES["time"]])
+        sink.append({"time": np.zeros(1)})
+        result = sink.close({"status": "complete"}, groups={"state": {"state": np.arange(5.0)}})
+    again = open_result(result.to_hdf5(tmp_path / "again.h5"))
+    np.testing.assert_array_equal(again.groups["state"]["state"], np.arange(5.0))
+    assert dict(again.profiles) == {}
+
+
 def test_further_quantities_come_with_their_own_dimensions(tmp_path):
     force = Quantity(
         "element_force", "force of the element", "F", "N", ("time", "element"), "kN", 1e-3
