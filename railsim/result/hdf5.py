@@ -38,6 +38,7 @@ from railsim.result.sinks import (
 )
 
 CHUNK_BYTES = 2**18
+ROWS_AT_ONCE = 512
 
 
 class Hdf5Sink(SinkContext):
@@ -75,6 +76,7 @@ class Hdf5Sink(SinkContext):
         self._attributes = dict(attributes)
         self._partial = partial_path(self.path, os.getpid())
         self._quantities: dict[str, Quantity] = {}
+        self._waiting: list[dict[str, Array]] = []
         self._length = 0
         try:
             self._file = h5py.File(self._partial, "w", track_order=True)
@@ -96,13 +98,21 @@ class Hdf5Sink(SinkContext):
                 _create(self._file, quantity, inner)
 
     def append(self, chunk: Mapping[str, Array]) -> None:
-        """See `Sink.append`."""
-        length = self._length + len(chunk["time"])
+        """See `Sink.append`; small chunks wait until they are worth writing."""
+        self._waiting.append({name: np.array(chunk[name]) for name in timed(self._quantities)})
+        if sum(len(waiting["time"]) for waiting in self._waiting) >= ROWS_AT_ONCE:
+            self._write_waiting()
+
+    def _write_waiting(self) -> None:
+        if not self._waiting:
+            return
+        length = self._length + sum(len(waiting["time"]) for waiting in self._waiting)
         for name in timed(self._quantities):
             dataset = self._file[name]
             dataset.resize(length, axis=0)
-            dataset[self._length :] = chunk[name]
+            dataset[self._length :] = np.concatenate([waiting[name] for waiting in self._waiting])
         self._length = length
+        self._waiting = []
 
     def close(
         self,
@@ -112,6 +122,7 @@ class Hdf5Sink(SinkContext):
         groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`; the file now has its name."""
+        self._write_waiting()
         for name, quantity in self._quantities.items():
             if "time" not in quantity.dims:
                 dataset = self._file.create_dataset(name, data=frozen(statics[name]))
