@@ -25,10 +25,14 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE")
 @click.argument("track", metavar="TRACK")
-@click.option("--speed", type=float, required=True, metavar="V", help="Speed in m/s.")
+@click.option("--speed", type=float, metavar="V", help="Speed in m/s.")
 @click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
-@click.option("--duration", type=float, metavar="T", help="End of the run in s.")
+@click.option("--start", type=float, default=0.0, metavar="S", help="Start in m along the track.")
+@click.option("--duration", type=float, metavar="T", help="Length of the run in s.")
 @click.option("--until", type=float, metavar="S", help="End of the run in m along the track.")
+@click.option(
+    "--continue", "before", metavar="R.h5", help="Begin where this result of the same inputs ended."
+)
 @click.option("--settings", metavar="F", help="Settings file.")
 @set_option
 @overwrite_option
@@ -38,10 +42,12 @@ if TYPE_CHECKING:
 def command(
     vehicle: str,
     track: str,
-    speed: float,
+    speed: float | None,
     out: str | None,
+    start: float,
     duration: float | None,
     until: float | None,
+    before: str | None,
     settings: str | None,
     assignments: tuple[str, ...],
     overwrite: bool,
@@ -53,6 +59,7 @@ def command(
 
     VEHICLE and TRACK are files or names of shipped ones.  The run ends with the track unless
     --duration or --until says otherwise.  Paths of --set begin with vehicle., track. or settings.
+    The speed is not needed with --continue, or where the settings have a speed table.
 
     \b
     Example:
@@ -61,34 +68,27 @@ def command(
     """
     from railsim.cli import DONE, ENDED_EARLY
     from railsim.definitions.layout import track_remarks
-    from railsim.studies.case import run_name
     from railsim.studies.run import run_case
 
-    path = Path(out or f"{run_name(vehicle, track, speed)}.h5")
-    picture = path.with_suffix(".png") if plots else None
-    case = _checked_case(
-        (vehicle, track, speed),
-        {
-            "settings": settings,
-            "duration": duration,
-            "until": until,
-            "assignments": assignments,
-        },
-        [path, *([picture] if picture else [])],
-        overwrite,
-    )
+    how = {"settings": settings, "duration": duration, "until": until, "assignments": assignments}
+    resume = _opened(before) if before else None
+    if resume:
+        speed, how["start"] = _end_of(resume)
+    else:
+        how["start"] = start
+    case, path = _checked((vehicle, track, speed), how, out, plots, overwrite)
     if not quiet:
         for remark in track_remarks(case.track):
             click.echo(f"{track}: {remark}", err=True)
     if not (quiet or as_json):
         click.echo("\n".join(_assumption_lines(case)))
     with progress_bar(case.name, quiet=quiet) as progress:
-        result = run_case(case, path, overwrite=overwrite, progress=progress)
-    if picture:
+        result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
+    if plots:
         from railsim.plot.histories import histories
         from railsim.plot.style import save
 
-        save(histories(result), picture, overwrite=overwrite)
+        save(histories(result), path.with_suffix(".png"), overwrite=overwrite)
     if as_json:
         print_json({"file": str(path), **result_record(result)})
     else:
@@ -96,10 +96,33 @@ def command(
     return DONE if result.status == "complete" else ENDED_EARLY
 
 
-def _checked_case(
-    what: tuple[str, str, float], how: dict[str, Any], paths: list[Path], overwrite: bool
-) -> "Case":
-    """Load the case; everything that is wrong in it or with the output at once."""
+def _opened(before: str) -> "Result":
+    from railsim.errors import Fault, InputError
+    from railsim.result import open_result
+
+    result = open_result(before)
+    if "state" not in result.groups:
+        raise InputError(
+            [Fault("--continue", "", f"{before} holds no state", "run it again first")]
+        )
+    return result
+
+
+def _end_of(result: "Result") -> tuple[float, float]:
+    """Return speed and place at the end of a result [m/s], [m]."""
+    from railsim.simulation import resume_place
+
+    return float(result.groups["state"]["state"][-1]), resume_place(result)
+
+
+def _checked(
+    what: tuple[str, str, float | None],
+    how: dict[str, Any],
+    out: str | None,
+    plots: bool,
+    overwrite: bool,
+) -> "tuple[Case, Path]":
+    """Load the case and settle its file; everything that is wrong with either at once."""
     from railsim.errors import Fault, InputError
     from railsim.result.hdf5 import check_target
     from railsim.studies.combine import load_case
@@ -110,14 +133,17 @@ def _checked_case(
         case = load_case(*what, **how)
     except InputError as error:
         faults.extend(error.faults)
-    for path in paths:
-        try:
-            check_target(path, overwrite=overwrite, option="--out")
-        except InputError as error:
-            faults.extend(error.faults)
-    if faults or case is None:
+    name = out or (case.file_name if case else None)
+    if name:
+        path = Path(name)
+        for target in (path, path.with_suffix(".png")) if plots else (path,):
+            try:
+                check_target(target, overwrite=overwrite, option="--out")
+            except InputError as error:
+                faults.extend(error.faults)
+    if faults or case is None or name is None:
         raise InputError(faults)
-    return case
+    return case, Path(name)
 
 
 def result_record(result: "Result") -> dict[str, Any]:
@@ -148,7 +174,8 @@ def _assumption_lines(case: "Case") -> list[str]:
         else f"{settings.output_rate:g} per s"
     )
     return [
-        f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)",
+        f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)"
+        f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
         f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
         f"{track.gauge * 1e3:g} mm, friction {_listed(f'{mu:g}' for mu in track.friction)}",
         f"  forces    FASTSIM {nx} x {ny}, G {settings.shear_modulus / 1e9:g} GPa, "

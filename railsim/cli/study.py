@@ -71,6 +71,7 @@ def _is_number(text: str) -> bool:
     help="Values of further keys; paths begin with vehicle., track. or settings.",
 )
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
+@click.option("--start", type=float, default=0.0, metavar="S", help="Start of all runs in m.")
 @click.option("--duration", type=float, metavar="T", help="End of all runs in s.")
 @click.option("--until", type=float, metavar="S", help="End of all runs in m along the track.")
 @click.option("--settings", metavar="F", help="Settings file for all runs.")
@@ -115,7 +116,7 @@ def command(
         "speeds": list(speeds),
         "grid": _grid(grids),
         "assignments": list(assignments),
-        **{name: how.pop(name) for name in ("settings", "duration", "until")},
+        **{name: how.pop(name) for name in ("settings", "start", "duration", "until")},
     }
     if resume and not any(inputs.values()):
         inputs = _stored_inputs(Path(out))

@@ -223,6 +223,7 @@ class Result:
             "track": self.track(),
             "settings": self.settings(),
             "speed": self.speed,
+            "start": float(self._attributes.get("start", 0.0)),
             "duration": float(self._attributes["duration"]),
             "profiles": self.profiles,
         }

@@ -26,9 +26,12 @@ class Case:
     vehicle, track, settings
         Definitions.
     speed : float
-        Speed [m/s].
+        Speed, at the start where it varies [m/s].
+    start : float
+        Distance at which the reference body starts [m].
     duration, until : float or None
-        End of the run: time [s] or distance [m]; the end of the track's plan if neither.
+        End of the run: time from its start [s] or distance [m]; the end of the track's plan if
+        neither.
     labels : mapping of str to str or float
         What tells the case apart: ``vehicle``, ``track``, ``speed`` and the keys of a grid.
     """
@@ -38,6 +41,7 @@ class Case:
     track: Track
     settings: Settings
     speed: float
+    start: float = 0.0
     duration: float | None = None
     until: float | None = None
     labels: Mapping[str, str | float] = field(default_factory=dict)
@@ -60,6 +64,7 @@ class Case:
             "track": self.track.to_toml(),
             "settings": self.settings.to_toml(),
             "speed": self.speed,
+            "start": self.start,
             "duration": self.duration,
             "until": self.until,
             "profiles": {

@@ -12,7 +12,7 @@ from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.overrides import split_overrides
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
-from railsim.simulation import run_length
+from railsim.simulation import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
 
 T = TypeVar("T")
@@ -22,9 +22,10 @@ Grid = Mapping[str, Sequence[str]]
 def load_case(
     vehicle: str | Path,
     track: str | Path,
-    speed: float,
+    speed: float | None,
     *,
     settings: str | Path | None = None,
+    start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
     assignments: Sequence[str] = (),
@@ -35,10 +36,12 @@ def load_case(
     ----------
     vehicle, track : str or Path
         File, or name of a shipped one.
-    speed : float
-        Speed [m/s].
+    speed : float or None
+        Speed [m/s]; not needed where the settings have a speed table.
     settings : str or Path, optional
         Settings file.
+    start : float
+        Distance at which the reference body starts [m].
     duration, until : float, optional
         End of the run: time [s] or distance [m].
     assignments : sequence of str
@@ -53,6 +56,7 @@ def load_case(
         [track],
         [speed],
         settings=settings,
+        start=start,
         duration=duration,
         until=until,
         assignments=assignments,
@@ -63,10 +67,11 @@ def load_case(
 def combinations(
     vehicles: Sequence[str | Path],
     tracks: Sequence[str | Path],
-    speeds: Sequence[float],
+    speeds: Sequence[float | None],
     grid: Grid | None = None,
     *,
     settings: str | Path | None = None,
+    start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
     assignments: Sequence[str] = (),
@@ -108,17 +113,32 @@ def combinations(
         a_vehicle = loaded(load_vehicle, vehicle, tuple(own["vehicle"]))
         a_track = loaded(load_track, track, tuple(own["track"]))
         a_settings = loaded(load_settings, settings, tuple(own["settings"]))
-        if a_track:
-            faults.extend(_end_faults(a_track, speed, duration, until))
-        if a_vehicle and a_track and a_settings:
+        first_speed = speed
+        if a_settings:
+            try:
+                first_speed = initial_speed(a_settings, speed, start)
+            except InputError as error:
+                faults.extend(error.faults)
+        if a_track and first_speed is not None:
+            faults.extend(_range_faults(a_track, first_speed, start, duration, until))
+        if a_vehicle and a_track and a_settings and first_speed is not None:
             labels: dict[str, str | float] = {
                 "vehicle": short_name(vehicle),
                 "track": short_name(track),
-                "speed": speed,
+                "speed": first_speed,
                 **point,
             }
-            name = run_name(vehicle, track, speed) + _suffix(point)
-            case = Case(name, a_vehicle, a_track, a_settings, speed, duration, until, labels)
+            case = Case(
+                run_name(vehicle, track, first_speed) + _suffix(point),
+                a_vehicle,
+                a_track,
+                a_settings,
+                first_speed,
+                start,
+                duration,
+                until,
+                labels,
+            )
             cases.append(case)
     if not faults:
         faults += _profile_faults(cases) + _double_names(cases)
@@ -137,11 +157,11 @@ def _profile_faults(cases: Sequence[Case]) -> list[Fault]:
     return faults
 
 
-def _end_faults(
-    track: Track, speed: float, duration: float | None, until: float | None
+def _range_faults(
+    track: Track, speed: float, start: float, duration: float | None, until: float | None
 ) -> list[Fault]:
     try:
-        run_length(track, speed, duration, until)
+        check_range(track, speed, start, duration, until)
     except InputError as error:
         return list(error.faults)
     return []

@@ -14,6 +14,7 @@ def run_case(
     *,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
+    resume: Result | None = None,
 ) -> Result:
     """Run a case into its file, which carries the case's name and key.
 
@@ -27,20 +28,26 @@ def run_case(
         Replace an existing file.
     progress : callable, optional
         Called with the finished fraction now and then.
+    resume : Result, optional
+        A result whose end is the beginning of this run; the file then carries no key.
 
     Raises
     ------
     InputError, ModelError : as `railsim.simulate`; the file cannot be written.
     """
-    facts = {"run": case.name, "inputs_hash": case.key}
+    facts = {"run": case.name}
+    if resume is None:
+        facts["inputs_hash"] = case.key
     with Hdf5Sink(path, overwrite=overwrite, attributes=facts) as sink:
         return simulate(
             case.vehicle,
             case.track,
             speed=case.speed,
+            start=case.start,
             duration=case.duration,
             until=case.until,
             settings=case.settings,
             sink=sink,
             progress=progress,
+            resume=resume,
         )

@@ -66,6 +66,7 @@ def study(
     out: str | Path,
     grid: Mapping[str, Iterable[object]] | None = None,
     settings: str | Path | None = None,
+    start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
     assignments: Sequence[str] = (),
@@ -91,6 +92,8 @@ def study(
         Values of further keys, ``{"track.friction": [0.3, 0.4]}``.
     settings : str or Path, optional
         Settings file for all runs.
+    start : float
+        Distance at which all runs start [m].
     duration, until : float, optional
         End of all runs: time [s] or distance [m].
     assignments : sequence of str
@@ -137,6 +140,7 @@ def study(
         speeds,
         written,
         settings=settings,
+        start=start,
         duration=duration,
         until=until,
         assignments=assignments,
@@ -149,6 +153,7 @@ def study(
         "speeds": list(speeds),
         "grid": written,
         "settings": None if settings is None else str(settings),
+        "start": start,
         "duration": duration,
         "until": until,
         "assignments": list(assignments),

@@ -43,6 +43,30 @@ def test_result_runs_again_from_itself_to_the_same_arrays(written):
         np.testing.assert_array_equal(again[name], result[name])
 
 
+def test_run_that_is_continued_equals_an_undisturbed_one(written, tmp_path):
+    parts = [tmp_path / "first.h5", tmp_path / "second.h5"]
+    options = ["--set", "settings.output_rate=100", "--quiet"]
+    first = [*COACH, "--speed", "20", "--until", "6", "--out", str(parts[0]), *options]
+    second = [*COACH, "--continue", str(parts[0]), "--until", "10", "--out", str(parts[1])]
+    assert main(first) == 0
+    assert main([*second, *options]) == 0
+    whole = railsim.open_result(written)
+    begin, end = (railsim.open_result(part) for part in parts)
+    count = len(end.time)
+    np.testing.assert_array_equal(end.Q, whole.Q[-count:])
+    np.testing.assert_array_equal(end.body_position, whole.body_position[-count:])
+    assert begin.distance[-1] == end.distance[0]
+
+
+def test_run_may_start_anywhere(tmp_path):
+    path = tmp_path / "run.h5"
+    given = [*COACH, "--speed", "20", "--start", "340", "--until", "350", "--out", str(path)]
+    assert main(given) == 0
+    result = railsim.open_result(path)
+    assert result.distance[0] == pytest.approx(340.0)
+    assert result.distance[-1] == pytest.approx(350.0)
+
+
 def test_speed_of_the_computation_is_kept(written):
     with h5py.File(written) as file:
         facts = file.attrs
