@@ -14,15 +14,21 @@ along the surface).
 
 import math
 
+import numba
 import numpy as np
 
-from . import jit
+from . import FASTMATH
 
 CONVERGED = 0
 NOT_CONVERGED = 1
 _MAX_TURN = 0.7  # largest turn of a traction's direction in one iteration [rad]
 _SETTLED = 15  # most cases need 5 to 11 iterations; after this many, cells that still
 _MAX_RETURNS = 2  # go to and fro are kept in stick at their next return but one
+
+
+def jit(function):
+    """Compile for use outside the time loop: unlike `railsim.kernels.jit` it may allocate."""
+    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH)(function)
 
 
 @jit
