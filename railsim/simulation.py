@@ -150,13 +150,12 @@ def simulate(
         "cpu_time": cpu_time,
         "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
     }
-    groups = {
-        "profiles": {
-            name: np.column_stack([p.y, p.z]) for name, p in prepared.model.profiles.items()
-        },
-        "state": {"state": state},
-    }
-    return sink.close(attributes, {"Q0": prepared.balance.Q0}, groups)
+    return sink.close(
+        attributes,
+        {"Q0": prepared.balance.Q0},
+        prepared.model.profiles,
+        {"state": {"state": state}},
+    )
 
 
 def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
