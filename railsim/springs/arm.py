@@ -24,6 +24,11 @@ Two forms of the moment that the nest exerts on the arm:
     lateral force that the seat's rotation causes (reciprocal to the moment of its displacement),
     and the change of the lateral stiffness with deflection.  Conserves energy by construction.
 
+A spring that joins later (tare-and-laden nests) carries nothing until it touches.  Its ends are not
+flush at once: lateral and tilting stiffness set in over the first `SETTLING` of its deflection, so
+that the load has no step.  Settling is not elastic: the form `energy` differentiates the stored
+energy of the share that has settled, and conserves energy outside that short stretch.
+
 Everything broadcasts: a thousand nests under five loads are one call with arrays of shape
 (nest, 1) in the springs and (load,) in the load.
 """
@@ -40,6 +45,10 @@ from railsim.springs import helical
 from railsim.springs.helical import Values
 
 Form = Literal["grossi", "energy"]
+
+SETTLING = 0.025
+"""Deflection over the mean diameter after which a spring stands flush on its seats (assumed: of the
+order of the parallelism of ground ends)."""
 
 _COMPLEX_STEP = 1e-30
 _ROTATION_TOLERANCE = 1e-14
@@ -144,14 +153,15 @@ def coil_state(arm: Arm, coil: Coil, phi: ArrayLike) -> CoilState:
     travel = coil.start + rise
     touching = travel > 0.0
     deflection = np.where(touching, travel, 0.0)
+    flush = _flush(deflection, coil.D)
     K_L = helical.lateral_stiffness(coil.K_V, coil.D, coil.H0, deflection, arm.nu)
     K_C = helical.tilting_stiffness(coil.K_V, coil.D, coil.H0, deflection, arm.nu)
     return CoilState(
         deflection=deflection,
         lateral=lateral,
         height=coil.H0 - deflection,
-        K_L=np.where(touching, K_L, 0.0),
-        K_C=np.where(touching, K_C, 0.0),
+        K_L=flush * K_L,
+        K_C=flush * K_C,
         force=coil.K_V * deflection,
     )
 
@@ -274,8 +284,15 @@ def _unit_energy(arm: Arm, coil: Coil, phi: Values) -> Values:
     K_L = helical.lateral_stiffness(1.0, coil.D, coil.H0, dz, arm.nu)
     K_C = helical.tilting_stiffness(1.0, coil.D, coil.H0, dz, arm.nu)
     coupling = helical.seat_moment(dz, K_L, coil.H0 - dz)
-    energy = 0.5 * (dz**2 + K_L * lateral**2 + K_C * phi**2) + coupling * lateral * phi
+    sheared = 0.5 * (K_L * lateral**2 + K_C * phi**2) + coupling * lateral * phi
+    energy = 0.5 * dz**2 + _flush(dz, coil.D) * sheared
     return np.where(touching, energy, 0.0)
+
+
+def _flush(deflection: Values, D: Values) -> Values:
+    """Share of the lateral and tilting stiffness that a spring has at a deflection: 0 to 1."""
+    share = np.minimum(np.real(deflection) / (SETTLING * np.asarray(D)), 1.0)
+    return share**2 * (3.0 - 2.0 * share)
 
 
 def _bracketed_root(
