@@ -144,6 +144,11 @@ def simulate(
         "speed": float(speed),
         "start": float(start),
         "duration": simulated,
+        **{
+            f"asked_{name}": float(value)
+            for name, value in (("duration", duration), ("until", until))
+            if value is not None
+        },
         "step": prepared.pace.smallest,
         "scheme": settings.scheme,
         "wall_time": time.perf_counter() - started,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import nearest
+from railsim.errors import ModelError, nearest
 from railsim.notation import Quantity
 from railsim.profiles.profile import Profile
 
@@ -217,14 +217,23 @@ class Result:
         return Settings.model_validate(json.loads(str(self._attributes["settings_json"])))
 
     def inputs(self) -> dict[str, Any]:
-        """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
+        """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again.
+
+        Raises
+        ------
+        ModelError : the run went on from another one, whose end it does not carry.
+        """
+        facts = self._attributes
+        if "continues" in facts:
+            raise ModelError(f"this run went on from '{facts['continues']}': run that one first")
         return {
             "vehicle": self.vehicle(),
             "track": self.track(),
             "settings": self.settings(),
             "speed": self.speed,
-            "start": float(self._attributes.get("start", 0.0)),
-            "duration": float(self._attributes["duration"]),
+            "start": float(facts.get("start", 0.0)),
+            "duration": facts.get("asked_duration"),
+            "until": facts.get("asked_until"),
             "profiles": self.profiles,
         }
 

@@ -38,6 +38,8 @@ def run_case(
     facts = {"run": case.name}
     if resume is None:
         facts["inputs_hash"] = case.key
+    else:
+        facts["continues"] = str(resume.attributes.get("run", "another run"))
     with Hdf5Sink(path, overwrite=overwrite, attributes=facts) as sink:
         return simulate(
             case.vehicle,

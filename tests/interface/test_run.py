@@ -56,6 +56,8 @@ def test_run_that_is_continued_equals_an_undisturbed_one(written, tmp_path):
     np.testing.assert_array_equal(end.Q, whole.Q[-count:])
     np.testing.assert_array_equal(end.body_position, whole.body_position[-count:])
     assert begin.distance[-1] == end.distance[0]
+    with pytest.raises(railsim.ModelError, match="run that one first"):
+        end.inputs()
 
 
 def test_run_may_start_anywhere(tmp_path):
@@ -157,6 +159,9 @@ def test_run_that_ends_early_keeps_its_file(tmp_path, capsys):
     assert main([*COACH, "--speed", "45", "--out", str(path)]) == 3
     result = railsim.open_result(path)
     assert result.status in ("derailed", "stopped")
+    again = railsim.simulate(**result.inputs())
+    assert again.attributes["status_reason"] == result.attributes["status_reason"]
+    np.testing.assert_array_equal(again.Q, result.Q)
     assert result.attributes["status_reason"] in capsys.readouterr().out
     assert 300.0 < result.distance[-1] < 980.0
     assert np.isfinite(result.Q).all()
