@@ -180,6 +180,7 @@ def work_arrays(system: System) -> Work:
         rail_force=np.zeros((n, 6)),
         acceleration=np.zeros((n, 6)),
         drive=np.zeros((len(system.internal.kind), 2)),
+        decay=np.zeros(len(system.internal.kind)),
         spin_damping=np.zeros(n),
         look_up=np.zeros(LOOK_UP_SIZE),
         rail=np.zeros(4),

@@ -19,7 +19,17 @@ FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
 
 def jit(function):
     """Compile `function` with numba: cached, numpy error model, NaN-preserving fastmath."""
-    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH)(function)
+    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, _nrt=False)(function)
+
+
+def jit_inline(function):
+    """As `jit`, for a small function that is put into its caller.
+
+    A call with a tuple of arrays puts all their descriptions on the stack, some hundred words; in
+    the innermost loops that costs more than the function itself.
+    """
+    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, inline="always",
+                      _nrt=False)(function)
 
 
 def source_hash(folder: Path) -> str:

@@ -18,7 +18,7 @@ states (see `internal`).
 
 from math import sqrt
 
-from railsim.kernels import jit
+from railsim.kernels import jit, jit_inline
 from railsim.kernels.internal import AIR, PAD, curve_value
 
 
@@ -70,7 +70,7 @@ def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
         M[j, 2] -= bx * fy - by * fx
 
 
-@jit
+@jit_inline
 def axis_force(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
     """Force along axis `k` of mount `e` at deflection `d` and its rate; `normal` loads a pad."""
     force = mounts.preload[e, k] + mounts.stiffness[e, k] * d + mounts.damping[e, k] * rate
@@ -91,7 +91,7 @@ def axis_force(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
     return force
 
 
-@jit
+@jit_inline
 def translation_force(mounts, internal, curves, e, i, j, p, scale, inner, drive,
                       R, X, V, W, F, M):
     """Force of a mount in the axes of body `i` (its point `p` first), at the point of body `j`.
@@ -144,7 +144,7 @@ def translation_force(mounts, internal, curves, e, i, j, p, scale, inner, drive,
     M[j, 2] -= bx * fy - by * fx
 
 
-@jit
+@jit_inline
 def rotation_moment(mounts, e, i, j, R, W, M):
     """Add the moment of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
     k1, k2, k3 = mounts.rotation[e, 0], mounts.rotation[e, 1], mounts.rotation[e, 2]

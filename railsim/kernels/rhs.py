@@ -341,8 +341,10 @@ def right_hand_side(system, work, state, derivative):
         return status, 0, 0
     kinematics(bodies, work.frames, speed, state, work.S, work.C, work.R, work.X, work.V, work.W,
                work.acceleration)
-    work.F[:, :] = 0.0
-    work.M[:, :] = 0.0
+    for b in range(n):
+        for i in range(3):
+            work.F[b, i] = 0.0
+            work.M[b, i] = 0.0
     m = system.internal.kind.shape[0]
     inner = state[12 * n:12 * n + m]
     link_forces(system.links, system.curves, inner, work.drive, work.R, work.X, work.V, work.W,

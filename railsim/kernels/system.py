@@ -219,6 +219,7 @@ class Work(NamedTuple):
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
+    decay : float64[m]          see `internal.constant_decays`
     spin_damping : float64[n]   estimate of -d(u_2')/d(u_2) of each wheelset [1/s]
     patch_* : per active patch, see `wheel_rail`
     """
@@ -237,6 +238,7 @@ class Work(NamedTuple):
     rail_force: np.ndarray
     acceleration: np.ndarray
     drive: np.ndarray
+    decay: np.ndarray
     spin_damping: np.ndarray
     look_up: np.ndarray
     rail: np.ndarray

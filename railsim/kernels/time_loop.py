@@ -41,11 +41,17 @@ class Recorder(NamedTuple):
 @jit
 def record(recorder, row, state, derivative, work):
     """Copy the state and the by-products of its evaluation into row `row`."""
-    n_coordinates = recorder.rates.shape[1]
-    recorder.state[row, :] = state
-    recorder.rates[row, :] = derivative[:n_coordinates]
-    recorder.acceleration[row, :, :] = work.acceleration
-    recorder.wheel[row, :, :, :] = work.wheel
+    for k in range(recorder.state.shape[1]):
+        recorder.state[row, k] = state[k]
+    for k in range(recorder.rates.shape[1]):
+        recorder.rates[row, k] = derivative[k]
+    for b in range(recorder.acceleration.shape[1]):
+        for k in range(6):
+            recorder.acceleration[row, b, k] = work.acceleration[b, k]
+    for w in range(recorder.wheel.shape[1]):
+        for side in range(2):
+            for k in range(recorder.wheel.shape[3]):
+                recorder.wheel[row, w, side, k] = work.wheel[w, side, k]
 
 
 @jit
@@ -103,11 +109,10 @@ def settle_pads(internal, first, drive, state):
 @jit
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
-    total = stages[0]
-    trial = stages[1]
-    rate = stages[2]
-    total[:] = derivative
-    rate[:] = derivative
+    total, trial, rate = stages[0], stages[1], stages[2]
+    for k in range(state.shape[0]):
+        total[k] = derivative[k]
+        rate[k] = derivative[k]
     for stage in range(1, 4):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
@@ -153,7 +158,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     status, where, steps, rows : int
         Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
     """
-    decay = np.empty(system.internal.kind.shape[0])
+    decay = work.decay
     constant_decays(system.internal, system.curves, h, decay)
     rows = 0
     for step in range(first_step, first_step + n_steps):
