@@ -135,7 +135,7 @@ def simulate(
     begin_time = float(prepared.state[-3])
     status, where, state, cpu_time = _loop(prepared, settings, sink, progress)
     simulated = float(state[-3]) - begin_time
-    attributes = {
+    attributes: dict[str, str | float | int] = {
         "status": STATUS[status][0],
         "status_reason": _sentence(prepared.model, status, where),
         "vehicle_toml": vehicle.to_toml(),
