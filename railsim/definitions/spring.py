@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 from railsim.definitions.base import (
     Definition,
     FileDefinition,
+    Finite,
     NonNegative,
     NonNegativeVector,
     Positive,
@@ -172,7 +173,7 @@ class Checks(Definition):
     """The same for the check after EN 13906-1 (hot coiled, static)"""
     solid_load: Text | None = None
     """Name of the load for the solid height; by default the highest"""
-    seating: Annotated[Positive, Field(ge=0.5, le=2.0)] = 1.0
+    seating: Annotated[Finite, Field(ge=0.5, le=2.0)] = 1.0
     """Seating coefficient of EN 13906-1 for buckling; 1: seats parallel, free to move sideways"""
     radial_clearance: NonNegative = 0.0
     """Least clearance between inner and outer spring [m]"""

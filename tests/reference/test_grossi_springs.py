@@ -3,6 +3,8 @@
 Each row: printed in the source, and computed independently (SPRINGS.md); kg (force) and mm.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from railsim.definitions.loading import load_spring
 from railsim.springs.design import design
 from railsim.springs.verification import verify
 
+DOCS = Path(__file__).parents[2] / "docs"
 KG_PER_MM = 9.81 / 1e-3  # N/m
 
 # printed, independent
@@ -95,3 +98,51 @@ def test_lateral_stiffness_of_the_coach_models(cases):
     assert lateral == pytest.approx(851e3, abs=0.5e3)
     bending = tare.K_C - tare.K_L * tare.springs["outer"].height ** 2 / 4
     assert bending == pytest.approx(9e3, abs=0.5e3)
+
+
+def table(heading):
+    """Rows of the table below a heading of the validation page, by their first cell."""
+    page = (DOCS / "validation" / "springs.md").read_text("utf-8")
+    section = page.split(f"## {heading}\n")[1].split("\n## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in section.splitlines() if line[:1] == "|"]
+    return {first: cells for first, *cells in rows[2:]}
+
+
+def shown(value, text):
+    """The value as a page shows it, with the digits of `text`."""
+    return f"{value:.{len(text.partition('.')[2])}f}"
+
+
+def test_page_shows_the_design(suspension):
+    result, rows = design(suspension), table("Design")
+    for i, spring in enumerate(result.names):
+        _, _, page = rows[f"K_V {spring}, kg/mm"]
+        assert shown(result.K_V[i] / KG_PER_MM, page) == page
+    for label, n in zip(("n outer, d = 41 mm", "n inner, d = 27 mm"), result.n, strict=True):
+        assert shown(n, rows[label][2]) == rows[label][2]
+
+
+def test_page_shows_stiffness_and_rotation(cases):
+    stiffness = table("System stiffness K_sys = P/dz, kg/mm")
+    rotation = table("Rotation of the arm, degrees")
+    energy = load_spring("turasas_axlebox", ["arm.equilibrium=energy"])
+    consistent = {case.name: case for case in verify(energy).cases}
+    assert list(stiffness) == list(rotation) == list(CASES)
+    for name, case in cases.items():
+        page = stiffness[name][2]
+        assert shown(case.K_sys / KG_PER_MM, page) == page
+        page = rotation[name][2]
+        assert shown(np.degrees(case.theta), page) == page
+        page = rotation[name][3]
+        assert shown(np.degrees(consistent[name].theta), page) == page
+
+
+def test_page_shows_the_stiffnesses_for_the_vehicles(cases):
+    rows = table("Stiffnesses for the vehicles")
+    K_V = sum(state.force / state.deflection for state in cases["ODM"].springs.values())
+    for label, value in (
+        ("K_V of the nest, N/m", K_V),
+        ("K_L at the mounting load (Manchester coach), N/m", cases["MOUNTING"].K_L),
+        ("K_L at tare (flexicoil coach), kN/m", cases["ODM"].K_L * 1e-3),
+    ):
+        assert shown(value, rows[label][1]) == rows[label][1]
