@@ -141,7 +141,7 @@ def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
 
 
 def wheel_curve(
-    profile: Profile, radius: float, tape_circle: float, spacing: float = 1e-4
+    profile: Profile, radius: float, tape_circle: float, spacing: float = 2e-4
 ) -> WheelCurve:
     """Candidate points of a wheel.
 

@@ -51,6 +51,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import platformdirs
@@ -101,6 +102,9 @@ class TableGrid:
         Half relative curvature across is kept above about this share of that along [1].
     approach : float
         Normal approach at which the place of contact is sought [m].
+    normal : "hertz" or "kik-piotrowski"
+        Stiffness and patch from the Hertz ellipse of the averaged curvatures, or from the
+        non-elliptic patch at `approach`, replaced by an ellipse of its area and proportions.
     """
 
     s_min: float = -0.020
@@ -114,6 +118,7 @@ class TableGrid:
     load: float = 60e3
     floor_ratio: float = 0.02
     approach: float = 80e-6
+    normal: Literal["hertz", "kik-piotrowski"] = "hertz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +210,43 @@ def ellipse_functions(G: float, nu: float) -> tuple[float, float, Array]:
     return float(x[0]), float(x[1] - x[0]), np.ascontiguousarray(rows)
 
 
+@cache
+def strip_influence() -> tuple[float, float, Array, Array]:
+    """Influences for the non-elliptic patch, as logarithms over a logarithm.
+
+    Returns
+    -------
+    start, spacing : float
+        Grid of the logarithms of q and of b/a.
+    strip : ndarray, shape (n,)
+        ln J(q), J(q) = integral_-1^1 sqrt(1 - t^2)/sqrt(t^2 + q^2) dt: a strip with a
+        semi-elliptic load at the distance q of its half length.  With t = q sinh(v) the integrand
+        has no peak.
+    whole : ndarray, shape (n,)
+        ln of integral_-1^1 sqrt(1 - t^2) J(|t| (b/a)/sqrt(1 - t^2)) dt: all strips of an ellipse.
+    """
+    x = np.linspace(-12.0, 4.0, 801)
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    q = np.exp(x)[:, None]
+    end = np.arcsinh(1.0 / q)
+    # v = end sin(w) takes away the square root at the ends
+    w = 0.25 * np.pi * (nodes + 1.0)
+    v = end * np.sin(w)
+    values = np.sqrt(np.maximum(1.0 - (q * np.sinh(v)) ** 2, 0.0)) * end * np.cos(w)
+    J = 2.0 * np.sum(values * weights, axis=1) * 0.25 * np.pi
+    # over an ellipse: t = sin(angle), with nodes drawn to the middle where J is singular
+    u = 0.5 * (nodes + 1.0)
+    angle = 0.5 * np.pi * u**3
+    distance = np.log(np.exp(x)[:, None] * np.tan(angle))
+    inner = np.exp(np.interp(distance, x, np.log(J), left=np.nan, right=np.nan))
+    # beyond the grid: 2 ln(2/q) - 1 close by, pi/(2 q) far away
+    inner = np.where(distance < x[0], 2.0 * np.log(2.0) - 2.0 * distance - 1.0, inner)
+    inner = np.where(distance > x[-1], 0.5 * np.pi * np.exp(-distance), inner)
+    jacobian = np.cos(angle) ** 2 * 0.5 * np.pi * 3.0 * u**2 * 0.5
+    whole = 2.0 * np.sum(weights * jacobian * inner, axis=1)
+    return float(x[0]), float(x[1] - x[0]), np.log(J), np.log(whole)
+
+
 def build_contact_table(
     wheel: Profile,
     rail: Profile,
@@ -271,7 +313,8 @@ def build_contact_table(
     log_window = np.log(np.maximum(window, 1e-30))
 
     n_y = round((grid.s_max - grid.s_min) / grid.ds) + 1
-    n_roll = 2 * round(grid.roll_max / grid.droll) + 1
+    # a cubic spline needs two nodes to each side of the middle
+    n_roll = 2 * max(round(grid.roll_max / grid.droll), 2) + 1
     s_nodes = grid.s_min + grid.ds * np.arange(n_y)
     roll_nodes = grid.droll * (np.arange(n_roll) - n_roll // 2)
     w_nodes = np.linspace(0.0, grid.yaw_max**2, grid.n_w)
@@ -309,6 +352,9 @@ def build_contact_table(
             grid.load,
             grid.floor_ratio,
             grid.approach,
+            G / (1.0 - nu),
+            grid.normal == "kik-piotrowski",
+            *strip_influence(),
         )
         values[:, i_w, i_roll] = part
 
@@ -345,9 +391,10 @@ def build_contact_table(
     )
 
 
-TYPICAL_CURVATURES = (8.0, 60.0, 77.0)
+TYPICAL_CURVATURES = (3.0, 30.0, 77.0)
 """Relative curvature across in an everyday contact of each zone [1/m]: R 300 to 80 mm on the
-tread, the gauge corner of R 13 mm against a root of 60 mm, and against a straight flank."""
+tread less a hollow wheel, the gauge corner of R 13 mm in the root, and against a straight flank.
+They only place the zones' heights against each other, within some micrometres."""
 
 
 def gap_offsets(wheel: WheelCurve, eps: float) -> Array:

@@ -17,8 +17,10 @@ import numpy as np
 
 from railsim.kernels import FASTMATH
 
-SPREAD = 30.0  # candidates whose gap exceeds the least by more than SPREAD eps have no weight
+SPREAD = 16.0  # candidates whose gap exceeds the least by more than SPREAD eps have no weight
 WIDTH_ITERATIONS = 8
+VIRTUAL_SHARE = 0.55  # of the approach, Kik and Piotrowski (1996)
+FAR_PATCH = 5e-4  # a patch that touches this much later carries nothing [m]
 
 # Fields of a table, see `railsim.contact.table`.
 G, K, C_Y, C_Z, C_X, A1, B1, TAN_GAMMA = range(8)
@@ -137,6 +139,12 @@ def fill_table_slice(
     load,
     floor_ratio,
     approach,
+    E_star,
+    non_elliptic,
+    strip_x0,
+    strip_dx,
+    strip,
+    whole,
 ):
     """Fill the table for one roll and one yaw.
 
@@ -176,6 +184,16 @@ def fill_table_slice(
         B is kept above about this many A [1].
     approach : float
         Normal approach at which the place of contact is sought, see `railsim.contact.table` [m].
+    E_star : float
+        Equivalent modulus [Pa].
+    non_elliptic : bool
+        Stiffness and patch by `kik_piotrowski` instead of the averaged ellipse.
+    strip_x0, strip_dx : float
+        Grid of `strip` over the logarithm of distance over half length.
+    strip : ndarray, shape (n,)
+        Influence of a strip, see `kik_piotrowski` [1].
+    whole : ndarray, shape (n,)
+        Influence of an elliptic virtual patch over ln(b/a), on the grid of `strip` [1].
     """
     n_u = wheel_u.size
     n_patch = values.shape[0]
@@ -187,15 +205,21 @@ def fill_table_slice(
     slope = np.empty(n_u)
     lift = np.empty(n_u)
     tangent = np.empty(n_u)
+    length = np.empty(n_u)
     node = np.empty(n_u, np.int64)
     stretch = np.empty(n_u)
     curvature = np.empty(n_width)
+    hertz_a1, hertz_b1, mean_radius = np.empty(n_patch), np.empty(n_patch), np.empty(n_patch)
+    half_B, stiffness = np.empty(n_patch), np.empty(n_patch)
     trace_line(wheel_u, wheel_r, wheel_t, roll, yaw, c_x, c_y, c_z, stretch)
     # c_x is odd in yaw: its ratio to yaw has a limit, taken at a yaw that is small but not zero
     yaw_for_x = yaw if abs(yaw) > 1e-6 else 1e-6
     sine = math.sin(yaw_for_x) / yaw_for_x * math.cos(roll)
     for k in range(n_u):
         c_x[k] = -(wheel_u[k] + wheel_r[k] * wheel_t[k]) * sine
+    # distance of neighbouring candidates along the contour
+    for k in range(n_u):
+        length[k] = wheel_du[k] * math.sqrt(1.0 + wheel_t[k] * wheel_t[k])
     for i in range(y_nodes.size):
         for k in range(n_u):
             h[k], slope[k], node[k] = rail_height(
@@ -238,7 +262,7 @@ def fill_table_slice(
             tan_gamma = s_tangent * inverse
             cos_gamma = 1.0 / math.sqrt(1.0 + tan_gamma * tan_gamma)
             A = 0.5 * cos_gamma / (s_r * inverse)
-            a1, b1, d1 = averaged_ellipse(
+            a1, b1, d1, B = averaged_ellipse(
                 A,
                 curvature,
                 half_widths,
@@ -251,12 +275,199 @@ def fill_table_slice(
             out = values[p, i]
             out[G] = least - eps * math.log(total) - s_lift * inverse
             out[K] = s_window * inverse * (cos_gamma**2.5) * d1**-1.5
+            hertz_a1[p], hertz_b1[p] = a1, b1
+            mean_radius[p] = s_r * inverse
+            half_B[p] = B
+            stiffness[p] = d1**-1.5
             out[C_Y] = s_y * inverse
             out[C_Z] = s_z * inverse
             out[C_X] = s_x * inverse
             out[A1] = a1
             out[B1] = b1
             out[TAN_GAMMA] = tan_gamma
+        if non_elliptic:
+            for p in range(n_patch):
+                out = values[p, i]
+                lowest = 1e9
+                for q in range(n_patch):
+                    lowest = min(lowest, values[q, i, G])
+                if out[G] > lowest + FAR_PATCH:
+                    continue
+                # the approach at which the averaged ellipse carries the load, twice corrected
+                delta = (load / stiffness[p]) ** (2.0 / 3.0)
+                N = a = b = 0.0
+                for _ in range(3):
+                    N, a, b = kik_piotrowski(
+                        h,
+                        c_y,
+                        wheel_r,
+                        length,
+                        lift,
+                        approach,
+                        first[p],
+                        last[p],
+                        out[C_Y],
+                        delta,
+                        E_star,
+                        strip_x0,
+                        strip_dx,
+                        strip,
+                    )
+                    N, a, b = corrected_by_hertz(
+                        N,
+                        a,
+                        b,
+                        0.5 / math.sqrt(1.0 + out[TAN_GAMMA] ** 2) / mean_radius[p],
+                        half_B[p],
+                        hertz_a1[p],
+                        hertz_b1[p],
+                        stiffness[p],
+                        delta,
+                        E_star,
+                        strip_x0,
+                        strip_dx,
+                        whole,
+                    )
+                    power = N / (delta * math.sqrt(delta))
+                    if N <= 0.0:
+                        break
+                    delta *= (load / N) ** (2.0 / 3.0)
+                if N > 0.0:
+                    third = N ** (1.0 / 3.0)
+                    out[A1] = a / third
+                    out[B1] = b / third
+                    out[K] *= power / stiffness[p]
+
+
+@_jit
+def corrected_by_hertz(N, a, b, A, B, a1, b1, stiffness, delta, E_star, x0, dx, whole):
+    """Force and axes of `kik_piotrowski`, made exact for elliptic patches.
+
+    Each is multiplied by the ratio of Hertz' to the method's own value for the ellipse of the
+    half relative curvatures A and B at the approach `delta`.
+    """
+    if N <= 0.0:
+        return 0.0, 0.0, 0.0
+    virtual = VIRTUAL_SHARE * delta
+    a_virtual, b_virtual = math.sqrt(virtual / A), math.sqrt(virtual / B)
+    influence = math.exp(interpolated(math.log(b_virtual / a_virtual), x0, dx, whole))
+    N_virtual = math.pi * E_star * delta * (2.0 * math.pi / 3.0) * a_virtual / influence
+    N_hertz = stiffness * delta * math.sqrt(delta)
+    third = N_hertz ** (1.0 / 3.0)
+    return N * N_hertz / N_virtual, a * a1 * third / a_virtual, b * b1 * third / b_virtual
+
+
+@_jit
+def kik_piotrowski(
+    h,
+    place,
+    radius,
+    length,
+    lift,
+    approach,
+    first,
+    last,
+    centre,
+    delta,
+    E_star,
+    x0,
+    dx,
+    strip,
+):
+    """Non-elliptic patch at a given approach.
+
+    The patch is where the undeformed surfaces would overlap if they approached by
+    `VIRTUAL_SHARE` of the real approach; in each strip along the rail the pressure is a
+    semi-ellipse, highest in proportion to the strip's length.  The real approach fixes the
+    pressure at the patch's centre:
+
+        N = pi E* delta I1/I2,   I1 = integral pi/2 x_l^2 ds,
+        I2 = integral x_l J(|s|/x_l) ds,   J(q) = integral_-1^1 sqrt(1 - t^2)/sqrt(t^2 + q^2) dt.
+
+    Parameters
+    ----------
+    h : ndarray, shape (n,)
+        Height at which each candidate reaches the rail, with `lift` [m].
+    place, radius, length, lift : ndarray, shape (n,)
+        Lateral place [m], rolling radius [m], length along the contour [m], approach over the
+        cosine of the contact angle [m] of each candidate.
+    first, last : int
+        Candidates of the zone.
+    approach : float
+        Approach that `h` and `lift` hold [m].
+    centre : float
+        Lateral place of the patch [m].
+    delta : float
+        Approach of the bodies along the normal [m].
+    E_star : float
+        Equivalent modulus [Pa].
+    x0, dx, strip
+        Logarithm of J over the logarithm of q: grid and values.
+
+    Returns
+    -------
+    N : float
+        Normal force, 0 if there is no patch [N].
+    a, b : float
+        Semi-axes of the ellipse with the patch's area and its ratio of length to width [m].
+
+    Notes
+    -----
+    Source: W. Kik, J. Piotrowski, A fast, approximate method to calculate normal load at contact
+    between wheel and rail and creep forces during rolling, 2nd mini conference on contact
+    mechanics and wear of rail/wheel systems, Budapest (1996).
+    """
+    z = 1e9
+    best = first
+    for k in range(first, last):
+        height = h[k] + lift[k] * (delta / approach - 1.0)
+        if height < z:
+            z = height
+            best = k
+    # candidate nearest to the patch's centre, from which the patch is followed to both sides
+    middle = best
+    for k in range(first, last):
+        if abs(place[k] - centre) < abs(place[middle] - centre):
+            middle = k
+    if _virtual_overlap(h, lift, approach, z, delta, middle) <= 0.0:
+        middle = best
+    start = middle
+    while start > 0 and _virtual_overlap(h, lift, approach, z, delta, start - 1) > 0.0:
+        start -= 1
+    end = middle
+    while end < h.size - 1 and _virtual_overlap(h, lift, approach, z, delta, end + 1) > 0.0:
+        end += 1
+    area = load_sum = depth_sum = width = longest = 0.0
+    s = 0.0
+    for k in range(start, middle):
+        s -= 0.5 * (length[k] + length[k + 1])
+    for k in range(start, end + 1):
+        overlap = _virtual_overlap(h, lift, approach, z, delta, k)
+        # 2 R, with the normal curvature radius r/cos(gamma) in rolling direction
+        squared = 2.0 * radius[k] * lift[k] / approach * overlap
+        half = math.sqrt(squared)
+        # the centre's own element: the mean of the logarithm over it
+        distance = max(abs(s), length[k] / (2.0 * math.e))
+        influence = math.exp(interpolated(math.log(distance / half), x0, dx, strip))
+        load_sum += 0.5 * math.pi * squared * length[k]
+        depth_sum += half * influence * length[k]
+        area += 2.0 * half * length[k]
+        width += length[k]
+        longest = max(longest, half)
+        if k < end:
+            s += 0.5 * (length[k] + length[k + 1])
+    if load_sum <= 0.0:
+        return 0.0, 0.0, 0.0
+    N = math.pi * E_star * delta * load_sum / depth_sum
+    ratio = longest / (0.5 * width)
+    a = math.sqrt(area / math.pi * ratio)
+    return N, a, a / ratio
+
+
+@_jit
+def _virtual_overlap(h, lift, approach, z, delta, k):
+    """Overlap of a candidate at the virtual approach [m]."""
+    return approach * ((z - h[k]) / lift[k] + 1.0) - (1.0 - VIRTUAL_SHARE) * delta
 
 
 @_jit
@@ -276,11 +487,13 @@ def averaged_ellipse(A, curvature, half_widths, ellipse_x0, ellipse_dx, ellipse,
     -------
     a1, b1, d1 : float
         As `railsim.kernels.hertz.unit_load_ellipse`.
+    B : float
+        Half the relative curvature across that was used [1/m].
     """
     n = half_widths.size
     b = 0.004
     third = load ** (1.0 / 3.0)
-    a1 = b1 = d1 = 0.0
+    a1 = b1 = d1 = B = 0.0
     scale = A ** (1.0 / 3.0)
     least_B = floor_ratio * A
     for _ in range(WIDTH_ITERATIONS):
@@ -298,7 +511,7 @@ def averaged_ellipse(A, curvature, half_widths, ellipse_x0, ellipse_dx, ellipse,
         d1 = math.exp(interpolated(place, ellipse_x0, ellipse_dx, ellipse[2])) * scale
         # the geometric mean damps the iteration, which may swing in the flange root
         b = math.sqrt(b * b1 * third)
-    return a1, b1, d1
+    return a1, b1, d1, B
 
 
 # Results of `rigid_contact`.

@@ -16,9 +16,9 @@ WHEEL_Y = np.arange(-60.0, 60.0, 0.02)
 WHEEL = 1e-3 * WHEEL_Y, 1e-3 * s1002_height(WHEEL_Y)
 
 
-NARROW = TableGrid(roll_max=0.012)
+NARROW = TableGrid(roll_max=0.015)
 # softness far below what is compared
-SHARP = TableGrid(roll_max=0.012, eps=1.5e-6)
+SHARP = TableGrid(roll_max=0.015, eps=1.5e-6)
 
 
 @cache

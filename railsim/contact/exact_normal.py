@@ -1,0 +1,290 @@
+"""Normal contact of real profiles by boundary elements, the check of the contact table.
+
+The contact surface follows the rail: s is the length along its contour, x along the track, and the
+gap is measured along the rail's normal at each s, exactly between the profiles (no curvatures).
+Each element of the half-space carries constant pressure; all patches of the wheel are solved for
+at once and feel each other.  Left out: friction, yaw, and the difference between a curved contact
+surface and a half-space (it matters in the flange root, where the normal turns over the patch).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from railsim.contact.curves import misfits, rail_curve, tape_circle_place, wheel_curve
+from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels import normal_contact as kernel
+from railsim.profiles.profile import Profile
+
+Array = NDArray[np.float64]
+
+CANDIDATE_SPACING = 3e-5
+LARGEST_OVERLAP = 1.5e-3
+"""Overlap beyond which the search for a load is given up [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExactPatch:
+    """One connected patch.
+
+    Attributes
+    ----------
+    N, N_z, N_y : float
+        Normal force (sum of pressures), its vertical and lateral components on the rail [N].
+    y : float
+        Lateral place of the pressure's centre, track axes [m].
+    angle : float
+        Contact angle of the resulting force, positive towards the flange [rad].
+    area : float
+        Area [m2].
+    p_max : float
+        Greatest pressure [Pa].
+    length, width : float
+        Extent along the track and along the rail's contour [m].
+    """
+
+    N: float
+    N_z: float
+    N_y: float
+    y: float
+    angle: float
+    area: float
+    p_max: float
+    length: float
+    width: float
+
+
+@dataclass(frozen=True, eq=False)
+class ExactContact:
+    """Contact of a right wheel on a right rail.
+
+    Attributes
+    ----------
+    z : float
+        Vertical displacement of the wheelset's centre [m].
+    penetration : float
+        How far the wheel is below its first touch, vertically [m].
+    patches : tuple of ExactPatch
+        From the flange to the tread.
+    x, s : ndarray, shape (n_x,), (n_s,)
+        Element centres along the track and along the rail's contour (0 at its top) [m].
+    Y : ndarray, shape (n_s,)
+        Lateral place on the rail at `s`, track axes [m].
+    pressure : ndarray, shape (n_x, n_s)
+        Pressure [Pa].
+    """
+
+    z: float
+    penetration: float
+    patches: tuple[ExactPatch, ...]
+    x: Array
+    s: Array
+    Y: Array
+    pressure: Array
+
+
+def exact_contact(
+    wheel: Profile,
+    rail: Profile,
+    y: float,
+    roll: float = 0.0,
+    load: float = 60e3,
+    *,
+    radius: float = 0.46,
+    gauge: float = 1.435,
+    inclination: float = 0.025,
+    back_to_back: float = 1.360,
+    G: float = 82e9,
+    nu: float = 0.28,
+    elements: int = 32,
+) -> ExactContact:
+    """Normal contact of a right wheel on its rail under a given vertical force.
+
+    Parameters
+    ----------
+    wheel, rail : Profile
+        Profiles.
+    y, roll : float
+        Lateral displacement [m] and roll [rad] of the wheelset.
+    load : float
+        Vertical force of the wheel on the rail [N].
+    radius, gauge, inclination, back_to_back, G, nu
+        As `railsim.contact.build_contact_table`.
+    elements : int
+        Elements across the narrowest patch and half as many along its half length.
+
+    Returns
+    -------
+    ExactContact
+
+    Raises
+    ------
+    InputError
+        If the wheelset does not fit into the track.
+    ModelError
+        If the load is not reached or the solver does not converge.
+    """
+    geometry = _Geometry(wheel, rail, y, roll, radius, gauge, inclination, back_to_back)
+    E_star = G / (1.0 - nu)
+    first = geometry.first_touch()
+
+    # a coarse solution gives the height, which places the fine elements
+    def excess(z: float, count: int) -> float:
+        solution = geometry.solve(first + z, first, E_star, count)
+        return sum(patch.N_z for patch in solution.patches) - load
+
+    upper = 50e-6
+    while excess(upper, 10) < 0.0:
+        upper *= 1.5
+        if upper > LARGEST_OVERLAP:
+            raise ModelError(f"a vertical load of {1e-3 * load:.0f} kN is not reached")
+    coarse = brentq(excess, 1e-7, upper, args=(10,), xtol=1e-9)
+    fine = brentq(excess, 0.8 * coarse, 1.25 * coarse, args=(elements,), xtol=2e-9, rtol=1e-6)
+    return geometry.solve(first + fine, first, E_star, elements)
+
+
+class _Geometry:
+    """Wheel and rail in the track's cross-section."""
+
+    def __init__(
+        self,
+        wheel: Profile,
+        rail: Profile,
+        y: float,
+        roll: float,
+        radius: float,
+        gauge: float,
+        inclination: float,
+        back_to_back: float,
+    ) -> None:
+        points = wheel_curve(wheel, radius, tape_circle_place(back_to_back), CANDIDATE_SPACING)
+        nodes = rail_curve(rail, gauge, inclination)
+        faults = [
+            Fault(f"gauge {1e3 * gauge:.1f} mm", f"{wheel.name} on {rail.name}", found, remedy)
+            for found, remedy in misfits(points, nodes, gauge)
+        ]
+        if faults:
+            raise InputError(faults)
+        cosine, sine = np.cos(roll), np.sin(roll)
+        place = y + points.u * cosine - points.r * sine
+        depth = points.u * sine + points.r * cosine - radius
+        self.wheel = CubicSpline(place, depth)
+        self.wheel_range = (place[0], place[-1])
+        self.radius = CubicSpline(place, points.r)
+        self.Y, self.z, self.slope = nodes.Y, nodes.z, nodes.slope
+        stretch = np.sqrt(1.0 + nodes.slope**2)
+        length = np.concatenate(([0.0], np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * nodes.dY)))
+        self.s = length - length[int(np.argmin(nodes.z))]
+        self.rail = CubicSpline(self.s, np.stack((self.Y, self.z), axis=1))
+
+    def first_touch(self) -> float:
+        """Displacement at which the rigid wheel touches [m]."""
+        first, last = self.wheel_range
+        inside = (first < self.Y) & (last > self.Y)
+        return float(np.min(self.z[inside] - self.wheel(self.Y[inside])))
+
+    def normal_gap(self, s: Array, z: float) -> tuple[Array, Array, Array, Array]:
+        """Gap along the rail's normal [m], lateral place [m], contact angle, wheel radius [m]."""
+        place = self.rail(s)
+        tangent = self.rail(s, 1)
+        angle = np.arctan2(-tangent[:, 1], tangent[:, 0])
+        sine, cosine = np.sin(angle), np.cos(angle)
+        t = np.zeros(s.size)
+        for _ in range(6):
+            Y = np.clip(place[:, 0] - t * sine, *self.wheel_range)
+            excess = place[:, 1] - t * cosine - self.wheel(Y) - z
+            t += np.clip(excess / (cosine - self.wheel(Y, 1) * sine), -2e-3, 2e-3)
+        first, last = self.wheel_range
+        outside = (first >= Y) | (last <= Y)
+        return np.where(outside, 1.0, t), place[:, 0], angle, self.radius(Y)
+
+    def solve(self, z: float, first: float, E_star: float, elements: int) -> ExactContact:
+        """Solution at a given height."""
+        s = np.arange(self.s[0] + 1e-3, self.s[-1] - 1e-3, 2.5e-5)
+        overlap = self.normal_gap(s, z)[0] < 0.0
+        if not overlap.any():
+            nothing = np.zeros(0)
+            return ExactContact(z, z - first, (), nothing, nothing, nothing, np.zeros((0, 0)))
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], overlap, [False])).astype(int)))
+        widths = 2.5e-5 * (edges[1::2] - edges[::2])
+        whole = 2.5e-5 * (edges[-1] - edges[0])
+        # a sliver that has just touched must not set the size of all elements
+        ds = max(float(widths.min()) / elements, float(widths.max()) / (3 * elements), 2e-5)
+        n_s = int(np.ceil(whole / ds)) + 2
+        centre = s[edges[0]] - ds + ds * np.arange(n_s)
+        gap, Y, angle, radius = self.normal_gap(centre, z)
+        deepest = float(np.max(-gap * radius / np.cos(angle)))
+        half_length = np.sqrt(2.0 * deepest)
+        n_x = elements // 2
+        dx = half_length / n_x
+        x = dx * (np.arange(n_x) + 0.5)
+        drop = radius[None, :] - np.sqrt(radius[None, :] ** 2 - x[:, None] ** 2)
+        full = gap[None, :] + drop * np.cos(angle)[None, :]
+        # under pressure the surfaces move apart only: contact lies within the overlap
+        row, column = np.nonzero(full < 0.0)
+        table = kernel.influence(2 * n_x + 1, n_s, dx, ds, E_star)
+        p = np.full(row.size, 1e8)
+        tolerance = 1e-6 * float(-full.min())
+        order = np.argsort(column, kind="stable")
+        row, column = row[order], column[order]
+        status = kernel.pressure(full[row, column], column, row, table, max(tolerance, 1e-12), p)
+        if status != kernel.CONVERGED:
+            raise ModelError("the boundary-element solver did not converge")
+        field = np.zeros((n_x, n_s))
+        field[row, column] = p
+        patches = self._patches(field, Y, angle, dx, ds)
+        return ExactContact(
+            z,
+            z - first,
+            patches,
+            np.concatenate((-x[::-1], x)),
+            centre,
+            Y,
+            np.concatenate((field[::-1], field)),
+        )
+
+    @staticmethod
+    def _patches(
+        field: Array, Y: Array, angle: Array, dx: float, ds: float
+    ) -> tuple[ExactPatch, ...]:
+        """Connected patches along s, with both halves."""
+        touching = field.any(axis=0)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], touching, [False])).astype(int)))
+        patches = []
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            part = field[:, start:end]
+            line = 2.0 * part.sum(axis=0) * dx * ds
+            N_y = float(np.sum(line * np.sin(angle[start:end])))
+            N_z = float(np.sum(line * np.cos(angle[start:end])))
+            patches.append(
+                ExactPatch(
+                    N=float(line.sum()),
+                    N_z=N_z,
+                    N_y=N_y,
+                    y=float(np.sum(line * Y[start:end]) / line.sum()),
+                    angle=float(np.arctan2(N_y, N_z)),
+                    area=2.0 * ds * sum(_reach(part[:, k]) for k in range(end - start)) * dx,
+                    p_max=float(part.max()),
+                    length=2.0 * dx * max(_reach(part[:, k]) for k in range(end - start)),
+                    width=ds * (_reach(part[0]) + _reach(part[0, ::-1]) - (end - start)),
+                )
+            )
+        return tuple(patches)
+
+
+def _reach(pressure: Array) -> float:
+    """Where a line of elements loses contact, in elements from its beginning.
+
+    At an edge the square of the pressure falls linearly; it is continued from the last two loaded
+    elements to zero, which removes most of the error of counting whole elements.
+    """
+    loaded = np.flatnonzero(pressure > 0.0)
+    if loaded.size == 0:
+        return 0.0
+    last = int(loaded[-1])
+    inner, outer = (pressure[last - 1] ** 2 if last else 0.0), pressure[last] ** 2
+    beyond = min(outer / (inner - outer), 1.0) if inner > outer else 0.5
+    return last + 0.5 + float(beyond)
