@@ -21,11 +21,10 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from math import cos, sin
-
 from railsim.kernels import jit
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
+from railsim.kernels.rotation import sine_cosine
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.system import AXLEBOX, FREE, TABLE, WHEELSET
 from railsim.kernels.track_frame import GRAVITY, OMEGA, OMEGA_S, track_frame
@@ -72,9 +71,9 @@ def attitudes(bodies, state, S, C):
         roll, pitch, yaw = state[6 * b + 3], state[6 * b + 4], state[6 * b + 5]
         if bodies.kind[b] == WHEELSET:
             pitch = 0.0
-        sr, cr = sin(roll), cos(roll)
-        sp, cp = sin(pitch), cos(pitch)
-        sy, cy = sin(yaw), cos(yaw)
+        sr, cr = sine_cosine(roll)
+        sp, cp = sine_cosine(pitch)
+        sy, cy = sine_cosine(yaw)
         S[b, 0], S[b, 1], S[b, 2], S[b, 3] = sr, cr, sp, cp
         C[b, 0] = cy * cp - sy * sr * sp
         C[b, 1] = -sy * cr
@@ -139,7 +138,7 @@ def kinematics(bodies, frames, speed, state, S, C, R, X, V, W, rates):
 @jit
 def axlebox_kinematics(b, p, n, state, R, X, V, W, rates):
     """Pose of axlebox `b`: that of its wheelset `p`, turned by its own pitch about the axle."""
-    s, c = sin(state[6 * b + 4]), cos(state[6 * b + 4])
+    s, c = sine_cosine(state[6 * b + 4])
     rate = state[6 * n + 6 * b + 4]
     rates[b, 4] = rate
     for i in range(3):
@@ -320,6 +319,22 @@ def hold_reference(bodies, C, acceleration, derivative):
 def right_hand_side(system, work, state, derivative):
     """Derivative of the whole state.
 
+    See `mechanics`, which leaves out the internal states of elements.
+    """
+    status, where, n_patches = mechanics(system, work, state, derivative)
+    if status == RUNNING:
+        first = 12 * system.bodies.kind.shape[0]
+        for i in range(system.internal.kind.shape[0]):
+            derivative[first + i] = internal_rate(system.internal, system.curves, i,
+                                                  state[first + i], work.drive[i, 0],
+                                                  work.drive[i, 1])
+    return status, where, n_patches
+
+
+@jit
+def mechanics(system, work, state, derivative):
+    """Derivative of coordinates, velocities, place and speed; drives of the internal states.
+
     Parameters
     ----------
     system : System;  work : Work
@@ -367,7 +382,4 @@ def right_hand_side(system, work, state, derivative):
     derivative[-3] = 1.0
     derivative[-2] = speed
     derivative[-1] = rate
-    for i in range(m):
-        derivative[12 * n + i] = internal_rate(system.internal, system.curves, i, inner[i],
-                                               work.drive[i, 0], work.drive[i, 1])
     return RUNNING, 0, n_patches

@@ -14,7 +14,7 @@ import numpy as np
 
 from railsim.kernels import jit
 from railsim.kernels.internal import PAD, advanced, constant_decays
-from railsim.kernels.rhs import euler_rates, right_hand_side, table_value_slope
+from railsim.kernels.rhs import euler_rates, mechanics, right_hand_side, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING
 from railsim.kernels.system import AXLEBOX, TABLE, WHEELSET
 
@@ -162,7 +162,10 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     constant_decays(system.internal, system.curves, h, decay)
     rows = 0
     for step in range(first_step, first_step + n_steps):
-        status, where, _ = right_hand_side(system, work, state, derivative)
+        if scheme == FAST:
+            status, where, _ = mechanics(system, work, state, derivative)
+        else:
+            status, where, _ = right_hand_side(system, work, state, derivative)
         if status == RUNNING:
             if step % every == 0:
                 record(recorder, rows, state, derivative, work)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import jit
+from railsim.kernels.rotation import sine_cosine
 
 # rows of TrackTables.coefficients
 X, Y, Z, PSI, THETA, PHI = range(6)
@@ -94,8 +95,8 @@ def track_frame(track, s, frames, f):
     phi_2 = 2.0 * c[i, PHI, 2] + 6.0 * u * c[i, PHI, 3]
 
     sp, cp = sin(psi), cos(psi)
-    st, ct = sin(theta), cos(theta)
-    sf, cf = sin(phi), cos(phi)
+    st, ct = sine_cosine(theta)
+    sf, cf = sine_cosine(phi)
     frames[f, 3] = cp * ct
     frames[f, 4] = cp * st * sf - sp * cf
     frames[f, 5] = cp * st * cf + sp * sf

@@ -16,6 +16,8 @@ g > 0 where the normal leans to the right; on the wheel the opposite, with momen
 
 from math import sqrt
 
+import numpy as np
+
 from railsim.kernels import jit
 from railsim.kernels.contact_table import (
     ABOVE_Y,
@@ -127,7 +129,7 @@ def normal_contact(system, work, speed, state):
                 N = vertical / cos_g
                 if N <= 0.0:
                     continue
-                third = N ** (1.0 / 3.0)
+                third = np.cbrt(N)
                 column[A, n] = t[5] * third
                 column[B, n] = t[6] * third
                 column[NORMAL, n] = N
