@@ -43,6 +43,7 @@ from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
 GRAVITY = 9.81  # m/s2, as in the reference study
+CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
 _KINDS = {"body": RIGID, "wheelset": WHEELSET, "axlebox": AXLEBOX}
 
 
@@ -202,11 +203,10 @@ def level_track(system: System) -> System:
     start = float(np.min(system.frame_offset)) - length / 2.0
     coefficients[:, 0, 0] += start + length
     track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0)
-    still = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
     nothing = system.loads._replace(
         body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
     )
-    return system._replace(track=track, drive=still, loads=nothing)
+    return system._replace(track=track, drive=CONSTANT_SPEED, loads=nothing)
 
 
 def drive_arrays(drive: DriveDefinition) -> Drive:
@@ -216,7 +216,7 @@ def drive_arrays(drive: DriveDefinition) -> Drive:
     if drive.mode == "free":
         traction = drive.traction_table or ((0.0, 0.0),)
         return Drive(FREE, np.array(traction, dtype=float), np.array(drive.resistance))
-    return Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
+    return CONSTANT_SPEED
 
 
 def _names(bodies: Sequence[FlatBody]) -> list[str]:

@@ -26,6 +26,7 @@ from railsim.kernels.time_loop import record_state, time_loop
 from railsim.outputs import quantities
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
+from railsim.run_in import settled
 from railsim.time_step import SCHEMES, choose_step, empty_recorder
 
 Floats = NDArray[np.float64]
@@ -211,9 +212,10 @@ def prepare(
     balance = equilibrium(assemble(vehicle, track, settings, profiles), speed)
     model = balance.model
     pace = Pace(model, settings, {speed: balance.state})
-    pace.at(speed)
+    step, _ = pace.at(speed)
+    state = settled(model, balance, track, start, step)
     return Preparation(
-        model, balance, _start(model, balance, settings, start),
+        model, balance, _start(model, balance, settings, start, state),
         end_time=math.inf if duration is None else duration,
         end_distance=track.length if until is None else until,
         pace=pace,
@@ -288,14 +290,18 @@ def output_interval(settings: Settings, speed: float) -> float:
     return 1.0 / settings.output_rate
 
 
-def _start(model: Model, balance: Equilibrium, settings: Settings, start: float) -> Floats:
-    """Initial state: steady rolling at `start` with the disturbances of the settings."""
+def _start(
+    model: Model, balance: Equilibrium, settings: Settings, start: float, state: Floats | None
+) -> Floats:
+    """Initial state at `start`: `state` or steady rolling, disturbed as the settings say."""
     work = work_arrays(model.system)
     bodies = model.system.bodies
     if locate_frames(model.system.track, model.system.frame_offset, bodies.frame[bodies.reference],
                      start, work.frames, work.cell, work.cell_u) != RUNNING:
         raise ModelError("the vehicle is longer than the track's table allows")
-    state = initial_state(model, balance, start, work.frames)
+    if state is None:
+        state = initial_state(model, balance, start, work.frames)
+    state[-2] = start
     n = model.index.n_bodies
     for name, change in settings.initial.items():
         if name not in model.index.bodies:
