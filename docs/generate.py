@@ -1,0 +1,76 @@
+"""Fill those tables of the manual that railsim itself knows.
+
+``python docs/generate.py`` writes them between ``<!-- generated: NAME -->`` and ``<!-- end -->``:
+the quantities of a result, and the published curving study against railsim.  The tests check that
+they are up to date.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+from railsim import load_track, load_vehicle, simulate
+from railsim.notation import QUANTITIES, Quantity
+
+DOCS = Path(__file__).parent
+PAGES = (DOCS.parent / "README.md", DOCS / "notation.md", DOCS / "validation" / "curving.md")
+TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
+from curving_study import COACHES, measured, published  # noqa: E402
+
+
+def tables() -> dict[str, str]:
+    """All tables by name."""
+    return {"quantities": quantity_table(), **{coach: curving_table(coach) for coach in COACHES}}
+
+
+def quantity_table() -> str:
+    """Table of the quantities of a result."""
+    head = ("name", "symbol", "meaning", "sign", "unit", "shown", "dimensions")
+    return _lines(head, "---", [_quantity_row(quantity) for quantity in QUANTITIES.values()])
+
+
+def _quantity_row(quantity: Quantity) -> tuple[str, ...]:
+    return (
+        f"`{quantity.name}`",
+        f"${quantity.symbol}$".replace("|", r"\vert "),
+        quantity.long_name,
+        quantity.sign,
+        quantity.unit,
+        quantity.shown_unit,
+        ", ".join(quantity.dims),
+    )
+
+
+def curving_table(coach: str) -> str:
+    """Comparison of one coach with the published curving study."""
+    result = simulate(load_vehicle(f"coach_{coach}"), load_track("curve_r250"), speed=20.0)
+    rows = []
+    for name, expected in published(coach).items():
+        quantity, found = QUANTITIES[name], measured(result, name)
+        where = "largest" if name == "dQ_over_Q0" else "mid-curve"
+        difference = f"{100.0 * (found / expected - 1.0):+.1f} %"
+        numbers = (_digits(quantity.scale * value) for value in (expected, found))
+        rows.append((f"{quantity.words}, {where}", *numbers, difference))
+    return _lines(("leading wheelset", "published", "railsim", "difference"), "---:", rows)
+
+
+def _digits(value: float) -> str:
+    return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.3f}"
+
+
+def _lines(head: tuple[str, ...], rule: str, rows: list[tuple[str, ...]]) -> str:
+    rules = ("---", *[rule] * (len(head) - 1))
+    return "".join(f"| {' | '.join(row)} |\n" for row in (head, rules, *rows))
+
+
+def filled(text: str, known: dict[str, str]) -> str:
+    """Return a page with its tables filled."""
+    return TABLE.sub(lambda match: f"{match[1]}\n{known[match[2]]}\n{match[3]}", text)
+
+
+if __name__ == "__main__":
+    known = tables()
+    for page in PAGES:
+        page.write_text(filled(page.read_text("utf-8"), known), encoding="utf-8")

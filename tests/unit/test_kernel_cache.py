@@ -1,0 +1,67 @@
+"""The disk cache of compiled kernels, in a copy of them: never an old callee, never a recompile."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import railsim.kernels
+
+# `locate_frames` lives in another file than `track_frame`, which it calls; prints the rate of turn
+# about x on straight track, and how often numba had to compile
+PROGRAM = """
+import numpy as np
+from railsim.kernels.rhs import locate_frames
+from railsim.kernels.track_frame import FRAME_SIZE, TrackTables
+track = TrackTables(-1.0, 1.0, np.zeros((3, 6, 4)), np.zeros((3, 6, 4)), 0)
+frames = np.zeros((1, FRAME_SIZE))
+cells = np.zeros(1, dtype=np.int64), np.zeros(1)
+assert locate_frames(track, np.zeros(1), 0, 0.5, frames, *cells) == 0
+print(frames[0, 12], sum(locate_frames.stats.cache_misses.values()))
+"""
+
+
+@pytest.fixture
+def copied_kernels(tmp_path):
+    package = tmp_path / "railsim"
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(railsim.kernels.__file__).parent, package / "kernels", ignore=ignored)
+    (package / "__init__.py").touch()
+    return package / "kernels"
+
+
+def run(folder):
+    environment = {name: text for name, text in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment["RAILSIM_CACHE_DIR"] = str(folder / "cache")
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        cwd=folder,  # where the copy is imported from
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    number, misses = done.stdout.split()
+    return float(number), int(misses)
+
+
+@pytest.mark.slow
+def test_edited_callee_in_another_file_gives_the_new_number(copied_kernels):
+    folder = copied_kernels.parent.parent
+    assert run(folder) == (0.0, 1)
+    callee = copied_kernels / "track_frame.py"
+    line = "frames[f, 12] = "
+    text = callee.read_text()
+    assert text.count(line) == 1
+    callee.write_text(text.replace(line, line + "7.0 + "))
+    assert run(folder)[0] == 7.0
+
+
+@pytest.mark.slow
+def test_second_process_compiles_nothing(copied_kernels):
+    folder = copied_kernels.parent.parent
+    assert run(folder) == (0.0, 1)
+    assert run(folder) == (0.0, 0)
