@@ -175,7 +175,8 @@ def evaluate(task: Task, x: Dimensions, n: Pair | None = None) -> Evaluation:
     weaker = np.minimum(*(coil.K_V for coil in frame.coils))
     share = weaker * task.wanted.mounting_deflection / task.wanted.mounting_load
     slack = _space_slack(task, x, share)
-    slack["equilibrium"] = np.where(np.all(np.isfinite(phi), axis=-1), 1.0, -1.0)
+    lost = np.isfinite(weaker) & np.any(np.isnan(phi), axis=-1)
+    slack["equilibrium"] = np.where(lost, -1.0, 1.0)
     mass, margins = np.zeros_like(x.H0), []
     for name, spring, coils, coil in zip(("outer", "inner"), springs, n, across.coils, strict=True):
         state = trailing_arm.coil_state(across, coil, phi)
@@ -276,6 +277,7 @@ def _with_load_axis(frame: Arm) -> Arm:
 
 
 def _space_slack(task: Task, x: Dimensions, share: Floats) -> dict[str, Floats]:
+    """Slacks of the space; a stiffness that no pair of springs has counts as a broken limit."""
     limits = task.limits
     clearance = 0.5 * (x.D_outer - x.D_inner - x.d_outer - x.d_inner)
     low, high = limits.free_height
@@ -287,7 +289,7 @@ def _space_slack(task: Task, x: Dimensions, share: Floats) -> dict[str, Floats]:
         "radial_clearance": (clearance - limits.clearance_min) / x.d_inner,
         "free_height_min": x.H0 / low - 1.0,
         "free_height_max": 1.0 - x.H0 / high,
-        "stiffness": share / _STIFFNESS_RATIO_MIN - 1.0,
+        "stiffness": np.where(np.isnan(share), -1.0, share / _STIFFNESS_RATIO_MIN - 1.0),
         **{name: np.minimum(w / w_min - 1.0, 1.0 - w / w_max) for name, w in index.items()},
     }
 

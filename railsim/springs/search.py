@@ -13,7 +13,7 @@ from the design equations, the numbers of coils from the stiffnesses.  In four s
 Every limit is a slack, relative and positive when it is kept (`LIMITS` says what each one means).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,7 @@ _MASS = 50.0  # kg: makes the masses of nests numbers of order one
 _PRICE = 10.0  # of a violation, against aims of order one
 _PROGRAMS, _FIRST_BOX, _CONVERGED = 40, 0.03, 1e-6  # linear programs, over the scaled dimensions
 _NEARLY = -2e-3  # slack at which an optimum is good enough to be rounded: rounding decides
+_FAR = -0.5  # slack below which a nest is no compromise
 _SPARE = 10  # pairs refined beyond those asked for: some do not survive rounding
 
 
@@ -115,8 +116,6 @@ class SearchResult:
         Number of candidates and how many of them kept every limit.
     broken : dict of str to int
         Number of candidates that broke a limit, by limit.
-    alone : dict of str to int
-        Number of candidates that broke this limit only.
     cloud : ndarray, shape (feasible, 2)
         Mass [kg] and fatigue margin of the feasible candidates.
     """
@@ -126,7 +125,6 @@ class SearchResult:
     tried: int
     feasible: int
     broken: Mapping[str, int]
-    alone: Mapping[str, int]
     cloud: Floats
 
 
@@ -142,10 +140,8 @@ def search(suspension: TrailingArmSuspension) -> SearchResult:
     sample = candidates(task.limits, task.wires)
     found = evaluate(task, sample)
     feasible = found.feasible
-    broken = {name: ~(slack >= -1e-9) for name, slack in found.slack.items()}
-    count = np.sum(list(broken.values()), axis=0)
     optima = _optima(task, sample, found)
-    nests = [nest for optimum in optima if (nest := _built(task, *optimum)) is not None]
+    nests = [nest for optimum in optima if (nest := _built(task, optimum)) is not None]
     by_mass = task.limits.objective == "mass"
     nests.sort(key=lambda nest: nest.mass if by_mass else -nest.fatigue_margin)
     result = SearchResult(
@@ -153,12 +149,11 @@ def search(suspension: TrailingArmSuspension) -> SearchResult:
         objective=task.limits.objective,
         tried=len(sample.H0),
         feasible=int(np.sum(feasible)),
-        broken={name: int(np.sum(mask)) for name, mask in broken.items()},
-        alone={name: int(np.sum(mask & (count == 1))) for name, mask in broken.items()},
+        broken={name: int(np.sum(slack < -1e-9)) for name, slack in found.slack.items()},
         cloud=np.column_stack([found.mass, np.minimum(*found.margin)])[feasible],
     )
     if not nests:
-        raise InputError(_nothing_fits(suspension, result))
+        raise InputError(_nothing_fits(suspension, result, optima))
     return result
 
 
@@ -187,13 +182,29 @@ def candidates(limits: Search, wires: Floats) -> Dimensions:
     )
 
 
-def _optima(
-    task: Task, sample: Dimensions, found: Evaluation
-) -> list[tuple[Dimensions, tuple[str, ...]]]:
-    """Optima of the most promising pairs of wires, with their active limits."""
+@dataclass(frozen=True)
+class _Optimum:
+    """Where the local optimisation ended: dimensions of one nest, slacks by limit."""
+
+    dimensions: Dimensions
+    slack: Mapping[str, float]
+
+    @property
+    def worst(self) -> float:
+        """The smallest slack."""
+        return min(self.slack.values())
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Limits that hold it in place."""
+        return tuple(name for name, value in self.slack.items() if value < ACTIVE)
+
+
+def _optima(task: Task, sample: Dimensions, found: Evaluation) -> list[_Optimum]:
+    """Optima of the most promising pairs of wires."""
     leaders, merit = _leaders(task, sample, _merit(task, found))
     best = np.argsort(merit, kind="stable")[: task.limits.results + _SPARE]
-    return [optimum for i in best if (optimum := _optimum(task, leaders, int(i))) is not None]
+    return [_optimum(task, leaders, int(i)) for i in best]
 
 
 def _merit(task: Task, found: Evaluation) -> Floats:
@@ -236,10 +247,8 @@ def _leaders(task: Task, sample: Dimensions, merit: Floats) -> tuple[Dimensions,
     return Dimensions(*d.T, *x.T), merit
 
 
-def _optimum(
-    task: Task, sample: Dimensions, start: int
-) -> tuple[Dimensions, tuple[str, ...]] | None:
-    """Best mean diameters and free height for one pair of wires, or None where none fit.
+def _optimum(task: Task, sample: Dimensions, start: int) -> _Optimum:
+    """Best mean diameters and free height for one pair of wires; the least broken where none fit.
 
     Variables are (D_outer, D_inner, H0) over the size of the space.  Sequential linear programming:
     aims and slacks are linearised, the program is solved within a box that shrinks when the step
@@ -283,12 +292,8 @@ def _optimum(
         if kept > 0.1:
             x, here = x + step, there
         reach = 1.5 * reach if kept > 0.7 else 0.35 * float(np.max(np.abs(step)))
-    if np.min(here.slack) < _NEARLY:
-        return None
-    active = tuple(
-        name for name, value in zip(here.names, here.slack, strict=True) if value < ACTIVE
-    )
-    return at(x[None, :]), active
+    slack = dict(zip(here.names, here.slack.tolist(), strict=True))
+    return _Optimum(at(x[None, :]), slack)
 
 
 @dataclass(frozen=True)
@@ -337,8 +342,11 @@ def _aims(task: Task, found: Evaluation) -> list[Floats]:
     return [1.0 / margin for margin in found.margin]
 
 
-def _built(task: Task, optimum: Dimensions, active: tuple[str, ...]) -> Nest | None:
+def _built(task: Task, found: _Optimum) -> Nest | None:
     """The best rounding of an optimum that keeps every limit, None where none does."""
+    if found.worst < _NEARLY:
+        return None
+    optimum = found.dimensions
     step, coil_step = task.limits.diameter_step, task.limits.coil_step
     axes = [
         [np.floor(value[0] / step) * step + k * step for k in (-1, 0, 1, 2)]
@@ -375,22 +383,36 @@ def _built(task: Task, optimum: Dimensions, active: tuple[str, ...]) -> Nest | N
         fatigue_margin=float(margin[best]),
         mounting_error=float(result.deflection_error[0][best]),
         target_error=float(result.deflection_error[1][best]),
-        active=active,
+        active=found.active,
         slack={name: float(values[best]) for name, values in result.slack.items()},
     )
 
 
-def _nothing_fits(suspension: TrailingArmSuspension, result: SearchResult) -> list[Fault]:
-    """The limits that stand in the way: those that are broken alone, else the most broken."""
-    counts = result.alone if any(result.alone.values()) else result.broken
-    worst = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])[:3]
-    how = "alone keeps" if counts is result.alone else "keeps"
+def _nothing_fits(
+    suspension: TrailingArmSuspension, result: SearchResult, optima: Sequence[_Optimum]
+) -> list[Fault]:
+    """The limits that the least broken nest breaks; without one, those that most candidates do."""
+    nearest = max(optima, key=lambda optimum: optimum.worst)
+    x = nearest.dimensions
+    wires = f"wires {x.d_outer[0] * 1e3:.6g} and {x.d_inner[0] * 1e3:.6g} mm"
+    if nearest.worst >= _NEARLY:
+        found = "no nest fits once its dimensions and coils are rounded"
+        mend = "reduce search.diameter_step or search.coil_step, or raise search.height_error_max"
+        return [Fault(suspension.name, "search.diameter_step", found, mend)]
+    if nearest.worst > _FAR:
+        missed = {name: -slack for name, slack in nearest.slack.items() if slack < 0.0}
+        words = "is missed by {:.1%} at the best compromise (" + wires + ")"
+    else:
+        missed = {name: count / result.tried for name, count in result.broken.items() if count}
+        words = "keeps out {:.0%} of the candidates"
+    names = sorted(missed, key=lambda name: -missed[name])[:3]
     return [
         Fault(
             suspension.name,
             LIMITS[name][0],
-            f"no nest fits: the limit '{name}' {how} out {counts[name]} of {result.tried}",
+            f"no nest fits: the limit '{name}' {words.format(missed[name])}",
             LIMITS[name][1],
         )
-        for name in worst
+        for name in names
+        if missed[name] > 0.5 * missed[names[0]]
     ]

@@ -123,7 +123,6 @@ def search_data(result: "SearchResult") -> Data:
         "tried": result.tried,
         "feasible": result.feasible,
         "broken": dict(result.broken),
-        "alone": dict(result.alone),
         "nests": [
             {
                 "outer": dict(vars(nest.outer)),
