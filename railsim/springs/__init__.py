@@ -1,9 +1,20 @@
 """Coil springs and the trailing-arm primary suspension.
 
-`helical`    stiffness of one helical spring; the vehicle models use it too.  Begin here.
-`arm`        an axlebox arm on two concentric springs: equilibrium, energy, all loads at once
-`design`     the inverse: spring stiffnesses from two wanted deflections; why there are none
-`checks`     solid height, yield, buckling, fatigue with the Goodman-Smith margin
-`search`     feasible nests ranked by mass or fatigue margin, with the limits that are active
-`tolerance`  scatter of the ride height from the scatter of wire, coils, height and material
+=================  ==============================================================================
+module             job
+=================  ==============================================================================
+helical            stiffness of one helical spring; the vehicle models use it too.  Begin here
+arm                an axlebox arm on concentric springs: equilibrium, energy, all loads at once
+design             the inverse: stiffnesses from two wanted deflections; why there are none
+checks             solid height, stresses, Goodman-Smith line: pure functions
+verification       a file's suspension under all its loads, against all limits; fatigue
+nests              thousands of nests in one call: what they do, how far from each limit
+search             feasible nests ranked by mass or fatigue margin, with the limits that are active
+tolerance          scatter of the ride height from wire, coils, heights, material, bush
+vehicle_table      the suspension as a part of a vehicle file
+summary            results as plain numbers by name: ``--json``
+=================  ==============================================================================
+
+`railsim.definitions.spring` is the file format, `railsim.plot.springs` draws, `railsim.report.springs`
+writes the page, `railsim.cli.spring` holds the commands.
 """

@@ -1,0 +1,60 @@
+"""How long the spring tools take: ``python benchmarks/springs.py``.
+
+Cold start (a new process, imports included) and warm calls apart; one core, best of five.
+"""
+
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from railsim.definitions.loading import load_spring
+from railsim.report.springs import as_png, collected, figures, page
+from railsim.springs.design import design
+from railsim.springs.nests import evaluate, task_of
+from railsim.springs.search import candidates, search
+from railsim.springs.verification import verify
+
+
+def best(function: Callable[[], object], times: int = 5) -> float:
+    """Shortest time of some calls [s]."""
+    spent = []
+    for _ in range(times):
+        start = time.perf_counter()
+        function()
+        spent.append(time.perf_counter() - start)
+    return min(spent)
+
+
+def whole_page() -> None:
+    """Everything that ``railsim spring verify --out`` computes and draws."""
+    results = collected(suspension)
+    page(results, {name: as_png(figure) for name, figure in figures(results).items()})
+
+
+def command() -> None:
+    """The same as a new process."""
+    with tempfile.TemporaryDirectory() as folder:
+        arguments = ["spring", "verify", "turasas_axlebox", "--quiet", "--out", str(Path(folder))]
+        subprocess.run(
+            [sys.executable, "-m", "railsim", *arguments], check=True, stdout=subprocess.DEVNULL
+        )
+
+
+if __name__ == "__main__":
+    suspension = load_spring("turasas_axlebox")
+    task = task_of(suspension)
+    sample = candidates(task.limits, task.wires)
+    print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
+    for name, seconds in (
+        ("design", best(lambda: design(suspension))),
+        ("verify, five loads", best(lambda: verify(suspension))),
+        ("verify with pictures and page", best(whole_page)),
+        ("the same as a command", best(command, 3)),
+        (f"evaluate {len(sample.H0)} nests", best(lambda: evaluate(task, sample))),
+        (f"search, {len(sample.H0)} candidates", best(lambda: search(suspension), 2)),
+    ):
+        print(f"{name:32} {seconds:8.4f} s")
