@@ -172,7 +172,7 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
     # one pair of axes for all cases, each at its own origin: far quicker than many axes
     wide = 1e3 * arm.length + half_spring + 170.0
     high = max(tops) + 420.0
-    figure = Figure(figsize=(7.6, 7.6 * rows * high / (columns * wide)))
+    figure = Figure(figsize=(2.55 * columns, 2.55 * rows * high / wide))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     for i, case in enumerate(cases):
         origin = np.array([(i % columns) * wide, -(i // columns) * high])
@@ -219,6 +219,7 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     single.barh(rows, low, color=DISTINCT[4], height=0.6, label="at the lower limit")
     single.barh(rows, high, color=DISTINCT[0], height=0.6, label="at the upper limit")
     single.set_yticks(rows, names)
+    single.set_ylim(-0.6, max(len(rows), 4) - 0.4)
     single.grid(axis="y", visible=False)
     single.axvline(0.0, color="0.35", lw=0.8)
     single.set_xlabel(f"change of the ride height at {shown.name} / mm")
@@ -255,7 +256,7 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
 def _curve(result: Verification) -> dict[str, Floats]:
     """All quantities over a range of rotations somewhat wider than that of the cases."""
     turned = [case.rotation for case in result.cases]
-    wider = 0.08 * (max(turned) - min(turned)) + 1e-4
+    wider = max(0.08 * (max(turned) - min(turned)), np.radians(0.5))
     lowest, highest = (float(end) for end in trailing_arm.rotation_range(result.arm))
     phi = np.linspace(max(min(turned) - wider, lowest), min(max(turned) + wider, highest), 201)
     load = trailing_arm.load(result.arm, phi)

@@ -15,6 +15,6 @@ vehicle_table      the suspension as a part of a vehicle file
 summary            results as plain numbers by name: ``--json``
 =================  ==============================================================================
 
-`railsim.definitions.spring` is the file format, `railsim.plot.springs` draws, `railsim.report.springs`
-writes the page, `railsim.cli.spring` holds the commands.
+`railsim.definitions.spring` is the file format, `railsim.plot.springs` draws,
+`railsim.report.springs` writes the page, `railsim.cli.spring` holds the commands.
 """
