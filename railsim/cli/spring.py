@@ -326,7 +326,8 @@ def _base(
     """The vehicle to extend as the written file must name it, and what to remove there."""
     if extends is None or suspension.vehicle is None:
         return None, None
-    from railsim.definitions.sources import find_file, key_path, read_source
+    from railsim.definitions.paths import key_path
+    from railsim.definitions.sources import find_file, read_source
 
     base = find_file(extends, "vehicle")
     data = read_source(base, "vehicle").data
