@@ -1,5 +1,6 @@
 """``railsim run``: one vehicle on one track at one speed."""
 
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from railsim.cli.progress import progress_bar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from railsim.compare import Comparison
     from railsim.result import MidCurve, Peak, Result
     from railsim.studies.case import Case
 
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 @set_option
 @overwrite_option
 @click.option("--plots", is_flag=True, help="Draw the result beside its file (.png).")
+@click.option("--check-step", is_flag=True, help="Run again at half the step and compare peaks.")
 @json_option
 @quiet_option
 def command(
@@ -52,6 +55,7 @@ def command(
     assignments: tuple[str, ...],
     overwrite: bool,
     plots: bool,
+    check_step: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -65,6 +69,7 @@ def command(
     Example:
       railsim run coach_manchester curve_r250 --speed 20 --overwrite
       railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.3 --out dry.h5
+      railsim run coach_manchester curve_r250 --speed 20 --check-step --overwrite
     """
     from railsim.cli import DONE, ENDED_EARLY
     from railsim.definitions.layout import track_remarks
@@ -89,10 +94,20 @@ def command(
         from railsim.plot.style import save
 
         save(histories(result), path.with_suffix(".png"), overwrite=overwrite)
+    record = {"file": str(path), **result_record(result)}
+    lines = _report_lines(result, path)
+    if check_step:
+        from railsim.check_step import difference_record, half_step, step_differences
+
+        with progress_bar("half the step", quiet=quiet) as progress:
+            half = half_step(result, resume=resume, progress=progress)
+        differences = step_differences(result, half)
+        record["half_step"] = [difference_record(row) for row in differences]
+        lines += ["", *_step_lines(result, differences)]
     if as_json:
-        print_json({"file": str(path), **result_record(result)})
+        print_json(record)
     else:
-        click.echo("\n".join(_report_lines(result, path)))
+        click.echo("\n".join(lines))
     return DONE if result.status == "complete" else ENDED_EARLY
 
 
@@ -228,6 +243,28 @@ def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
         )
     header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "t (s)", "s (m)"]
     return table(header, rows, numbers=4)
+
+
+def _step_lines(result: "Result", differences: "Sequence[Comparison]") -> list[str]:
+    """Return a table of what half the step changes."""
+    from railsim.check_step import FULL, HALF
+
+    step = float(result.attributes["step"])
+    rows = []
+    for row in differences:
+        full, half = row.peaks[FULL], row.peaks[HALF]
+        relative = row.differences[FULL]
+        rows.append(
+            [
+                row.quantity.words,
+                row.where,
+                row.quantity.text(full.value),
+                f"{(full.value - half.value) * row.quantity.scale:+.2g}",
+                "" if isnan(relative) else f"{100.0 * relative:+.2g}",
+            ]
+        )
+    header = [f"Check of the step, {1e3 * step:g} ms", "", "value", "less that at half", "%"]
+    return table(header, rows, numbers=2)
 
 
 def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:

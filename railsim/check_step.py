@@ -1,0 +1,84 @@
+"""An estimate of a run's error from its time step: the run again at half the step.
+
+The scheme `fast` is of first order: the difference between both runs is about the error of the
+second one, and half the error of the first.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from railsim.compare import Comparison, compare
+from railsim.result import Result
+from railsim.simulation import simulate
+
+FULL, HALF = "step", "half"
+
+
+def half_step(
+    result: Result,
+    *,
+    resume: Result | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Run the inputs of a result again at half its step.
+
+    Parameters
+    ----------
+    result : Result
+        A run; it stays as it is.
+    resume : Result, optional
+        The result that `result` went on from.
+    progress : callable, optional
+        Called with the finished fraction now and then.
+
+    Returns
+    -------
+    Result
+        Kept in memory.
+
+    Raises
+    ------
+    InputError, ModelError : as `railsim.simulate`.
+    """
+    settings = result.settings().replace(step=0.5 * float(result.attributes["step"]))
+    return simulate(
+        result.vehicle(),
+        result.track(),
+        speed=result.speed,
+        start=float(result.attributes["start"]),
+        duration=_asked(result, "duration"),
+        until=_asked(result, "until"),
+        settings=settings,
+        profiles=result.profiles,
+        resume=resume,
+        progress=progress,
+    )
+
+
+def _asked(result: Result, end: str) -> float | None:
+    value = result.attributes.get(f"asked_{end}")
+    return None if value is None else float(value)
+
+
+def step_differences(result: Result, half: Result) -> tuple[Comparison, ...]:
+    """Compare the peaks of a run with those at half its step, which is the reference.
+
+    Returns
+    -------
+    tuple of Comparison
+        The labels of its values are `HALF` and `FULL`.
+    """
+    return compare({HALF: half, FULL: result})
+
+
+def difference_record(row: Comparison) -> dict[str, Any]:
+    """Return one line of the check as plain numbers and strings, SI."""
+    full, half = row.peaks[FULL], row.peaks[HALF]
+    return {
+        "quantity": row.quantity.name,
+        "where": row.where,
+        "unit": row.quantity.unit,
+        "value": full.value,
+        "half_step_value": half.value,
+        "difference": full.value - half.value,
+    }

@@ -1,0 +1,46 @@
+"""``railsim run --check-step``: the run again at half the step."""
+
+import json
+
+import pytest
+
+import railsim
+from railsim.check_step import FULL, HALF, half_step, step_differences
+from railsim.cli import main
+
+SHORT = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10"]
+
+
+def test_check_prints_what_half_the_step_changes(tmp_path, capsys):
+    assert main([*SHORT, "--out", str(tmp_path / "run.h5"), "--check-step"]) == 0
+    printed = capsys.readouterr().out
+    assert "Check of the step, 1 ms" in printed
+    assert "less that at half" in printed
+
+
+def test_check_in_json_is_the_difference_of_two_runs(tmp_path, capsys):
+    path = tmp_path / "run.h5"
+    assert main([*SHORT, "--out", str(path), "--check-step", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["half_step"]
+    result = railsim.open_result(path)
+    step = float(result.attributes["step"])
+    other = railsim.simulate(**(
+        result.inputs() | {"settings": result.settings().replace(step=0.5 * step)}
+    ))
+    largest = next(row for row in rows if (row["quantity"], row["where"]) == ("Q", "peak"))
+    assert largest["value"] == pytest.approx(result.Q.max(), rel=1e-15)
+    assert largest["half_step_value"] == pytest.approx(other.Q.max(), rel=1e-15)
+    assert largest["difference"] == largest["value"] - largest["half_step_value"]
+
+
+def test_half_a_step_that_is_converged_changes_nothing():
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    settings = railsim.load_settings(overrides=["scheme=rk4", "step=0.00025"])
+    result = railsim.simulate(vehicle, track, speed=20.0, until=10.0, settings=settings)
+    half = half_step(result)
+    assert half.attributes["step"] == 0.5 * result.attributes["step"]
+    for row in step_differences(result, half):
+        if row.quantity.name == "Q":
+            # order four at 0.25 ms: far below the printed digits
+            assert row.differences[FULL] == pytest.approx(0.0, abs=1e-6)
+            assert row.differences[HALF] == 0.0
