@@ -130,7 +130,7 @@ def _figure(
     figure.suptitle(title(result), x=0.012, ha="left")
     handles = _legend(result, drawn, by)
     if handles:
-        figure.legend(handles=handles, loc="outside lower left", ncols=min(len(handles), 6))
+        figure.legend(handles=handles, loc="outside lower left", ncols=4 if columns == 1 else 6)
     return figure
 
 

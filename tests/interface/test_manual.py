@@ -1,0 +1,86 @@
+"""The manual and the README are up to date: generated tables, command lines, the main job."""
+
+import importlib.util
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from railsim.cli import railsim as command_line
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+MENDED_BY = "python docs/generate.py"
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
+
+
+@pytest.fixture(scope="module")
+def generate():
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def generated(name):
+    """Tables of this name, in all pages."""
+    block = re.compile(rf"<!-- generated: {name} -->\n\n(.*?)\n<!-- end -->", re.DOTALL)
+    return [table for page in PAGES for table in block.findall(page.read_text("utf-8"))]
+
+
+def test_table_of_quantities_is_up_to_date(generate):
+    assert generated("quantities") == [generate.quantity_table()], MENDED_BY
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("coach", ["manchester", "flexicoil"])
+def test_tables_of_the_curving_study_are_up_to_date(generate, coach):
+    made = generate.curving_table(coach)
+    tables = generated(coach)
+    assert len(tables) == 2  # README and the page on validation
+    for table in tables:
+        assert NUMBER.sub("", table) == NUMBER.sub("", made), MENDED_BY
+        # one unit of the last digit: another processor may round the other way
+        for written, now in zip(NUMBER.findall(table), NUMBER.findall(made), strict=True):
+            unit = 10.0 ** -len(now.partition(".")[2])
+            assert float(written) == pytest.approx(float(now), abs=1.01 * unit), MENDED_BY
+
+
+def command_lines():
+    """Every call of railsim in the shell blocks of all pages, as arguments."""
+    for page in PAGES:
+        for block in re.findall(r"^```sh\n(.*?)^```", page.read_text("utf-8"), re.M | re.S):
+            for line in block.replace("\\\n", " ").splitlines():
+                for part in line.split("&&"):
+                    words = shlex.split(part, comments=True)
+                    if words and Path(words[0]).name == "railsim":
+                        yield pytest.param(words[1:], id=f"{page.name}: {' '.join(words[1:4])}")
+
+
+@pytest.mark.parametrize("arguments", list(command_lines()))
+def test_commands_of_the_manual_have_their_options(arguments):
+    """Parsed, not run: a renamed option or command is found."""
+    command, words = command_line, arguments
+    context = click.Context(command_line)
+    while isinstance(command, click.Group) and not words[0].startswith("-"):
+        _, command, words = command.resolve_command(context, words)
+    if {"--help", "--version"}.isdisjoint(words):
+        command.make_context(arguments[0], list(words), resilient_parsing=False)
+
+
+@pytest.mark.slow
+def test_main_job_of_the_readme_runs_and_computes_nothing_twice(tmp_path):
+    (line,) = re.findall(r"railsim (study .*)", (ROOT / "README.md").read_text("utf-8"))
+    command = [sys.executable, "-m", "railsim", *shlex.split(line)]
+    first, second = (
+        subprocess.run(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert "4 of 4 runs computed" in first
+    assert "0 of 4 runs computed" in second
+    assert len(list((tmp_path / "results").glob("*.h5"))) == 4
+    assert list((tmp_path / "results").glob("*.png"))
