@@ -74,7 +74,10 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     if suffix in PROFILE_SUFFIXES:
         from railsim.profiles import load_profile
 
-        return f"{load_profile(file).kind} profile", []
+        profile = load_profile(file)
+        return f"{profile.kind} profile", [
+            {"key": "points", "text": note} for note in profile.notes
+        ]
     if suffix in RESULT_SUFFIXES:
         from railsim.result import open_result
 

@@ -241,6 +241,28 @@ def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
     return float(min(crossing, y[below + 1 : top + 1].min()))
 
 
+def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Array, Array]:
+    """Points of a right rail in the track: lateral place and height below the rail tops [m].
+
+    Parameters
+    ----------
+    profile, gauge, inclination
+        As `rail_curve`.
+
+    Raises
+    ------
+    InputError
+        If the profile does not reach down to where gauge is measured.
+    """
+    y, z = inclined(profile, inclination)
+    try:
+        face = gauge_face(y, z)
+    except ValueError as error:
+        remedy = f"the gauge is measured {1e3 * GAUGE_DEPTH:.0f} mm below the top"
+        raise InputError([Fault(profile.name, "", str(error), remedy)]) from None
+    return y - face + 0.5 * gauge, z
+
+
 def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     """Place a right rail in the track.
 
@@ -258,21 +280,7 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     -------
     RailCurve
     """
-    y, z = inclined(profile, inclination)
-    try:
-        face = gauge_face(y, z)
-    except ValueError as error:
-        raise InputError(
-            [
-                Fault(
-                    profile.name,
-                    "",
-                    str(error),
-                    f"the gauge is measured {1e3 * GAUGE_DEPTH:.0f} mm below the top",
-                )
-            ]
-        ) from None
-    y = y - face + 0.5 * gauge
+    y, z = inclined_to_track(profile, gauge, inclination)
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
     spline = CubicSpline(y[part], z[part])
     n = int((y[part.stop - 1] - y[part.start]) / RAIL_SPACING)

@@ -304,6 +304,7 @@ def fill_table_slice(
                         length,
                         lift,
                         approach,
+                        window[p],
                         first[p],
                         last[p],
                         out[C_Y],
@@ -365,6 +366,7 @@ def kik_piotrowski(
     length,
     lift,
     approach,
+    window,
     first,
     last,
     centre,
@@ -391,6 +393,8 @@ def kik_piotrowski(
     place, radius, length, lift : ndarray, shape (n,)
         Lateral place [m], rolling radius [m], length along the contour [m], approach over the
         cosine of the contact angle [m] of each candidate.
+    window : ndarray, shape (n,)
+        Window of the zone [1].
     first, last : int
         Candidates of the zone.
     approach : float
@@ -431,12 +435,8 @@ def kik_piotrowski(
             middle = k
     if _virtual_overlap(h, lift, approach, z, delta, middle) <= 0.0:
         middle = best
-    start = middle
-    while start > 0 and _virtual_overlap(h, lift, approach, z, delta, start - 1) > 0.0:
-        start -= 1
-    end = middle
-    while end < h.size - 1 and _virtual_overlap(h, lift, approach, z, delta, end + 1) > 0.0:
-        end += 1
+    start = _patch_end(h, lift, approach, z, delta, window, middle, -1)
+    end = _patch_end(h, lift, approach, z, delta, window, middle, 1)
     area = load_sum = depth_sum = width = longest = 0.0
     s = 0.0
     for k in range(start, middle):
@@ -462,6 +462,24 @@ def kik_piotrowski(
     ratio = longest / (0.5 * width)
     a = math.sqrt(area / math.pi * ratio)
     return N, a, a / ratio
+
+
+@_jit
+def _patch_end(h, lift, approach, z, delta, window, middle, step):
+    """Last candidate of the patch in one direction.
+
+    The patch ends where the virtual overlap does; in a neighbouring zone also where the overlap
+    begins to grow again, for there another patch begins.
+    """
+    k = middle
+    overlap = _virtual_overlap(h, lift, approach, z, delta, k)
+    while 0 <= k + step < h.size:
+        following = _virtual_overlap(h, lift, approach, z, delta, k + step)
+        if following <= 0.0 or (window[k + step] < 0.5 and following > overlap):
+            break
+        k += step
+        overlap = following
+    return k
 
 
 @_jit

@@ -42,6 +42,8 @@ class Profile:
         Inclination that a rail's points already carry, as tangent (0.025 for 1:40) [1].
     notes : tuple of str
         What was recognised and put right when the profile was read, a sentence each.
+    measured : ndarray, shape (2, n), optional
+        y and z before smoothing, where the profile was smoothed [m].
     """
 
     name: str
@@ -51,6 +53,7 @@ class Profile:
     source: str = ""
     inclination: float = 0.0
     notes: tuple[str, ...] = field(default=())
+    measured: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("y", "z"):

@@ -113,9 +113,17 @@ def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> 
     _check_steps(work, kind)
     y, z = _smoothed(work)
     _check_overhang(work, kind, y, z)
-    z = z - (np.interp(0.0, *_function_part(y, z, 0.0)) if kind == "wheel" else z.min())
+    level = float(np.interp(0.0, *_function_part(y, z, 0.0)) if kind == "wheel" else z.min())
+    smoothed = y is not work.y
     return Profile(
-        raw.name or Path(file).stem, kind, y, z, str(file), inclination, tuple(work.notes)
+        raw.name or Path(file).stem,
+        kind,
+        y,
+        z - level,
+        str(file),
+        inclination,
+        tuple(work.notes),
+        measured=np.stack((work.y, work.z - level)) if smoothed else None,
     )
 
 

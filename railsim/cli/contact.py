@@ -1,0 +1,511 @@
+"""``railsim contact``: contact geometry of a wheelset, equivalent conicity, patches."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option, table
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from railsim.contact.elastic import LoadedContact
+    from railsim.contact.exact_normal import ExactContact
+    from railsim.contact.geometry import ContactGeometry
+    from railsim.contact.table import ContactTable
+    from railsim.plot.contact import Pair
+
+PICTURES = ("profiles.png", "functions.png", "conicity.png", "patches.png")
+TABLES = ("functions.csv", "conicity.csv", "patches.csv")
+STEP = 5e-5
+"""Step of the lateral displacement [m]."""
+
+PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
+"""Displacements at which patches are shown, over the largest one."""
+
+
+@click.command()
+@click.option(
+    "--wheel",
+    "wheels",
+    multiple=True,
+    default=("S1002",),
+    show_default=True,
+    metavar="W",
+    help="Wheel profile, name or file; give it twice for different left and right wheels.",
+)
+@click.option(
+    "--rail",
+    "rails",
+    multiple=True,
+    default=("60E1",),
+    show_default=True,
+    metavar="R",
+    help="Rail profile, name or file; twice for left and right.",
+)
+@click.option("--gauge", default=1.435, show_default=True, help="Track gauge (m).")
+@click.option("--inclination", default=0.025, show_default=True, help="Rail inclination (1).")
+@click.option(
+    "--back-to-back", default=1.360, show_default=True, help="Distance of the wheel backs (m)."
+)
+@click.option(
+    "--radius",
+    "radii",
+    multiple=True,
+    type=float,
+    default=(0.46,),
+    show_default=True,
+    help="Rolling radius (m); twice for left and right.",
+)
+@click.option("--load", default=60e3, show_default=True, help="Vertical wheel load (N).")
+@click.option(
+    "--max-shift", default=0.010, show_default=True, help="Largest lateral displacement (m)."
+)
+@click.option(
+    "--exact", is_flag=True, help="Check the patches by boundary elements (some ten seconds)."
+)
+@click.option(
+    "--normal",
+    type=click.Choice(["hertz", "kik-piotrowski"]),
+    default="hertz",
+    show_default=True,
+    help="Normal contact of the table; with --exact both are compared.",
+)
+@click.option("--out", metavar="DIR", help="Folder for pictures and tables; made if need be.")
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    wheels: tuple[str, ...],
+    rails: tuple[str, ...],
+    gauge: float,
+    inclination: float,
+    back_to_back: float,
+    radii: tuple[float, ...],
+    load: float,
+    max_shift: float,
+    exact: bool,
+    normal: str,
+    out: str | None,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    r"""Contact geometry of a wheelset on its rails.
+
+    Prints rolling radius difference, contact angles and places over the lateral displacement, the
+    equivalent conicity of EN 15302, and the contact patches of the right wheel under a load.
+
+    \b
+    Example:
+      railsim contact --wheel S1002 --rail 60E1 --inclination 0.025 --out s1002_60e1
+      railsim contact --wheel measured.whl --rail 54E1 --exact --json
+    """
+    import numpy as np
+
+    from railsim.contact import contact_geometry
+    from railsim.plot.contact import Pair
+
+    _check_numbers(wheels, rails, radii, load, max_shift)
+    folder = _checked_folder(out, overwrite) if out else None
+    wheel_pair, rail_pair = _profiles(wheels, "wheel"), _profiles(rails, "rail")
+    radius_pair = (radii[0], radii[-1])
+    steps = max(round(max_shift / STEP), 10)
+    geometry = contact_geometry(
+        wheel_pair,
+        rail_pair,
+        radius_pair,
+        gauge,
+        inclination,
+        back_to_back,
+        np.linspace(-max_shift, max_shift, 2 * steps + 1),
+    )
+    amplitudes = 1e-3 * np.arange(0.5, 1e3 * max_shift + 1e-9, 0.5)
+    conicity = geometry.equivalent_conicity(amplitudes)
+    pairs = [
+        Pair(w, r, gauge, inclination, back_to_back)
+        for w, r in zip(wheel_pair, rail_pair, strict=True)
+    ]
+    contact_table = _table(pairs[1], radius_pair, normal)
+    places = [round(share * max_shift, 6) for share in PATCH_SHARES]
+    contacts = _loaded(contact_table, geometry, places, load)
+    solutions = _exact(pairs[1], radius_pair[1], geometry, list(contacts), load, exact)
+    notes = _notes(pairs)
+    if folder:
+        _write_tables(folder, geometry, amplitudes, conicity, contacts, solutions)
+        other = _other_table(pairs[1], radius_pair, geometry, list(contacts), load, normal, exact)
+        _write_pictures(
+            folder, geometry, pairs, amplitudes, conicity, contacts, load, solutions, other
+        )
+    if as_json:
+        print_json(_data(geometry, amplitudes, conicity, contacts, solutions, notes))
+        return
+    for note in notes:
+        click.echo(note, err=True)
+    for line in _lines(geometry, amplitudes, conicity, contacts, solutions, load):
+        click.echo(line)
+    if folder and not quiet:
+        click.echo(f"wrote {', '.join((*PICTURES, *TABLES))} to {folder}", err=True)
+
+
+def _check_numbers(
+    wheels: Sequence[str],
+    rails: Sequence[str],
+    radii: Sequence[float],
+    load: float,
+    max_shift: float,
+) -> None:
+    """Refuse numbers that mean nothing, all at once."""
+    from railsim.errors import Fault, InputError
+
+    faults = [
+        Fault(option, "", f"given {len(values)} times", "give it once, or for left and right")
+        for option, values in (("--wheel", wheels), ("--rail", rails), ("--radius", radii))
+        if len(values) > 2
+    ]
+    if not all(0.05 <= radius <= 1.5 for radius in radii):
+        faults.append(Fault("--radius", "", str(list(radii)), "0.05 to 1.5 m"))
+    if not 1.0 <= load <= 1e6:
+        faults.append(Fault("--load", "", f"{load:g}", "1 to 1e6 N"))
+    if not 0.001 <= max_shift <= 0.020:
+        faults.append(Fault("--max-shift", "", f"{max_shift:g}", "0.001 to 0.020 m"))
+    if faults:
+        raise InputError(faults)
+
+
+def _checked_folder(out: str, overwrite: bool) -> Path:
+    """Make the folder; refuse files that may not be replaced."""
+    from railsim.errors import Fault, InputError
+
+    folder = Path(out)
+    taken = [name for name in (*PICTURES, *TABLES) if (folder / name).exists()]
+    if taken and not overwrite:
+        found = f"{folder} holds {', '.join(taken)}"
+        raise InputError([Fault("--out", "", found, "give --overwrite or another folder")])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fault = Fault("--out", "", f"cannot make {folder} ({error.strerror})", "choose another")
+        raise InputError([fault]) from None
+    return folder
+
+
+def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
+    """Left and right profile."""
+    from railsim.profiles import load_profile
+
+    loaded = {name: load_profile(name, kind) for name in dict.fromkeys(names)}
+    return loaded[names[0]], loaded[names[-1]]
+
+
+def _notes(pairs: Sequence["Pair"]) -> list[str]:
+    """What was recognised in the profiles' files, once each."""
+    profiles = {p.name: p for pair in pairs for p in (pair.wheel, pair.rail)}
+    return [f"{p.source or p.name}: {note}" for p in profiles.values() for note in p.notes]
+
+
+def _table(pair: "Pair", radii: tuple[float, float], normal: str) -> "ContactTable":
+    from railsim.contact import cached_contact_table
+    from railsim.contact.table import TableGrid
+
+    return cached_contact_table(
+        pair.wheel,
+        pair.rail,
+        radius=radii[1],
+        gauge=pair.gauge,
+        inclination=pair.inclination,
+        back_to_back=pair.back_to_back,
+        centre_height=0.5 * (radii[0] + radii[1]),
+        grid=TableGrid(normal=normal),  # type: ignore[arg-type]
+    )
+
+
+def _loaded(
+    contact_table: "ContactTable",
+    geometry: "ContactGeometry",
+    places: Sequence[float],
+    load: float,
+) -> dict[float, "LoadedContact"]:
+    """Patches of the right wheel at the given displacements, where the geometry knows them."""
+    import numpy as np
+
+    from railsim.contact.elastic import loaded_contact
+    from railsim.errors import ModelError
+
+    contacts = {}
+    for y in places:
+        i = int(np.argmin(np.abs(geometry.lateral - y)))
+        roll = float(geometry.roll[i])
+        if np.isfinite(roll):
+            try:
+                contacts[y] = loaded_contact(contact_table, y, roll, load)
+            except ModelError:
+                continue  # beyond the table: a wheel that has climbed its rail
+    return contacts
+
+
+def _exact(
+    pair: "Pair",
+    radius: float,
+    geometry: "ContactGeometry",
+    places: Sequence[float],
+    load: float,
+    wanted: bool,
+) -> dict[float, "ExactContact"]:
+    """The same patches by boundary elements."""
+    if not wanted:
+        return {}
+    import numpy as np
+
+    from railsim.contact.exact_normal import exact_contact
+    from railsim.errors import ModelError
+
+    solutions = {}
+    for y in places:
+        roll = float(geometry.roll[int(np.argmin(np.abs(geometry.lateral - y)))])
+        try:
+            solutions[y] = exact_contact(
+                pair.wheel,
+                pair.rail,
+                y,
+                roll,
+                load,
+                radius=radius,
+                gauge=pair.gauge,
+                inclination=pair.inclination,
+                back_to_back=pair.back_to_back,
+            )
+        except ModelError:
+            continue  # the load is not reached: a wheel that hangs on its flange
+    return solutions
+
+
+def _other_table(
+    pair: "Pair",
+    radii: tuple[float, float],
+    geometry: "ContactGeometry",
+    places: Sequence[float],
+    load: float,
+    normal: str,
+    wanted: bool,
+) -> dict[float, "LoadedContact"] | None:
+    """Patches with the other kind of normal contact, for the comparison."""
+    if not wanted:
+        return None
+    other = "kik-piotrowski" if normal == "hertz" else "hertz"
+    return _loaded(_table(pair, radii, other), geometry, places, load)
+
+
+def _write_pictures(
+    folder: Path,
+    geometry: "ContactGeometry",
+    pairs: Sequence["Pair"],
+    amplitudes: "np.ndarray[Any, Any]",
+    conicity: "np.ndarray[Any, Any]",
+    contacts: dict[float, "LoadedContact"],
+    load: float,
+    solutions: dict[float, "ExactContact"],
+    other: dict[float, "LoadedContact"] | None,
+) -> None:
+    from railsim.plot import contact as plot
+    from railsim.plot.style import save
+
+    names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in pairs)
+    figures = (
+        plot.profiles_figure(geometry, pairs),
+        plot.functions_figure(geometry),
+        plot.conicity_figure({" / ".join(names): (amplitudes, conicity)}),
+        plot.patches_figure(contacts, load, solutions, other),
+    )
+    for name, figure in zip(PICTURES, figures, strict=True):
+        save(figure, folder / name, overwrite=True)
+
+
+def _columns(geometry: "ContactGeometry") -> dict[str, "np.ndarray[Any, Any]"]:
+    """Contact functions by the names of the interface, SI."""
+    columns = {"lateral": geometry.lateral, "delta_r": geometry.delta_r}
+    for name, values in (
+        ("rolling_radius", geometry.rolling_radius),
+        ("contact_angle", geometry.contact_angle),
+        ("contact_y", geometry.contact_y),
+        ("wheel_y", geometry.wheel_y),
+    ):
+        for side, side_name in enumerate(("left", "right")):
+            columns[f"{name}_{side_name}"] = values[:, side]
+    columns["roll"] = geometry.roll
+    return columns
+
+
+def _patch_rows(
+    contacts: dict[float, "LoadedContact"], solutions: dict[float, "ExactContact"]
+) -> list[dict[str, Any]]:
+    """One row for each patch of table and boundary elements, SI."""
+    import numpy as np
+
+    rows = []
+    for y, contact in contacts.items():
+        for patch in contact.patches:
+            rows.append(
+                {
+                    "lateral": y,
+                    "method": "table",
+                    "zone": patch.zone,
+                    "N": patch.N,
+                    "Q": patch.N_z,
+                    "Y": patch.N_y,
+                    "contact_y": patch.y,
+                    "contact_angle": patch.angle,
+                    "length": 2.0 * patch.a,
+                    "width": 2.0 * patch.b,
+                    "area": float(np.pi) * patch.a * patch.b,
+                    "p_max": patch.p_max,
+                    "z": contact.z,
+                }
+            )
+        for exact in solutions[y].patches[::-1] if y in solutions else ():
+            rows.append(
+                {
+                    "lateral": y,
+                    "method": "exact",
+                    "zone": "",
+                    "N": exact.N,
+                    "Q": exact.N_z,
+                    "Y": exact.N_y,
+                    "contact_y": exact.y,
+                    "contact_angle": exact.angle,
+                    "length": exact.length,
+                    "width": exact.width,
+                    "area": exact.area,
+                    "p_max": exact.p_max,
+                    "z": solutions[y].z,
+                }
+            )
+    return rows
+
+
+def _write_tables(
+    folder: Path,
+    geometry: "ContactGeometry",
+    amplitudes: "np.ndarray[Any, Any]",
+    conicity: "np.ndarray[Any, Any]",
+    contacts: dict[float, "LoadedContact"],
+    solutions: dict[float, "ExactContact"],
+) -> None:
+    columns = _columns(geometry)
+    patches = _patch_rows(contacts, solutions)
+    contents: tuple[tuple[list[str], list[list[Any]]], ...] = (
+        (list(columns), [[f"{x:.9g}" for x in row] for row in zip(*columns.values(), strict=True)]),
+        (
+            ["amplitude", "equivalent_conicity"],
+            [[f"{a:.6g}", f"{v:.6g}"] for a, v in zip(amplitudes, conicity, strict=True)],
+        ),
+        (
+            list(patches[0]) if patches else ["lateral"],
+            [[x if isinstance(x, str) else f"{x:.7g}" for x in row.values()] for row in patches],
+        ),
+    )
+    for name, (header, rows) in zip(TABLES, contents, strict=True):
+        with (folder / name).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            writer.writerows(rows)
+
+
+def _data(
+    geometry: "ContactGeometry",
+    amplitudes: "np.ndarray[Any, Any]",
+    conicity: "np.ndarray[Any, Any]",
+    contacts: dict[float, "LoadedContact"],
+    solutions: dict[float, "ExactContact"],
+    notes: list[str],
+) -> dict[str, Any]:
+    """Everything for ``--json``, SI."""
+    data: dict[str, Any] = {name: values.tolist() for name, values in _columns(geometry).items()}
+    data["equivalent_conicity"] = [
+        {"amplitude": float(a), "value": float(v)}
+        for a, v in zip(amplitudes, conicity, strict=True)
+    ]
+    data["jumps"] = [{"lateral": place, "side": side} for place, side in geometry.jumps()]
+    data["patches"] = _patch_rows(contacts, solutions)
+    data["notes"] = notes
+    return data
+
+
+def _lines(
+    geometry: "ContactGeometry",
+    amplitudes: "np.ndarray[Any, Any]",
+    conicity: "np.ndarray[Any, Any]",
+    contacts: dict[float, "LoadedContact"],
+    solutions: dict[float, "ExactContact"],
+    load: float,
+) -> list[str]:
+    """Printed tables, in the field's units."""
+    import numpy as np
+
+    rows = []
+    count = geometry.lateral.size
+    for i in range(0, count, max((count - 1) // 20, 1)):
+        left, right = 0, 1
+        rows.append(
+            [
+                f"{1e3 * geometry.lateral[i]:.2f}",
+                f"{1e3 * geometry.delta_r[i]:.3f}",
+                *(f"{1e3 * geometry.rolling_radius[i, s]:.3f}" for s in (left, right)),
+                *(f"{np.degrees(geometry.contact_angle[i, s]):.2f}" for s in (left, right)),
+                *(f"{1e3 * geometry.wheel_y[i, s]:.2f}" for s in (left, right)),
+                f"{1e3 * geometry.roll[i]:.3f}",
+            ]
+        )
+    header = [
+        "y mm",
+        "dr mm",
+        "r left",
+        "r right",
+        "angle left",
+        "right deg",
+        "wheel y left",
+        "right mm",
+        "roll mrad",
+    ]
+    lines = table(header, rows, numbers=0)
+    lines.append("")
+    lines.append("Equivalent conicity (EN 15302)")
+    shown = [i for i in range(amplitudes.size) if i % 2 and np.isfinite(conicity[i])]
+    lines += table(
+        ["amplitude mm", *(f"{1e3 * amplitudes[i]:.0f}" for i in shown)],
+        [["tan(gamma_e)", *(f"{conicity[i]:.3f}" for i in shown)]],
+    )
+    lines.append("")
+    lines.append(f"Patches of the right wheel under {1e-3 * load:.0f} kN")
+    rows = [
+        [
+            f"{1e3 * row['lateral']:.2f}",
+            row["method"] + (f", {row['zone']}" if row["zone"] else ""),
+            f"{1e-3 * row['Q']:.1f}",
+            f"{1e-3 * row['Y']:.1f}",
+            f"{np.degrees(row['contact_angle']):.1f}",
+            f"{1e3 * row['contact_y']:.2f}",
+            f"{1e3 * row['length']:.1f}",
+            f"{1e3 * row['width']:.1f}",
+            f"{1e6 * row['area']:.0f}",
+            f"{1e-6 * row['p_max']:.0f}",
+        ]
+        for row in _patch_rows(contacts, solutions)
+    ]
+    header = [
+        "y mm",
+        "patch",
+        "Q kN",
+        "Y kN",
+        "angle deg",
+        "at y mm",
+        "length",
+        "width mm",
+        "area mm2",
+        "p_max MPa",
+    ]
+    lines += table(header, rows, numbers=2)
+    return lines

@@ -1,0 +1,299 @@
+"""Pictures of the contact geometry of a wheelset: pairs of points, functions, conicity, patches.
+
+Every function takes what `railsim.contact` computes and returns a figure in the field's habits:
+mm, degrees, MPa.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from railsim.contact.curves import inclined_to_track, rail_curve, tape_circle_place
+from railsim.contact.elastic import LoadedContact
+from railsim.contact.exact_normal import ExactContact
+from railsim.contact.geometry import ContactGeometry
+from railsim.plot.style import DISTINCT, SIDE_LINES, styled
+from railsim.profiles.profile import Profile
+
+Array = NDArray[np.float64]
+
+SIDES = ("left", "right")
+WHEEL, RAIL = DISTINCT[0], "0.35"
+SIDE_COLOURS = {"left": DISTINCT[1], "right": DISTINCT[0]}
+LIFT = 14.0
+"""Height at which the wheel is drawn above its rail [mm]."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Wheel and rail of one side with what places them.
+
+    Attributes
+    ----------
+    wheel, rail : Profile
+    gauge, inclination, back_to_back : float
+        As `railsim.contact.contact_geometry` [m], [1], [m].
+    """
+
+    wheel: Profile
+    rail: Profile
+    gauge: float
+    inclination: float
+    back_to_back: float
+
+
+def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
+    """Wheels above their rails, with lines between the points that touch.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+        Contact functions.
+    pairs : sequence of Pair, left and right
+        What is drawn.
+    """
+    with styled():
+        measured = [p for pair in pairs for p in (pair.wheel, pair.rail) if p.measured is not None]
+        unique = list(dict.fromkeys(measured))
+        rows = 1 + bool(unique)
+        height = 3.0 + 2.4 * bool(unique)
+        figure = Figure(figsize=(9.6, height))
+        figure.subplots_adjust(
+            left=0.06,
+            right=0.99,
+            bottom=0.45 / height,
+            top=1.0 - 0.3 / height,
+            wspace=0.14,
+            hspace=0.28,
+        )
+        grid = figure.add_gridspec(rows, 2, height_ratios=[1.1, 1.0][:rows])
+        for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
+            axes = figure.add_subplot(grid[0, side])
+            _draw_pair(axes, geometry, pair, side)
+            axes.set_title(f"{name}: {pair.wheel.name} on {pair.rail.name}")
+        if unique:
+            _draw_smoothing(figure.add_subplot(grid[1, :]), unique)
+    return figure
+
+
+def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> None:
+    sign = 2.0 * side - 1.0
+    rail_y, rail_z = inclined_to_track(pair.rail, pair.gauge, pair.inclination)
+    head = rail_curve(pair.rail, pair.gauge, pair.inclination)
+    tape = tape_circle_place(pair.back_to_back)
+    axes.plot(sign * 1e3 * rail_y, -1e3 * rail_z, color=RAIL)
+    wheel_y, wheel_z = 1e3 * (pair.wheel.y + tape), -1e3 * pair.wheel.z
+    axes.plot(sign * wheel_y, wheel_z + LIFT, color=WHEEL)
+    on_wheel = geometry.wheel_y[:, side]
+    order = np.argsort(pair.wheel.y, kind="stable")
+    heights = np.interp(on_wheel, pair.wheel.y[order], pair.wheel.z[order])
+    known = np.isfinite(on_wheel)
+    wanted = np.arange(np.ceil(1e3 * geometry.lateral[0]), 1e3 * geometry.lateral[-1] + 1e-6)
+    last_label = np.inf
+    for millimetres in wanted:
+        i = int(np.argmin(np.abs(1e3 * geometry.lateral - millimetres)))
+        if not known[i]:
+            continue
+        x_wheel = sign * 1e3 * (on_wheel[i] + tape)
+        x_rail = 1e3 * geometry.contact_y[i, side]
+        height = -1e3 * np.interp(1e-3 * abs(x_rail), head.Y, head.z)
+        axes.plot([x_wheel, x_rail], [-1e3 * heights[i] + LIFT, height], color="0.6", lw=0.6)
+        if abs(x_wheel - last_label) < 3.6:
+            continue  # the number would lie on its neighbour
+        last_label = x_wheel
+        axes.annotate(
+            f"{millimetres:.0f}".replace("-", "−"),
+            (x_wheel, -1e3 * heights[i] + LIFT),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="center",
+            fontsize=6,
+            color="0.3",
+        )
+    low, high = 1e3 * tape - 72.0, 1e3 * rail_y.max() + 12.0
+    axes.set_xlim(*sorted((sign * low, sign * high)))
+    axes.set_ylim(-30.0, LIFT + 10.0)
+    axes.set_aspect("equal")
+    axes.set_xlabel("lateral place $y$ (mm)")
+    axes.set_ylabel("height (mm)")
+
+
+def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
+    """How far smoothing moved the points, along the contour's normal."""
+    for colour, profile in zip(DISTINCT, profiles, strict=False):
+        if profile.measured is None:
+            continue
+        moved = profile.measured - np.stack((profile.y, profile.z))
+        tangent = np.stack((np.gradient(profile.y), np.gradient(profile.z)))
+        tangent /= np.hypot(*tangent)
+        normal = moved[1] * tangent[0] - moved[0] * tangent[1]
+        axes.plot(1e3 * profile.y, 1e6 * normal, ".", ms=2, color=colour, label=profile.name)
+    axes.axhline(0.0, color="0.35", lw=0.7)
+    axes.set_xlabel("place on the profile $y$ (mm)")
+    axes.set_ylabel("measured − smoothed (µm)")
+    axes.legend(loc="upper right")
+
+
+def functions_figure(geometry: ContactGeometry) -> Figure:
+    """Rolling radius difference, radii, contact angles, places and roll over displacement."""
+    y = 1e3 * geometry.lateral
+    with styled():
+        figure = Figure(figsize=(9.6, 5.4))
+        figure.subplots_adjust(
+            left=0.06, right=0.99, bottom=0.085, top=0.985, wspace=0.24, hspace=0.08
+        )
+        axes = figure.subplots(2, 3, sharex=True)
+        axes[0, 0].plot(y, 1e3 * geometry.delta_r, color=DISTINCT[0])
+        panels = (
+            (axes[0, 1], 1e3 * geometry.rolling_radius, "rolling radius (mm)"),
+            (axes[0, 2], np.degrees(geometry.contact_angle), "contact angle (deg)"),
+            (axes[1, 0], 1e3 * geometry.wheel_y, "place on the wheel (mm)"),
+            (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
+        )
+        for panel, values, label in panels:
+            for side, name in enumerate(SIDES):
+                panel.plot(
+                    y,
+                    values[:, side],
+                    color=SIDE_COLOURS[name],
+                    ls=SIDE_LINES[name],
+                    label=name,
+                )
+            panel.set_ylabel(label)
+        axes[0, 1].legend(loc="upper center")
+        axes[0, 0].set_ylabel("rolling radius difference $\\Delta r$ (mm)")
+        axes[1, 2].plot(y, 1e3 * geometry.roll, color=DISTINCT[0])
+        axes[1, 2].set_ylabel("roll (mrad)")
+        # with a flange on its rail everything else would be a flat line
+        for panel, values in (
+            (axes[0, 0], 1e3 * geometry.delta_r),
+            (axes[0, 1], 1e3 * geometry.rolling_radius),
+            (axes[1, 2], 1e3 * geometry.roll),
+        ):
+            _limit(panel, values, geometry)
+        for panel in axes[1]:
+            panel.set_xlabel("lateral displacement $y$ (mm)")
+        for panel in axes.flat:
+            for place, _ in geometry.jumps():
+                panel.axvline(1e3 * place, color="0.8", lw=0.5, zorder=0)
+    return figure
+
+
+def _limit(axes: Axes, values: Array, geometry: ContactGeometry) -> None:
+    """Show the range that belongs to tread and flange root, contact angles below 45 degrees."""
+    angle = np.max(np.abs(geometry.contact_angle), axis=1)
+    usual = np.isfinite(angle) & (angle < np.radians(45.0))
+    if not usual.any():
+        return
+    low, high = float(np.min(values[usual])), float(np.max(values[usual]))
+    margin = 0.25 * (high - low) + 1e-6
+    axes.set_ylim(low - margin, high + margin)
+
+
+def conicity_figure(conicity: Mapping[str, tuple[Array, Array]]) -> Figure:
+    """Equivalent conicity over the amplitude.
+
+    Parameters
+    ----------
+    conicity : mapping of str to (amplitudes [m], values [1])
+        Curves by their name.
+    """
+    with styled():
+        figure = Figure(figsize=(5.6, 3.6))
+        figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
+        axes = figure.subplots()
+        for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
+            axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=name)
+        axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
+        axes.set_xlabel("amplitude $\\hat y$ (mm)")
+        axes.set_ylabel("equivalent conicity $\\tan\\gamma_e$")
+        axes.set_xlim(left=0.0)
+        axes.set_ylim(bottom=0.0)
+        axes.legend(loc="best")
+    return figure
+
+
+def patches_figure(
+    contacts: Mapping[float, LoadedContact],
+    load: float,
+    exact: Mapping[float, ExactContact] | None = None,
+    other: Mapping[float, LoadedContact] | None = None,
+) -> Figure:
+    """Contact patches of the right wheel, seen from above, one picture for each displacement.
+
+    Parameters
+    ----------
+    contacts : mapping of displacement [m] to LoadedContact
+        From the contact table.
+    load : float
+        Wheel load, for the title [N].
+    exact : mapping of displacement [m] to ExactContact, optional
+        Pressure by boundary elements, drawn beneath.
+    other : mapping of displacement [m] to LoadedContact, optional
+        From a second table, drawn dashed.
+    """
+    with styled():
+        columns = 4
+        rows = -(-len(contacts) // columns)
+        height = 1.75 * rows + 0.9
+        figure = Figure(figsize=(9.6, height))
+        figure.subplots_adjust(
+            left=0.06,
+            right=0.90 if exact else 0.99,
+            bottom=0.45 / height,
+            top=1.0 - 0.65 / height,
+            wspace=0.08,
+            hspace=0.32,
+        )
+        figure.suptitle(f"Contact patches of the right wheel under {1e-3 * load:.0f} kN")
+        axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
+        places = [patch.y for contact in contacts.values() for patch in contact.patches]
+        low, high = 1e3 * min(places) - 14.0, 1e3 * max(places) + 14.0
+        image = None
+        for panel, (y, contact) in zip(axes, contacts.items(), strict=False):
+            if exact is not None and y in exact and exact[y].pressure.size:
+                solution = exact[y]
+                shown = np.where(solution.pressure > 0.0, 1e-6 * solution.pressure, np.nan)
+                image = panel.pcolormesh(
+                    1e3 * solution.Y, 1e3 * solution.x, shown, cmap="YlOrBr", vmin=0.0, vmax=2500.0
+                )
+            _draw_ellipses(panel, contact, "-")
+            if other is not None:
+                _draw_ellipses(panel, other[y], "--")
+            panel.set_title(f"$y$ = {1e3 * y:g} mm".replace("-", "−"))
+            panel.set_xlim(low, high)
+            panel.set_ylim(-22.0, 22.0)
+            panel.set_aspect("equal")
+        for panel in axes[len(contacts) :]:
+            panel.set_visible(False)
+        for panel in axes[::columns]:
+            panel.set_ylabel("along the rail (mm)")
+        for panel in axes[max(len(contacts) - columns, 0) : len(contacts)]:
+            panel.set_xlabel("lateral place (mm)")
+        if image is not None:
+            bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
+            figure.colorbar(image, cax=bar, label="pressure (MPa)")
+    return figure
+
+
+def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:
+    colours = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DISTINCT[1]}
+    for patch in contact.patches:
+        # seen from above, the patch's width is foreshortened by its angle
+        width = 2e3 * patch.b * np.cos(patch.angle)
+        axes.add_patch(
+            Ellipse(
+                (1e3 * patch.y, 0.0),
+                width,
+                2e3 * patch.a,
+                fill=False,
+                ls=line,
+                lw=1.2,
+                color=colours[patch.zone],
+            )
+        )

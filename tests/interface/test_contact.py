@@ -1,0 +1,139 @@
+"""``railsim contact``: the interface's names and signs, files, messages."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from railsim import cli
+from railsim.profiles import load_profile
+
+NAMES = (
+    "lateral",
+    "delta_r",
+    "rolling_radius_left",
+    "rolling_radius_right",
+    "contact_angle_left",
+    "contact_angle_right",
+    "contact_y_left",
+    "contact_y_right",
+    "wheel_y_left",
+    "wheel_y_right",
+    "roll",
+)
+
+
+def as_json(capsys, *arguments):
+    assert cli.main(["contact", *arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_json_has_the_names_units_and_signs_of_the_interface(capsys):
+    data = as_json(capsys, "--wheel", "S1002", "--rail", "60E1", "--max-shift", "0.008")
+    lists = {name: np.array(data[name]) for name in NAMES}
+    assert len({values.size for values in lists.values()}) == 1
+    y = lists["lateral"]
+    assert y[0] == pytest.approx(-0.008)
+    assert y[-1] == pytest.approx(0.008)
+    np.testing.assert_allclose(
+        lists["delta_r"],
+        lists["rolling_radius_right"] - lists["rolling_radius_left"],
+        atol=1e-15,
+    )
+    # shifted to the right: right wheel on its larger radius towards the flange, steeper there
+    right = y > 0.001
+    assert np.all(lists["delta_r"][right] > 0)
+    assert np.all(lists["contact_angle_right"][right] > lists["contact_angle_left"][right])
+    assert np.all(lists["contact_angle_left"] > 0)
+    assert np.all(lists["contact_y_left"] < -0.7)
+    assert np.all(lists["contact_y_right"] > 0.7)
+    assert np.all(lists["wheel_y_right"][right] < 0)  # between tape circle and flange
+    assert np.all(lists["roll"][right] < 0)  # the right side is lifted
+    conicity = {row["amplitude"]: row["value"] for row in data["equivalent_conicity"]}
+    assert conicity[0.003] == pytest.approx(0.177, abs=0.002)  # PHYSICS.md: about 0.18
+
+
+def test_pictures_and_tables_are_written_and_kept(tmp_path, capsys):
+    out = tmp_path / "contact"
+    arguments = ["contact", "--rail", "54E1", "--out", str(out)]
+    assert cli.main(arguments) == 0
+    names = {path.name for path in out.iterdir()}
+    assert names == {
+        "profiles.png", "functions.png", "conicity.png", "patches.png",
+        "functions.csv", "conicity.csv", "patches.csv",
+    }  # fmt: skip
+    for name in names:
+        if name.endswith(".png"):
+            pixels = np.asarray(Image.open(out / name).convert("L"))
+            assert pixels.std() > 5.0, f"{name} is empty"
+    with (out / "functions.csv").open() as file:
+        header = next(csv.reader(file))
+    assert tuple(header) == NAMES
+    capsys.readouterr()
+    assert cli.main(arguments) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert cli.main([*arguments, "--overwrite", "--quiet"]) == 0
+
+
+def test_exact_patches_stand_beside_those_of_the_table(capsys):
+    data = as_json(capsys, "--max-shift", "0.004", "--exact", "--load", "40000")
+    by_method = {
+        method: [row for row in data["patches"] if row["method"] == method]
+        for method in ("table", "exact")
+    }
+    assert len(by_method["exact"]) >= 12
+    for rows in by_method.values():
+        for y in {row["lateral"] for row in rows}:
+            load = sum(row["Q"] for row in rows if row["lateral"] == y)
+            assert load == pytest.approx(40e3, rel=1e-3)
+
+
+def test_left_and_right_may_differ(tmp_path, capsys):
+    data = as_json(capsys, "--wheel", "cone_1in20", "--wheel", "cone_1in40")
+    i = int(np.argmin(np.abs(np.array(data["lateral"]))))
+    angles = data["contact_angle_left"][i], data["contact_angle_right"][i]
+    # the wheelset rolls a little
+    assert np.tan(angles) == pytest.approx([0.05, 0.025], abs=5e-4)
+    data = as_json(capsys, "--radius", "0.460", "--radius", "0.461", "--wheel", "cone_1in40")
+    assert data["delta_r"][i] == pytest.approx(0.001, abs=5e-5)
+
+
+def test_what_was_put_right_in_a_file_is_told(tmp_path, capsys):
+    profile = load_profile("S1002")
+    path = tmp_path / "wheel.csv"
+    rows = "".join(
+        f"{-1e3 * y:.6f},{1e3 * z:.6f}\n" for y, z in zip(profile.y, profile.z, strict=True)
+    )
+    path.write_text("y_mm,z_mm\n" + rows)
+    assert cli.main(["contact", "--wheel", str(path)]) == 0
+    assert "mirrored" in capsys.readouterr().err
+    assert any("mirrored" in note for note in as_json(capsys, "--wheel", str(path))["notes"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--wheel", "60E1"], "this is a rail profile"),
+        (["--wheel", "S1003"], "did you mean 'S1002'"),
+        (["--gauge", "1.6"], "falls between the rails"),
+        (["--gauge", "1.4"], "flange"),
+        (["--load", "-5"], "--load"),
+        (["--max-shift", "5"], "--max-shift"),
+        (["--radius", "46"], "--radius"),
+        (["--wheel", "none.csv"], "cannot be read"),
+        (["--wheel", "S1002", "--wheel", "S1002", "--wheel", "S1002"], "given 3 times"),
+    ],
+)
+def test_wrong_input_is_named_with_status_2(arguments, words, capsys):
+    assert cli.main(["contact", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert words in err
+    assert out == ""
+    assert "Traceback" not in err
+
+
+def test_help_shows_an_example(capsys):
+    assert cli.main(["contact", "--help"]) == 0
+    assert "railsim contact --wheel S1002" in capsys.readouterr().out
