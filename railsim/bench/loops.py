@@ -1,0 +1,159 @@
+"""Compiled loops over one part of the right-hand side, in the order in which it is called.
+
+Each `many_...` repeats its part `n` times at one state, so that a call lasts some hundred
+microseconds and Python's part in it does not count.  Everything is in the cache, and branches are
+predicted: the sum of the parts is a lower bound of what they take in the time loop.
+"""
+
+from railsim.kernels import jit
+from railsim.kernels.contact_table import INSIDE, locate, look_up
+from railsim.kernels.elements import link_forces, mount_forces
+from railsim.kernels.fastsim import fastsim, kalker_lookup
+from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, right_hand_side
+from railsim.kernels.wheel_rail import (
+    C11,
+    C22,
+    C23,
+    C33,
+    M_Z,
+    MU_N,
+    PHI,
+    T_X,
+    T_Y,
+    XI_X,
+    XI_Y,
+    A,
+    B,
+    add_creep_forces,
+    creepages,
+    normal_contact,
+    wheel_rail,
+)
+
+
+@jit
+def many_right_hand_sides(system, work, state, derivative, n):
+    """Everything, as RK4 calls it."""
+    for _ in range(n):
+        right_hand_side(system, work, state, derivative)
+
+
+@jit
+def many_mechanics(system, work, state, derivative, n):
+    """Everything, as the fast scheme calls it."""
+    for _ in range(n):
+        mechanics(system, work, state, derivative)
+
+
+@jit
+def many_frames(system, work, state, derivative, n):
+    """Track frames of all bodies."""
+    origin = system.bodies.frame[system.bodies.reference]
+    for _ in range(n):
+        locate_frames(system.track, system.frame_offset, origin, state[-2], work.frames, work.cell,
+                      work.cell_u)
+
+
+@jit
+def many_kinematics(system, work, state, derivative, n):
+    """Positions, attitudes and velocities of all bodies."""
+    for _ in range(n):
+        kinematics(system.bodies, work.frames, state[-1], state, work.S, work.C, work.R, work.X,
+                   work.V, work.W, work.acceleration)
+
+
+@jit
+def many_links(system, work, state, derivative, n):
+    """Point-to-point elements."""
+    first = 12 * system.bodies.kind.shape[0]
+    inner = state[first:first + system.internal.kind.shape[0]]
+    for _ in range(n):
+        link_forces(system.links, system.curves, inner, work.drive, work.R, work.X, work.V, work.W,
+                    work.F, work.M)
+
+
+@jit
+def many_mounts(system, work, state, derivative, n):
+    """Elements with three axes."""
+    first = 12 * system.bodies.kind.shape[0]
+    inner = state[first:first + system.internal.kind.shape[0]]
+    for _ in range(n):
+        mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.R,
+                     work.X, work.V, work.W, work.F, work.M)
+
+
+@jit
+def many_wheel_rail(system, work, state, derivative, n):
+    """All of the wheel-rail contact."""
+    for _ in range(n):
+        wheel_rail(system, work, state[-1], state)
+
+
+@jit
+def many_normal_contacts(system, work, state, derivative, n):
+    """Table look-up and normal forces of all wheels; the number of patches."""
+    patches = 0
+    for _ in range(n):
+        _, _, patches = normal_contact(system, work, state[-1], state)
+    return patches
+
+
+@jit
+def many_creepages(system, work, state, patches, n):
+    """Creepages and Kalker's coefficients of all patches."""
+    patch = work.patch
+    for _ in range(n):
+        creepages(system, work, patches, state[-1], state)
+        kalker_lookup(patches, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
+                      patch[C23], patch[C33])
+
+
+@jit
+def many_fastsims(system, work, state, patches, n):
+    """FASTSIM of all patches."""
+    patch = work.patch
+    for _ in range(n):
+        fastsim(patches, system.contact.n_x, system.contact.n_y, patch[A], patch[B], patch[MU_N],
+                patch[C11], patch[C22], patch[C23], system.contact.shear_modulus, patch[XI_X],
+                patch[XI_Y], patch[PHI], work.fastsim, patch[T_X], patch[T_Y], patch[M_Z])
+
+
+@jit
+def many_creep_forces(system, work, state, patches, n):
+    """Creep forces put on the wheelsets, outputs of the wheels gathered."""
+    for _ in range(n):
+        add_creep_forces(system, work, patches, state[-1])
+
+
+@jit
+def many_dynamics(system, work, state, derivative, n):
+    """Accelerations of all bodies."""
+    for _ in range(n):
+        dynamics(system.bodies, work.frames, state[-1], system.gravity, state, work.C, work.R,
+                 work.F, work.M, work.rail_force, work.acceleration, derivative)
+
+
+@jit
+def many_look_ups(system, work, state, derivative, n):
+    """Look-ups of the tread of the leading right wheel; the number of them."""
+    contact = system.contact
+    b = contact.body[0]
+    table = contact.table[0, 1]
+    done = 0
+    for _ in range(n):
+        yaw = state[6 * b + 5]
+        where, iy, ir, iw, ty, tr, tw = locate(contact, table, state[6 * b + 1], state[6 * b + 3],
+                                               yaw * yaw)
+        if where == INSIDE:
+            look_up(contact, table, 0, iy, ir, iw, ty, tr, tw, work.look_up)
+            done += 1
+    return done
+
+
+@jit
+def many_fastsim_patches(patches, n_x, n_y, inputs, shear_modulus, work, out, n):
+    """FASTSIM of `patches` equal patches; rows of inputs: a, b, mu_N, c11, c22, c23, xi, phi."""
+    for _ in range(n):
+        fastsim(patches, n_x, n_y, inputs[0], inputs[1], inputs[2], inputs[3], inputs[4],
+                inputs[5], shear_modulus, inputs[6], inputs[7], inputs[8], work, out[0], out[1],
+                out[2])

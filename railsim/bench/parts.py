@@ -1,0 +1,162 @@
+"""Time per right-hand side and its parts, FASTSIM over its grid, table look-up."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import work_arrays
+from railsim.bench import loops
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.kernels.fastsim import fastsim_workspace
+from railsim.kernels.time_loop import FAST, time_loop
+from railsim.simulation import Preparation, prepare
+from railsim.time_step import empty_recorder
+
+Floats = NDArray[np.float64]
+GRIDS = (5, 10, 20, 50)
+REPETITIONS = 200
+CALLS = 50  # evaluations in one repetition: some 200 us
+PATCHES = 10
+
+# part, and the names of the loops that measure it
+PARTS: tuple[tuple[str, str], ...] = (
+    ("track frames", "many_frames"),
+    ("kinematics", "many_kinematics"),
+    ("links", "many_links"),
+    ("mounts", "many_mounts"),
+    ("normal contact with table look-up", "many_normal_contacts"),
+    ("creepages, Kalker's coefficients", "many_creepages"),
+    ("FASTSIM 10 x 10", "many_fastsims"),
+    ("creep forces on the wheelsets", "many_creep_forces"),
+    ("dynamics", "many_dynamics"),
+)
+_BY_PATCHES = ("many_creepages", "many_fastsims", "many_creep_forces")
+
+
+def least_time(call: Callable[[], Any], repetitions: int, evaluations: int) -> float:
+    """Return the least time of one evaluation [s].
+
+    Many short repetitions: one of them runs undisturbed, however loaded the machine is.
+    """
+    call()
+    best = np.inf
+    for _ in range(repetitions):
+        begin = time.perf_counter()
+        call()
+        best = min(best, time.perf_counter() - begin)
+    return best / evaluations
+
+
+def state_at(vehicle: str, track: str, speed: float, place: float) -> tuple[Preparation, Floats]:
+    """Prepare a run and advance it to a place along the track."""
+    prepared = prepare(load_vehicle(vehicle), load_track(track), Settings(), speed)
+    system, state = prepared.model.system, prepared.state.copy()
+    step, _ = prepared.pace.at(speed)
+    steps = int(place / speed / step)
+    time_loop(system, work_arrays(system), state, np.zeros_like(state),
+              np.zeros((3, len(state))), empty_recorder(prepared.model, 1), FAST, step, 1, steps,
+              1 << 40)
+    return prepared, state
+
+
+def right_hand_side_parts(
+    vehicle: str = "coach_manchester",
+    track: str = "curve_r250",
+    speed: float = 20.0,
+    place: float = 396.0,
+    repetitions: int = REPETITIONS,
+) -> dict[str, Any]:
+    """Measure the right-hand side and its parts in the middle of the curve.
+
+    Returns
+    -------
+    dict
+        `patches`; times in seconds: `right_hand_side` (as RK4 calls it), `evaluation` (as the fast
+        scheme calls it), `wheel_rail`, `parts` by name, `rest`: evaluation less the parts, `step`:
+        a whole step of the fast scheme in the loop.
+    """
+    prepared, state = state_at(vehicle, track, speed, place)
+    model = prepared.model
+    system, work = model.system, work_arrays(model.system)
+    derivative = np.zeros_like(state)
+    loops.many_right_hand_sides(system, work, state, derivative, 1)
+    patches = loops.many_normal_contacts(system, work, state, derivative, 1)
+    # FASTSIM needs creepages, the rest the forces that belong to them
+    loops.many_right_hand_sides(system, work, state, derivative, 1)
+
+    def measured(name: str) -> float:
+        loop = getattr(loops, name)
+        what = patches if name in _BY_PATCHES else derivative
+        found = least_time(
+            lambda: loop(system, work, state, what, CALLS), repetitions, CALLS
+        )
+        # forces add up and columns are overwritten: begin anew
+        loops.many_right_hand_sides(system, work, state, derivative, 1)
+        return found
+
+    parts = {part: measured(name) for part, name in PARTS}
+    evaluation = measured("many_mechanics")
+    return {
+        "vehicle": vehicle,
+        "place": place,
+        "patches": patches,
+        "right_hand_side": measured("many_right_hand_sides"),
+        "evaluation": evaluation,
+        "wheel_rail": measured("many_wheel_rail"),
+        "parts": parts,
+        "rest": evaluation - sum(parts.values()),
+        "step": _step_time(prepared, state, repetitions),
+        "look_up": measured("many_look_ups"),
+    }
+
+
+def _step_time(prepared: Preparation, state: Floats, repetitions: int) -> float:
+    """Time of a step of the fast scheme along the curve [s]."""
+    system = prepared.model.system
+    work, trial = work_arrays(system), state.copy()
+    derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
+    recorder = empty_recorder(prepared.model, 1)
+    step, _ = prepared.pace.at(float(state[-1]))
+
+    def some_steps() -> None:
+        trial[:] = state
+        time_loop(system, work, trial, derivative, stages, recorder, FAST, step, 1, CALLS, 1 << 40)
+
+    return least_time(some_steps, repetitions, CALLS)
+
+
+def fastsim_grids(
+    grids: Sequence[int] = GRIDS, patches: int = PATCHES, repetitions: int = REPETITIONS
+) -> list[dict[str, float]]:
+    """Measure FASTSIM over its grid, time per patch of `patches` together and of one alone [s]."""
+    inputs = patch_inputs(patches)
+    out = np.zeros((3, patches))
+    rows = []
+    for cells in grids:
+        work = fastsim_workspace(patches, cells, cells)
+        calls = max(1, round(2000 / cells**2))
+
+        def per_patch(n: int, cells: int = cells, work: Floats = work, calls: int = calls) -> float:
+            return least_time(
+                lambda: loops.many_fastsim_patches(
+                    n, cells, cells, inputs, 82e9, work, out, calls
+                ),
+                repetitions, calls * n,
+            )
+
+        rows.append({"grid": cells, "together": per_patch(patches), "alone": per_patch(1)})
+    return rows
+
+
+def patch_inputs(patches: int) -> Floats:
+    """Return patches of a curving coach, some of which slide; rows as `many_fastsim_patches`."""
+    share = np.linspace(0.1, 1.0, patches)
+    one = np.ones(patches)
+    return np.array([
+        6e-3 * one, 4e-3 * one, 0.4 * 60e3 * share, 4.5 * one, 4.0 * one, 1.8 * one,
+        1e-3 * share, -4e-3 * share, 0.5 * share,
+    ])

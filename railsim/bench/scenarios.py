@@ -1,0 +1,87 @@
+"""The runs that are timed: the study's four, and the ends of the range of speeds."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.result import Result, Sink
+from railsim.simulation import simulate
+
+REFERENCE_STEP = 0.125e-3  # s, of RK4
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One run.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in tables.
+    vehicle, track : str
+        Names of shipped files.
+    speed : float
+        [m/s]
+    irregularity : str or None
+        Spectrum of random irregularities on the track.
+    settings : tuple of pairs of str and value
+        What differs from the default settings.
+    until : float or None
+        End of the run [m], the track's end if None.
+    target : float or None
+        Least multiple of real time that this run is to reach.
+    """
+
+    name: str
+    vehicle: str
+    track: str
+    speed: float
+    irregularity: str | None = None
+    settings: tuple[tuple[str, Any], ...] = ()
+    until: float | None = None
+    target: float | None = None
+
+    def run(self, sink: Sink | None = None, **settings: Any) -> Result:
+        """Run it, with further settings if given."""
+        track = load_track(self.track)
+        if self.irregularity:
+            track = track.replace(
+                irregularities=[{"type": "random", "spectrum": self.irregularity}]
+            )
+        return simulate(
+            load_vehicle(self.vehicle),
+            track,
+            speed=self.speed,
+            until=self.until,
+            settings=Settings.model_validate(dict(self.settings) | settings),
+            sink=sink,
+        )
+
+    def reference(self) -> Result:
+        """Run it by RK4 at `REFERENCE_STEP`."""
+        return self.run(scheme="rk4", step=REFERENCE_STEP)
+
+
+STUDY = (
+    Scenario("Manchester coach, R 250 m", "coach_manchester", "curve_r250", 20.0, target=300.0),
+    Scenario("Manchester coach, R 500 m", "coach_manchester", "curve_r500", 20.0),
+    Scenario("flexicoil coach, R 250 m", "coach_flexicoil", "curve_r250", 20.0, target=250.0),
+    Scenario("flexicoil coach, R 500 m", "coach_flexicoil", "curve_r500", 20.0),
+)
+"""The runs of the curving study."""
+
+OTHERS = (
+    Scenario(
+        "Manchester coach, R 250 m, RK4 at 0.5 ms", "coach_manchester", "curve_r250", 20.0,
+        settings=(("scheme", "rk4"), ("step", 0.5e-3)), target=35.0,
+    ),
+    Scenario(
+        "Manchester coach, R 250 m, 5 m/s", "coach_manchester", "curve_r250", 5.0, target=30.0
+    ),
+    Scenario(
+        "flexicoil coach, straight, ERRI B176 low, 60 m/s", "coach_flexicoil", "straight", 60.0,
+        irregularity="erri_b176_low", target=100.0,
+    ),
+)
+"""The reference scheme, low speed, high speed on irregular track."""

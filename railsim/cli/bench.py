@@ -1,0 +1,42 @@
+"""``railsim bench``: the runtime benchmark on this machine."""
+
+import click
+
+from railsim.cli.common import json_option, print_json, table
+from railsim.cli.progress import progress_bar
+
+
+@click.command()
+@click.option(
+    "--quick", is_flag=True, help="Two runs instead of seven, no start with empty caches."
+)
+@json_option
+@click.option("--quiet", is_flag=True, help="No progress bar.")
+def command(quick: bool, as_json: bool, quiet: bool) -> None:
+    r"""Measure how fast railsim is on this machine, and how right at that speed.
+
+    The study's runs in multiples of real time with their errors against RK4 at 0.125 ms; the parts
+    of the right-hand side; FASTSIM over its grid; one core and two; start-up, whole commands and
+    memory.  Takes a few minutes.  Other programs that run meanwhile spoil wall times.
+
+    \b
+    Example:
+      railsim bench
+      railsim bench --quick --json > bench.json
+    """
+    from railsim.bench.report import FULL, QUICK, benchmark, tables
+
+    with progress_bar("bench", quiet=quiet) as progress:
+        found = benchmark(QUICK if quick else FULL, progress)
+    if as_json:
+        print_json(found)
+        return
+    facts = found["hardware"]
+    click.echo(
+        f"{facts['processor']}, {facts['cores']} cores, {facts['memory']}, {facts['system']}; "
+        f"FASTSIM's vectors: {facts['vectors']}"
+    )
+    click.echo(", ".join(f"{name} {number}" for name, number in found["versions"].items()))
+    for header, rows in tables(found):
+        click.echo("")
+        click.echo("\n".join(table(header, rows)))
