@@ -180,8 +180,8 @@ def _magnitudes(sections: Sequence[Section]) -> list[Section]:
     parts = []
     for section in sections:
         start, end = section.start_value, section.end_value
-        if start * end < 0.0:
-            zero = section.begin - start / section.slope
+        zero = section.begin - start / section.slope if start * end < 0.0 else section.begin
+        if section.begin < zero < section.end:
             parts.append(replace(section, end=zero, start_value=abs(start), end_value=0.0))
             parts.append(replace(section, begin=zero, start_value=0.0, end_value=abs(end)))
         else:

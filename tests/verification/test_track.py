@@ -199,6 +199,22 @@ def test_reverse_curve_with_cant_through_zero_lifts_either_inner_rail():
     assert ends[1] - ends[0] == pytest.approx(0.05, abs=0.5 * 10.0 / 4.0 * 0.2 / 80.0)
 
 
+@pytest.mark.parametrize("trace", [3e-25, 1e-12])
+def test_trace_of_cant_before_a_ramp_to_the_other_side_changes_nothing(trace):
+    def height(cant):
+        plan = [{"type": "CIR", "length": 120.0, "radius": -300.0}]
+        ramp = [
+            {"type": "CST", "length": 20.0, "cant": cant},
+            {"type": "LIR", "length": 80.0},
+            {"type": "CST", "length": 20.0, "cant": -0.1},
+        ]
+        tables = track_tables(track_of(plan, ramp, cant_rotation="inner_rail"))
+        return evaluate(tables, np.linspace(0.0, 120.0, 50), Z)
+
+    # half the cant, where the cant itself is measured from zero
+    np.testing.assert_allclose(height(trace), height(0.0), atol=trace + 1e-12)
+
+
 def test_end_elements_continue_beyond_both_ends():
     plan = [
         {"type": "CIR", "length": 60.0, "radius": 300.0},
