@@ -5,24 +5,40 @@ the two surfaces over the speed of travel), the contact ellipse and friction.  S
 are wheel minus rail in the contact frame (x forward, t to the right, n into the rail), the force
 is that on the *rail* and has the sign of the creepage.
 
-`creep_force` is for scripts, plots and tests; the time loop calls the kernels
-(:mod:`railsim.kernels.fastsim` and its neighbours) on its own arrays.  The laws are described in
-docs/theory/creep.md.
+========= =====================================================================
+law       what it is
+========= =====================================================================
+`fastsim` Kalker's simplified theory (1982), the usual compromise
+`table`   Kalker's full half-space theory, tabulated: the best, at FASTSIM's cost
+`fastrip` strip theory joined to FASTSIM (after Sichani and others, 2016)
+`polach`  closed formula, with falling friction the choice for traction
+`linear`  Kalker's linear theory, saturated after Shen, Hedrick and Elkins
+========= =====================================================================
+
+`creep_force` is for scripts, plots and tests; the time loop calls the kernel
+:func:`railsim.kernels.creep.creep_forces` on its own arrays.  docs/theory/creep.md describes the
+laws, docs/validation/creep.md says how good they are.
 """
 
-from collections.abc import Callable
+import warnings
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from railsim.contact.creep_table import CreepTable, creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.errors import Fault, InputError, ModelError, nearest
-from railsim.kernels.fastsim import fastsim, fastsim_workspace
+from railsim.kernels.creep import LAW_NUMBERS, creep_forces, falling_friction
+from railsim.kernels.creep_table import RATIO_MAX
+from railsim.kernels.fastsim import fastsim_workspace
 
 Array = NDArray[np.float64]
 
-LAWS: dict[str, Callable[..., None]] = {"fastsim": fastsim}
+LAWS = tuple(LAW_NUMBERS)
+"""Names of the creep laws."""
+
+_NO_TABLE = CreepTable(np.zeros(0, dtype=np.float32), np.zeros((0, 4)))
 
 
 class CreepForce(NamedTuple):
@@ -54,6 +70,12 @@ def creep_force(
     law: str = "fastsim",
     nx: int = 10,
     ny: int = 10,
+    *,
+    reduction: float = 1.0,
+    slip_reduction: float | None = None,
+    friction_rest: float = 1.0,
+    friction_decay: float = 0.0,
+    speed: float = 0.0,
 ) -> CreepForce:
     """Creep force of elliptic contact patches by one of the laws.
 
@@ -76,17 +98,32 @@ def creep_force(
     law : str
         One of `LAWS`.
     nx, ny : int
-        Cells along and strips across the patch, where the law has them.
+        Cells along and strips across the patch, where the law has them (`fastsim`, `fastrip`).
+    reduction : float
+        Third-body reduction of Kalker's coefficients, 0 < k <= 1 [1].
+    slip_reduction : float, optional
+        Polach's factor for the slip area, by default equal to `reduction` [1].
+    friction_rest, friction_decay : float
+        Friction falling with the slip velocity w = speed |xi|:
+        mu(w) = mu ((1 - rest) exp(-decay w) + rest) [1, s/m].
+    speed : float
+        Speed of travel, for falling friction [m/s].
 
     Returns
     -------
     CreepForce
         T_x, T_y [N] and M_z [N m] on the rail; shape: that of the inputs broadcast.
 
+    Warns
+    -----
+    UserWarning
+        If patches lie outside the range of `table` (a/b beyond 1/20..20): they get the force of
+        the nearest ratio.
+
     Raises
     ------
     InputError
-        If the law is unknown or nx or ny is not at least 1.
+        If the law is unknown, nx or ny is not at least 1, or an option is out of its range.
     ModelError
         If N or mu is negative, a semi-axis of a loaded patch is not positive, or an input is not
         finite.
@@ -99,8 +136,21 @@ def creep_force(
     """
     if law not in LAWS:
         raise InputError([Fault("creep_force", "law", f"'{law}'", nearest(law, LAWS))])
-    if nx < 1 or ny < 1:
-        raise InputError([Fault("creep_force", "nx, ny", f"{nx}, {ny}", "at least 1 cell")])
+    k_slip = reduction if slip_reduction is None else slip_reduction
+    ranges = {
+        "nx, ny": (nx >= 1 and ny >= 1, f"{nx}, {ny}", "at least 1 cell"),
+        "reduction": (0.0 < reduction <= 1.0, f"{reduction}", "above 0, at most 1"),
+        "slip_reduction": (0.0 < k_slip <= reduction, f"{k_slip}", "above 0, at most reduction"),
+        "friction_rest": (0.0 <= friction_rest <= 1.0, f"{friction_rest}", "0 to 1"),
+        "friction_decay": (friction_decay >= 0.0, f"{friction_decay}", "at least 0"),
+    }
+    faults = [
+        Fault("creep_force", key, found, allowed)
+        for key, (fine, found, allowed) in ranges.items()
+        if not fine
+    ]
+    if faults:
+        raise InputError(faults)
     inputs = np.broadcast_arrays(a, b, N, mu, xi_x, xi_y, phi)
     shape = inputs[0].shape
     flat = [np.array(value, dtype=float).ravel() for value in inputs]
@@ -114,12 +164,21 @@ def creep_force(
         raise ModelError("creep force: the semi-axes of a loaded patch must be positive")
     semi_a[~loaded] = 1.0
     semi_b[~loaded] = 1.0
-    c11, c22, c23, _ = kalker_coefficients(semi_a / semi_b, nu)
     n = semi_a.size
+    bound = friction * normal
+    if friction_rest < 1.0:
+        falling_friction(n, bound, *creepages[:2], speed, friction_rest, friction_decay)
+    table = creep_table(nu) if law == "table" else _NO_TABLE
     T_x, T_y, M_z = np.zeros(n), np.zeros(n), np.zeros(n)
-    work = fastsim_workspace(n, ny, nx)
-    LAWS[law](
-        n, nx, ny, semi_a, semi_b, friction * normal, c11, c22, c23, G, *creepages, work,
-        T_x, T_y, M_z,
+    outside = creep_forces(
+        LAW_NUMBERS[law], n, nx, ny, semi_a, semi_b, bound,
+        *kalker_coefficients(semi_a / semi_b, nu), G, reduction, k_slip, *creepages,
+        *table, np.zeros(16, dtype=np.int64), fastsim_workspace(n, ny, nx), T_x, T_y, M_z,
     )  # fmt: skip
+    if outside:
+        warnings.warn(
+            f"creep law 'table': {outside} of {n} patches have a/b outside 1/{RATIO_MAX:g} to "
+            f"{RATIO_MAX:g} and got the force of the nearest ratio",
+            stacklevel=2,
+        )
     return CreepForce(T_x.reshape(shape), T_y.reshape(shape), M_z.reshape(shape))
