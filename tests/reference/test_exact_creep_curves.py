@@ -1,0 +1,64 @@
+"""Own half-space solver against CONTACT: creep curves and creepage coefficients."""
+
+import csv
+
+import numpy as np
+import pytest
+from creep_curves import creep_curves
+
+from railsim.contact.creep_table import linear_coefficients
+from railsim.contact.exact_creep import exact_creep_force
+
+# One point of each kind, the worst ones of each ratio among them.
+POINTS = (
+    "long_spin_ab0.3_12", "lat_spin_opp_ab0.3_10", "long_lat_ab1_06", "mixed_ab1_08",
+    "lat_sweep_spin1_ab1_04", "lat_ab3_06", "lat_spin_opp_ab3_12", "spin_ab3_12",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def curves(reference_dir):
+    return creep_curves(reference_dir)
+
+
+def worst_errors(curves, chosen, **grid):
+    forces, moments = [], []
+    for i in chosen:
+        case = [float(values[i]) for values in curves.inputs()]
+        found = exact_creep_force(*case, G=curves.G, nu=curves.nu, **grid)
+        bound = curves.mu[i] * curves.N[i]
+        fx, fy, mz = curves.result("contact_ext")[:, i]
+        forces.append(np.hypot(found.T_x / bound - fx, found.T_y / bound - fy))
+        moments.append(abs(found.M_z / (bound * np.sqrt(curves.a[i] * curves.b[i])) - mz))
+    return max(forces), max(moments)
+
+
+def test_chosen_points_within_a_hundredth(curves):
+    chosen = [int(np.flatnonzero(curves.case == name)[0]) for name in POINTS]
+    force, moment = worst_errors(curves, chosen)
+    # the issue's demand; grid error at 28 x 28 is up to 0.007, that of the reference 0.003
+    assert force < 0.01
+    assert moment < 0.01
+
+
+@pytest.mark.slow
+def test_every_point_within_a_hundredth(curves):
+    force, moment = worst_errors(curves, range(curves.case.size))
+    assert force < 0.01
+    assert moment < 0.01
+
+
+def test_small_creepage_gives_the_recomputed_coefficients(reference_dir):
+    with open(reference_dir / "contact" / "kalker_coefficients_computed.csv", newline="") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["nu"] == "0.28"]
+    for row in rows:
+        ratio = float(row["a_over_b"])
+        if ratio not in (0.1, 0.3, 1.0, 2.0, 5.0):
+            continue
+        c11, c22, c23, c33 = linear_coefficients(ratio)
+        # CONTACT's own C23 and -C32, which should be one number, differ by 0.3 %
+        assert c11 == pytest.approx(float(row["C11"]), rel=0.005)
+        assert c22 == pytest.approx(float(row["C22"]), rel=0.007)
+        assert c23 == pytest.approx(float(row["C23"]), rel=0.008)
+        if row["C33_reliable"] == "yes":
+            assert c33 == pytest.approx(float(row["C33"]), rel=0.005)
