@@ -1,0 +1,276 @@
+"""Pictures of creep forces: curves of all laws over creepage, and the traction within a patch.
+
+Seen as the wheel looks at the rail from above: forward is up, right is right.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from railsim.contact.creep import creep_force
+from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
+from railsim.contact.kalker import kalker_coefficients
+from railsim.plot.style import DISTINCT, styled
+
+Array = NDArray[np.float64]
+
+LAW_COLOURS = {
+    "fastsim": DISTINCT[0],
+    "table": DISTINCT[1],
+    "fastrip": DISTINCT[2],
+    "polach": DISTINCT[3],
+    "linear": DISTINCT[6],
+}
+CASES = {
+    "longitudinal": (1.0, 0.0, 0.0),
+    "lateral": (0.0, 1.0, 0.0),
+    "spin": (0.0, 0.0, 1.0),
+    "lateral and spin, same sign": (0.0, 1.0, 1.0),
+    "lateral and spin, opposed": (0.0, 1.0, -0.5),
+    "longitudinal and spin": (1.0, 0.0, 1.0),
+}
+"""Directions of the normalised creepages (x, y, spin) whose curves are drawn."""
+
+LARGEST = 5.0
+"""End of the axis of normalised creepage."""
+
+
+class Patch(NamedTuple):
+    """A loaded contact ellipse.
+
+    Attributes
+    ----------
+    a, b : float
+        Semi-axes along and across the rail [m].
+    N, mu : float
+        Normal force [N], friction coefficient [1].
+    G, nu : float
+        Shear modulus [Pa], Poisson's number [1].
+    """
+
+    a: float
+    b: float
+    N: float
+    mu: float
+    G: float = 82e9
+    nu: float = 0.28
+
+    def creepages(self, normalised: Sequence[float] | Array) -> tuple[float, float, float]:
+        """Creepages whose forces in linear theory are the given multiples of mu N."""
+        c11, c22, c23, _ = (float(c) for c in kalker_coefficients(self.a / self.b, self.nu))
+        unit = self.mu * self.N / (self.G * self.a * self.b)
+        x, y, spin = (float(value) for value in normalised)
+        return unit * x / c11, unit * y / c22, unit * spin / (c23 * float(np.sqrt(self.a * self.b)))
+
+
+def creep_curves_figure(
+    patch: Patch, laws: Sequence[str], nx: int = 10, ny: int = 10, exact_points: int = 7
+) -> Figure:
+    """Creep forces over normalised creepage, for six directions of creepage.
+
+    Parameters
+    ----------
+    patch : Patch
+        The contact ellipse.
+    laws : sequence of str
+        Laws of `railsim.contact.creep_force`.
+    nx, ny : int
+        Cells and strips of the laws that have them.
+    exact_points : int
+        Points of the full theory in each picture (half a second each); 0 for none.
+    """
+    scale = np.linspace(0.0, 1.0, 121) ** 1.5 * LARGEST
+    with styled():
+        figure = Figure(figsize=(9.6, 6.2))
+        figure.subplots_adjust(
+            left=0.06, right=0.99, bottom=0.13, top=0.90, wspace=0.18, hspace=0.36
+        )
+        figure.suptitle(
+            f"Creep forces, a/b = {patch.a / patch.b:.3g}, N = {1e-3 * patch.N:.3g} kN, "
+            f"μ = {patch.mu:.3g}"
+        )
+        panels: list[Axes] = list(figure.subplots(2, 3, sharex=True).flat)
+        for panel, (name, direction) in zip(panels, CASES.items(), strict=True):
+            _draw_curves(panel, patch, direction, scale, laws, (nx, ny))
+            if exact_points:
+                _draw_exact(panel, patch, direction, exact_points)
+            panel.set_title(name)
+            panel.axhline(0.0, color="0.6", lw=0.6, zorder=0)
+            panel.set_xlim(0.0, LARGEST)
+        for panel in panels[::3]:
+            panel.set_ylabel("force over $\\mu N$")
+        for panel in panels[3:]:
+            panel.set_xlabel("size of the normalised creepage")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(
+            [*handles], [*labels], loc="lower center", ncols=len(labels), bbox_to_anchor=(0.5, 0.0)
+        )
+        for panel in panels:
+            _name_components(panel)
+    return figure
+
+
+def _draw_curves(
+    panel: Axes,
+    patch: Patch,
+    direction: Sequence[float],
+    scale: Array,
+    laws: Sequence[str],
+    grid: tuple[int, int],
+) -> None:
+    unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+    x, y, spin = unit[:, None] * scale
+    for law in laws:
+        force = creep_force(
+            patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu, law, *grid
+        )
+        colour, label = LAW_COLOURS[law], law
+        for values, shown, line in (
+            (force.T_x, direction[0] != 0.0, "-"),
+            (force.T_y, direction[1] != 0.0 or direction[2] != 0.0, "--"),
+        ):
+            if shown:
+                dashed = line if direction[0] != 0.0 else "-"
+                panel.plot(
+                    scale, values / (patch.mu * patch.N), color=colour, ls=dashed, label=label
+                )
+                label = "_"
+
+
+def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: int) -> None:
+    unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+    sizes = np.linspace(0.0, 1.0, count + 1)[1:] ** 1.5 * LARGEST
+    forces = np.array([exact_force(patch, s * unit)[:2] for s in sizes])
+    label = "full theory"
+    for column, shown in (
+        (0, direction[0] != 0.0),
+        (1, direction[1] != 0.0 or direction[2] != 0.0),
+    ):
+        if shown:
+            values = forces[:, column] / (patch.mu * patch.N)
+            panel.plot(sizes, values, "o", ms=3.6, mfc="none", mec="0.1", mew=0.9, label=label)
+            label = "_"
+
+
+def exact_force(patch: Patch, creepages: Sequence[float] | Array) -> ExactCreepForce:
+    """Full theory for a patch and its creepages (x, y, spin) [1, 1, 1/m]."""
+    x, y, spin = (float(value) for value in creepages)
+    return exact_creep_force(
+        patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu
+    )  # fmt: skip
+
+
+def _name_components(panel: Axes) -> None:
+    """Say which lines are longitudinal where a picture has both."""
+    if any(line.get_linestyle() == "--" for line in panel.get_lines()):
+        panel.text(
+            0.985, 0.03, "solid $T_x$, dashed $T_y$", transform=panel.transAxes, ha="right",
+            va="bottom", fontsize=8, color="0.3",
+        )  # fmt: skip
+
+
+def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: float) -> Figure:
+    """Traction on the rail within the contact ellipse, stick zone shaded.
+
+    Parameters
+    ----------
+    solutions : mapping of str to ExactCreepForce
+        Fields by their title, one picture each, of the same ellipse.
+    friction_force : float
+        mu N, for the resultants [N].
+    """
+    columns = min(len(solutions), 3)
+    rows = -(-len(solutions) // columns)
+    first = next(iter(solutions.values()))
+    reach_x = 1e3 * float(np.abs(first.x).max() + np.abs(np.diff(first.x, axis=1)).max())
+    reach_y = 1e3 * float(np.abs(first.y).max() * 1.08)
+    width = float(np.clip(3.2 * (reach_y / reach_x) ** 0.5, 1.6, 3.4))
+    panel_height = width * reach_x / reach_y
+    with styled():
+        height = rows * (panel_height + 0.75) + 0.25
+        figure = Figure(figsize=(columns * (width + 0.3) + 1.5, height))
+        axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
+        figure.subplots_adjust(
+            left=0.55 / figure.get_figwidth(),
+            right=1.0 - 0.95 / figure.get_figwidth(),
+            bottom=0.45 / height,
+            top=1.0 - 0.45 / height,
+            wspace=0.3 / width,
+            hspace=0.75 / panel_height,
+        )
+        top = 1e-6 * max(float(s.bound.max()) for s in solutions.values())
+        for panel, (title, solution) in zip(axes, solutions.items(), strict=False):
+            image = _draw_traction(panel, solution, top)
+            panel.set_xlim(-reach_y, reach_y)
+            panel.set_ylim(-reach_x, reach_x)
+            panel.set_aspect("equal")
+            panel.grid(False)
+            panel.set_title(
+                f"{title}\n$T_x$ {solution.T_x / friction_force:+.2f}, "
+                f"$T_y$ {solution.T_y / friction_force:+.2f} $\\mu N$".replace("-", "−")
+            )
+        for panel in axes[max(len(solutions) - columns, 0) : len(solutions)]:
+            panel.set_xlabel("to the right (mm)")
+        for panel in axes[len(solutions) :]:
+            panel.set_visible(False)
+        for panel in axes[::columns]:
+            panel.set_ylabel("forward (mm)")
+        bar = figure.add_axes((1.0 - 0.8 / figure.get_figwidth(), 0.2, 0.12 / width * 0.3, 0.6))
+        figure.colorbar(image, cax=bar, label="traction on the rail (MPa)")
+    return figure
+
+
+def _draw_traction(panel: Axes, solution: ExactCreepForce, top: float) -> QuadMesh:
+    """Size in colour, direction as arrows, border of the stick zone, the ellipse."""
+    # cells do not line up across strips: draw each strip as a row of its own
+    size = 1e-6 * np.hypot(solution.t_x, solution.t_y)
+    strips = solution.y[:, 0]
+    half = 0.5 * float(strips[1] - strips[0]) if strips.size > 1 else float(solution.y.max())
+    for j in range(strips.size):
+        x = solution.x[j]
+        middle = 0.5 * (x[:-1] + x[1:])
+        border = np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
+        image = panel.pcolormesh(
+            1e3 * np.array([strips[j] - half, strips[j] + half]),
+            1e3 * border,
+            size[j][:, None],
+            cmap="YlOrBr",
+            vmin=0.0,
+            vmax=top,
+            rasterized=True,
+        )
+        held = np.flatnonzero(solution.sticks[j])
+        if held.size:
+            panel.fill_between(
+                1e3 * np.array([strips[j] - half, strips[j] + half]),
+                1e3 * border[held[-1] + 1],
+                1e3 * border[held[0]],
+                facecolor="none",
+                edgecolor="#2a6f97",
+                hatch="////",
+                lw=0.0,
+                alpha=0.6,
+            )
+    across = max(strips.size // 9, 1)
+    along = max(solution.x.shape[1] // 9, 1)
+    shown = (slice(across // 2, None, across), slice(along // 2, None, along))
+    panel.quiver(
+        1e3 * solution.y[shown],
+        1e3 * solution.x[shown],
+        solution.t_y[shown],
+        solution.t_x[shown],
+        color="0.1",
+        scale=12e6 * top,
+        width=0.006,
+        pivot="mid",
+    )
+    a = float(solution.x.max()) / float(np.cos(np.pi / (2 * solution.x.shape[1])))
+    b = float(strips[-1]) + half
+    panel.add_patch(Ellipse((0.0, 0.0), 2e3 * b, 2e3 * a, fill=False, color="0.2", lw=1.0))
+    return image
