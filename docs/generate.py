@@ -34,7 +34,7 @@ def quantity_table() -> str:
 def _quantity_row(quantity: Quantity) -> tuple[str, ...]:
     return (
         f"`{quantity.name}`",
-        f"${quantity.symbol}$".replace("|", r"\vert "),
+        f"${quantity.symbol}$".replace("|", r"{\vert}"),
         quantity.long_name,
         quantity.sign,
         quantity.unit,

@@ -17,21 +17,6 @@ from numba.core import config as _config
 FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
 
 
-def jit(function):
-    """Compile `function` with numba: cached, numpy error model, NaN-preserving fastmath."""
-    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, _nrt=False)(function)
-
-
-def jit_inline(function):
-    """As `jit`, for a small function that is put into its caller.
-
-    A call with a tuple of arrays puts all their descriptions on the stack, some hundred words; in
-    the innermost loops that costs more than the function itself.
-    """
-    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, inline="always",
-                      _nrt=False)(function)
-
-
 def source_hash(folder: Path) -> str:
     """Hash of all kernel sources in `folder` and of the versions that compile them."""
     digest = hashlib.sha256(numba.__version__.encode())
@@ -41,28 +26,24 @@ def source_hash(folder: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def _cache_folder() -> Path:
+def _cache_folder() -> Path | None:
+    """Folder of these sources' compiled code; None where nothing can be written."""
     base = os.environ.get("RAILSIM_CACHE_DIR")
     if base is None:
         base = os.environ.get("XDG_CACHE_HOME", "") or str(Path.home() / ".cache")
         base = str(Path(base) / "railsim")
-    return Path(base) / "kernels" / source_hash(Path(__file__).parent)
-
-
-def _use_own_cache() -> None:
-    """Point numba to the folder of these sources unless the user has set one."""
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return
-    folder = _cache_folder()
+    folder = Path(base) / "kernels" / source_hash(Path(__file__).parent)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
-        return  # numba falls back to its own choice of folder
+        return None
+    if not os.access(folder, os.W_OK):
+        return None
     for old in folder.parent.iterdir():
-        # keep the newest few: another version of railsim may be in use beside this one
+        # another version of railsim may be in use beside this one
         if old != folder and old.is_dir() and _is_stale(old, folder):
             shutil.rmtree(old, ignore_errors=True)
-    _config.CACHE_DIR = str(folder)
+    return folder
 
 
 def _is_stale(old: Path, current: Path) -> bool:
@@ -70,4 +51,35 @@ def _is_stale(old: Path, current: Path) -> bool:
     return old.stat().st_mtime < current.stat().st_mtime - month
 
 
-_use_own_cache()
+_FOLDER = os.environ.get("NUMBA_CACHE_DIR") or _cache_folder()  # a user's choice comes first
+
+
+def _compiled(function, **options):
+    """Compile into the cache of these sources, leaving numba's own choice to everybody else."""
+    before = _config.CACHE_DIR
+    _config.CACHE_DIR = str(_FOLDER or before)
+    try:
+        return numba.njit(
+            cache=_FOLDER is not None, error_model="numpy", fastmath=FASTMATH, **options
+        )(function)
+    finally:
+        _config.CACHE_DIR = before
+
+
+def jit(function):
+    """Compile for the time loop: numpy error model, NaN-preserving fastmath, no allocation."""
+    return _compiled(function, _nrt=False)
+
+
+def jit_inline(function):
+    """As `jit`, for a small function that is put into its caller.
+
+    A call with a tuple of arrays puts all their descriptions on the stack, some hundred words; in
+    the innermost loops that costs more than the function itself.
+    """
+    return _compiled(function, inline="always", _nrt=False)
+
+
+def jit_outside(function):
+    """Compile for use outside the time loop: may allocate, lets other Python threads run."""
+    return _compiled(function, nogil=True)

@@ -12,10 +12,9 @@ which the zone touches.
 
 import math
 
-import numba
 import numpy as np
 
-from railsim.kernels import FASTMATH
+from railsim.kernels import jit_outside
 
 SPREAD = 16.0  # candidates whose gap exceeds the least by more than SPREAD eps have no weight
 WIDTH_ITERATIONS = 8
@@ -27,12 +26,7 @@ G, K, C_Y, C_Z, C_X, A1, B1, TAN_GAMMA = range(8)
 N_FIELD = 8
 
 
-def _jit(function):
-    """Compile as `railsim.kernels.jit`, but letting other Python threads run meanwhile."""
-    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, nogil=True)(function)
-
-
-@_jit
+@jit_outside
 def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
     """Trace line of a wheel relative to the wheelset's centre, in track axes.
 
@@ -64,7 +58,7 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
         c_z[k] = u[k] * l_z + r[k] * (along * l_z + across * l_y) / m
 
 
-@_jit
+@jit_outside
 def rail_height(Y, Y0, dY, z, slope):
     """Height of the rail's surface and its slope at the lateral place `Y`, cubic, straight beyond.
 
@@ -98,7 +92,7 @@ def rail_height(Y, Y0, dY, z, slope):
     return z[j] + x * (d0 + x * (c2 + x * c3)), (d0 + x * (2.0 * c2 + 3.0 * x * c3)) / dY, j
 
 
-@_jit
+@jit_outside
 def interpolated(x, x0, dx, values):
     """Linear interpolation on a uniform grid, constant beyond its ends."""
     s = (x - x0) / dx
@@ -110,7 +104,7 @@ def interpolated(x, x0, dx, values):
     return values[i] + (s - i) * (values[i + 1] - values[i])
 
 
-@_jit
+@jit_outside
 def fill_table_slice(
     values,
     y_nodes,
@@ -340,7 +334,7 @@ def fill_table_slice(
                     out[K] *= power / stiffness[p]
 
 
-@_jit
+@jit_outside
 def corrected_by_hertz(N, a, b, A, B, a1, b1, stiffness, delta, E_star, x0, dx, whole):
     """Force and axes of `kik_piotrowski`, made exact for elliptic patches.
 
@@ -358,7 +352,7 @@ def corrected_by_hertz(N, a, b, A, B, a1, b1, stiffness, delta, E_star, x0, dx, 
     return N * N_hertz / N_virtual, a * a1 * third / a_virtual, b * b1 * third / b_virtual
 
 
-@_jit
+@jit_outside
 def kik_piotrowski(
     h,
     place,
@@ -464,7 +458,7 @@ def kik_piotrowski(
     return N, a, a / ratio
 
 
-@_jit
+@jit_outside
 def _patch_end(h, lift, approach, z, delta, window, middle, step):
     """Last candidate of the patch in one direction.
 
@@ -482,13 +476,13 @@ def _patch_end(h, lift, approach, z, delta, window, middle, step):
     return k
 
 
-@_jit
+@jit_outside
 def _virtual_overlap(h, lift, approach, z, delta, k):
     """Overlap of a candidate at the virtual approach [m]."""
     return approach * ((z - h[k]) / lift[k] + 1.0) - (1.0 - VIRTUAL_SHARE) * delta
 
 
-@_jit
+@jit_outside
 def averaged_ellipse(A, curvature, half_widths, ellipse_x0, ellipse_dx, ellipse, load, floor_ratio):
     """Unit-load ellipse with the lateral curvature averaged over the patch itself.
 
@@ -536,7 +530,7 @@ def averaged_ellipse(A, curvature, half_widths, ellipse_x0, ellipse_dx, ellipse,
 R_GAP, R_U, R_RADIUS, R_PLACE, R_SLOPE, R_INDEX = range(6)
 
 
-@_jit
+@jit_outside
 def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y, roll, out):
     """First contact of a rigid wheel that is lowered onto its rail, without yaw.
 
@@ -589,7 +583,7 @@ def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y,
     out[R_INDEX] = index
 
 
-@_jit
+@jit_outside
 def _gap_slope(wheel, k, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine):
     """Derivative of the gap with respect to u at a candidate [1]."""
     u, r, t = wheel[0, k], wheel[1, k], wheel[2, k]
@@ -597,7 +591,7 @@ def _gap_slope(wheel, k, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine):
     return slope * (cosine - t * sine) - (sine + t * cosine)
 
 
-@_jit
+@jit_outside
 def rigid_sweep(
     lateral,
     wheel_right,

@@ -14,10 +14,9 @@ along the surface).
 
 import math
 
-import numba
 import numpy as np
 
-from . import FASTMATH
+from . import jit_outside
 
 CONVERGED = 0
 NOT_CONVERGED = 1
@@ -26,12 +25,7 @@ _SETTLED = 15  # most cases need 5 to 11 iterations; after this many, cells that
 _MAX_RETURNS = 2  # go to and fro are kept in stick at their next return but one
 
 
-def jit(function):
-    """Compile for use outside the time loop: unlike `railsim.kernels.jit` it may allocate."""
-    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH)(function)
-
-
-@jit
+@jit_outside
 def _log_sum(u, v):
     """log(u + sqrt(u^2 + v^2)) without cancellation for u < 0; 0 where the sum vanishes."""
     r = math.sqrt(u * u + v * v)
@@ -40,7 +34,7 @@ def _log_sum(u, v):
     return math.log(v * v / (r - u)) if v != 0.0 else 0.0
 
 
-@jit
+@jit_outside
 def cell_influence(x, y, half_x, half_y, nu):
     """Displacement differences at (x, y) by unit tractions on a cell about the origin.
 
@@ -78,7 +72,7 @@ def cell_influence(x, y, half_x, half_y, nu):
     return (even + nu * xx) / math.pi, nu * xy / math.pi, (even + nu * yy) / math.pi
 
 
-@jit
+@jit_outside
 def rolling_matrices(x, y, half_x, half_y, edge, nu, middle, centre, x_middle):
     """Matrices that give the elastic part of the slip from the cells' tractions.
 
@@ -138,7 +132,7 @@ def rolling_matrices(x, y, half_x, half_y, edge, nu, middle, centre, x_middle):
                     centre[q, row, column] = value
 
 
-@jit
+@jit_outside
 def _slips(matrix, p, rigid, slip):
     """Slip of every cell: rigid part plus elastic part of the traction."""
     n = p.shape[1]
@@ -152,7 +146,7 @@ def _slips(matrix, p, rigid, slip):
         slip[1, i] = sy
 
 
-@jit
+@jit_outside
 def _newton_system(middle, centre, stick, slide, p, bound, slip_middle, slip_centre, A, r):
     """Linear system of one Newton step; see `rolling_traction`.
 
@@ -199,7 +193,7 @@ def _newton_system(middle, centre, stick, slide, p, bound, slip_middle, slip_cen
             A[ns + i, ns + i] -= cos_i * slip_centre[0, cell] + sin_i * slip_centre[1, cell]
 
 
-@jit
+@jit_outside
 def rolling_traction(
     middle, centre, rigid_middle, rigid_centre, bound, p, sticks, slip, tolerance, iterations
 ):
@@ -288,7 +282,7 @@ def rolling_traction(
     return NOT_CONVERGED, iterations
 
 
-@jit
+@jit_outside
 def _cut_back(p, bound):
     """Shorten tractions that exceed the bound."""
     for i in range(bound.size):

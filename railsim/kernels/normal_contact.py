@@ -10,20 +10,14 @@ and complementarity conditions, here for a prescribed approach.
 
 import math
 
-import numba
 import numpy as np
 
-from railsim.kernels import FASTMATH
+from railsim.kernels import jit_outside
 
 CONVERGED, NOT_CONVERGED = range(2)
 
 
-def _jit(function):
-    """Compile as `railsim.kernels.jit`; loops over sums may be vectorised."""
-    return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH)(function)
-
-
-@_jit
+@jit_outside
 def _corner(x, y):
     """Integral of 1/r over a rectangle, at one corner."""
     r = math.sqrt(x * x + y * y)
@@ -35,7 +29,7 @@ def _corner(x, y):
     return total
 
 
-@_jit
+@jit_outside
 def influence(n_x, n_s, dx, ds, E_star):
     """Displacement at the distance (i, j) of an element under unit pressure [m/Pa].
 
@@ -64,13 +58,13 @@ def influence(n_x, n_s, dx, ds, E_star):
     return table
 
 
-@_jit
+@jit_outside
 def _signed(x, y):
     """Integral of 1/r from 0 to x and 0 to y, odd in both."""
     return math.copysign(1.0, x) * math.copysign(1.0, y) * _corner(abs(x), abs(y))
 
 
-@_jit
+@jit_outside
 def pressure(gap, column, row, table, tolerance, p):
     """Pressure that lifts the overlap of two half-spaces.
 
@@ -132,7 +126,7 @@ def pressure(gap, column, row, table, tolerance, p):
     return NOT_CONVERGED
 
 
-@_jit
+@jit_outside
 def _displace(p, column, row, table, u):
     """Displacements under pressures, mirror images included."""
     n = p.size

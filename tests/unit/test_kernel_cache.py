@@ -13,12 +13,15 @@ import railsim.kernels
 # `locate_frames` lives in another file than `track_frame`, which it calls; prints the rate of turn
 # about x on straight track, and how often numba had to compile
 PROGRAM = """
+import os
+import numba
 import numpy as np
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.track_frame import FRAME_SIZE, TrackTables
 track = TrackTables(-1.0, 1.0, np.zeros((3, 6, 4)), np.zeros((3, 6, 4)), 0)
 frames = np.zeros((1, FRAME_SIZE))
 cells = np.zeros(1, dtype=np.int64), np.zeros(1)
+assert numba.config.CACHE_DIR == os.environ.get("NUMBA_CACHE_DIR", "")  # others' kernels
 assert locate_frames(track, np.zeros(1), 0, 0.5, frames, *cells) == 0
 print(frames[0, 12], sum(locate_frames.stats.cache_misses.values()))
 """
@@ -33,9 +36,9 @@ def copied_kernels(tmp_path):
     return package / "kernels"
 
 
-def run(folder):
+def run(folder, **variables):
     environment = {name: text for name, text in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    environment["RAILSIM_CACHE_DIR"] = str(folder / "cache")
+    environment |= {"RAILSIM_CACHE_DIR": str(folder / "cache"), **variables}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM],
         cwd=folder,  # where the copy is imported from
@@ -65,3 +68,16 @@ def test_second_process_compiles_nothing(copied_kernels):
     folder = copied_kernels.parent.parent
     assert run(folder) == (0.0, 1)
     assert run(folder) == (0.0, 0)
+
+
+@pytest.mark.slow
+def test_folder_that_a_user_chose_for_numba_is_used(copied_kernels, tmp_path):
+    run(copied_kernels.parent.parent, NUMBA_CACHE_DIR=str(tmp_path / "mine"))
+    assert list((tmp_path / "mine").rglob("rhs.locate_frames*"))
+    assert not (tmp_path / "cache").exists()
+
+
+@pytest.mark.slow
+def test_without_a_folder_to_write_to_kernels_run_uncached(copied_kernels, tmp_path):
+    (tmp_path / "file").touch()
+    run(copied_kernels.parent.parent, RAILSIM_CACHE_DIR=str(tmp_path / "file" / "cache"))
