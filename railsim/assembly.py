@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.contact.coupling import coupling
 from railsim.contact.kalker import creep_tables
 from railsim.contact.table import ContactTable, cached_contact_table
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
@@ -183,7 +184,9 @@ def work_arrays(system: System) -> Work:
         drive=np.zeros((len(system.internal.kind), 2)),
         decay=np.zeros(len(system.internal.kind)),
         spin_damping=np.zeros(n),
-        look_up=np.zeros(LOOK_UP_SIZE),
+        look_up=np.zeros(N_PATCH * LOOK_UP_SIZE),
+        stiffness=np.zeros(N_PATCH),
+        approach=np.zeros(N_PATCH),
         rail=np.zeros(4),
         patch_index=np.zeros((n_patches, 3), dtype=np.int64),
         patch=np.zeros((PATCH_ROWS, n_patches)),
@@ -305,6 +308,9 @@ def _contact(
         table=which,
         values=np.ascontiguousarray(values, dtype=float),
         shear=np.array([t.shear for t in tables]),
+        coupling=np.array([
+            coupling(t.values, settings.shear_modulus, settings.poisson) for t in tables
+        ]),
         y0=first.y0,
         dy=first.dy,
         roll0=first.roll0,

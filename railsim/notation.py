@@ -283,3 +283,51 @@ QUANTITIES: dict[str, Quantity] = _table(
         "absolute, in body axes",
     ),
 )
+
+
+_ELEMENT = ("time", "element", "component")
+_PATCH = ("time", "wheelset", "side", "patch")
+PATCHES = ("tread", "flange root", "flange")
+
+# Quantities that a run puts out only where its settings ask for them.
+REQUESTED: dict[str, Quantity] = _table(
+    Quantity(
+        "element_deflection", "deflection of the element", "d", "m, rad", _ELEMENT, "mm, mrad", 1e3,
+        "body 2 against body 1, axes of body 1; a link's elongation stands under x",
+    ),
+    Quantity(
+        "element_force", "force of the element", "F", "N, N m", _ELEMENT, "kN, kN m", 1e-3,
+        "on body 1, its axes; a link's tension stands under x",
+    ),
+    Quantity(
+        "element_power", "power of the element", "P", "W", ("time", "element"), "kW", 1e-3,
+        "taken from the bodies",
+    ),
+    Quantity("patch_N", "normal force of the patch", "N", "N", _PATCH, "kN", 1e-3),
+    Quantity("patch_pressure", "largest pressure of the patch", "p_{max}", "Pa", _PATCH, "MPa",
+             1e-6, "Hertz: 3 N / (2 pi a b)"),
+    Quantity("patch_a", "semi-axis of the patch along the rail", "a", "m", _PATCH, "mm", 1e3),
+    Quantity("patch_b", "semi-axis of the patch across the rail", "b", "m", _PATCH, "mm", 1e3),
+    Quantity("patch_angle", "contact angle", r"\gamma", "rad", _PATCH, "mrad", 1e3,
+             "positive where the normal into the rail leans to the right"),
+    Quantity("patch_x", "place of the patch along the track", "x_c", "m", _PATCH, "mm", 1e3,
+             "from the wheelset's centre, forwards"),
+    Quantity("patch_y", "place of the patch across the track", "y_c", "m", _PATCH, "mm", 1e3,
+             "from the wheelset's centre, to the right"),
+    Quantity("patch_z", "depth of the patch", "z_c", "m", _PATCH, "mm", 1e3,
+             "from the wheelset's centre, down"),
+    Quantity("patch_T_x", "longitudinal creep force", "T_x", "N", _PATCH, "kN", 1e-3,
+             "on the rail, forwards"),
+    Quantity("patch_T_y", "lateral creep force", "T_y", "N", _PATCH, "kN", 1e-3,
+             "on the rail, in the contact plane to the right"),
+    Quantity("track_curvature", "curvature at the wheelset", r"\kappa", "1/m", _AXLE, "1/km", 1e3,
+             "positive to the right"),
+    Quantity("track_cant", "cant at the wheelset", "h", "m", _AXLE, "mm", 1e3,
+             "positive with the left rail higher"),
+    Quantity("track_gradient", "gradient at the wheelset", "i", "1", _AXLE, "per mille", 1e3,
+             "positive uphill"),
+    Quantity("rail_lateral", "lateral displacement of the rail", "y_r", "m", _WHEEL, "mm", 1e3,
+             "irregularity at the wheelset's place, to the right"),
+    Quantity("rail_vertical", "vertical displacement of the rail", "z_r", "m", _WHEEL, "mm", 1e3,
+             "irregularity at the wheelset's place, down"),
+)

@@ -1,13 +1,23 @@
 """From raw records of the time loop to the quantities of a result (see `railsim.notation`)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
 
 from railsim.assembly import Model
 from railsim.kernels.time_loop import Recorder
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.errors import Fault, InputError, nearest
+from railsim.kernels import element_outputs as element
+from railsim.kernels import wheel_rail as patch
 from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_XI_X, W_XI_Y, W_Y
+from railsim.notation import PATCHES, QUANTITIES, REQUESTED, Quantity
+from railsim.time_step import empty_recorder
+from railsim.track.alignment import Alignment
+from railsim.track.irregularity import displacement
 
 Floats = NDArray[np.float64]
 
@@ -57,4 +67,121 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "body_position": position,
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
+    }
+
+
+class OutputPlan:
+    """What a run puts out: which elements, patches and track quantities beyond the usual ones.
+
+    Parameters
+    ----------
+    model, settings, track : Model, Settings, Track
+
+    Raises
+    ------
+    InputError
+        The settings name an element that the vehicle does not have.
+    """
+
+    def __init__(self, model: Model, settings: Settings, track: Track) -> None:
+        self._model = model
+        self._asked = settings.outputs
+        self._alignment = Alignment(track)
+        self._irregularity = displacement(track)
+        known = {
+            name: (group, index)
+            for group, names in ((element.LINK, model.index.links),
+                                 (element.MOUNT, model.index.mounts))
+            for index, name in enumerate(names)
+        }
+        self.elements = _matching(self._asked.elements, list(known))
+        self._chosen = np.array([known[name] for name in self.elements], dtype=np.int64)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All quantities of the result."""
+        prefixes = ["element_"] * bool(self.elements)
+        prefixes += ["patch_"] * self._asked.contact_patches
+        prefixes += ["track_", "rail_"] * self._asked.track
+        more = [q for name, q in REQUESTED.items() if name.startswith(tuple(prefixes))]
+        return (*QUANTITIES.values(), *(more if prefixes else ()))
+
+    @property
+    def coordinates(self) -> dict[str, Sequence[str]]:
+        """Names along the dimensions of the result."""
+        names: dict[str, Sequence[str]] = {
+            "wheelset": self._model.index.wheelsets, "body": self._model.index.bodies,
+        }
+        if self.elements:
+            names["element"] = self.elements
+        if self._asked.contact_patches:
+            names["patch"] = PATCHES
+        return names
+
+    def recorder(self, rows: int) -> Recorder:
+        """Recorder with room for `rows` outputs."""
+        chosen = self._chosen.reshape(-1, 2)
+        return empty_recorder(self._model, rows, chosen, self._asked.contact_patches)
+
+    def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
+        """Quantities of the first `rows` records by name."""
+        values = dict(quantities(self._model, recorder, rows, Q0))
+        if self.elements:
+            values |= _elements(recorder.element[:rows])
+        if self._asked.contact_patches:
+            values |= _patches(recorder.patch[:rows])
+        if self._asked.track:
+            values |= self._track(values["wheelset_distance"])
+        return values
+
+    def _track(self, place: Floats) -> dict[str, Floats]:
+        rails = np.zeros((4, *place.shape))
+        if self._irregularity is not None:
+            rails = self._irregularity(place.ravel())[0].reshape(4, *place.shape)
+        return {
+            "track_curvature": self._alignment.curvature(place),
+            "track_cant": self._alignment.cant(place),
+            "track_gradient": self._alignment.gradient(place),
+            "rail_lateral": np.stack((rails[0], rails[2]), axis=-1),
+            "rail_vertical": np.stack((rails[1], rails[3]), axis=-1),
+        }
+
+
+def _matching(patterns: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    faults = [
+        Fault("settings", "outputs.elements", f"no element is called '{pattern}'",
+              nearest(pattern, names))
+        for pattern in patterns
+        if not any(fnmatchcase(name, pattern) for name in names)
+    ]
+    if faults:
+        raise InputError(faults)
+    return tuple(n for n in names if any(fnmatchcase(n, pattern) for pattern in patterns))
+
+
+def _elements(raw: Floats) -> dict[str, Floats]:
+    def triples(first: int, second: int) -> Floats:
+        return np.concatenate((raw[..., first : first + 3], raw[..., second : second + 3]), axis=-1)
+
+    return {
+        "element_deflection": triples(element.DEFLECTION, element.ANGLE),
+        "element_force": triples(element.FORCE, element.MOMENT),
+        "element_power": raw[..., element.POWER],
+    }
+
+
+def _patches(raw: Floats) -> dict[str, Floats]:
+    a, b, N = raw[..., patch.A], raw[..., patch.B], raw[..., patch.NORMAL]
+    area = np.where(N > 0.0, np.pi * a * b, 1.0)
+    return {
+        "patch_N": N,
+        "patch_pressure": 1.5 * N / area,
+        "patch_a": a,
+        "patch_b": b,
+        "patch_angle": np.arctan2(raw[..., patch.ANGLE_SIN], raw[..., patch.ANGLE_COS]) * (N > 0.0),
+        "patch_x": raw[..., patch.C_X],
+        "patch_y": raw[..., patch.C_Y],
+        "patch_z": raw[..., patch.C_Z],
+        "patch_T_x": raw[..., patch.T_X],
+        "patch_T_y": raw[..., patch.T_Y],
     }

@@ -23,11 +23,11 @@ from railsim.errors import Fault, InputError, ModelError, nearest
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
 from railsim.kernels.time_loop import record_state, time_loop
-from railsim.outputs import quantities
+from railsim.outputs import OutputPlan
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.run_in import settled
-from railsim.time_step import SCHEMES, choose_step, empty_recorder
+from railsim.time_step import SCHEMES, choose_step
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -130,11 +130,10 @@ def simulate(
     if resume is not None:
         take_up(prepared, resume, duration)
     sink = sink or MemorySink()
-    sink.begin({
-        "wheelset": prepared.model.index.wheelsets, "body": prepared.model.index.bodies,
-    })
+    plan = OutputPlan(prepared.model, settings, track)
+    sink.begin(plan.coordinates, plan.quantities)
     begin_time = float(prepared.state[-3])
-    status, where, state, cpu_time = _loop(prepared, settings, sink, progress)
+    status, where, state, cpu_time = _loop(prepared, settings, plan, sink, progress)
     simulated = float(state[-3]) - begin_time
     attributes: dict[str, str | float | int] = {
         "status": STATUS[status][0],
@@ -320,7 +319,11 @@ def _start(
 
 
 def _loop(
-    prepared: Preparation, settings: Settings, sink: Sink, progress: Progress | None
+    prepared: Preparation,
+    settings: Settings,
+    plan: OutputPlan,
+    sink: Sink,
+    progress: Progress | None,
 ) -> tuple[int, int, Floats, float]:
     """Run the time loop chunk by chunk: status, where, last state, CPU seconds."""
     model = prepared.model
@@ -328,7 +331,7 @@ def _loop(
     state = prepared.state.copy()
     derivative = np.zeros_like(state)
     stages = np.zeros((3, len(state)))
-    recorder = empty_recorder(model, ROWS)
+    recorder = plan.recorder(ROWS)
     scheme = SCHEMES[settings.scheme]
     status, where, cpu_time, every = RUNNING, 0, 0.0, 1
     whole = _left(prepared, prepared.state)
@@ -343,12 +346,12 @@ def _loop(
         )
         cpu_time += time.process_time() - begin
         if rows:
-            sink.append(quantities(model, recorder, rows, prepared.balance.Q0))
+            sink.append(plan.chunk(recorder, rows, prepared.balance.Q0))
         if progress is not None:
             progress(min(1.0, 1.0 - _left(prepared, state) / whole))
     if status == RUNNING and steps % every == 0:
         status, where = record_state(model.system, work, state, derivative, recorder)
-        sink.append(quantities(model, recorder, 1, prepared.balance.Q0))
+        sink.append(plan.chunk(recorder, 1, prepared.balance.Q0))
     return status, where, state, cpu_time
 
 

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from railsim.assembly import Model, work_arrays
 from railsim.errors import ModelError
+from railsim.kernels.contact_table import N_PATCH
+from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import N_SCALARS, System
 from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
-from railsim.kernels.wheel_rail import WHEEL_COLUMNS
+from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
 
 Floats = NDArray[np.float64]
 
@@ -26,15 +28,29 @@ GROWTH = 5.0  # 1/s, growth beyond that of the vehicle that counts as instabilit
 _NEVER = 1 << 40
 
 
-def empty_recorder(model: Model, rows: int) -> Recorder:
-    """Recorder with room for `rows` outputs."""
+def empty_recorder(
+    model: Model, rows: int, chosen: NDArray[np.int64] | None = None, patches: bool = False
+) -> Recorder:
+    """Recorder with room for `rows` outputs.
+
+    Parameters
+    ----------
+    chosen : int64[e, 2], optional
+        Elements to record, see `railsim.kernels.element_outputs`.
+    patches : bool
+        Whether the contact patches are recorded.
+    """
     n = model.index.n_bodies
     wheelsets = len(model.index.wheelsets)
+    chosen = np.zeros((0, 2), dtype=np.int64) if chosen is None else chosen
     return Recorder(
         state=np.zeros((rows, model.n_state)),
         rates=np.zeros((rows, 6 * n)),
         acceleration=np.zeros((rows, n, 6)),
         wheel=np.zeros((rows, wheelsets, 2, WHEEL_COLUMNS)),
+        patch=np.zeros((rows if patches else 0, wheelsets, 2, N_PATCH, PATCH_ROWS)),
+        chosen=chosen,
+        element=np.zeros((rows, len(chosen), ELEMENT_COLUMNS)),
     )
 
 

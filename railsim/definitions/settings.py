@@ -9,8 +9,10 @@ from railsim.definitions.base import (
     Definition,
     FileDefinition,
     Finite,
+    Flag,
     NonNegative,
     Positive,
+    Text,
     rising,
 )
 
@@ -82,6 +84,17 @@ class Drive(Definition):
         return self
 
 
+class Outputs(Definition):
+    """What a run puts out beyond the usual quantities."""
+
+    elements: tuple[Text, ...] = ()
+    """Full names of force elements, `*` standing for any letters: their deflection, force, power"""
+    contact_patches: Flag = False
+    """Place, size, load, creep forces and pressure of every contact patch"""
+    track: Flag = False
+    """Curvature, cant, gradient and irregularities at each wheelset"""
+
+
 class Settings(FileDefinition):
     """How a run is computed: everything that a settings file says."""
 
@@ -99,7 +112,7 @@ class Settings(FileDefinition):
     """Cells of a contact patch along and across"""
     creep_law: Literal["fastsim"] = "fastsim"
     """Law of the creep forces"""
-    contact_damping: NonNegative = 1e5
+    contact_damping: NonNegative = 2e5
     """Damping of the wheel-rail contact, normal to the patch [N s/m]"""
     shear_modulus: Positive = 82e9
     """Shear modulus of wheels and rails [Pa]"""
@@ -107,6 +120,8 @@ class Settings(FileDefinition):
     """Poisson's number of wheels and rails [1]"""
     drive: Drive = Drive()
     """How the speed goes along the track"""
+    outputs: Outputs = Outputs()
+    """Further quantities in the result"""
     initial: dict[str, InitialState] = Field(default_factory=dict)
     """Disturbance at the start by the body's full name"""
 

@@ -19,6 +19,8 @@ The first axis of the grid is s = y - shear * roll, the lateral displacement of 
 see `railsim.contact.table`.
 """
 
+from math import sqrt
+
 import numpy as np
 
 from railsim.kernels import jit
@@ -40,6 +42,9 @@ INSIDE, BELOW_Y, ABOVE_Y, OUTSIDE_ROLL, OUTSIDE_W = range(5)
 # the node differs from the exact place by less (half a cell in y at a slope of 3).
 FAR = 4.0e-4
 LEVER = 0.75
+
+MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
+SETTLED = 1e-14  # relative change of the approaches below which they have converged
 
 
 @jit
@@ -89,8 +94,8 @@ def spline_weights(t):
 
 
 @jit
-def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out):
-    """Fields of one patch and the gradients of g and K into ``out[LOOK_UP_SIZE]``.
+def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out, first=0):
+    """Fields of one patch and the gradients of g and K into ``out[first:first + LOOK_UP_SIZE]``.
 
     Sums are kept in scalars, not in `out`: the compiler then puts the eight fields of a node,
     which lie side by side, into vector registers (2.5 times faster than sums in an array).
@@ -146,15 +151,57 @@ def look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out):
             K_roll += weight_w * slope_r * K_here
             g_w += slope_w * weight_r * g_here
             K_w += slope_w * weight_r * K_here
-    out[0], out[1], out[2], out[3] = g, K, y, z
-    out[4], out[5], out[6], out[7] = x, a, b, t
-    out[G_Y] = g_y / contact.dy
-    out[K_Y] = K_y / contact.dy
+    out[first], out[first + 1], out[first + 2], out[first + 3] = g, K, y, z
+    out[first + 4], out[first + 5], out[first + 6], out[first + 7] = x, a, b, t
+    g_y /= contact.dy
+    K_y /= contact.dy
+    out[first + G_Y] = g_y
+    out[first + K_Y] = K_y
     # the table's lateral coordinate moves with roll: the chain rule
-    out[G_ROLL] = g_roll / contact.droll - contact.shear[table] * out[G_Y]
-    out[K_ROLL] = K_roll / contact.droll - contact.shear[table] * out[K_Y]
-    out[G_W] = g_w / contact.dw
-    out[K_W] = K_w / contact.dw
+    out[first + G_ROLL] = g_roll / contact.droll - contact.shear[table] * g_y
+    out[first + K_ROLL] = K_roll / contact.droll - contact.shear[table] * K_y
+    out[first + G_W] = g_w / contact.dw
+    out[first + K_W] = K_w / contact.dw
+
+
+@jit
+def coupled_approaches(coupling, table, stiffness, approach):
+    """Take from the penetrations what the neighbours' loads bend the surfaces.
+
+    With e_i the patches' own approaches and N_i = K_i e_i^(3/2),
+
+        e_i = p_i - sum_j kappa_ij N_j,      U = sum_i 2/5 K_i e_i^(5/2) + sum_{i<j} kappa_ij N_i N_j
+
+    and dU/dp_i = N_i, dU/dK_i = 2/5 e_i^(5/2): the forces stay the gradient of a potential.
+    Newton's method on the three patches in a row; a patch that lifts off drops out.
+
+    Parameters
+    ----------
+    stiffness : float64[3]   K, 0 for a patch that is not near
+    approach : float64[3]    p (negative: apart) on entry, e on return, never below 0
+    """
+    p0, p1, p2 = approach[0], approach[1], approach[2]
+    e0, e1, e2 = max(p0, 0.0), max(p1, 0.0), max(p2, 0.0)
+    a, b = coupling[table, 0], coupling[table, 1]
+    if e1 > 0.0 and (e0 > 0.0 or e2 > 0.0):
+        k0, k1, k2 = stiffness[0], stiffness[1], stiffness[2]
+        for _ in range(MOST_ITERATIONS):
+            s0, s1, s2 = sqrt(e0), sqrt(e1), sqrt(e2)
+            d0, d1, d2 = 1.5 * k0 * s0, 1.5 * k1 * s1, 1.5 * k2 * s2
+            r0 = e0 - p0 + a * k1 * e1 * s1
+            r1 = e1 - p1 + a * k0 * e0 * s0 + b * k2 * e2 * s2
+            r2 = e2 - p2 + b * k1 * e1 * s1
+            # rows 0 and 2 eliminated into row 1; one that has lifted off stays at zero
+            on0 = 1.0 if e0 > 0.0 or r0 < 0.0 else 0.0
+            on2 = 1.0 if e2 > 0.0 or r2 < 0.0 else 0.0
+            pivot = 1.0 - on0 * a * a * d0 * d1 - on2 * b * b * d2 * d1
+            c1 = (r1 - on0 * a * d0 * r0 - on2 * b * d2 * r2) / max(pivot, 0.1)
+            c0 = on0 * (r0 - a * d1 * c1)
+            c2 = on2 * (r2 - b * d1 * c1)
+            e0, e1, e2 = max(e0 - c0, 0.0), max(e1 - c1, 0.0), max(e2 - c2, 0.0)
+            if abs(c0) + abs(c1) + abs(c2) < SETTLED * (e0 + e1 + e2):
+                break
+    approach[0], approach[1], approach[2] = e0, e1, e2
 
 
 def bounds(contact) -> np.ndarray:

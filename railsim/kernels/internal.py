@@ -5,15 +5,15 @@ Each state x has a drive, left by the element that owns it, and a law:
 MAXWELL        force of a damper c with a series stiffness k_s, F' = k_s (v - F/c); exact over a
                step at constant v: F <- F e^(-h/tau) + c (1 - e^(-h/tau)) v, tau = c/k_s
                (Maxwell 1867)
-MAXWELL_CURVE  the same with a force-velocity table F_d(v); relaxes to F_d(v) with the table's
-               slope at the present force as c: F' = (F_d(v) - F) k_s/c(F)
+MAXWELL_CURVE  the same with a force-velocity table F_d(u): F' = k_s (v - u), F = F_d(u); exact over
+               a step at constant v, branch of the table by branch
 PAD            force of a friction pad that sticks elastically and slides at a limit,
                F' = k_t v, |F| <= F_max (Masing 1926): no creep at rest, loss = work of sliding
 AIR            deflection w of the reservoir, c w' = k_1 (z - w) - k_2 w (Nishimura 1984); exact
                over a step at constant z
 """
 
-from math import exp
+from math import exp, log
 from typing import NamedTuple
 
 import numpy as np
@@ -51,37 +51,96 @@ def curve_value(curves, index, x):
 
 
 @jit
-def curve_slope_at_value(curves, index, f):
-    """Slope of a rising table where it takes the value `f`."""
+def curve_speed(curves, index, f, v):
+    """Speed at which a rising table has the value `f`; on a flat part the one nearest to `v`."""
     first = curves.start[index]
     last = curves.start[index + 1] - 2
     i = first
     while i < last and f > curves.f[i + 1]:
         i += 1
-    return (curves.f[i + 1] - curves.f[i]) / (curves.x[i + 1] - curves.x[i])
+    j = i
+    while j < last and f >= curves.f[j + 1]:
+        j += 1
+    # below branch i and above branch j the table goes on, or is flat and takes any speed
+    slow = speed_on_branch(curves, i, f, -np.inf if i == first else curves.x[i])
+    fast = speed_on_branch(curves, j, f, np.inf if j == last else curves.x[j + 1])
+    return min(max(v, slow), fast)
 
 
 @jit
-def relaxation_time(internal, curves, i, x):
-    """Time constant of state `i` at its value `x`, 0 for a pad [s]."""
+def speed_on_branch(curves, i, f, flat):
+    """Speed at which branch `i`, continued, has the value `f`; `flat` where it has no slope."""
+    rise = curves.f[i + 1] - curves.f[i]
+    if rise == 0.0:
+        return flat
+    return curves.x[i] + (f - curves.f[i]) * (curves.x[i + 1] - curves.x[i]) / rise
+
+
+@jit
+def curve_advanced(curves, index, k_s, f, v, h):
+    """Force of a damper with the table `index` behind a spring `k_s` after a step at constant `v`.
+
+    On each branch of slope c the force relaxes to that of the branch at `v` with tau = c/k_s; where
+    it meets the branch's border, the rest of the step goes on from there.
+    """
+    first = curves.start[index]
+    last = curves.start[index + 1] - 2
+    target = curve_value(curves, index, v)
+    rising = f < target
+    i = first if rising else last
+    while h > 0.0 and f != target:
+        if rising:
+            while i < last and f >= curves.f[i + 1]:
+                i += 1
+            border = np.inf if i == last else curves.f[i + 1]
+        else:
+            while i > first and f <= curves.f[i]:
+                i -= 1
+            border = -np.inf if i == first else curves.f[i]
+        slope = (curves.f[i + 1] - curves.f[i]) / (curves.x[i + 1] - curves.x[i])
+        end = curves.f[i] + slope * (v - curves.x[i])
+        if slope == 0.0:
+            f = border  # it lay beyond a table that ends flat
+            continue
+        tau = slope / k_s
+        beyond = end > border if rising else end < border
+        if not beyond:
+            return end + (f - end) * exp(-h / tau)
+        time = tau * log((end - f) / (end - border))
+        if time >= h:
+            return end + (f - end) * exp(-h / tau)
+        h -= time
+        f = border
+    return f
+
+
+@jit
+def within_table(curves, index, f):
+    """`f`, but not beyond the end of a table that is flat there."""
+    first = curves.start[index]
+    last = curves.start[index + 1] - 1
+    if curves.f[last] == curves.f[last - 1]:
+        f = min(f, curves.f[last])
+    if curves.f[first] == curves.f[first + 1]:
+        f = max(f, curves.f[first])
+    return f
+
+
+@jit
+def relaxation_time(internal, i):
+    """Time constant of state `i`, a linear one [s]."""
     p = internal.parameter
     if internal.kind[i] == MAXWELL:
         return p[i, 0] / p[i, 1]
-    if internal.kind[i] == MAXWELL_CURVE:
-        return curve_slope_at_value(curves, internal.curve[i], x) / p[i, 1]
-    if internal.kind[i] == AIR:
-        return p[i, 2] / (p[i, 0] + p[i, 1])
-    return 0.0
+    return p[i, 2] / (p[i, 0] + p[i, 1])
 
 
 @jit
-def steady_value(internal, curves, i, drive):
-    """Value to which state `i` relaxes at a constant drive."""
+def steady_value(internal, i, drive):
+    """Value to which state `i`, a linear one, relaxes at a constant drive."""
     p = internal.parameter
     if internal.kind[i] == MAXWELL:
         return p[i, 0] * drive
-    if internal.kind[i] == MAXWELL_CURVE:
-        return curve_value(curves, internal.curve[i], drive)
     return p[i, 0] * drive / (p[i, 0] + p[i, 1])
 
 
@@ -92,18 +151,20 @@ def internal_rate(internal, curves, i, x, drive, limit):
         rate = internal.parameter[i, 0] * drive
         sliding = (x >= limit and rate > 0.0) or (x <= -limit and rate < 0.0)
         return 0.0 if sliding else rate
-    return ((steady_value(internal, curves, i, drive) - x)
-            / relaxation_time(internal, curves, i, x))
+    if internal.kind[i] == MAXWELL_CURVE:
+        speed = curve_speed(curves, internal.curve[i], x, drive)
+        return internal.parameter[i, 1] * (drive - speed)
+    return (steady_value(internal, i, drive) - x) / relaxation_time(internal, i)
 
 
 @jit
-def constant_decays(internal, curves, h, decay):
-    """e^(-h/tau) of the states whose time constant never changes, -1 for the others."""
+def constant_decays(internal, h, decay):
+    """e^(-h/tau) of the linear states, 0 for the others."""
     for i in range(internal.kind.shape[0]):
         if internal.kind[i] == MAXWELL or internal.kind[i] == AIR:
-            decay[i] = exp(-h / relaxation_time(internal, curves, i, 0.0))
+            decay[i] = exp(-h / relaxation_time(internal, i))
         else:
-            decay[i] = -1.0
+            decay[i] = 0.0
 
 
 @jit
@@ -111,8 +172,7 @@ def advanced(internal, curves, i, x, drive, limit, h, decay):
     """State `i` after a step `h` at constant drive."""
     if internal.kind[i] == PAD:
         return min(limit, max(-limit, x + h * internal.parameter[i, 0] * drive))
-    if decay < 0.0:
-        tau = relaxation_time(internal, curves, i, x)
-        decay = exp(-h / tau) if tau > 0.0 else 0.0
-    end = steady_value(internal, curves, i, drive)
+    if internal.kind[i] == MAXWELL_CURVE:
+        return curve_advanced(curves, internal.curve[i], internal.parameter[i, 1], x, drive, h)
+    end = steady_value(internal, i, drive)
     return end + (x - end) * decay

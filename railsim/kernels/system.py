@@ -62,6 +62,7 @@ class Contact(NamedTuple):
     table : int64[w, 2]          which table serves each wheel
     values : float64[t, 3, n_w, n_roll, n_y, 8]  tables, see `contact_table`
     shear : float64[t]           lever of roll in the tables' lateral coordinate [m]
+    coupling : float64[t, 2]     compliance between neighbouring patches [m/N]
     y0, dy, roll0, droll, dw : float   grid of the tables [m, rad, rad2]
     creep : float64[k, 4]        Kalker's c11 c22 c23 c33 over log(a/b)
     shear_modulus, damping : float   [Pa], [N s/m]
@@ -72,6 +73,7 @@ class Contact(NamedTuple):
     table: np.ndarray
     values: np.ndarray
     shear: np.ndarray
+    coupling: np.ndarray
     y0: float
     dy: float
     roll0: float
@@ -241,6 +243,8 @@ class Work(NamedTuple):
     decay: np.ndarray
     spin_damping: np.ndarray
     look_up: np.ndarray
+    stiffness: np.ndarray
+    approach: np.ndarray
     rail: np.ndarray
     patch_index: np.ndarray
     patch: np.ndarray

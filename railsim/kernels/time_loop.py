@@ -13,7 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import jit
-from railsim.kernels.internal import PAD, advanced, constant_decays
+from railsim.kernels.element_outputs import element_outputs
+from railsim.kernels.internal import (
+    MAXWELL_CURVE,
+    PAD,
+    advanced,
+    constant_decays,
+    within_table,
+)
 from railsim.kernels.rhs import euler_rates, mechanics, right_hand_side, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING
 from railsim.kernels.system import AXLEBOX, TABLE, WHEELSET
@@ -30,16 +37,22 @@ class Recorder(NamedTuple):
     rates : float64[r, 6 n]           rates of the coordinates
     acceleration : float64[r, n, 6]   absolute, in body axes
     wheel : float64[r, w, 2, 8]       see `wheel_rail`
+    patch : float64[r, w, 2, 3, PATCH_ROWS]  contact patches, or of length 0
+    chosen : int64[e, 2]              elements to record, see `element_outputs`
+    element : float64[r, e, ELEMENT_COLUMNS]
     """
 
     state: np.ndarray
     rates: np.ndarray
     acceleration: np.ndarray
     wheel: np.ndarray
+    patch: np.ndarray
+    chosen: np.ndarray
+    element: np.ndarray
 
 
 @jit
-def record(recorder, row, state, derivative, work):
+def record(recorder, row, system, state, derivative, work, n_patches):
     """Copy the state and the by-products of its evaluation into row `row`."""
     for k in range(recorder.state.shape[1]):
         recorder.state[row, k] = state[k]
@@ -52,6 +65,26 @@ def record(recorder, row, state, derivative, work):
         for side in range(2):
             for k in range(recorder.wheel.shape[3]):
                 recorder.wheel[row, w, side, k] = work.wheel[w, side, k]
+    if recorder.patch.shape[0] > 0:
+        record_patches(recorder.patch, row, work, n_patches)
+    if recorder.chosen.shape[0] > 0:
+        first = 12 * system.bodies.kind.shape[0]
+        element_outputs(system, work, state[first:first + system.internal.kind.shape[0]],
+                        recorder.chosen, recorder.element[row])
+
+
+@jit
+def record_patches(out, row, work, n_patches):
+    """Copy the active contact patches to their places; the others are zero."""
+    for w in range(out.shape[1]):
+        for side in range(2):
+            for k in range(out.shape[3]):
+                for c in range(out.shape[4]):
+                    out[row, w, side, k, c] = 0.0
+    for i in range(n_patches):
+        w, side, k = work.patch_index[i, 0], work.patch_index[i, 1], work.patch_index[i, 2]
+        for c in range(out.shape[4]):
+            out[row, w, side, k, c] = work.patch[c, i]
 
 
 @jit
@@ -98,12 +131,14 @@ def advance_place(drive, state, derivative, h):
 
 
 @jit
-def settle_pads(internal, first, drive, state):
-    """Bring the forces of friction pads back within their limits."""
+def settle_limits(internal, curves, first, drive, state):
+    """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
+        k = first + i
         if internal.kind[i] == PAD:
-            k = first + i
             state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
+        elif internal.kind[i] == MAXWELL_CURVE:
+            state[k] = within_table(curves, internal.curve[i], state[k])
 
 
 @jit
@@ -125,7 +160,8 @@ def step_rk4(system, work, state, derivative, stages, h):
             total[k] += weight * rate[k]
     for k in range(state.shape[0]):
         state[k] += h / 6.0 * total[k]
-    settle_pads(system.internal, 12 * system.bodies.kind.shape[0], work.drive, state)
+    settle_limits(system.internal, system.curves, 12 * system.bodies.kind.shape[0], work.drive,
+                  state)
     return RUNNING, 0
 
 
@@ -159,16 +195,16 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
         Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
     """
     decay = work.decay
-    constant_decays(system.internal, system.curves, h, decay)
+    constant_decays(system.internal, h, decay)
     rows = 0
     for step in range(first_step, first_step + n_steps):
         if scheme == FAST:
-            status, where, _ = mechanics(system, work, state, derivative)
+            status, where, patches = mechanics(system, work, state, derivative)
         else:
-            status, where, _ = right_hand_side(system, work, state, derivative)
+            status, where, patches = right_hand_side(system, work, state, derivative)
         if status == RUNNING:
             if step % every == 0:
-                record(recorder, rows, state, derivative, work)
+                record(recorder, rows, system, state, derivative, work, patches)
                 rows += 1
             if scheme == FAST:
                 step_fast(system, work, state, derivative, decay, h)
@@ -186,7 +222,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
 @jit
 def record_state(system, work, state, derivative, recorder):
     """Evaluate and record a state without a step: the end of a run.  Status and wheelset."""
-    status, where, _ = right_hand_side(system, work, state, derivative)
+    status, where, patches = right_hand_side(system, work, state, derivative)
     if status == RUNNING:
-        record(recorder, 0, state, derivative, work)
+        record(recorder, 0, system, state, derivative, work, patches)
     return status, where

@@ -2,8 +2,9 @@
 
 Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`):
 
-- penetration p = z - g; elastic normal force as the gradient of U = 2/5 K p^(5/2), which includes
-  the small terms from the change of K along the profile;
+- penetration p = z - g, less what the loads of neighbouring patches bend the surfaces; elastic
+  normal force as the gradient of the potential U, which includes the small terms from the change
+  of K along the profile (`coupled_approaches`);
 - contact damping c_N on the *geometric* rate of approach, faded in over 30 um, the sum never
   pulling;
 - creepages from the velocity of the wheel's material at the patch, c from the wheelset's centre:
@@ -29,9 +30,11 @@ from railsim.kernels.contact_table import (
     K_ROLL,
     K_W,
     K_Y,
+    LOOK_UP_SIZE,
     N_PATCH,
     OUTSIDE_ROLL,
     TAN_GAMMA,
+    coupled_approaches,
     is_far,
     locate,
     look_up,
@@ -73,6 +76,7 @@ def normal_contact(system, work, speed, state):
     """
     contact = system.contact
     force, wheel, column, t = work.rail_force, work.wheel, work.patch, work.look_up
+    stiffness, approach = work.stiffness, work.approach
     n_bodies = system.bodies.kind.shape[0]
     n = 0
     for w in range(contact.body.shape[0]):
@@ -102,27 +106,39 @@ def normal_contact(system, work, speed, state):
             lateral = 0.0
             lift = 1.0
             for patch in range(N_PATCH):
+                stiffness[patch] = 0.0
+                approach[patch] = -1.0
                 if is_far(contact, table, patch, iy, ir, iw, tr, z):
                     continue
-                look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, t)
-                p = z - t[0]
-                lift = min(lift, -p)
+                first = patch * LOOK_UP_SIZE
+                look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, t, first)
+                stiffness[patch] = t[first + 1]
+                approach[patch] = z - t[first]
+                lift = min(lift, -approach[patch])
+            coupled_approaches(contact.coupling, table, stiffness, approach)
+            for patch in range(N_PATCH):
+                p = approach[patch]
                 if p <= 0.0:
                     continue
-                p_rate = (z_dot - t[G_Y] * y_dot - t[G_ROLL] * sign * roll_rate
-                          - t[G_W] * 2.0 * yaw * yaw_rate)
+                k = patch * LOOK_UP_SIZE
+                p_rate = (z_dot - t[k + G_Y] * y_dot - t[k + G_ROLL] * sign * roll_rate
+                          - t[k + G_W] * 2.0 * yaw * yaw_rate)
                 root = sqrt(p)
-                elastic = t[1] * p * root
-                cos_2 = 1.0 / (1.0 + t[TAN_GAMMA] * t[TAN_GAMMA])
+                elastic = t[k + 1] * p * root
+                # direction of the contact plane: the slope at the place of contact and the direction
+                # of the elastic force differ where the normal turns over the patch, in opposite
+                # senses from the boundary-element solution; their mean is within 3 % of it
+                tangent = 0.5 * (t[k + TAN_GAMMA] + 0.4 * p * t[k + K_Y] / t[k + 1] - t[k + G_Y])
+                cos_2 = 1.0 / (1.0 + tangent * tangent)
                 fade = min(1.0, p / FADE)
                 vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
                 stretch = 0.4 * p * p * root
-                q_y = sign * (vertical * t[G_Y] - stretch * t[K_Y])
+                q_y = sign * (vertical * t[k + G_Y] - stretch * t[k + K_Y])
                 force[b, 0] -= q_y * work.rail[2] - vertical * work.rail[3]
                 force[b, 1] += q_y
                 force[b, 2] -= vertical
-                force[b, 3] += sign * (vertical * t[G_ROLL] - stretch * t[K_ROLL])
-                force[b, 5] += (vertical * t[G_W] - stretch * t[K_W]) * 2.0 * yaw
+                force[b, 3] += sign * (vertical * t[k + G_ROLL] - stretch * t[k + K_ROLL])
+                force[b, 5] += (vertical * t[k + G_W] - stretch * t[k + K_W]) * 2.0 * yaw
                 normal += vertical
                 lateral -= q_y
                 cos_g = sqrt(cos_2)
@@ -130,15 +146,15 @@ def normal_contact(system, work, speed, state):
                 if N <= 0.0:
                     continue
                 third = np.cbrt(N)
-                column[A, n] = t[5] * third
-                column[B, n] = t[6] * third
+                column[A, n] = t[k + 5] * third
+                column[B, n] = t[k + 6] * third
                 column[NORMAL, n] = N
                 column[MU_N, n] = mu * N
                 column[ANGLE_COS, n] = cos_g
-                column[ANGLE_SIN, n] = sign * t[TAN_GAMMA] * cos_g
-                column[C_X, n] = sign * yaw * t[4]
-                column[C_Y, n] = sign * t[2]
-                column[C_Z, n] = t[3]
+                column[ANGLE_SIN, n] = sign * tangent * cos_g
+                column[C_X, n] = sign * yaw * t[k + 4]
+                column[C_Y, n] = sign * t[k + 2]
+                column[C_Z, n] = t[k + 3]
                 column[PENETRATION, n] = p
                 work.patch_index[n, 0] = w
                 work.patch_index[n, 1] = side
@@ -187,7 +203,9 @@ def creepages(system, work, n, speed, state):
         w = work.patch_index[k, 0]
         b = system.contact.body[w]
         f = system.bodies.frame[b]
-        w1, w2, w3 = speed * frames[f, OMEGA], speed * frames[f, OMEGA + 1], speed * frames[f, OMEGA + 2]
+        w1 = speed * frames[f, OMEGA]
+        w2 = speed * frames[f, OMEGA + 1]
+        w3 = speed * frames[f, OMEGA + 2]
         y = state[6 * b + 1] + system.bodies.nominal[b, 0]
         z = state[6 * b + 2] + system.bodies.nominal[b, 1]
         v = 6 * n_bodies + 6 * b
@@ -196,8 +214,8 @@ def creepages(system, work, n, speed, state):
         a2 = C[b, 3] * u1 + C[b, 4] * u2 + C[b, 5] * u3
         a3 = C[b, 6] * u1 + C[b, 7] * u2 + C[b, 8] * u3
         cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
-        # along the rail the wheel's material moves with the rail's own direction, e_x + omega x rho:
-        # on curved and twisted track only what it moves relative to the frame is slip across it
+        # the rail itself runs along e_x + omega x rho: on curved and twisted track only what the
+        # material moves relative to the frame is slip across it
         vx = speed + w2 * z - w3 * y + state[v] + a2 * cz - a3 * cy
         vy = state[v + 1] + (a3 - w3) * cx - (a1 - w1) * cz
         vz = state[v + 2] + (a1 - w1) * cy - (a2 - w2) * cx
@@ -236,8 +254,8 @@ def add_creep_forces(system, work, n, speed):
         force[b, 5] += cx * fy - cy * fx - mz * c
         wheel[w, side, W_Q] -= fz
         wheel[w, side, W_Y] -= fy
-        wheel[w, side, W_T_GAMMA] += (patch[T_X, k] * patch[XI_X, k] + patch[T_Y, k] * patch[XI_Y, k]
-                             + mz * patch[PHI, k])
+        wheel[w, side, W_T_GAMMA] += (patch[T_X, k] * patch[XI_X, k]
+                                      + patch[T_Y, k] * patch[XI_Y, k] + mz * patch[PHI, k])
         if patch[NORMAL, k] > wheel[w, side, W_NORMAL]:
             wheel[w, side, W_NORMAL] = patch[NORMAL, k]
             wheel[w, side, W_XI_X] = patch[XI_X, k]

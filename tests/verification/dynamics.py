@@ -166,10 +166,22 @@ def _contact_energy(system, work, state):
             y, z, roll, _, yaw = state[6 * b + 1 : 6 * b + 6]
             table = contact.table[w, side]
             _, iy, ir, iw, ty, tr, tw = locate(contact, table, sign * y, sign * roll, yaw**2)
+            p, K = np.zeros(3), np.zeros(3)
             for patch in range(3):
                 look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out)
-                total += 0.4 * out[1] * max(0.0, z - out[0]) ** 2.5
+                p[patch], K[patch] = z - out[0], out[1]
+            total += _patch_energy(p, K, contact.coupling[table])
     return total
+
+
+def _patch_energy(p, K, kappa):
+    """sum 2/5 K e^2.5 + kappa N N with e = p - kappa N, by a damped fixed-point iteration."""
+    coupling = np.array([[0.0, kappa[0], 0.0], [kappa[0], 0.0, kappa[1]], [0.0, kappa[1], 0.0]])
+    e = np.maximum(p, 0.0)
+    for _ in range(400):
+        e = 0.5 * (e + np.maximum(p - coupling @ (K * e**1.5), 0.0))
+    N = K * e**1.5
+    return np.sum(0.4 * K * e**2.5) + 0.5 * N @ coupling @ N
 
 
 __all__ = ["Settings", "load_track", "load_vehicle"]

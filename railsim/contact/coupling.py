@@ -1,0 +1,83 @@
+"""Elastic coupling of neighbouring contact patches.
+
+The load on one patch bends the surfaces at the other: at the distance D from a normal force N two
+half-spaces of equal material approach each other less by
+
+    u = (1 - nu)/(pi G) N/D        (Boussinesq 1885, both bodies)
+
+and as patches are long along the rail, 1/D is averaged over the neighbour's semi-axis a with the
+line load of Hertz's pressure, 3/(4a) (1 - x^2/a^2):
+
+    <1/sqrt(D^2 + x^2)>
+
+Where tread and flange root, or root and flange, touch side by side some millimetres apart, this is
+a quarter of their own approach; left out, the pair is too stiff and its forces point too far
+outwards (docs/validation/contact_geometry.md compares with the boundary-element solution).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.kernels.contact_table import N_PATCH, TAN_GAMMA
+
+Floats = NDArray[np.float64]
+
+G_FIELD, K_FIELD, Y_FIELD, Z_FIELD, A_FIELD = 0, 1, 2, 3, 5
+REFERENCE_LOAD = 30e3  # N, half a wheel's load on each patch of a pair
+NEGLIGIBLE = 0.05  # share of its largest stiffness below which a patch is fading out
+
+
+def coupling(values: Floats, G: float, nu: float) -> Floats:
+    """Compliance between the vertical forces of neighbouring patches of one table.
+
+    For each pair the distance is taken where both touch at once, with the wheelset neither rolled
+    nor yawed; it is kept constant, so that the forces stay the gradient of a potential.
+
+    Parameters
+    ----------
+    values : float64[patch, w, roll, s, field]
+        Contact table.
+    G, nu : float
+        Shear modulus [Pa] and Poisson's number [1].
+
+    Returns
+    -------
+    float64[patch - 1]
+        Loss of vertical penetration per vertical force on the neighbour [m/N].
+    """
+    line = values[:, 0, values.shape[2] // 2]
+    found = np.zeros(N_PATCH - 1)
+    for i in range(N_PATCH - 1):
+        a, b = line[i], line[i + 1]
+        present = (a[:, K_FIELD] > NEGLIGIBLE * a[:, K_FIELD].max()) & (
+            b[:, K_FIELD] > NEGLIGIBLE * b[:, K_FIELD].max())
+        if not present.any():
+            continue
+        apart = np.where(present, np.abs(a[:, G_FIELD] - b[:, G_FIELD]), np.inf)
+        node = int(np.argmin(apart))
+        distance = np.hypot(a[node, Y_FIELD] - b[node, Y_FIELD],
+                            a[node, Z_FIELD] - b[node, Z_FIELD])
+        angle_a, angle_b = np.arctan(a[node, TAN_GAMMA]), np.arctan(b[node, TAN_GAMMA])
+        third = REFERENCE_LOAD ** (1.0 / 3.0)
+        reach = mean_inverse_distance(distance, third * 0.5 * (a[node, A_FIELD] + b[node, A_FIELD]))
+        normal = (1.0 - nu) / (np.pi * G) * reach
+        found[i] = normal * np.cos(angle_b - angle_a) / (np.cos(angle_a) * np.cos(angle_b))
+    return found
+
+
+def mean_inverse_distance(distance: float, semi_axis: float) -> float:
+    """Mean of 1/sqrt(D^2 + x^2) over the line load 3/(4a) (1 - x^2/a^2), |x| < a [1/m].
+
+    Parameters
+    ----------
+    distance, semi_axis : float
+        D > 0 across the rail, a along it [m].
+
+    Examples
+    --------
+    >>> round(mean_inverse_distance(1.0, 1e-3), 6)
+    1.0
+    """
+    x = semi_axis * (np.arange(200) + 0.5) / 200.0
+    weight = 1.5 * (1.0 - (x / semi_axis) ** 2) / 200.0
+    return float(np.sum(weight / np.hypot(distance, x)))
