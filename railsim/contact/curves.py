@@ -140,6 +140,15 @@ def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
     return slice(first, last + 1)
 
 
+def contour_spline(y: Array, z: Array) -> CubicSpline:
+    """Cubic spline of a contour whose end slopes are those of its last pieces.
+
+    Where the usable part ends at a kink, a free end would swing to the wrong side.
+    """
+    ends = (z[1] - z[0]) / (y[1] - y[0]), (z[-1] - z[-2]) / (y[-1] - y[-2])
+    return CubicSpline(y, z, bc_type=((1, ends[0]), (1, ends[1])))
+
+
 def wheel_curve(
     profile: Profile, radius: float, tape_circle: float, spacing: float = 2e-4
 ) -> WheelCurve:
@@ -177,7 +186,7 @@ def wheel_curve(
                 )
             ]
         )
-    spline = CubicSpline(y[part], z[part])
+    spline = contour_spline(y[part], z[part])
     fine = np.linspace(y[part.start], y[part.stop - 1], 40_001)
     slope = spline(fine, 1)
     back = np.flatnonzero((fine < y[tip]) & (slope > STEEPEST_BACK))
@@ -282,10 +291,12 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     """
     y, z = inclined_to_track(profile, gauge, inclination)
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
-    spline = CubicSpline(y[part], z[part])
+    spline = contour_spline(y[part], z[part])
     n = int((y[part.stop - 1] - y[part.start]) / RAIL_SPACING)
     places = y[part.start] + RAIL_SPACING * np.arange(n + 1)
     slope = spline(places, 1)
+    # what lies beyond the ends continues them straight, and never upwards
+    slope[0], slope[-1] = min(float(slope[0]), 0.0), max(float(slope[-1]), 0.0)
     return RailCurve(
         Y0=float(places[0]),
         dY=RAIL_SPACING,

@@ -16,7 +16,7 @@ WHEEL_Y = np.arange(-60.0, 60.0, 0.02)
 WHEEL = 1e-3 * WHEEL_Y, 1e-3 * s1002_height(WHEEL_Y)
 
 
-NARROW = TableGrid(roll_max=0.015)
+NARROW = TableGrid(roll_max=0.015, n_w=5)
 # softness far below what is compared
 SHARP = TableGrid(roll_max=0.015, eps=1.5e-6)
 
@@ -122,6 +122,38 @@ def test_force_has_no_jump_where_the_contact_jumps(place):
         return np.abs(np.diff(f, axis=0)).max()
 
     assert largest_change(2.5e-6) == pytest.approx(0.25 * largest_change(1e-5), rel=0.1)
+
+
+def hollow_wheel():
+    profile = load_profile("S1002")
+    depth = 1.5e-3 * np.exp(-(((1e3 * profile.y - 2.0) / 14.0) ** 2)) * (profile.y > -0.040)
+    return Profile("hollow", "wheel", profile.y, profile.z - depth)
+
+
+def conformal_rail():
+    """60E1 worn by 0.25 mm to the shape of the wheel that stands 4 mm aside."""
+    y, z = rail_points()
+    shape = 1e-3 * s1002_height(1e3 * (y - 0.754))
+    worn_z = np.maximum(z, shape + np.min(z - shape) + 0.25e-3)
+    return Profile("conformal", "rail", y - 0.7533, worn_z, inclination=0.025)
+
+
+@pytest.mark.parametrize("pair", ["hollow wheel", "conformal rail"])
+def test_worn_and_conformal_pairs_have_forces_without_jumps(pair):
+    wheel = hollow_wheel() if pair == "hollow wheel" else load_profile("S1002")
+    rail = load_profile("60E1") if pair == "hollow wheel" else conformal_rail()
+    table = build_contact_table(wheel, rail, grid=NARROW)
+    assert np.all(np.isfinite(table.values))
+
+    def largest_change(step):
+        y = np.arange(3.5e-3, 4.6e-3, step)
+        lowest = np.array([evaluate(table, a, 0.0)[0][:, 0].min() for a in y])
+        f = [forces(table, a, b + 80e-6, 0.0)[:2] for a, b in zip(y, lowest, strict=True)]
+        assert np.all(np.isfinite(f))
+        return np.abs(np.diff(f, axis=0)).max()
+
+    # tread and flange root touch at once here; half the step, half the change
+    assert largest_change(5e-6) == pytest.approx(0.5 * largest_change(1e-5), rel=0.15)
 
 
 @pytest.mark.parametrize("degrees", [15.0, 30.0, 45.0])
