@@ -1,4 +1,4 @@
-"""``railsim contact``: contact geometry of a wheelset, equivalent conicity, patches."""
+"""``railsim contact``: contact geometry of a wheelset, equivalent conicity, patches, creep."""
 
 import csv
 from collections.abc import Sequence
@@ -74,6 +74,20 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
     show_default=True,
     help="Normal contact of the table; with --exact both are compared.",
 )
+@click.option(
+    "--creep",
+    is_flag=True,
+    help="Creep forces of the centred wheel's patch by every creep law, and traction fields.",
+)
+@click.option(
+    "--friction", default=0.4, show_default=True, help="Friction coefficient, for --creep."
+)
+@click.option(
+    "--build-creep-table",
+    is_flag=True,
+    help="Only compute the table of the creep law `table` anew (hours; goes on where it was).",
+)
+@click.option("--workers", default=2, show_default=True, help="Processes, for --build-creep-table.")
 @click.option("--out", metavar="DIR", help="Folder for pictures and tables; made if need be.")
 @overwrite_option
 @json_option
@@ -89,6 +103,10 @@ def command(
     max_shift: float,
     exact: bool,
     normal: str,
+    creep: bool,
+    friction: float,
+    build_creep_table: bool,
+    workers: int,
     out: str | None,
     overwrite: bool,
     as_json: bool,
@@ -103,14 +121,20 @@ def command(
     Example:
       railsim contact --wheel S1002 --rail 60E1 --inclination 0.025 --out s1002_60e1
       railsim contact --wheel measured.whl --rail 54E1 --exact --json
+      railsim contact --creep --friction 0.35 --out creep
     """
     import numpy as np
 
+    from railsim.cli import creep as creep_part
     from railsim.contact import contact_geometry
     from railsim.plot.contact import Pair
 
+    if build_creep_table:
+        creep_part.build_table(out, workers, as_json, quiet)
+        return
     _check_numbers(wheels, rails, radii, load, max_shift)
-    folder = _checked_folder(out, overwrite) if out else None
+    written = (*PICTURES, *TABLES, *((*creep_part.PICTURES, *creep_part.TABLES) if creep else ()))
+    folder = _checked_folder(out, overwrite, written) if out else None
     wheel_pair, rail_pair = _profiles(wheels, "wheel"), _profiles(rails, "rail")
     radius_pair = (radii[0], radii[-1])
     steps = max(round(max_shift / STEP), 10)
@@ -134,6 +158,10 @@ def command(
     contacts = _loaded(contact_table, geometry, places, load)
     solutions = _exact(pairs[1], radius_pair[1], geometry, list(contacts), load, exact)
     notes = _notes(pairs)
+    patch = creep_part.patch_of(contacts, friction) if creep else None
+    creep_rows = creep_part.rows_of(patch) if patch else []
+    if folder and patch:
+        creep_part.write(folder, patch, creep_rows)
     if folder:
         _write_tables(folder, geometry, amplitudes, conicity, contacts, solutions)
         other = _other_table(pairs[1], radius_pair, geometry, list(contacts), load, normal, exact)
@@ -141,14 +169,18 @@ def command(
             folder, geometry, pairs, amplitudes, conicity, contacts, load, solutions, other
         )
     if as_json:
-        print_json(_data(geometry, amplitudes, conicity, contacts, solutions, notes))
+        data = _data(geometry, amplitudes, conicity, contacts, solutions, notes)
+        print_json(data | ({"creep": creep_rows} if patch else {}))
         return
     for note in notes:
         click.echo(note, err=True)
     for line in _lines(geometry, amplitudes, conicity, contacts, solutions, load):
         click.echo(line)
+    if patch:
+        for line in creep_part.lines_of(patch, creep_rows):
+            click.echo(line)
     if folder and not quiet:
-        click.echo(f"wrote {', '.join((*PICTURES, *TABLES))} to {folder}", err=True)
+        click.echo(f"wrote {', '.join(written)} to {folder}", err=True)
 
 
 def _check_numbers(
@@ -176,12 +208,12 @@ def _check_numbers(
         raise InputError(faults)
 
 
-def _checked_folder(out: str, overwrite: bool) -> Path:
+def _checked_folder(out: str, overwrite: bool, names: Sequence[str]) -> Path:
     """Make the folder; refuse files that may not be replaced."""
     from railsim.errors import Fault, InputError
 
     folder = Path(out)
-    taken = [name for name in (*PICTURES, *TABLES) if (folder / name).exists()]
+    taken = [name for name in names if (folder / name).exists()]
     if taken and not overwrite:
         found = f"{folder} holds {', '.join(taken)}"
         raise InputError([Fault("--out", "", found, "give --overwrite or another folder")])

@@ -1,0 +1,152 @@
+"""The creep part of ``railsim contact``: curves and traction fields, the table's generator."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import print_json, table
+from railsim.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from railsim.contact.elastic import LoadedContact
+    from railsim.plot.creep import Patch
+
+PICTURES = ("creep_curves.png", "traction.png")
+TABLES = ("creep_curves.csv",)
+SIZES = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0)
+"""Sizes of the normalised creepage in the table."""
+
+FIELD_SIZE = 1.2
+"""Size of the normalised creepage of the traction fields."""
+
+TABLE_FILE = "creep_table.npz"
+
+
+def patch_of(contacts: dict[float, "LoadedContact"], friction: float) -> "Patch":
+    """Return the most loaded patch of the centred wheel.
+
+    Raises
+    ------
+    InputError
+        If the friction coefficient is out of its range.
+    """
+    from railsim.errors import Fault, InputError
+    from railsim.plot.creep import Patch
+
+    if not 0.0 < friction <= 1.0:
+        raise InputError([Fault("--friction", "", f"{friction:g}", "above 0, at most 1")])
+    centred = contacts[min(contacts, key=abs)]
+    largest = max(centred.patches, key=lambda patch: patch.N)
+    return Patch(largest.a, largest.b, largest.N, friction)
+
+
+def rows_of(patch: "Patch") -> list[dict[str, Any]]:
+    """Creep forces of all laws for all directions and sizes, over mu N (moment: times size)."""
+    import numpy as np
+
+    from railsim.contact.creep import LAWS, creep_force
+    from railsim.plot.creep import CASES
+
+    rows = []
+    size = float(np.sqrt(patch.a * patch.b))
+    bound = patch.mu * patch.N
+    for case, direction in CASES.items():
+        unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+        for scale in SIZES:
+            xi_x, xi_y, phi = (float(value) for value in scale * unit)
+            for law in LAWS:
+                force = creep_force(
+                    patch.a, patch.b, patch.N, patch.mu, xi_x, xi_y, phi, patch.G, patch.nu, law
+                )
+                rows.append(
+                    {
+                        "case": case,
+                        "size": scale,
+                        "xi_x": xi_x,
+                        "xi_y": xi_y,
+                        "phi": phi,
+                        "law": law,
+                        "T_x": float(force.T_x) / bound,
+                        "T_y": float(force.T_y) / bound,
+                        "M_z": float(force.M_z) / (bound * size),
+                    }
+                )
+    return rows
+
+
+def write(folder: Path, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
+    """Write pictures and table; the folder exists and files may be replaced."""
+    import numpy as np
+
+    from railsim.contact.creep import LAWS
+    from railsim.plot.creep import CASES, creep_curves_figure, exact_force, traction_figure
+    from railsim.plot.style import save
+
+    fields = {}
+    for case, direction in CASES.items():
+        unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+        fields[case] = exact_force(patch, FIELD_SIZE * unit)
+    figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
+    for name, figure in zip(PICTURES, figures, strict=True):
+        save(figure, folder / name, overwrite=True)
+    with (folder / TABLES[0]).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(
+            {key: v if isinstance(v, str) else f"{v:.7g}" for key, v in row.items()} for row in rows
+        )
+
+
+def lines_of(patch: "Patch", rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Printed table: force over mu N of each law, by direction and size of creepage."""
+    from railsim.contact.creep import LAWS
+
+    head = (
+        f"Creep force over mu N, a = {1e3 * patch.a:.2f} mm, b = {1e3 * patch.b:.2f} mm, "
+        f"N = {1e-3 * patch.N:.1f} kN, mu = {patch.mu:g}"
+    )
+    by_place: dict[tuple[str, float], dict[str, dict[str, Any]]] = {}
+    for row in rows:
+        by_place.setdefault((row["case"], row["size"]), {})[row["law"]] = row
+    body = [
+        [
+            case,
+            f"{size:g}",
+            *(f"{by_law[law]['T_x']:.3f} {by_law[law]['T_y']:.3f}" for law in LAWS),
+        ]
+        for (case, size), by_law in by_place.items()
+    ]
+    return ["", head, *table(["T_x, T_y by", "creepage", *LAWS], body)]
+
+
+def build_table(out: str | None, workers: int, as_json: bool, quiet: bool) -> None:
+    """Compute the table of the full theory anew into a folder and compare it with the shipped one.
+
+    Parameters
+    ----------
+    out : str or None
+        Folder of the rows and the result; by default ``creep_table``.
+    workers : int
+        Processes.
+    """
+    import numpy as np
+
+    from railsim.contact.creep_table import build_nodes, gather_nodes, shipped_nodes, write_nodes
+
+    folder = Path(out or "creep_table")
+    with progress_bar("creep table", quiet=quiet) as show:
+        for done, count in build_nodes(folder, workers):
+            show(done / count)
+    nodes = gather_nodes(folder)
+    write_nodes(nodes, folder / TABLE_FILE)
+    difference = float(np.abs(nodes.force - shipped_nodes().force).max())
+    if as_json:
+        print_json({"file": str(folder / TABLE_FILE), "largest_difference": difference})
+        return
+    click.echo(
+        f"wrote {folder / TABLE_FILE}; largest difference from the shipped table "
+        f"{difference:.1e} of mu N"
+    )
