@@ -11,9 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from railsim.contact.coupling import coupling
 from railsim.contact.table import PATCHES, ContactTable
 from railsim.errors import ModelError
-from railsim.kernels.contact_table import INSIDE, LOOK_UP_SIZE, N_PATCH, TAN_GAMMA, locate, look_up
+from railsim.kernels.contact_table import (
+    G_Y,
+    INSIDE,
+    K_Y,
+    LOOK_UP_SIZE,
+    N_PATCH,
+    TAN_GAMMA,
+    coupled_approaches,
+    locate,
+    look_up,
+)
 
 Array = NDArray[np.float64]
 
@@ -117,12 +128,20 @@ def loaded_contact(
             f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad and yaw {1e3 * yaw:.2f} mrad "
             "lies outside of the contact table"
         )
-    fields = np.empty((N_PATCH, LOOK_UP_SIZE))
+    flat = np.empty(N_PATCH * LOOK_UP_SIZE)
     for patch in range(N_PATCH):
-        look_up(arrays, 0, patch, *cell, fields[patch])
+        look_up(arrays, 0, patch, *cell, flat, patch * LOOK_UP_SIZE)
+    fields = flat.reshape(N_PATCH, LOOK_UP_SIZE)
+    compliance = coupling(table.values, table.G, table.nu)[None]
+    stiffness = np.ascontiguousarray(fields[:, 1])
+
+    def approaches(z: float) -> Array:
+        e = z - fields[:, 0]
+        coupled_approaches(compliance, 0, stiffness, e)
+        return e
 
     def vertical(z: float) -> Array:
-        force: Array = fields[:, 1] * np.maximum(z - fields[:, 0], 0.0) ** 1.5
+        force: Array = stiffness * np.maximum(approaches(z), 0.0) ** 1.5
         return force
 
     lowest = float(fields[:, 0].min())
@@ -133,20 +152,23 @@ def loaded_contact(
             raise ModelError(f"the load of {load:g} N is not reached")
     z = float(brentq(lambda z: vertical(z).sum() - load, lowest, lowest + depth, xtol=1e-12))
     patches = []
-    for patch, N_z in enumerate(vertical(z)):
+    for patch, (N_z, e) in enumerate(zip(vertical(z), approaches(z), strict=True)):
         if N_z < 1e-3 * load:
             continue
-        tan_gamma = float(fields[patch, TAN_GAMMA])
-        N = float(N_z) * float(np.hypot(1.0, tan_gamma))
-        a, b = (float(fields[patch, k]) * N ** (1.0 / 3.0) for k in (5, 6))
+        field = fields[patch]
+        # lateral force from the potential; direction of the plane as the simulation takes it
+        slope = 0.4 * e * field[K_Y] / field[1] - field[G_Y]
+        tangent = float(0.5 * (field[TAN_GAMMA] + slope))
+        N = float(N_z) * float(np.hypot(1.0, tangent))
+        a, b = (float(field[k]) * N ** (1.0 / 3.0) for k in (5, 6))
         patches.append(
             Patch(
                 zone=PATCHES[patch],
                 N=N,
                 N_z=float(N_z),
-                N_y=float(N_z) * tan_gamma,
-                y=y + float(fields[patch, 2]),
-                angle=float(np.arctan(tan_gamma)),
+                N_y=float(N_z * slope),
+                y=y + float(field[2]),
+                angle=float(np.arctan(tangent)),
                 a=a,
                 b=b,
                 p_max=1.5 * N / (np.pi * a * b),

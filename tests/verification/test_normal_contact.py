@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from independent_contact import evaluate
-from scipy.optimize import brentq
 
 from railsim.contact import build_contact_table, contact_geometry, hertz
+from railsim.contact.elastic import loaded_contact
 from railsim.contact.exact_normal import exact_contact
 from railsim.contact.table import TableGrid
 from railsim.profiles import Profile, load_profile
@@ -81,32 +81,19 @@ def pairs():
     return lateral, roll, exact, tables
 
 
-def loaded(table, y, roll):
-    """Penetration-independent fields, height and patch loads of the table under the load."""
-    fields = evaluate(table, y, roll)[0]
-
-    def force(z):
-        return fields[:, 1] * np.maximum(z - fields[:, 0], 0.0) ** 1.5
-
-    lowest = fields[:, 0].min()
-    z = brentq(lambda z: force(z).sum() - LOAD, lowest, lowest + 2e-3)
-    return fields, z, force(z)
-
-
-def test_table_agrees_with_boundary_elements_in_place_angle_and_height(pairs):
+def test_table_agrees_with_boundary_elements_in_place_direction_and_height(pairs):
     lateral, roll, exact, tables = pairs
     for y, angle, contact in zip(lateral, roll, exact, strict=True):
-        fields, z, N_z = loaded(tables["hertz"], y, angle)
-        centre = np.sum(N_z * (y + fields[:, 2])) / LOAD
+        found = loaded_contact(tables["hertz"], y, angle, LOAD)
+        centre = sum(patch.N_z * patch.y for patch in found.patches) / LOAD
         expected = sum(patch.N_z * patch.y for patch in contact.patches) / LOAD
-        Y_force = np.sum(N_z * fields[:, 7])
+        # docs/validation/contact_geometry.md: within 0.1 mm, but where the patch spreads over
+        # 18 mm or there are two, of whose loads 1 % shifts the centre by 0.1 mm
+        assert centre == pytest.approx(expected, abs=0.9e-3)
+        Y_force = sum(patch.N_y for patch in found.patches)
         expected_Y = sum(patch.N_y for patch in contact.patches)
-        # docs/validation/contact_geometry.md: centre within 0.7 mm where the patch spreads over
-        # 18 mm, elsewhere 0.3 mm, with two patches 1 mm; lateral force within 3 % of the load
-        assert centre == pytest.approx(expected, abs=1.2e-3 if len(contact.patches) > 1 else 0.7e-3)
-        assert Y_force == pytest.approx(expected_Y, abs=0.03 * LOAD * max(1.0, expected_Y / LOAD))
-        # two patches press each other apart, which the table does not know: 10 um
-        assert z - contact.z == pytest.approx(0.0, abs=13e-6 if len(contact.patches) > 1 else 6e-6)
+        assert Y_force == pytest.approx(expected_Y, abs=1.2e3 * max(1.0, expected_Y / LOAD))
+        assert found.z == pytest.approx(contact.z, abs=7e-6)
 
 
 def test_two_patches_share_the_load_like_the_boundary_elements(pairs):
@@ -115,9 +102,9 @@ def test_two_patches_share_the_load_like_the_boundary_elements(pairs):
     for y, angle, contact in zip(lateral, roll, exact, strict=True):
         if len(contact.patches) < 2 or y > 0.0055:
             continue
-        N_z = loaded(tables["hertz"], y, angle)[2]
+        found = loaded_contact(tables["hertz"], y, angle, LOAD)
         tread = max(contact.patches, key=lambda patch: patch.y)
-        assert N_z[0] == pytest.approx(tread.N_z, abs=0.08 * LOAD)
+        assert found.patches[0].N_z == pytest.approx(tread.N_z, abs=0.05 * LOAD)
         shared += 1
     assert shared >= 2
 
@@ -130,10 +117,8 @@ def test_non_elliptic_patches_have_the_area_of_the_boundary_elements(pairs):
             continue
         (patch,) = contact.patches
         for normal, table in tables.items():
-            fields, _, N_z = loaded(table, y, angle)
-            j = int(np.argmax(N_z))
-            N = N_z[j] * np.hypot(1.0, fields[j, 7])
-            area = np.pi * fields[j, 5] * fields[j, 6] * N ** (2 / 3)
+            found = max(loaded_contact(table, y, angle, LOAD).patches, key=lambda p: p.N)
+            area = np.pi * found.a * found.b * (patch.N / found.N) ** (2 / 3)
             errors[normal].append(area / patch.area - 1)
     # the ellipse misses a fifth of the area where the patch spreads, the non-elliptic one does not
     assert np.max(np.abs(errors["hertz"])) > 0.15
