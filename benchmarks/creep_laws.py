@@ -1,0 +1,91 @@
+"""Time of the creep laws per contact patch and call, all patches of a vehicle together.
+
+``python benchmarks/creep_laws.py [--patches 10] [--json]``
+"""
+
+import argparse
+import json
+import platform
+import time
+
+import numba
+import numpy as np
+
+from railsim.contact.creep_table import creep_table
+from railsim.contact.kalker import kalker_coefficients
+from railsim.kernels import fastsim_simd
+from railsim.kernels.creep import LAW_NUMBERS, creep_forces
+from railsim.kernels.fastsim import fastsim_workspace
+
+GRIDS = (5, 10, 20, 50)
+
+
+@numba.njit
+def repeated(times, law, n, nx, ny, inputs, G, table, scale, offsets, work, out):
+    a, b, mu_N, c11, c22, c23, c33, xi_x, xi_y, phi = inputs
+    for _ in range(times):
+        creep_forces(law, n, nx, ny, a, b, mu_N, c11, c22, c23, c33, G, 1.0, 1.0, xi_x, xi_y, phi,
+                     table, scale, offsets, work, out[0], out[1], out[2])  # fmt: skip
+
+
+def patches(n):
+    """Mixed patches: treads and flanges, stick and slip."""
+    rng = np.random.default_rng(0)
+    ratio = np.exp(rng.uniform(-1.5, 2.0, n))
+    size = rng.uniform(3e-3, 6e-3, n)
+    a, b = size * np.sqrt(ratio), size / np.sqrt(ratio)
+    mu_N = rng.uniform(10e3, 40e3, n)
+    coefficients = kalker_coefficients(ratio)
+    unit = mu_N / (82e9 * a * b)
+    creepages = [rng.normal(size=n) * unit / c for c in coefficients[:3]]
+    creepages[2] /= size
+    return tuple(np.ascontiguousarray(v) for v in (a, b, mu_N, *coefficients, *creepages))
+
+
+def nanoseconds(law, n, grid, inputs, rounds=25):
+    """Least time per patch and call."""
+    table, scale = creep_table()
+    work, offsets = fastsim_workspace(n, grid, grid), np.zeros(16, dtype=np.int64)
+    out = [np.zeros(n) for _ in range(3)]
+    times = max(10, 200_000 // (grid * grid * n))
+    arguments = (LAW_NUMBERS[law], n, grid, grid, inputs, 82e9, table, scale, offsets, work,
+                 tuple(out))  # fmt: skip
+    repeated(1, *arguments)
+    best = np.inf
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        repeated(times, *arguments)
+        best = min(best, time.perf_counter() - begin)
+    return 1e9 * best / times / n
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--patches", type=int, default=10)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    inputs = patches(options.patches)
+    found = {
+        "processor": platform.processor() or platform.machine(),
+        "avx512": fastsim_simd.available(),
+        "patches": options.patches,
+        "fastsim_ns": {g: nanoseconds("fastsim", options.patches, g, inputs) for g in GRIDS},
+        "other_laws_ns": {
+            law: nanoseconds(law, options.patches, 10, inputs)
+            for law in ("table", "fastrip", "polach", "linear")
+        },
+    }
+    if options.json:
+        print(json.dumps(found))
+        return
+    print(f"{options.patches} patches, AVX-512: {found['avx512']}; ns per patch and call")
+    for grid, value in found["fastsim_ns"].items():
+        print(f"fastsim {grid} x {grid}: {value:8.1f}   {value / grid**2:.2f} per cell")
+    reference = found["fastsim_ns"][10]
+    for law, value in found["other_laws_ns"].items():
+        print(f"{law:8} {'10 x 10' if law == 'fastrip' else '       '}: {value:8.1f}   "
+              f"{value / reference:.2f} of fastsim 10 x 10")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
