@@ -40,6 +40,7 @@ from railsim.kernels.system import (
 from railsim.kernels.track_frame import FRAME_SIZE, TrackTables
 from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.profiles import Profile, load_profile
+from railsim.profiles.profile import Kind
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -263,7 +264,7 @@ class _ProfileBook:
         self._known = known
         self.used: dict[str, Profile] = {}
 
-    def profile(self, name: str, kind: str) -> Profile:
+    def profile(self, name: str, kind: Kind) -> Profile:
         if name not in self.used:
             self.used[name] = self._known.get(name) or load_profile(name, kind=kind)
         return self.used[name]

@@ -260,7 +260,9 @@ class _Balance:
             self.residual = float(np.max(np.abs(rest)))
             if self.residual < RESIDUAL:
                 break
-            change, *_ = np.linalg.lstsq(self._jacobian(state, rest), -rest, rcond=1e-13)
+            change: Floats = np.asarray(
+                np.linalg.lstsq(self._jacobian(state, rest), -rest, rcond=1e-13)[0], dtype=float
+            )
             state, rest, shorter = self._line_search(state, rest, change)
             if not shorter:
                 break
