@@ -239,8 +239,9 @@ def rolling_traction(
         stick = np.nonzero(sticks == 1)[0]
         slide = np.nonzero(sticks == 0)[0]
         ns, nl = stick.size, slide.size
-        A = np.empty((2 * ns + nl, 2 * ns + nl))
-        r = np.empty(2 * ns + nl)
+        # single precision is enough for a step of Newton's method, and half as dear
+        A = np.empty((2 * ns + nl, 2 * ns + nl), np.float32)
+        r = np.empty(2 * ns + nl, np.float32)
         _newton_system(middle, centre, stick, slide, p, bound, slip_middle, slip, A, r)
         change = np.linalg.solve(A, r)
         largest = 0.0

@@ -1,0 +1,208 @@
+"""Fill the tables of `docs/validation/creep.md` and draw its pictures.
+
+``python docs/generate_creep.py [NAME ...]`` takes some minutes: it solves all reference points with
+the half-space solver on several grids, and runs the curving study with every creep law.
+"""
+
+import csv
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+from generate import TABLE, filled
+
+from railsim import load_settings, load_track, load_vehicle, simulate
+from railsim.contact.creep import LAWS, CreepForce, creep_force
+from railsim.contact.creep_table import linear_coefficients
+from railsim.contact.exact_creep import exact_creep_force
+from railsim.contact.kalker import kalker_coefficients
+from railsim.plot.creep import CASES, Patch, creep_curves_figure, exact_force, traction_figure
+from railsim.plot.style import save
+
+DOCS = Path(__file__).parent
+PAGE = DOCS / "validation" / "creep.md"
+REFERENCE = Path(os.environ.get("RAILSIM_REFERENCE", DOCS.parent.parent / "shared" / "reference"))
+sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
+from creep_curves import creep_curves  # noqa: E402
+from curving_study import measured, published  # noqa: E402
+
+CURVES = creep_curves(REFERENCE)
+RATIOS = (0.3, 1.0, 3.0)
+
+
+def rows(header, body):
+    """A table of the manual."""
+    rule = ("---", *["---:"] * (len(header) - 1))
+    return "".join(f"| {' | '.join(row)} |\n" for row in (header, rule, *body))
+
+
+def law(name, n=10):
+    """Forces of a law at all points."""
+    return creep_force(*CURVES.inputs(), G=CURVES.G, nu=CURVES.nu, law=name, nx=n, ny=n)
+
+
+def exact(nx, ny):
+    """Forces of the half-space solver at all points."""
+    found = []
+    for case in zip(*CURVES.inputs(), strict=True):
+        solution = exact_creep_force(*map(float, case), G=CURVES.G, nu=CURVES.nu, nx=nx, ny=ny)
+        found.append((solution.T_x, solution.T_y, solution.M_z))
+    return CreepForce(*np.array(found).T)
+
+
+def error_row(name, force, method="contact_ext"):
+    """Largest and root mean square error of the force by ratio, largest of the moment."""
+    error, moment = CURVES.errors(force, method)
+    cells = [f"{error[ratio == CURVES.ratio].max():.4f}" for ratio in RATIOS]
+    return (name, *cells, f"{np.sqrt(np.mean(error**2)):.4f}", f"{moment.max():.4f}")
+
+
+HEADER = ("", "a/b = 0.3", "1", "3", "rms", "moment")
+
+
+def fastsim_table():
+    """FASTSIM against its own limit."""
+    return rows(
+        HEADER,
+        [
+            error_row(f"{n} × {n}", law("fastsim", n), "fastsim3_continuum")
+            for n in (10, 20, 50, 100)
+        ],
+    )
+
+
+def laws_table():
+    """All laws against the full theory."""
+    body = [
+        error_row("`table`", law("table")),
+        error_row("`fastsim`, 10 × 10", law("fastsim")),
+        error_row("`fastsim`, 100 × 100", law("fastsim", 100)),
+        error_row("`fastrip`, 10 × 10", law("fastrip")),
+        error_row("`fastrip`, 100 × 100", law("fastrip", 100)),
+        error_row("`polach`", law("polach")),
+        error_row("`linear`", law("linear")),
+    ]
+    for name, method in (
+        ("CONTACT's FASTSIM, blended flexibilities, 100 × 100", "fastsim3_blend_par_100"),
+        ("CONTACT's FaStrip, 100 × 100", "fastrip_100"),
+        ("CONTACT itself, 60 × 60, not extrapolated", "contact60"),
+    ):
+        difference = CURVES.result(method) - CURVES.result("contact_ext")
+        error = np.hypot(difference[0], difference[1])
+        cells = [f"{error[ratio == CURVES.ratio].max():.4f}" for ratio in RATIOS]
+        rms = np.sqrt(np.mean(error**2))
+        body.append((name, *cells, f"{rms:.4f}", f"{np.abs(difference[2]).max():.4f}"))
+    return rows(HEADER, body)
+
+
+def curves_table():
+    """Largest error of each curve."""
+    with open(REFERENCE / "contact" / "creep_curve_errors_dev.csv", newline="") as stream:
+        listed = {(float(r["a_over_b"]), r["curve"]): r for r in csv.DictReader(stream)}
+    forces = {"table": law("table"), "fastsim": law("fastsim", 100), "fastrip": law("fastrip", 100)}
+    errors = {name: CURVES.errors(force, "contact_ext") for name, force in forces.items()}
+    body = []
+    for (ratio, curve), row in listed.items():
+        chosen = (CURVES.ratio == ratio) & (CURVES.curve == curve)
+        largest = {name: error[chosen].max() for name, (error, _) in errors.items()}
+        body.append(
+            (
+                f"{curve.replace('_', ' ')}, a/b = {ratio:g}",
+                f"{largest['table']:.3f}",
+                f"{largest['fastsim']:.3f}",
+                f"{float(row['fastsim3_continuum_maxerr_f']):.3f}",
+                f"{largest['fastrip']:.3f}",
+                f"{float(row['fastrip_100_maxerr_f']):.3f}",
+            )
+        )
+    header = ("curve", "`table`", "`fastsim`", "listed", "`fastrip`", "listed")
+    return rows(header, body)
+
+
+def solver_table():
+    """The half-space solver on several grids."""
+    found = {n: exact(n, n) for n in (14, 20, 28, 36)}
+    body = [error_row(f"{n} × {n}", force) for n, force in found.items()]
+    weight = 1.0 / (np.sqrt(8.0) - 1.0)
+    both = CreepForce(*(f + weight * (f - c) for f, c in zip(found[28], found[14], strict=True)))
+    body.append(error_row("28 × 28 and 14 × 14, extrapolated", both))
+    return rows(HEADER, body)
+
+
+def coefficients_table():
+    """Creepage coefficients by the solver, by CONTACT and as printed."""
+    with open(REFERENCE / "contact" / "kalker_coefficients_computed.csv", newline="") as stream:
+        computed = {
+            float(r["a_over_b"]): r for r in csv.DictReader(stream) if float(r["nu"]) == 0.28
+        }
+    body = []
+    for ratio in (0.1, 0.3, 1.0, 2.0, 5.0, 10.0):
+        own = linear_coefficients(ratio)
+        printed = kalker_coefficients(ratio, 0.28)
+        other = [computed[ratio][c] for c in ("C11", "C22", "C23", "C33")]
+        cells = [
+            f"{o:.4g} / {float(k):.4g} / {float(t):.4g}"
+            for o, k, t in zip(own, other, printed, strict=True)
+        ]
+        body.append((f"{ratio:g}", *cells))
+    return rows(("a/b", "c11", "c22", "c23", "c33"), body)
+
+
+def curving_table():
+    """The curving study with every law."""
+    body, base = [], None
+    names = list(published("manchester"))
+    runs = [("fastsim, 10 × 10", "fastsim", 10), ("fastsim, 50 × 50", "fastsim", 50)]
+    runs += [(name, name, 10) for name in LAWS if name != "fastsim"]
+    for title, name, n in runs:
+        settings = load_settings(overrides=[f'creep_law="{name}"', f"fastsim_grid=[{n},{n}]"])
+        result = simulate(
+            load_vehicle("coach_manchester"), load_track("curve_r250"), speed=20.0,
+            settings=settings,
+        )  # fmt: skip
+        values = [measured(result, quantity) for quantity in names]
+        if base is None:
+            base = values
+            scales, digits = (100.0, 1e-3, 1.0, 1e3, 1e3, 1e3), (2, 2, 3, 3, 2, 3)
+            shown = [f"{s * v:.{d}f}" for v, s, d in zip(values, scales, digits, strict=True)]
+        else:
+            shown = [f"{100 * (v / b - 1):+.1f} %" for v, b in zip(values, base, strict=True)]
+        body.append((title, *shown))
+        print(body[-1], flush=True)
+    header = (
+        "creep law", "dQ/Q0, %", "sum abs Y, kN", "Y/Q", "roll, mrad", "yaw, mrad", "lateral, mm",
+    )  # fmt: skip
+    return rows(header, body)
+
+
+def pictures():
+    """Creep curves and traction fields of a flange-root patch."""
+    patch = Patch(a=6e-3, b=4e-3, N=70e3, mu=0.35)
+    save(creep_curves_figure(patch, LAWS), DOCS / "img" / "creep_curves.png", overwrite=True)
+    fields = {}
+    for name, direction in CASES.items():
+        unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+        fields[name] = exact_force(patch, 1.5 * unit)
+    figure = traction_figure(fields, patch.mu * patch.N)
+    save(figure, DOCS / "img" / "creep_traction.png", overwrite=True)
+
+
+if __name__ == "__main__":
+    makers = {
+        "fastsim": fastsim_table,
+        "creep_laws": laws_table,
+        "creep_curves": curves_table,
+        "solver": solver_table,
+        "coefficients": coefficients_table,
+        "law_curving": curving_table,
+    }
+    wanted = sys.argv[1:] or [*makers, "pictures"]
+    if "pictures" in wanted:
+        pictures()
+    text = PAGE.read_text("utf-8")
+    known = {name: makers[name]() for name in wanted if name in makers}
+    for match in TABLE.finditer(text):  # tables that were not asked for stay
+        present = match[0].split("-->\n", 1)[1].rsplit("<!-- end", 1)[0]
+        known.setdefault(match[2], present.strip() + "\n")
+    PAGE.write_text(filled(text, known), encoding="utf-8")
