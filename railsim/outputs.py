@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.assembly import Model
-from railsim.kernels.time_loop import Recorder
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import element_outputs as element
 from railsim.kernels import wheel_rail as patch
+from railsim.kernels.time_loop import Recorder
 from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_XI_X, W_XI_Y, W_Y
 from railsim.notation import PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.time_step import empty_recorder

@@ -170,7 +170,8 @@ def coupled_approaches(coupling, table, stiffness, approach):
 
     With e_i the patches' own approaches and N_i = K_i e_i^(3/2),
 
-        e_i = p_i - sum_j kappa_ij N_j,      U = sum_i 2/5 K_i e_i^(5/2) + sum_{i<j} kappa_ij N_i N_j
+        e_i = p_i - sum_j kappa_ij N_j,
+        U = sum_i 2/5 K_i e_i^(5/2) + sum_{i<j} kappa_ij N_i N_j
 
     and dU/dp_i = N_i, dU/dK_i = 2/5 e_i^(5/2): the forces stay the gradient of a potential.
     Newton's method on the three patches in a row; a patch that lifts off drops out.

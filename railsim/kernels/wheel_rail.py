@@ -125,10 +125,11 @@ def normal_contact(system, work, speed, state):
                           - t[k + G_W] * 2.0 * yaw * yaw_rate)
                 root = sqrt(p)
                 elastic = t[k + 1] * p * root
-                # direction of the contact plane: the slope at the place of contact and the direction
-                # of the elastic force differ where the normal turns over the patch, in opposite
-                # senses from the boundary-element solution; their mean is within 3 % of it
-                tangent = 0.5 * (t[k + TAN_GAMMA] + 0.4 * p * t[k + K_Y] / t[k + 1] - t[k + G_Y])
+                # contact plane: the slope at the place of contact and the direction of the elastic
+                # force differ where the normal turns over the patch, in opposite senses from the
+                # boundary-element solution; their mean is within 3 % of it
+                of_force = 0.4 * p * t[k + K_Y] / t[k + 1] - t[k + G_Y]
+                tangent = 0.5 * (t[k + TAN_GAMMA] + of_force)
                 cos_2 = 1.0 / (1.0 + tangent * tangent)
                 fade = min(1.0, p / FADE)
                 vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)

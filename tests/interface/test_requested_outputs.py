@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import railsim
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
@@ -40,7 +41,7 @@ def test_pressure_is_that_of_hertz(result):
 
 
 def test_primary_springs_carry_the_frame(result):
-    """The vertical forces of one axle's bushings press on the frame (body 1) upwards with about the static 59.9 kN."""
+    """The bushings of one axle press on the frame (body 1) upwards with about 59.9 kN each."""
     names = result.coordinates["element"]
     vertical = result.element_force[:, [n.startswith("front.outer.primary.") for n in names], 2]
     static = (43628.0 + 2 * 2615.0) * 9.81 / 8.0

@@ -1,6 +1,7 @@
 """What the verification tests of the simulator share: model variants and an independent energy."""
 
 import numpy as np
+
 from railsim.assembly import assemble, work_arrays
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
@@ -122,7 +123,8 @@ def _curve_energy(curves, index, x):
     if index < 0:
         return 0.0
     part = slice(curves.start[index], curves.start[index + 1])
-    grid = np.unique(np.concatenate([np.linspace(0.0, x, 3), curves.x[part].clip(min(0, x), max(0, x))]))
+    inside = curves.x[part].clip(min(0, x), max(0, x))
+    grid = np.unique(np.concatenate([np.linspace(0.0, x, 3), inside]))
     values = np.interp(grid, curves.x[part], curves.f[part])
     return np.sign(x) * np.trapezoid(values, grid)
 
