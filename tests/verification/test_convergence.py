@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-import railsim.assembly as assembly
 from dynamics import Settings, load_track, load_vehicle
+
+import railsim.assembly as assembly
 from railsim.contact.table import TableGrid, build_contact_table
 from railsim.simulation import simulate
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 from dynamics import Settings, load_track, load_vehicle
+
 from railsim.simulation import simulate
 
 WHEELSETS = ("front.outer.wheelset", "front.inner.wheelset",
