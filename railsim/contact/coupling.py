@@ -79,5 +79,5 @@ def mean_inverse_distance(distance: float, semi_axis: float) -> float:
     1.0
     """
     x = semi_axis * (np.arange(200) + 0.5) / 200.0
-    weight = 1.5 * (1.0 - (x / semi_axis) ** 2) / 200.0
-    return float(np.sum(weight / np.hypot(distance, x)))
+    weight = 1.0 - (x / semi_axis) ** 2
+    return float(np.average(1.0 / np.hypot(distance, x), weights=weight))
