@@ -18,6 +18,7 @@ _STRIP_SPIN = 1.05
 _SPIN_ARM = 0.6
 _TINY = 1e-30
 _HUGE = 1e9
+_EXCESS_POINTS = 16
 
 
 @jit
@@ -130,8 +131,9 @@ def _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, wo
     """Prepare the strips of all patches for `_fastrip_march`.
 
     Rows of work: 0 to 2 growth per cell of the direction's traction (x and y at the middle, y by
-    spin times x/l); 3 to 6 the stick zone's factors kappa, lambda, lambda', slip length over l;
-    7, 8 state of the direction's traction, 9 whether it is at its bound; 10 to 12 sums.
+    spin times x/l); 3 end of the slip zone, x/l; 4, 5 state of the direction's traction, 6 whether
+    it is at its bound; 7 to 9 sums of p_x, p_y, x p_y, which begin with those of the stick zone;
+    10 integral of the ellipse over the slipping part of the cell that the stick zone cuts.
     """
     for i in range(n):
         loaded = mu_N[i] > 0.0 and a[i] > 0.0 and b[i] > 0.0
@@ -179,31 +181,71 @@ def _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, wo
             inside = v * v + (1.0 - psi * psi) * u * u
             # slip length d solves (1 - psi^2) d^2 - 2 v psi d - u^2 - v^2 = 0
             divisor = math.sqrt(max(inside, 0.0)) - v * psi
-            sticks = inside >= 0.0 and divisor * l > square
-            d = square / divisor if sticks and square > 0.0 else 1.0
-            work[3, c] = u / d
-            work[4, c] = v / d + psi
-            work[5, c] = v / d
-            work[6, c] = (
-                square / divisor / l if sticks and square > 0.0 else (0.0 if sticks else 2.0)
-            )
-            work[7, c] = 0.0
-            work[8, c] = 0.0
-            work[9, c] = 1.0 if sticks else 0.0
-            work[10, c] = 0.0
-            work[11, c] = 0.0
-            work[12, c] = 0.0
+            sticks = inside >= 0.0 and divisor * l > square and square > 0.0
+            d = square / divisor if sticks else l
+            stick_x, stick_y, stick_m = _stick_zone(u / d, v / d, psi, d / l)
+            work[3, c] = 2.0 * d / l - 1.0
+            work[4, c] = 0.0
+            work[5, c] = 0.0
+            work[6, c] = 1.0 if sticks else 0.0
+            work[7, c] = stick_x
+            work[8, c] = stick_y
+            work[9, c] = stick_m
+            # the cell that is cut by the end of the slip zone: ellipse between its rear and there
+            end = work[3, c]
+            rear = 1.0 - 2.0 * math.ceil(max(0.5 * nx * (1.0 - end), 1e-12)) / nx
+            work[10, c] = _ellipse_area(end) - _ellipse_area(max(rear, -1.0))
 
 
 @jit
-def _fastrip_cell(m, x_cell, x_slip, step, work):
-    """One cell of all m strips: strip theory where it sticks, FASTSIM's direction where not."""
-    grow_x, grow_y, grow_s = work[0], work[1], work[2]
-    kappa, lam, lam_d, slip_length = work[3], work[4], work[5], work[6]
-    fx, fy, at_bound = work[7], work[8], work[9]
-    sum_x, sum_y, sum_m = work[10], work[11], work[12]
+def _ellipse_area(x):
+    """Integral of sqrt(1 - x^2) from 0 to x, |x| <= 1."""
+    x = min(max(x, -1.0), 1.0)
+    return 0.5 * (x * math.sqrt(1.0 - x * x) + math.asin(x))
+
+
+@jit
+def _stick_zone(kappa, lam_d, psi, d):
+    """Integrals over the stick zone 2 d - 1 < x < 1 of a strip: p_x, p_y, x p_y.
+
+    In units of the strip's bound at its middle and its half length; d: slip length over l.
+    """
+    lam = lam_d + psi
+    end = 2.0 * d - 1.0
+    rest = max(1.0 - end * end, 0.0)
+    outer_area = 0.25 * math.pi - _ellipse_area(end)
+    outer_moment = rest * math.sqrt(rest) / 3.0
+    inner_area = 0.5 * math.pi * (1.0 - d) * (1.0 - d)
+    x_sum = kappa * (outer_area - inner_area)
+    y_sum = lam * outer_area - lam_d * inner_area
+    m_sum = lam * outer_moment - lam_d * d * inner_area
+    # strip theory may exceed the bound at the leading edge where spin is beyond its limit (the
+    # inner root is sqrt(1 - d) of the outer one there): take away what is too much
+    inner = math.sqrt(1.0 - d)
+    if (kappa * (1.0 - inner)) ** 2 + (lam - lam_d * inner) ** 2 > 1.0:
+        for k in range(_EXCESS_POINTS):
+            angle = math.pi * (k + 0.5) / _EXCESS_POINTS
+            x = d + (1.0 - d) * math.cos(angle)
+            width = (1.0 - d) * math.sin(angle) * math.pi / _EXCESS_POINTS
+            bound = math.sqrt(1.0 - x * x)
+            root = (1.0 - d) * math.sin(angle)
+            p_x = kappa * (bound - root)
+            p_y = lam * bound - lam_d * root
+            excess = width * max(1.0 - bound / math.sqrt(p_x * p_x + p_y * p_y + _TINY), 0.0)
+            x_sum -= excess * p_x
+            y_sum -= excess * p_y
+            m_sum -= excess * p_y * x
+    return x_sum, y_sum, m_sum
+
+
+@jit
+def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
+    """One cell of all m strips: FASTSIM's direction, and its share of the slip zone added up."""
+    grow_x, grow_y, grow_s, slip_end = work[0], work[1], work[2], work[3]
+    fx, fy, at_bound = work[4], work[5], work[6]
+    sum_x, sum_y, sum_m, partial = work[7], work[8], work[9], work[10]
+    x_cell = 0.5 * (lead + trail)
     parabola = 1.0 - x_cell * x_cell
-    ellipse = math.sqrt(parabola)
     for c in range(m):
         gx = grow_x[c]
         gy = grow_y[c] + x_slip * grow_s[c]
@@ -220,19 +262,12 @@ def _fastrip_cell(m, x_cell, x_slip, step, work):
         fx[c] = x
         fy[c] = y
         at_bound[c] = mode
-        d = slip_length[c]
-        inner = math.sqrt(max((1.0 - d) * (1.0 - d) - (x_cell - d) * (x_cell - d), 0.0))
-        sticks = x_cell > 2.0 * d - 1.0
-        factor = ellipse / (size * cut) if mode > 0.5 else 1.0 / ellipse
-        px = kappa[c] * (ellipse - inner) if sticks else factor * x
-        py = lam[c] * ellipse - lam_d[c] * inner if sticks else factor * y
-        # strip theory may exceed the bound at the leading edge where spin is beyond its limit
-        over = min(1.0, ellipse / math.sqrt(px * px + py * py + _TINY))
-        px *= over
-        py *= over
-        sum_x[c] += px
-        sum_y[c] += py
-        sum_m[c] += x_cell * py
+        end = slip_end[c]
+        slides = ellipse if end >= lead else (partial[c] if end > trail else 0.0)
+        factor = slides / (size * cut) if mode > 0.5 else slides / parabola
+        sum_x[c] += factor * x
+        sum_y[c] += factor * y
+        sum_m[c] += factor * y * x_cell
 
 
 @jit
@@ -260,17 +295,12 @@ def fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     """
     _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work)
     m = n * ny
+    half = 1.0 / nx
     for k in range(nx):
-        x_cell = 1.0 - (2 * k + 1) / nx
-        if k == 0:
-            _fastrip_cell(m, x_cell, 1.0 - 0.5 / nx, 0.5, work)
-        else:
-            _fastrip_cell(m, x_cell, 1.0 - 2.0 * k / nx, 1.0, work)
-    # cells' areas times the elliptic bound, summed: for full sliding along x exactly mu N
-    whole = 0.0
-    for k in range(nx):
-        x_cell = 1.0 - (2 * k + 1) / nx
-        whole += math.sqrt(1.0 - x_cell * x_cell)
+        lead, trail = 1.0 - 2.0 * k * half, 1.0 - 2.0 * (k + 1) * half
+        ellipse = _ellipse_area(lead) - _ellipse_area(trail)
+        x_slip, step = (1.0 - 0.5 * half, 0.5) if k == 0 else (lead, 1.0)
+        _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work)
     across = 0.0
     for j in range(ny):
         place = (2 * j + 1 - ny) / ny
@@ -281,10 +311,11 @@ def fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
             c = j * n + i
             place = (2 * j + 1 - ny) / ny
             l2 = 1.0 - place * place
-            tx += l2 * work[10, c]
-            ty += l2 * work[11, c]
-            mz += l2 * (math.sqrt(l2) * a[i] * work[12, c] - place * b[i] * work[10, c])
-        unit = max(mu_N[i], 0.0) / (whole * across)
+            tx += l2 * work[7, c]
+            ty += l2 * work[8, c]
+            mz += l2 * (math.sqrt(l2) * a[i] * work[9, c] - place * b[i] * work[7, c])
+        # full sliding along one direction gives pi/2 per strip: scaled to mu N
+        unit = max(mu_N[i], 0.0) / (0.5 * math.pi * across)
         if not (a[i] > 0.0 and b[i] > 0.0):
             unit = 0.0
         T_x[i] = unit * tx

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from . import fastsim_simd, jit
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
-WORK_ROWS = 13
+WORK_ROWS = 11
 _COLUMNS_MIN = 24  # least number of strips that a march takes (three vectors of eight)
 # Added under the root: the least traction (relative to the bound) that counts is 1e-15.
 _TINY = 1e-30

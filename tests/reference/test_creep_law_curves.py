@@ -1,0 +1,72 @@
+"""Every creep law against CONTACT's full theory on 27 creep curves."""
+
+import csv
+
+import numpy as np
+import pytest
+from creep_curves import creep_curves
+
+from railsim.contact.creep import LAWS, creep_force
+
+
+@pytest.fixture(scope="module")
+def curves(reference_dir):
+    return creep_curves(reference_dir)
+
+
+def forces(curves, law, n=10):
+    return creep_force(*curves.inputs(), G=curves.G, nu=curves.nu, law=law, nx=n, ny=n)
+
+
+def test_table_within_two_hundredths_on_every_point(curves):
+    error, moment = curves.errors(forces(curves, "table"), "contact_ext")
+    assert error.max() < 0.02
+    assert moment.max() < 0.03
+
+
+def test_fastrip_no_worse_than_the_listed_one(curves, reference_dir):
+    error, moment = curves.errors(forces(curves, "fastrip", 100), "contact_ext")
+    with open(reference_dir / "contact" / "creep_curve_errors_dev.csv", newline="") as stream:
+        listed = list(csv.DictReader(stream))
+    for row in listed:
+        chosen = (curves.curve == row["curve"]) & (curves.ratio == float(row["a_over_b"]))
+        # 0.003: what the reference itself is good for (pure spin on a circle uses 0.002 of it)
+        assert error[chosen].max() < float(row["fastrip_100_maxerr_f"]) + 0.003
+        assert moment[chosen].max() < float(row["fastrip_100_maxerr_mz"]) + 0.003
+    assert error.max() < 0.075  # the listed one: 0.135
+
+
+def test_fastrip_gives_linear_theory_for_small_creepage(curves):
+    small = curves.mu * 0 + 1e-9
+    for which in range(3):
+        creepages = [small if k == which else 0.0 * small for k in range(3)]
+        pair = [
+            creep_force(
+                curves.a, curves.b, curves.N, curves.mu, *creepages, G=curves.G, law=law,
+                nx=200, ny=200,
+            )
+            for law in ("fastrip", "linear")
+        ]  # fmt: skip
+        largest = np.max(np.hypot(pair[1].T_x, pair[1].T_y))
+        # midpoint sums over 200 strips
+        assert np.abs(pair[0].T_x - pair[1].T_x).max() < 1e-3 * largest
+        assert np.abs(pair[0].T_y - pair[1].T_y).max() < 1e-3 * largest
+
+
+def test_polach_and_linear_are_good_without_spin_only(curves):
+    # closed formulas for treads: pure creepage within 0.06 (Polach), 0.04 (linear)
+    pure = np.isin(curves.curve, ("long", "lat"))
+    for law, limit in (("polach", 0.06), ("linear", 0.04)):
+        error, _ = curves.errors(forces(curves, law), "contact_ext")
+        assert error[pure].max() < limit
+    error, _ = curves.errors(forces(curves, "linear"), "contact_ext")
+    assert error.max() < 0.34  # with the spin in the saturation; 0.91 without
+
+
+def test_table_is_the_best_and_fastrip_the_second(curves):
+    size = {}
+    for law in LAWS:
+        error, _ = curves.errors(forces(curves, law), "contact_ext")
+        size[law] = np.sqrt(np.mean(error**2))
+    assert size["table"] < 0.25 * size["fastrip"]
+    assert size["fastrip"] < min(size["fastsim"], size["polach"], size["linear"])

@@ -1,0 +1,113 @@
+"""Limits of the closed creep laws, falling friction and the third body."""
+
+import numpy as np
+import pytest
+
+from railsim.contact.creep import LAWS, creep_force
+from railsim.contact.kalker import kalker_coefficients
+from railsim.errors import InputError
+
+A, B, N, MU, G = 5e-3, 3e-3, 70e3, 0.35, 82e9
+PATCH = {"a": A, "b": B, "N": N, "mu": MU}
+laws = pytest.mark.parametrize("law", LAWS)
+
+
+@laws
+@pytest.mark.parametrize(
+    "case", [{"mu": 0.0}, {"N": 0.0}, {"N": 0.0, "a": 0.0, "b": 0.0}, {"xi_x": 0.0, "phi": 0.0}]
+)
+def test_no_friction_no_load_or_no_creepage_gives_zero(law, case):
+    values = {**PATCH, "xi_x": 0.01, "xi_y": 0.0, "phi": 1.0} | case
+    assert creep_force(**values, law=law) == (0.0, 0.0, 0.0)
+
+
+@laws
+@pytest.mark.parametrize("size", [1e2, 1e100])
+def test_huge_creepage_is_full_sliding(law, size):
+    along = creep_force(**PATCH, xi_x=size, xi_y=0.0, phi=0.0, law=law, nx=30, ny=30)
+    across = creep_force(**PATCH, xi_x=0.0, xi_y=-size, phi=0.0, law=law, nx=30, ny=30)
+    # FASTSIM: quadrature of the parabola over 30 x 30 cells
+    assert along.T_x == pytest.approx(MU * N, rel=3e-3)
+    assert across.T_y == pytest.approx(-MU * N, rel=3e-3)
+    spin = creep_force(**PATCH, xi_x=0.0, xi_y=0.0, phi=size, law=law)
+    mixed = creep_force(**PATCH, xi_x=size, xi_y=size, phi=-size, law=law)
+    assert np.isfinite([*spin, *mixed]).all()
+
+
+@laws
+@pytest.mark.parametrize("ratio", [1e-3, 0.04, 30.0, 1e3])
+@pytest.mark.filterwarnings("ignore:creep law 'table'")
+def test_extreme_ellipses_give_finite_forces_within_friction(law, ratio):
+    a, b = 4e-3 * ratio**0.5, 4e-3 / ratio**0.5
+    for xi in ((1e-3, 0.0, 0.0), (0.0, 1e-3, 0.2), (1e-3, -1e-3, 3.0), (0.0, 0.0, 50.0)):
+        force = creep_force(a, b, N, MU, *xi, law=law)
+        assert np.isfinite(force).all()
+        assert np.hypot(force.T_x, force.T_y) < 1.017 * MU * N
+
+
+@laws
+def test_third_body_reduces_the_slope_and_not_the_friction(law):
+    small, large = 1e-8, 0.5
+    for k in (1.0, 0.3):
+        slope = creep_force(
+            **PATCH, xi_x=small, xi_y=0.0, phi=0.0, law=law, reduction=k, nx=100, ny=100
+        ).T_x / small  # fmt: skip
+        c11 = float(kalker_coefficients(A / B, 0.28)[0])
+        # table: the solver's own coefficients, within 1 % of the printed ones
+        assert slope == pytest.approx(k * G * A * B * c11, rel=0.01)
+        full = creep_force(**PATCH, xi_x=large, xi_y=0.0, phi=0.0, law=law, reduction=k)
+        assert full.T_x == pytest.approx(MU * N, rel=0.02)
+
+
+@laws
+def test_falling_friction_has_a_maximum_and_a_rest(law):
+    xi = np.array([1e-3, 3e-3, 6e-3, 0.02, 0.1, 1.0, 10.0])
+    force = creep_force(
+        **PATCH, xi_x=xi, xi_y=0.0, phi=0.0, law=law, friction_rest=0.4, friction_decay=0.6,
+        speed=20.0,
+    ).T_x  # fmt: skip
+    assert force.argmax() in (1, 2, 3)
+    expected = MU * N * (0.6 * np.exp(-0.6 * 20.0 * xi[3:]) + 0.4)
+    np.testing.assert_allclose(force[3:], expected, rtol=0.02)
+
+
+def test_polach_on_wet_rails_is_softer_in_the_slip_area():
+    xi = np.geomspace(1e-4, 0.1, 30)
+    dry = creep_force(**PATCH, xi_x=xi, xi_y=0.0, phi=0.0, law="polach").T_x
+    wet = creep_force(
+        **PATCH, xi_x=xi, xi_y=0.0, phi=0.0, law="polach", reduction=0.3, slip_reduction=0.1
+    ).T_x
+    assert (wet < dry).all()
+    assert wet[-1] < 0.85 * MU * N < 0.95 * MU * N < dry[-1]
+
+
+def test_polach_slopes_are_linear_theory():
+    small = 1e-9
+    c11, c22, c23, _ = (float(c) for c in kalker_coefficients(A / B, 0.28))
+    along = creep_force(**PATCH, xi_x=small, xi_y=0.0, phi=0.0, law="polach").T_x
+    across = creep_force(**PATCH, xi_x=0.0, xi_y=small, phi=0.0, law="polach").T_y
+    spin = creep_force(**PATCH, xi_x=0.0, xi_y=0.0, phi=small / A, law="polach").T_y
+    assert along == pytest.approx(G * A * B * c11 * small, rel=1e-5)
+    assert across == pytest.approx(G * A * B * c22 * small, rel=1e-5)
+    assert spin == pytest.approx(G * (A * B) ** 1.5 * c23 * small / A, rel=1e-4)
+
+
+def test_linear_is_shen_hedrick_elkins_without_spin():
+    c11, c22, _, _ = (float(c) for c in kalker_coefficients(A / B, 0.28))
+    xi = np.array([1e-4, 5e-4, 1e-3, 3e-3, 1e-2])
+    force = creep_force(**PATCH, xi_x=xi, xi_y=-0.5 * xi, phi=0.0, law="linear")
+    x, y = G * A * B * c11 * xi, -0.5 * G * A * B * c22 * xi
+    u = np.hypot(x, y) / (MU * N)
+    size = np.where(u < 3.0, u - u**2 / 3.0 + u**3 / 27.0, 1.0) * MU * N
+    np.testing.assert_allclose(force.T_x, size * x / np.hypot(x, y), rtol=1e-12)
+    np.testing.assert_allclose(force.T_y, size * y / np.hypot(x, y), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [{"reduction": 0.0}, {"reduction": 1.5}, {"reduction": 0.3, "slip_reduction": 0.5},
+     {"friction_rest": -0.1}, {"friction_decay": -1.0}, {"nx": 0}],
+)  # fmt: skip
+def test_options_out_of_range_are_refused(option):
+    with pytest.raises(InputError):
+        creep_force(**PATCH, xi_x=0.0, xi_y=0.0, phi=0.0, **option)
