@@ -37,7 +37,7 @@ from railsim.kernels.system import (
     System,
     Work,
 )
-from railsim.kernels.track_frame import FRAME_SIZE, TrackTables
+from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
@@ -213,6 +213,15 @@ def level_track(system: System) -> System:
     return system._replace(track=track, drive=CONSTANT_SPEED, loads=nothing)
 
 
+def level_track_with_friction(system: System) -> System:
+    """As `level_track`, with the largest friction that each rail of the real track has."""
+    level = level_track(system)
+    rail = level.track.rail.copy()
+    for row in (MU_LEFT, MU_RIGHT):
+        rail[:, row, 0] = np.max(system.track.rail[:, row, 0])
+    return level._replace(track=level.track._replace(rail=rail))
+
+
 def drive_arrays(drive: DriveDefinition) -> Drive:
     """Arrays of the way the speed goes along the track."""
     if drive.mode == "table":
@@ -296,6 +305,8 @@ def _contact(
                     tape_circle_distance=wheelset.tape_circle_distance,
                     G=settings.shear_modulus,
                     nu=settings.poisson,
+                    centre_height=-body.position[2],
+                    normal=settings.normal_contact,
                 ))
             which[w, side] = keys[key]
     if not tables:

@@ -14,20 +14,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, assemble, level_track, work_arrays
+from railsim.assembly import Model, assemble, level_track_with_friction, work_arrays
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import Equilibrium, equilibrium, initial_state
 from railsim.errors import Fault, InputError, ModelError, nearest
-from railsim.kernels.rhs import locate_frames
+from railsim.kernels.rhs import locate_frames, right_hand_side
 from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
+from railsim.kernels.system import Work
 from railsim.kernels.time_loop import record_state, time_loop
+from railsim.kernels.track_frame import rail_state
 from railsim.outputs import OutputPlan
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.run_in import settled
 from railsim.time_step import SCHEMES, choose_step
+from railsim.track.alignment import CANT_BASE
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -254,9 +257,11 @@ class Pace:
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
 
-    def at(self, speed: float) -> tuple[float, int]:
-        """Step [s] at `speed` and number of steps to the next output."""
+    def at(self, speed: float, rate: float = 0.0) -> tuple[float, int]:
+        """Step [s] at `speed`, which changes at `rate`, and number of steps to the next output."""
         interval = output_interval(self._settings, speed)
+        if self._settings.output_spacing is not None:
+            interval = _duration(self._settings.output_spacing, speed, rate)
         key = speed
         if self.varies:
             key = self.CLASS ** math.floor(math.log(speed, self.CLASS))
@@ -272,7 +277,7 @@ class Pace:
             state = self._states.get(speed)
             if state is None:
                 state = equilibrium(self._model, speed).state
-            level = level_track(self._model.system)
+            level = level_track_with_friction(self._model.system)
             return choose_step(self._model, level, state, self._settings.scheme, interval)
         if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
             raise InputError([Fault(
@@ -280,6 +285,12 @@ class Pace:
                 f"a whole part of the output interval {interval:g} s",
             )])
         return given
+
+
+def _duration(distance: float, speed: float, rate: float) -> float:
+    """Time to cover `distance` at a speed that changes at `rate` [s]; without it if that stops."""
+    square = speed**2 + 2.0 * rate * distance
+    return 2.0 * distance / (speed + math.sqrt(square)) if square > 0.0 else distance / speed
 
 
 def output_interval(settings: Settings, speed: float) -> float:
@@ -302,6 +313,7 @@ def _start(
         state = initial_state(model, balance, start, work.frames)
     state[-2] = start
     n = model.index.n_bodies
+    _follow_rails(model, work, state)
     for name, change in settings.initial.items():
         if name not in model.index.bodies:
             raise InputError([Fault(
@@ -316,6 +328,24 @@ def _start(
             change.vx, change.vy, change.vz, change.vroll, change.vpitch, change.vyaw,
         )
     return state
+
+
+def _follow_rails(model: Model, work: Work, state: Floats) -> None:
+    """Put the wheelsets on rails that are irregular at the start, moving as the rails lead them."""
+    system, speed = model.system, state[-1]
+    half_base = 0.5 * CANT_BASE
+    n = model.index.n_bodies
+    for body in system.contact.body if system.track.has_irregularity else ():
+        frame = system.bodies.frame[body]
+        rails = np.zeros((2, 4))
+        for side in range(2):
+            rail_state(system.track, work.cell[frame], work.cell_u[frame], side, rails[side])
+        y, z, y_slope, z_slope = rails.mean(axis=0)
+        _, height, _, height_slope = rails[1] - rails[0]
+        state[6 * body + 1 : 6 * body + 4] += y, z, 0.5 * height / half_base
+        place = 6 * n + 6 * body
+        state[place + 1 : place + 3] += speed * y_slope, speed * z_slope
+        state[place + 3] += speed * 0.5 * height_slope / half_base
 
 
 def _loop(
@@ -335,15 +365,28 @@ def _loop(
     scheme = SCHEMES[settings.scheme]
     status, where, cpu_time, every = RUNNING, 0, 0.0, 1
     whole = _left(prepared, prepared.state)
+    in_distance = prepared.pace.varies and settings.output_spacing is not None
     while status == RUNNING and (left := _left(prepared, state)) > 1e-9:
-        step, every = prepared.pace.at(state[-1])
+        begin = time.process_time()
+        if in_distance:
+            right_hand_side(model.system, work, state, derivative)
+        step, every = prepared.pace.at(state[-1], derivative[-1])
         intervals = 1 if prepared.pace.varies else ROWS
         n_steps = min(intervals * every, math.ceil(left / step * (1.0 - 1e-9)))
-        begin = time.process_time()
+        last = int(in_distance and n_steps == every)
+        goal = state[-2] + (settings.output_spacing or 0.0)
         status, where, steps, rows = time_loop(
-            model.system, work, state, derivative, stages, recorder, scheme, step, 0, n_steps,
-            every,
+            model.system, work, state, derivative, stages, recorder, scheme, step, 0,
+            n_steps - last, every,
         )
+        if last and status == RUNNING:
+            # the last step of an interval of distance ends where the interval ends
+            rest = _duration(goal - state[-2], state[-1], derivative[-1])
+            status, where, more, first = time_loop(
+                model.system, work, state, derivative, stages, recorder, scheme, rest, steps, 1,
+                every,
+            )
+            steps, rows = steps + more, rows + first
         cpu_time += time.process_time() - begin
         if rows:
             sink.append(plan.chunk(recorder, rows, prepared.balance.Q0))

@@ -100,8 +100,9 @@ class Settings(FileDefinition):
 
     format: Literal["railsim-settings/1"] = "railsim-settings/1"
     """Kind and version of the file"""
-    scheme: Literal["fast", "rk4"] = "fast"
-    """Integration scheme: `fast` for use, `rk4` as the reference"""
+    scheme: Literal["fast", "heun", "rk4"] = "fast"
+    """Integration scheme: `fast` of order one, `heun` of order two at twice the cost, `rk4` as the
+    reference"""
     step: Positive | None = None
     """Time step [s]; by default chosen from vehicle and speed"""
     output_rate: Positive = 200.0
@@ -112,6 +113,8 @@ class Settings(FileDefinition):
     """Cells of a contact patch along and across"""
     creep_law: Literal["fastsim"] = "fastsim"
     """Law of the creep forces"""
+    normal_contact: Literal["hertz", "kik-piotrowski"] = "hertz"
+    """Normal contact: the Hertz ellipse of averaged curvatures, or non-elliptic patches"""
     contact_damping: NonNegative = 2e5
     """Damping of the wheel-rail contact, normal to the patch [N s/m]"""
     shear_modulus: Positive = 82e9

@@ -5,6 +5,11 @@ Internal states of elements are advanced exactly for a constant drive (see `inte
 their short time constants do not limit the step; the spin of each wheelset is taken linearly
 implicit (its creep force is the stiffest mode of the vehicle), which changes no other mode.
 
+`heun`: two evaluations a step, of order two: positions as in velocity Verlet, velocities by the
+mean of the accelerations at both ends (Heun), the spin by a two-stage Rosenbrock method that stays
+of order two with any estimate of its stiffness (ROS2: Verwer, Spee, Blom, Hundsdorfer 1999),
+internal states exactly for the mean drive.
+
 `rk4`: the classical Runge-Kutta method of order four on the whole state; the reference.
 """
 
@@ -25,7 +30,8 @@ from railsim.kernels.rhs import euler_rates, mechanics, right_hand_side, table_v
 from railsim.kernels.status import NOT_FINITE, RUNNING
 from railsim.kernels.system import AXLEBOX, TABLE, WHEELSET
 
-FAST, RK4 = range(2)
+FAST, RK4, HEUN = range(3)
+GAMMA = 1.0 - 0.5 * 2.0**0.5  # of ROS2: L-stable
 
 
 class Recorder(NamedTuple):
@@ -131,6 +137,75 @@ def advance_place(drive, state, derivative, h):
 
 
 @jit
+def predict(bodies, S, state, derivative, trial, spin, h):
+    """First stage of `step_heun`: coordinates to second, velocities to first order into `trial`.
+
+    `spin` holds what damps the wheelsets' spin; their spin's derivative is replaced by its stage.
+    """
+    n = bodies.kind.shape[0]
+    for b in range(n):
+        q = 6 * b
+        v = 6 * n + q
+        kind = bodies.kind[b]
+        if kind == WHEELSET:
+            derivative[v + 4] /= 1.0 + GAMMA * h * spin[b]
+        a1, a2, a3 = derivative[v + 3], derivative[v + 4], derivative[v + 5]
+        if kind != AXLEBOX:
+            a1, a2, a3 = euler_rates(kind, S[b, 0], S[b, 1], S[b, 2], S[b, 3], a1, a2, a3)
+        for k in range(6):
+            trial[v + k] = state[v + k] + h * derivative[v + k]
+            trial[q + k] = state[q + k] + h * derivative[q + k]
+        half = 0.5 * h * h
+        for k in range(3):
+            trial[q + k] += half * derivative[v + k]
+        trial[q + 3] += half * a1
+        trial[q + 4] += half * a2
+        trial[q + 5] += half * a3
+
+
+@jit
+def step_heun(system, work, state, derivative, stages, decay, h):
+    """Advance `state` by `h`; `derivative` holds the first stage."""
+    bodies, internal, curves, drive = system.bodies, system.internal, system.curves, system.drive
+    n, m, end = bodies.kind.shape[0], internal.kind.shape[0], state.shape[0]
+    trial, rate = stages[0], stages[1]
+    spin, before = stages[2, :n], stages[2, n:n + m]
+    for b in range(n):
+        spin[b] = work.spin_damping[b]
+    predict(bodies, work.S, state, derivative, trial, spin, h)
+    for i in range(m):
+        k = 12 * n + i
+        before[i] = work.drive[i, 0]
+        trial[k] = advanced(internal, curves, i, state[k], before[i], work.drive[i, 1], h, decay[i])
+    trial[end - 1] = state[end - 1] + h * derivative[end - 1]
+    trial[end - 2] = state[end - 2] + h * (state[end - 1] + 0.5 * h * derivative[end - 1])
+    trial[end - 3] = state[end - 3] + h
+    if drive.mode == TABLE:
+        trial[end - 1], _ = table_value_slope(drive.table, trial[end - 2])
+    status, where, _ = mechanics(system, work, trial, rate)
+    if status != RUNNING:
+        return status, where
+    for b in range(n):
+        if bodies.kind[b] == WHEELSET:
+            # u + h (3/2 k_1 + 1/2 k_2) with (1 + gamma h lambda) k_2 = f_2 - 2 k_1
+            k = 6 * n + 6 * b + 4
+            second = (rate[k] - 2.0 * derivative[k]) / (1.0 + GAMMA * h * spin[b])
+            rate[k] = 2.0 * derivative[k] + second
+    for k in range(12 * n):
+        state[k] += 0.5 * h * (derivative[k] + rate[k])
+    for i in range(m):
+        k = 12 * n + i
+        state[k] = advanced(internal, curves, i, state[k], 0.5 * (before[i] + work.drive[i, 0]),
+                            work.drive[i, 1], h, decay[i])
+    state[-2] += 0.5 * h * (state[-1] + trial[end - 1])
+    state[-1] += 0.5 * h * (derivative[end - 1] + rate[end - 1])
+    state[-3] += h
+    if drive.mode == TABLE:
+        state[-1], _ = table_value_slope(drive.table, state[-2])
+    return RUNNING, 0
+
+
+@jit
 def settle_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
@@ -198,7 +273,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     constant_decays(system.internal, h, decay)
     rows = 0
     for step in range(first_step, first_step + n_steps):
-        if scheme == FAST:
+        if scheme != RK4:
             status, where, patches = mechanics(system, work, state, derivative)
         else:
             status, where, patches = right_hand_side(system, work, state, derivative)
@@ -208,6 +283,8 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
                 rows += 1
             if scheme == FAST:
                 step_fast(system, work, state, derivative, decay, h)
+            elif scheme == HEUN:
+                status, where = step_heun(system, work, state, derivative, stages, decay, h)
             else:
                 status, where = step_rk4(system, work, state, derivative, stages, h)
         if status != RUNNING or step % every == 0:

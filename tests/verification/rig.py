@@ -1,0 +1,198 @@
+"""A test rig for one force element: its second body is moved as prescribed, the force is read.
+
+Also the work of all forces that are not conservative, from positions alone: an independent account
+of where a vehicle's energy goes.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from dynamics import Settings, absolute_frame, evaluate, load_track, load_vehicle, rotation
+
+from railsim.assembly import assemble, level_track
+from railsim.definitions.vehicle import Vehicle
+from railsim.kernels.internal import (
+    AIR,
+    PAD,
+    advanced,
+    constant_decays,
+    curve_value,
+)
+from railsim.kernels.system import AXLEBOX, WHEELSET
+from railsim.kernels.time_loop import FAST, RK4, time_loop
+from railsim.time_step import empty_recorder
+
+DATA = Path(__file__).parent.parent / "data" / "vehicles"
+
+
+def test_vehicle(name):
+    """One of the vehicles in tests/data/vehicles."""
+    return load_vehicle(str(DATA / f"{name}.toml"))
+
+
+test_vehicle.__test__ = False  # a helper, not a test
+
+
+class Rig:
+    """`probe` hangs on `frame` by the element under test and is moved relative to it."""
+
+    def __init__(self, **element):
+        data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+        wheelset = data["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"]
+        body = {"mass": 1e3, "inertia": [1e3, 1e3, 1e3], "position": [0.0, 0.0, -1.0]}
+        vehicle = Vehicle.model_validate({
+            "format": "railsim-vehicle/1", "name": "rig", "wheelsets": {"wheelset": wheelset},
+            "bodies": {"frame": body, "probe": body},
+            "elements": {"tested": {"bodies": ["frame", "probe"], "preload": 0.0, **element}
+                         if element["kind"] == "spring_damper" else
+                         {"bodies": ["frame", "probe"], "point": [0.0, 0.0, -1.0], **element}},
+        })
+        model = assemble(vehicle, load_track("straight"), Settings())
+        self.system = level_track(model.system)
+        self.state = np.zeros(model.n_state)
+        self.state[-1] = 1.0
+        self.probe = model.index.coordinate("probe", 0)
+        self.n = model.index.n_bodies
+        self.body = self.probe // 6
+
+    def force(self, axis, deflection, rate=0.0):
+        """Force on the frame along `axis`, positive as the probe moves away; sets the drives."""
+        self.state[self.probe + axis] = deflection
+        self.state[6 * self.n + self.probe + axis] = rate
+        self.work, self.derivative = evaluate(self.system, self.state)
+        return -self.work.F[self.body, axis]
+
+    def history(self, axis, time, deflection, rate):
+        """Forces along a prescribed motion, internal states advanced as the fast scheme does."""
+        internal, curves = self.system.internal, self.system.curves
+        h = time[1] - time[0]
+        decay = np.zeros(len(internal.kind))
+        constant_decays(internal, h, decay)
+        forces = np.zeros_like(time)
+        for k in range(len(time)):
+            # a step's drive: a rate counts in its middle, an air spring's deflection too
+            forces[k] = self.force(axis, deflection(time[k]), rate(time[k]))
+            self.force(axis, deflection(time[k] + 0.5 * h), rate(time[k] + 0.5 * h))
+            for i in range(len(internal.kind)):
+                at = 12 * self.n + i
+                self.state[at] = advanced(internal, curves, i, self.state[at],
+                                          self.work.drive[i, 0], self.work.drive[i, 1], h,
+                                          decay[i])
+        return forces
+
+
+def poses(system, state):
+    """Position and attitude of every body in global axes."""
+    pose = {}
+    for b, kind in enumerate(system.bodies.kind):
+        q = state[6 * b : 6 * b + 6]
+        if kind == AXLEBOX:
+            centre, attitude = pose[system.bodies.parent[b]]
+            pose[b] = (centre, attitude @ rotation(q[4], 1))
+            continue
+        frame = absolute_frame(system, state[-2] + system.frame_offset[system.bodies.frame[b]])
+        A = frame[3:12].reshape(3, 3)
+        C = rotation(q[5], 2) @ rotation(q[3], 0)
+        if kind != WHEELSET:
+            C = C @ rotation(q[4], 1)
+        pose[b] = (frame[:3] + A @ (q[:3] + np.array([0.0, *system.bodies.nominal[b]])), A @ C)
+    return pose
+
+
+class WorkOfDissipation:
+    """Sum of F dd over all dampers, friction pads and air spring reservoirs along a motion [J].
+
+    Deflections come from the poses alone, rates from their differences: nothing of the kernels but
+    the internal states themselves.
+    """
+
+    def __init__(self, model):
+        self.system = model.system
+        self.inner = slice(12 * model.index.n_bodies, 12 * model.index.n_bodies
+                           + len(model.system.internal.kind))
+        self.total = 0.0
+        self._before = None
+
+    def add(self, state, h):
+        """Take up the state after one more step `h`."""
+        now = self._deflections(state)
+        if self._before is not None:
+            inner = 0.5 * (state[self.inner] + self._inner_before)
+            self.total += self._links(now[0], self._before[0], inner, h)
+            self.total += self._mounts(now[1], self._before[1], inner, h)
+            self.total += self._rotations(now[2], self._before[2], h)
+        self._before, self._inner_before = now, state[self.inner].copy()
+
+    def _deflections(self, state):
+        system, pose = self.system, poses(self.system, state)
+        links = np.array([
+            np.linalg.norm(pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p)
+            for (i, j), (p, q) in zip(system.links.body, system.links.point, strict=True)
+        ])
+        mounts = []
+        for (i, j), (p, q), flags in zip(system.mounts.body, system.mounts.point,
+                                         system.mounts.flags, strict=True):
+            gap = pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p
+            second = pose[j][1].T @ gap if flags[1] else pose[i][1].T @ gap
+            mounts.append([pose[i][1].T @ gap, second])
+        relative = [pose[i][1].T @ pose[j][1] for i, j in system.mounts.body]
+        return links, np.array(mounts).reshape(-1, 2, 3), np.array(relative).reshape(-1, 3, 3)
+
+    def _links(self, now, before, inner, h):
+        system, total = self.system, 0.0
+        for e, way in enumerate(now - before):
+            force = system.links.spring[e, 1] * way / h
+            if system.links.internal[e] >= 0:
+                force += inner[system.links.internal[e]]
+            if system.links.curve[e, 1] >= 0:
+                force += curve_value(system.curves, system.links.curve[e, 1], way / h)
+            total += force * way
+        return total
+
+    def _mounts(self, now, before, inner, h):
+        system, total = self.system, 0.0
+        for e, (ways, middles) in enumerate(zip(now - before, 0.5 * (now + before), strict=True)):
+            for way, middle in zip(ways, middles, strict=True):
+                for k in range(3):
+                    force = system.mounts.damping[e, k] * way[k] / h
+                    m = system.mounts.internal[e, k]
+                    if m >= 0 and system.internal.kind[m] == AIR:
+                        force += system.internal.parameter[m, 0] * (middle[k] - inner[m])
+                    elif m >= 0:
+                        force += inner[m]
+                    total += 0.5 * force * way[k]
+        return total
+
+    def _rotations(self, now, before, h):
+        total = 0.0
+        for c, new, old in zip(self.system.mounts.rotation_damping, now, before, strict=True):
+            turn = (new - old) @ (0.5 * (new + old)).T
+            angle = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
+                                    turn[1, 0] - turn[0, 1]])
+            total += float(c @ angle**2) / h
+        return total
+
+    def stored(self, state):
+        """Energy that sticking pads and series springs hold for a while [J]."""
+        internal, total = self.system.internal, 0.0
+        for i, value in enumerate(state[self.inner]):
+            if internal.kind[i] == PAD:
+                total += 0.5 * value**2 / internal.parameter[i, 0]
+            elif internal.kind[i] != AIR:
+                total += 0.5 * value**2 / internal.parameter[i, 1]
+        return total
+
+
+def step_by_step(model, state, h, n_steps, scheme="rk4"):
+    """States after each of `n_steps` steps."""
+    from railsim.assembly import work_arrays
+
+    state = state.copy()
+    work = work_arrays(model.system)
+    derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
+    recorder = empty_recorder(model, 1)
+    for _ in range(n_steps):
+        status, *_ = time_loop(model.system, work, state, derivative, stages, recorder,
+                               RK4 if scheme == "rk4" else FAST, h, 1, 1, 1 << 40)
+        assert status == 0
+        yield state
