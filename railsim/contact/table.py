@@ -48,7 +48,7 @@ import json
 import os
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -75,6 +75,9 @@ Array = NDArray[np.float64]
 FORMAT = "railsim-contact-table/1"
 PATCHES = ("tread", "flange root", "flange")
 FIELDS = ("g", "K", "c_y", "c_z", "c_x", "a1", "b1", "tan_gamma")
+
+
+Normal = Literal["hertz", "kik-piotrowski"]
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ class TableGrid:
     load: float = 60e3
     floor_ratio: float = 0.02
     approach: float = 80e-6
-    normal: Literal["hertz", "kik-piotrowski"] = "hertz"
+    normal: Normal = "hertz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +262,7 @@ def build_contact_table(
     nu: float = 0.28,
     *,
     centre_height: float | None = None,
+    normal: Normal | None = None,
     grid: TableGrid | None = None,
     workers: int | None = None,
 ) -> ContactTable:
@@ -282,6 +286,8 @@ def build_contact_table(
         Shear modulus [Pa] and Poisson's number [1].
     centre_height : float, optional
         Height of the wheelset's centre above the rail tops at z = 0; default `radius` [m].
+    normal : "hertz" or "kik-piotrowski", optional
+        Kind of normal contact; default that of `grid`.
     grid : TableGrid, optional
         Extent and fineness.
     workers : int, optional
@@ -296,7 +302,7 @@ def build_contact_table(
     InputError
         If the wheelset does not fit into the track, or a profile cannot be used.
     """
-    grid = grid or TableGrid()
+    grid = _chosen_grid(grid, normal)
     height = radius if centre_height is None else centre_height
     wheel_points = wheel_curve(wheel, radius, tape_circle_place(back_to_back))
     rail_nodes = rail_curve(rail, gauge, inclination)
@@ -391,6 +397,11 @@ def build_contact_table(
     )
 
 
+def _chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
+    grid = grid or TableGrid()
+    return replace(grid, normal=normal) if normal else grid
+
+
 TYPICAL_CURVATURES = (3.0, 30.0, 77.0)
 """Relative curvature across in an everyday contact of each zone [1/m]: R 300 to 80 mm on the
 tread less a hollow wheel, the gauge corner of R 13 mm in the root, and against a straight flank.
@@ -441,6 +452,7 @@ def cached_contact_table(
     nu: float = 0.28,
     *,
     centre_height: float | None = None,
+    normal: Normal | None = None,
     grid: TableGrid | None = None,
 ) -> ContactTable:
     """As `build_contact_table`, from the disk where the same table has been built before.
@@ -450,7 +462,7 @@ def cached_contact_table(
     so that parallel runs never see half a table; they are memory-mapped, so that parallel runs
     share one copy.
     """
-    grid = grid or TableGrid()
+    grid = _chosen_grid(grid, normal)
     numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu, centre_height)
     digest = hashlib.sha256(generator_hash().encode())
     digest.update(repr((numbers, grid)).encode())
