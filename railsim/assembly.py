@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.contact.coupling import coupling
+from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import creep_tables
 from railsim.contact.table import ContactTable, cached_contact_table
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
@@ -22,6 +23,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.element_arrays import ElementArrays
 from railsim.errors import ModelError
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH
+from railsim.kernels.creep import LAW_NUMBERS
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.system import (
     AXLEBOX,
@@ -191,7 +193,8 @@ def work_arrays(system: System) -> Work:
         rail=np.zeros(4),
         patch_index=np.zeros((n_patches, 3), dtype=np.int64),
         patch=np.zeros((PATCH_ROWS, n_patches)),
-        fastsim=fastsim_workspace(n_patches, system.contact.n_y),
+        fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
+        offsets=np.zeros(16, dtype=np.int64),
         wheel=np.zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
     )
 
@@ -312,6 +315,7 @@ def _contact(
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")
     first = tables[0]
+    law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
     # one table is used as it lies in memory (or on disk); several are put side by side
     values = first.values[None] if len(tables) == 1 else np.stack([t.values for t in tables])
     names = _names(flat.bodies)
@@ -333,5 +337,12 @@ def _contact(
         damping=settings.contact_damping,
         n_x=settings.fastsim_grid[0],
         n_y=settings.fastsim_grid[1],
+        law=LAW_NUMBERS[settings.creep_law],
+        reduction=settings.third_body[0],
+        slip_reduction=settings.third_body[1],
+        friction_rest=settings.friction_rest,
+        friction_decay=settings.friction_decay,
+        law_table=law_table.coefficients,
+        law_scale=law_table.scale,
     )
     return contact, tuple(tables)

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from railsim.contact.creep_table import CreepTable, creep_table
+from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.errors import Fault, InputError, ModelError, nearest
 from railsim.kernels.creep import LAW_NUMBERS, creep_forces, falling_friction
@@ -37,8 +37,6 @@ Array = NDArray[np.float64]
 
 LAWS = tuple(LAW_NUMBERS)
 """Names of the creep laws."""
-
-_NO_TABLE = CreepTable(np.zeros(0, dtype=np.float32), np.zeros((0, 4)))
 
 
 class CreepForce(NamedTuple):
@@ -168,7 +166,7 @@ def creep_force(
     bound = friction * normal
     if friction_rest < 1.0:
         falling_friction(n, bound, *creepages[:2], speed, friction_rest, friction_decay)
-    table = creep_table(nu) if law == "table" else _NO_TABLE
+    table = creep_table(nu) if law == "table" else NO_TABLE
     T_x, T_y, M_z = np.zeros(n), np.zeros(n), np.zeros(n)
     outside = creep_forces(
         LAW_NUMBERS[law], n, nx, ny, semi_a, semi_b, bound,

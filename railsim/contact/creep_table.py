@@ -83,6 +83,10 @@ class CreepTable(NamedTuple):
     scale: Array
 
 
+NO_TABLE = CreepTable(np.zeros(0, dtype=np.float32), np.zeros((0, 4)))
+"""Stands for the table where another law is used."""
+
+
 def node_ratios() -> Array:
     """Ratios a/b of the table's nodes."""
     return np.exp(np.linspace(-np.log(RATIO_MAX), np.log(RATIO_MAX), N_RATIO + 1))

@@ -67,6 +67,10 @@ class Contact(NamedTuple):
     creep : float64[k, 4]        Kalker's c11 c22 c23 c33 over log(a/b)
     shear_modulus, damping : float   [Pa], [N s/m]
     n_x, n_y : int               cells of FASTSIM along and across
+    law : int                    creep law, see `creep.LAW_NUMBERS`
+    reduction, slip_reduction : float   third-body factors of Kalker's coefficients
+    friction_rest, friction_decay : float   friction falling with slip [1], [s/m]
+    law_table : float32[], law_scale : float64[k, 4]   table of the full theory; else empty
     """
 
     body: np.ndarray
@@ -84,6 +88,13 @@ class Contact(NamedTuple):
     damping: float
     n_x: int
     n_y: int
+    law: int
+    reduction: float
+    slip_reduction: float
+    friction_rest: float
+    friction_decay: float
+    law_table: np.ndarray
+    law_scale: np.ndarray
 
 
 class Links(NamedTuple):
@@ -249,4 +260,5 @@ class Work(NamedTuple):
     patch_index: np.ndarray
     patch: np.ndarray
     fastsim: np.ndarray
+    offsets: np.ndarray
     wheel: np.ndarray

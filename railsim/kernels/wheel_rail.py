@@ -9,7 +9,7 @@ Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`
   pulling;
 - creepages from the velocity of the wheel's material at the patch, c from the wheelset's centre:
   v = V e_x + w_F x r + r' + w_abs x c, minus the rail's own slope times V;
-- tangential forces by FASTSIM for all patches of the vehicle in one call.
+- tangential forces by the creep law for all patches of the vehicle in one call.
 
 Forces on the rail in track axes: Y = T_y cos g + N sin g, Q = -T_y sin g + N cos g with the angle
 g > 0 where the normal leans to the right; on the wheel the opposite, with moment c x F.
@@ -39,7 +39,8 @@ from railsim.kernels.contact_table import (
     locate,
     look_up,
 )
-from railsim.kernels.fastsim import fastsim, kalker_lookup
+from railsim.kernels.creep import creep_forces, falling_friction
+from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.status import (
     DERAILED,
     FELL_BETWEEN_RAILS,
@@ -264,7 +265,7 @@ def add_creep_forces(system, work, n, speed):
             wheel[w, side, W_PHI] = patch[PHI, k]
         if patch[MU_N, k] > 0.0:
             work.spin_damping[b] += (
-                contact.shear_modulus * patch[A, k] * patch[B, k] * patch[C11, k] * cz * cz
+                contact.reduction * contact.shear_modulus * patch[A, k] * patch[B, k] * patch[C11, k] * cz * cz
                 / (speed * system.bodies.inertia[b, 1])
             )
 
@@ -290,9 +291,15 @@ def wheel_rail(system, work, speed, state):
     creepages(system, work, n, speed, state)
     kalker_lookup(n, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
                   patch[C23], patch[C33])
-    fastsim(n, system.contact.n_x, system.contact.n_y, patch[A], patch[B], patch[MU_N],
-            patch[C11], patch[C22], patch[C23], system.contact.shear_modulus, patch[XI_X],
-            patch[XI_Y], patch[PHI], work.fastsim, patch[T_X], patch[T_Y], patch[M_Z])
+    contact = system.contact
+    if contact.friction_rest < 1.0:
+        falling_friction(n, patch[MU_N], patch[XI_X], patch[XI_Y], speed, contact.friction_rest,
+                         contact.friction_decay)
+    creep_forces(contact.law, n, contact.n_x, contact.n_y, patch[A], patch[B], patch[MU_N],
+                 patch[C11], patch[C22], patch[C23], patch[C33], contact.shear_modulus,
+                 contact.reduction, contact.slip_reduction, patch[XI_X], patch[XI_Y], patch[PHI],
+                 contact.law_table, contact.law_scale, work.offsets, work.fastsim, patch[T_X],
+                 patch[T_Y], patch[M_Z])
     add_creep_forces(system, work, n, speed)
     return RUNNING, 0, n
 
