@@ -29,7 +29,9 @@ _ATAN = (
     0.0028333177,
 )
 _LOG_MAX = math.log(RATIO_MAX)
-_Q_MAX = 1e12
+_Q_MAX = 1e12  # nothing changes beyond; its square is finite
+_ROUND_OFF = 1e-9
+_NO_LOAD = 1e-200  # a bound below this is none [N]
 _TINY = 1e-300
 
 
@@ -115,14 +117,14 @@ def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work,
     planes = N_THETA + 3
     outside = 0
     for i in range(n):
-        if not (mu_N[i] > 0.0 and a[i] > 0.0 and b[i] > 0.0):
+        if not (mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0):
             # NaN must stay visible
             T_x[i] = 0.0 * (mu_N[i] + a[i] + b[i])
             T_y[i] = 0.0
             M_z[i] = 0.0
             continue
         log_ratio = math.log(a[i] / b[i])
-        if abs(log_ratio) > _LOG_MAX:
+        if abs(log_ratio) > _LOG_MAX + _ROUND_OFF:
             outside += 1
         r, r0, r1, r2, r3 = _weights((log_ratio / _LOG_MAX + 1.0) * (0.5 * N_RATIO), N_RATIO)
         unit = G * a[i] * b[i] / mu_N[i]
@@ -139,9 +141,13 @@ def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work,
         qx = abs(qx)
         qy *= turn_y
         qs = abs(qs)
+        peak = max(qx, abs(qy), qs)
+        if peak > _Q_MAX:
+            qx *= _Q_MAX / peak
+            qy *= _Q_MAX / peak
+            qs *= _Q_MAX / peak
         across = math.sqrt(qy * qy + qs * qs)
         q = math.sqrt(qx * qx + across * across)
-        q = _Q_MAX if q > _Q_MAX else q
         t = q / (q + T_HALF)
         h, h0, h1, h2, h3 = _weights(_angle(across, qx) * (2.0 * N_THETA / math.pi), N_THETA)
         psi = _angle(qs, abs(qy))
