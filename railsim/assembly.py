@@ -195,6 +195,7 @@ def work_arrays(system: System) -> Work:
         patch=np.zeros((PATCH_ROWS, n_patches)),
         fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
         offsets=np.zeros(16, dtype=np.int64),
+        events=np.zeros(2, dtype=np.int64),
         wheel=np.zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
     )
 
@@ -315,6 +316,7 @@ def _contact(
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")
     first = tables[0]
+    falling = track.friction_falling
     law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
     # one table is used as it lies in memory (or on disk); several are put side by side
     values = first.values[None] if len(tables) == 1 else np.stack([t.values for t in tables])
@@ -338,10 +340,10 @@ def _contact(
         n_x=settings.fastsim_grid[0],
         n_y=settings.fastsim_grid[1],
         law=LAW_NUMBERS[settings.creep_law],
-        reduction=settings.third_body[0],
-        slip_reduction=settings.third_body[1],
-        friction_rest=settings.friction_rest,
-        friction_decay=settings.friction_decay,
+        reduction=track.third_body[0],
+        slip_reduction=track.third_body[1],
+        friction_rest=falling.rest if falling else 1.0,
+        friction_decay=falling.decay if falling else 0.0,
         law_table=law_table.coefficients,
         law_scale=law_table.scale,
     )

@@ -6,6 +6,7 @@ Ctrl-C and for writing.  The outcome goes chunk by chunk to a sink.
 """
 
 import json
+import logging
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -35,6 +36,7 @@ from railsim.track.alignment import CANT_BASE
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
+_LOG = logging.getLogger(__name__)
 ROWS = 500  # outputs per chunk: some hundredths of a second of computing
 SPEED_RANGE = (0.5, 150.0)  # m/s
 
@@ -136,7 +138,7 @@ def simulate(
     plan = OutputPlan(prepared.model, settings, track)
     sink.begin(plan.coordinates, plan.quantities)
     begin_time = float(prepared.state[-3])
-    status, where, state, cpu_time = _loop(prepared, settings, plan, sink, progress)
+    status, where, state, cpu_time, events = _loop(prepared, settings, plan, sink, progress)
     simulated = float(state[-3]) - begin_time
     attributes: dict[str, str | float | int] = {
         "status": STATUS[status][0],
@@ -156,14 +158,19 @@ def simulate(
         "scheme": settings.scheme,
         "wall_time": time.perf_counter() - started,
         "cpu_time": cpu_time,
+        "patches_evaluated": int(events[0]),
+        "patches_out_of_range": int(events[1]),
         "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
     }
-    return sink.close(
+    result = sink.close(
         attributes,
         {"Q0": prepared.balance.Q0},
         prepared.model.profiles,
         {"state": {"state": state}},
     )
+    for remark in result.remarks:
+        _LOG.warning(remark)
+    return result
 
 
 def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
@@ -354,8 +361,8 @@ def _loop(
     plan: OutputPlan,
     sink: Sink,
     progress: Progress | None,
-) -> tuple[int, int, Floats, float]:
-    """Run the time loop chunk by chunk: status, where, last state, CPU seconds."""
+) -> tuple[int, int, Floats, float, NDArray[np.int64]]:
+    """Run the time loop chunk by chunk: status, where, last state, CPU seconds, `Work.events`."""
     model = prepared.model
     work = work_arrays(model.system)
     state = prepared.state.copy()
@@ -395,7 +402,7 @@ def _loop(
     if status == RUNNING and steps % every == 0:
         status, where = record_state(model.system, work, state, derivative, recorder)
         sink.append(plan.chunk(recorder, 1, prepared.balance.Q0))
-    return status, where, state, cpu_time
+    return status, where, state, cpu_time, work.events
 
 
 def _left(prepared: Preparation, state: Floats) -> float:

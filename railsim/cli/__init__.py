@@ -5,6 +5,7 @@ module holds a click command named `command`; heavy parts of railsim are importe
 function, so that ``railsim --help`` answers at once.
 """
 
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -99,6 +100,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted, 1 anything
         else.  Unforeseen exceptions pass: Python prints their traceback and ends with 1.
     """
+    # the commands print themselves what the library logs
+    logging.getLogger("railsim").addHandler(logging.NullHandler())
     try:
         status = _called(sys.argv[1:] if arguments is None else list(arguments))
         sys.stdout.flush()

@@ -205,6 +205,8 @@ def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
         "rail": track.rail,
         "inclination": track.inclination,
         "friction": track.friction,
+        "friction_falling": track.friction_falling and track.friction_falling.model_dump(),
+        "third_body": track.third_body,
         "rounding": track.rounding,
         "plan": [_plan_row(section, cant, speeds) for section in plan],
         "cant": [_row(section) for section in cant],
@@ -263,6 +265,11 @@ def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
         f"1:{1.0 / track.inclination if track.inclination else math.inf:g}, "
         f"friction {_either(track.friction)}, rounded over {track.rounding:g} m",
     ]
+    if track.friction_falling:
+        falling = track.friction_falling
+        lines.append(f"  friction falls to {falling.rest:g} of it by {falling.decay:g} s/m of slip")
+    if track.third_body != (1.0, 1.0):
+        lines.append(f"  third body: Kalker's coefficients times {_either(track.third_body)}")
     lines += [f"  source: {track.source}"] if track.source else []
     header = ["plan", "from m", "to m", "radius m", "cant mm", "balanced at", "150 mm at"]
     header += [f"{speed:g} m/s" for speed in speeds]

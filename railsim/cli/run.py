@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from railsim.compare import Comparison
+    from railsim.definitions.settings import Settings
+    from railsim.definitions.track import Track
     from railsim.result import MidCurve, Peak, Result
     from railsim.studies.case import Case
 
@@ -181,7 +183,6 @@ def _assumption_lines(case: "Case") -> list[str]:
     wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)
     wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
-    nx, ny = settings.fastsim_grid
     step = "chosen" if settings.step is None else f"{settings.step * 1e3:g} ms"
     rate = (
         f"every {settings.output_spacing:g} m"
@@ -192,13 +193,34 @@ def _assumption_lines(case: "Case") -> list[str]:
         f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
         f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
-        f"{track.gauge * 1e3:g} mm, friction {_listed(f'{mu:g}' for mu in track.friction)}",
-        f"  forces    FASTSIM {nx} x {ny}, G {settings.shear_modulus / 1e9:g} GPa, "
+        f"{track.gauge * 1e3:g} mm, friction {_friction(track)}",
+        f"  forces    {_creep_law(settings)}, G {settings.shear_modulus / 1e9:g} GPa, "
         f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
         f"  track     transitions rounded over {track.rounding:g} m, cant about the "
         f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
         f"  time      scheme {settings.scheme}, step {step}, output {rate}",
     ]
+
+
+def _friction(track: "Track") -> str:
+    """Coefficients of friction, how they fall with slip, and the third body, where it is given."""
+    text = _listed(f"{mu:g}" for mu in track.friction)
+    if track.friction_table is not None:
+        text = "by table"
+    if track.friction_falling is not None:
+        falling = track.friction_falling
+        text += f" falling to {falling.rest:g} of it by {falling.decay:g} s/m"
+    if track.third_body != (1.0, 1.0):
+        text += f", third body {_listed(f'{k:g}' for k in track.third_body)}"
+    return text
+
+
+def _creep_law(settings: "Settings") -> str:
+    names = {"fastsim": "FASTSIM", "fastrip": "FaStrip"}
+    if settings.creep_law not in names:
+        return f"creep law {settings.creep_law}"
+    nx, ny = settings.fastsim_grid
+    return f"{names[settings.creep_law]} {nx} x {ny}"
 
 
 def _listed(names: "Any") -> str:
@@ -214,6 +236,7 @@ def _report_lines(result: "Result", path: Path) -> list[str]:
         f"  {end}; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m",
         f"  step {1e3 * float(facts['step']):g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
+        *(f"  {remark}" for remark in result.remarks),
         "",
         *peak_lines(result, peaks(result)),
     ]

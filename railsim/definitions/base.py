@@ -33,27 +33,29 @@ PositiveVector = tuple[Positive, Positive, Positive]
 NonNegativeVector = tuple[NonNegative, NonNegative, NonNegative]
 
 
-def _pair(value: Any) -> Any:
+def pair(value: Any) -> Any:
+    """Return what holds for both sides as the pair (left, right)."""
     return value if isinstance(value, list | tuple) else (value, value)
 
 
-def _one_or_two(member: dict[str, Any]) -> WithJsonSchema:
-    pair = {"type": "array", "items": member, "minItems": 2, "maxItems": 2}
-    return WithJsonSchema({"anyOf": [member, pair]})
+def one_or_two(member: dict[str, Any]) -> WithJsonSchema:
+    """Schema of one value or a pair."""
+    both = {"type": "array", "items": member, "minItems": 2, "maxItems": 2}
+    return WithJsonSchema({"anyOf": [member, both]})
 
 
 PositivePair = Annotated[
     tuple[Positive, Positive],
-    BeforeValidator(_pair),
-    _one_or_two({"type": "number", "exclusiveMinimum": 0}),
+    BeforeValidator(pair),
+    one_or_two({"type": "number", "exclusiveMinimum": 0}),
 ]
 NonNegativePair = Annotated[
     tuple[NonNegative, NonNegative],
-    BeforeValidator(_pair),
-    _one_or_two({"type": "number", "minimum": 0}),
+    BeforeValidator(pair),
+    one_or_two({"type": "number", "minimum": 0}),
 ]
 TextPair = Annotated[
-    tuple[Text, Text], BeforeValidator(_pair), _one_or_two({"type": "string", "minLength": 1})
+    tuple[Text, Text], BeforeValidator(pair), one_or_two({"type": "string", "minLength": 1})
 ]
 
 

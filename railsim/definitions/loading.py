@@ -56,7 +56,7 @@ class Format:
     remarks : callable
         What is allowed but unusual.
     free : tuple of str
-        Tables whose members are dotted names.
+        Tables that an assignment makes where they are missing; their members are dotted names.
     """
 
     kind: str
@@ -71,7 +71,12 @@ class Format:
 FORMATS: dict[str, Format] = {
     VEHICLE_FORMAT: Format("vehicle", Vehicle, names.name_faults, position_faults),
     TRACK_FORMAT: Format(
-        "track", Track, faults=track_faults, remarks=track_remarks, prepare=embed_measured
+        "track",
+        Track,
+        faults=track_faults,
+        remarks=track_remarks,
+        free=("friction_falling",),
+        prepare=embed_measured,
     ),
     SETTINGS_FORMAT: Format("settings", Settings, free=("initial",)),
     SPRING_FORMAT: Format(

@@ -62,9 +62,6 @@ class InitialState(Definition):
     """Angular velocity about z [rad/s]"""
 
 
-Share = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
-
-
 class Drive(Definition):
     """How the speed goes along the track."""
 
@@ -115,13 +112,7 @@ class Settings(FileDefinition):
     fastsim_grid: tuple[Count, Count] = (10, 10)
     """Cells of a contact patch along and across"""
     creep_law: Literal["fastsim", "table", "fastrip", "polach", "linear"] = "fastsim"
-    """Law of the creep forces; `table` is the full theory at about the same cost"""
-    third_body: tuple[Share, Share] = (1.0, 1.0)
-    """Reduction of Kalker's coefficients by dirt or water in adhesion and (Polach) slip [1]"""
-    friction_rest: Share = 1.0
-    """Friction at very large slip over that at rest; 1: does not fall with slip [1]"""
-    friction_decay: NonNegative = 0.6
-    """How fast friction falls with the slip velocity [s/m]"""
+    """Law of the creep forces; `table` is the full theory, tabulated"""
     normal_contact: Literal["hertz", "kik-piotrowski"] = "hertz"
     """Normal contact: the Hertz ellipse of averaged curvatures, or non-elliptic patches"""
     contact_damping: NonNegative = 2e5

@@ -18,6 +18,8 @@ from railsim.definitions.base import (
     Positive,
     Text,
     TextPair,
+    one_or_two,
+    pair,
     rising,
 )
 from railsim.definitions.irregularity import Irregularity
@@ -35,6 +37,12 @@ def _forward(rows: tuple[Any, ...]) -> tuple[Any, ...]:
     if not rising(rows):
         raise ValueError("the arc length must increase from row to row")
     return rows
+
+
+def _softer_in_slip(factors: tuple[float, float]) -> tuple[float, float]:
+    if factors[1] > factors[0]:
+        raise ValueError("the factor of the slip area is at most that of the adhesion area")
+    return factors
 
 
 def _same_on_both_sides(value: Any) -> Any:
@@ -70,6 +78,13 @@ FrictionRows = Annotated[
     AfterValidator(_forward),
     BeforeValidator(_same_on_both_sides),
     _ROWS,
+]
+Share = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
+ThirdBody = Annotated[
+    tuple[Share, Share],
+    AfterValidator(_softer_in_slip),
+    BeforeValidator(pair),
+    one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
 ]
 WideningRows = Annotated[
     Annotated[tuple[tuple[Finite, Widening, Widening], ...], Field(min_length=1)],
@@ -161,6 +176,18 @@ CantElement = Annotated[ConstantCant | CantRamp, Field(discriminator="type")]
 VerticalElement = Annotated[ConstantGradient | GradientRamp, Field(discriminator="type")]
 
 
+class FallingFriction(Definition):
+    """Friction that falls with the slip velocity w of a contact patch (Polach 2005).
+
+    mu(w) = mu ((1 - rest) exp(-decay w) + rest)
+    """
+
+    rest: Share
+    """Friction at very large slip over that without slip [1]"""
+    decay: NonNegative
+    """How fast it falls with the slip velocity [s/m]"""
+
+
 class Track(FileDefinition):
     """A track: everything that its file says."""
 
@@ -180,6 +207,11 @@ class Track(FileDefinition):
     """Coefficient of friction, one number or [left, right] [1]"""
     friction_table: FrictionRows | None = None
     """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
+    friction_falling: FallingFriction | None = None
+    """How friction falls with the slip velocity; by default it does not"""
+    third_body: ThirdBody = (1.0, 1.0)
+    """Factor of Kalker's coefficients by a layer of dirt or water, one number or [adhesion, slip]:
+    the second, for the slip area, is for the creep law `polach` only [1]"""
     gauge_widening: WideningRows | None = None
     """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
     much each rail stands further out than the gauge says, one number being shared by both rails"""

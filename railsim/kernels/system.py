@@ -235,6 +235,8 @@ class Work(NamedTuple):
     decay : float64[m]          see `internal.constant_decays`
     spin_damping : float64[n]   estimate of -d(u_2')/d(u_2) of each wheelset [1/s]
     patch_* : per active patch, see `wheel_rail`
+    events : int64[2]           loaded patches so far, and how many of them were outside the range
+                                of the creep law
     """
 
     frames: np.ndarray
@@ -261,4 +263,5 @@ class Work(NamedTuple):
     patch: np.ndarray
     fastsim: np.ndarray
     offsets: np.ndarray
+    events: np.ndarray
     wheel: np.ndarray

@@ -265,8 +265,8 @@ def add_creep_forces(system, work, n, speed):
             wheel[w, side, W_PHI] = patch[PHI, k]
         if patch[MU_N, k] > 0.0:
             work.spin_damping[b] += (
-                contact.reduction * contact.shear_modulus * patch[A, k] * patch[B, k] * patch[C11, k] * cz * cz
-                / (speed * system.bodies.inertia[b, 1])
+                contact.reduction * contact.shear_modulus * patch[A, k] * patch[B, k]
+                * patch[C11, k] * cz * cz / (speed * system.bodies.inertia[b, 1])
             )
 
 
@@ -289,17 +289,21 @@ def wheel_rail(system, work, speed, state):
         complete_normal_force(b, system.bodies, work.frames, work.C, work.S, state, work.rail_force)
     patch = work.patch
     creepages(system, work, n, speed, state)
-    kalker_lookup(n, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
-                  patch[C23], patch[C33])
     contact = system.contact
+    beyond = kalker_lookup(n, patch[A], patch[B], contact.creep, patch[C11], patch[C22],
+                           patch[C23], patch[C33])
     if contact.friction_rest < 1.0:
         falling_friction(n, patch[MU_N], patch[XI_X], patch[XI_Y], speed, contact.friction_rest,
                          contact.friction_decay)
-    creep_forces(contact.law, n, contact.n_x, contact.n_y, patch[A], patch[B], patch[MU_N],
-                 patch[C11], patch[C22], patch[C23], patch[C33], contact.shear_modulus,
-                 contact.reduction, contact.slip_reduction, patch[XI_X], patch[XI_Y], patch[PHI],
-                 contact.law_table, contact.law_scale, work.offsets, work.fastsim, patch[T_X],
-                 patch[T_Y], patch[M_Z])
+    outside_law = creep_forces(
+        contact.law, n, contact.n_x, contact.n_y, patch[A], patch[B], patch[MU_N],
+        patch[C11], patch[C22], patch[C23], patch[C33], contact.shear_modulus,
+        contact.reduction, contact.slip_reduction, patch[XI_X], patch[XI_Y], patch[PHI],
+        contact.law_table, contact.law_scale, work.offsets, work.fastsim, patch[T_X],
+        patch[T_Y], patch[M_Z],
+    )
+    work.events[0] += n
+    work.events[1] += max(beyond, outside_law)
     add_creep_forces(system, work, n, speed)
     return RUNNING, 0, n
 

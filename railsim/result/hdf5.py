@@ -226,8 +226,10 @@ def _read(file: h5py.File, path: Path) -> Result:
             coordinates[name] = tuple(member.asstr()[()])
         else:
             quantities[name] = _quantity(name, member)
+    # whole numbers come as numpy's: JSON knows Python's only
+    facts = {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
     return Result(
-        StoredArrays(path, quantities), quantities, coordinates, dict(file.attrs), profiles, groups
+        StoredArrays(path, quantities), quantities, coordinates, facts, profiles, groups
     )
 
 

@@ -16,7 +16,10 @@ from railsim.result import Result, mid_curves, peaks
 from railsim.studies.case import Case
 
 FORMAT = "railsim-study-result/1"
-FACTS = ("status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor")
+FACTS = (
+    "status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor",
+    "patches_out_of_range",
+)  # fmt: skip
 
 Record = dict[str, Any]
 
