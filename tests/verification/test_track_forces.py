@@ -1,0 +1,263 @@
+"""What the track does to a vehicle: vertical profile, cant, friction, gauge, irregularities."""
+
+import numpy as np
+import pytest
+from dynamics import Settings, evaluate, load_vehicle, steady
+from rig import test_vehicle
+
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.track import Track
+from railsim.kernels.wheel_rail import W_NORMAL
+from railsim.simulation import simulate
+
+G = 9.81
+
+
+def track(plan=None, **more):
+    plan = plan or [{"type": "STR", "length": 1000.0}]
+    return Track.model_validate({"format": "railsim-track/1", "name": "t", "plan": plan, **more})
+
+
+def curve(radius=500.0, cant=0.1, length=250.0, **more):
+    """Straight, clothoid, a long circle."""
+    return track(
+        [{"type": "STR", "length": 20.0}, {"type": "CLO", "length": 80.0},
+         {"type": "CIR", "length": length, "radius": radius}],
+        cant=[{"type": "CST", "length": 20.0, "cant": 0.0}, {"type": "LIR", "length": 80.0},
+              {"type": "CST", "length": length, "cant": cant}],
+        **more,
+    )
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return load_vehicle("coach_manchester")
+
+
+def masses(vehicle):
+    """Mass of a vehicle and what its wheelsets' rotation adds [kg]."""
+    system = steady(vehicle, track(), Settings(), 10.0).model.system
+    axles = system.contact.body
+    turning = np.sum(system.bodies.inertia[axles, 1] / system.bodies.radius[axles] ** 2)
+    return np.sum(system.bodies.mass), turning
+
+
+# vertical profile ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_crest_takes_and_sag_gives_the_load_of_m_v2_over_r(coach, sign):
+    """R 10 km at 40 m/s: 1.63 % of the weight, met to 1 % of itself where the bounce has died."""
+    gradient = 0.02 * sign
+    profile = track(vertical=[
+        {"type": "CST", "length": 100.0, "gradient": gradient}, {"type": "LIR", "length": 400.0},
+        {"type": "CST", "length": 500.0, "gradient": -gradient},
+    ])
+    result = simulate(coach, profile, speed=40.0, until=420.0)
+    middle = (result.distance > 330.0) & (result.distance < 400.0)
+    mass, _ = masses(coach)
+    lost = mass * G - result.Q.sum(axis=(1, 2))[middle]
+    expected = sign * mass * 40.0**2 * (2 * 0.02 / 400.0)
+    assert np.mean(lost) == pytest.approx(expected, rel=0.01)
+    assert lost == pytest.approx(expected, rel=0.05)
+
+
+def test_free_coach_rolls_down_a_gradient_less_its_resistance(coach):
+    """V' = (m g sin(theta) - W) / (m + sum(I/r0^2)), once the jerk of the start has died.
+
+    Within 0.1 %: the wheels roll on radii a little off r0, 4 % of the mass turns with them.
+    """
+    slope, resistance = 0.02, 2000.0
+    profile = track(vertical=[{"type": "CST", "length": 1000.0, "gradient": -slope}])
+    drive = {"mode": "free", "resistance": (resistance, 0.0, 0.0)}
+    result = simulate(coach, profile, speed=20.0, duration=8.0, settings=Settings(drive=drive))
+    t, s = result.time, result.distance
+    late = t > 4.0
+    rate = 2.0 * np.polyfit(t[late], s[late], 2)[0]
+    mass, turning = masses(coach)
+    expected = (mass * G * np.sin(np.arctan(slope)) - resistance) / (mass + turning)
+    assert rate == pytest.approx(expected, rel=1e-3)
+
+
+def test_traction_accelerates_the_mass_and_the_turning_wheels(coach):
+    """Within 0.1 %, as above: also the spin, which `fast` integrates linearly implicitly."""
+    drive = {"mode": "free", "traction_table": ((0.0, 30e3), (100.0, 30e3))}
+    result = simulate(coach, track(), speed=20.0, duration=8.0, settings=Settings(drive=drive))
+    late = result.time > 4.0
+    rate = 2.0 * np.polyfit(result.time[late], result.distance[late], 2)[0]
+    mass, turning = masses(coach)
+    assert rate == pytest.approx(30e3 / (mass + turning), rel=1e-3)
+
+
+def test_cant_about_the_inner_rail_is_cant_about_the_centre_when_steady(coach):
+    centre = simulate(coach, curve(), speed=20.0)
+    inner = simulate(coach, curve(cant_rotation="inner_rail"), speed=20.0)
+    last = slice(-100, None)
+    # what is left of the bounce on the ramp: the centre line rises by 50 mm in the second case
+    assert inner.Q[last] == pytest.approx(centre.Q[last], rel=2e-3)
+    assert np.max(np.abs(inner.Y[last] - centre.Y[last])) < 100.0
+
+
+# rails --------------------------------------------------------------------------------------------
+
+
+def test_friction_counts_by_side_and_along_the_track(coach):
+    """The right rail loses its friction at s = 50 m, the left one at 250 m."""
+    rows = ((0.0, 0.4, 0.4), (50.0, 0.4, 0.4), (50.5, 0.4, 0.0), (250.0, 0.4, 0.0),
+            (250.5, 0.0, 0.0), (1000.0, 0.0, 0.0))
+    result = simulate(coach, curve(friction_table=rows), speed=20.0)
+    place, wear = result.wheelset_distance, result.T_gamma
+    in_curve = (place > 180.0) & (place < 249.0)
+    assert np.all(wear[:, :, 1][place > 51.0] == 0.0)
+    assert np.all(wear[:, :, 0][place > 251.0] == 0.0)
+    assert np.all(wear[place < 49.0] > 0.0)
+    assert np.max(wear[:, 0, 0][in_curve[:, 0]]) > 10.0
+
+
+def test_creep_forces_stay_within_friction(coach):
+    balance = steady(coach, curve(friction=[0.4, 0.2]), Settings(), 20.0)
+    model = balance.model
+    state = balance.state.copy()
+    for k, wheelset in enumerate(model.index.wheelsets):
+        state[model.index.coordinate(wheelset, 5)] += 8e-3 * (-1) ** k
+    work, _ = evaluate(model.system, state)
+    for w, body in enumerate(model.system.contact.body):
+        limit = 0.4 * work.wheel[w, 0, W_NORMAL] + 0.2 * work.wheel[w, 1, W_NORMAL]
+        assert 0.8 * limit < np.hypot(*work.rail_force[body, :2]) < 1.2 * limit
+
+
+def test_wider_gauge_lets_the_guiding_wheel_run_further_out(coach):
+    """In flange contact the leading wheelset follows the outer rail: by what the gauge gains."""
+    widening = 0.006
+    rows = ((0.0, widening, 0.0), (1000.0, widening, 0.0))
+    usual = simulate(coach, curve(250.0, 0.1, length=150.0), speed=15.0)
+    wide = simulate(coach, curve(250.0, 0.1, length=150.0, gauge_widening=rows), speed=15.0)
+    moved = wide.wheelset_lateral[-1, 0] - usual.wheelset_lateral[-1, 0]
+    assert moved == pytest.approx(-widening, abs=0.1e-3)
+
+
+def test_widening_of_one_rail_moves_the_middle(coach):
+    """On the straight the coach settles in the middle of its rails: half of the widening aside."""
+    rows = ((0.0, 0.0, 0.004), (1000.0, 0.0, 0.004))
+    result = simulate(coach, track(gauge_widening=rows), speed=15.0, until=400.0)
+    last = result.wheelset_lateral[result.distance > 350.0]
+    assert last == pytest.approx(0.002, abs=0.1e-3)
+
+
+def test_reverse_curve_mirrors_the_first_one(coach):
+    """Steady values of the second curve are those of the first with left and right exchanged."""
+    def arc(radius):
+        return [{"type": "CLO", "length": 60.0}, {"type": "CIR", "length": 160.0, "radius": radius},
+                {"type": "CLO", "length": 60.0}]
+
+    def cant(height):
+        return [{"type": "LIR", "length": 60.0}, {"type": "CST", "length": 160.0, "cant": height},
+                {"type": "LIR", "length": 60.0}]
+
+    straight = [{"type": "STR", "length": 20.0}]
+    level = [{"type": "CST", "length": 20.0, "cant": 0.0}]
+    reverse = track(straight + arc(400.0) + straight + arc(-400.0) + straight,
+                    cant=level + cant(0.1) + level + cant(-0.1) + level)
+    result = simulate(coach, reverse, speed=15.0)
+    first = int(np.argmin(np.abs(result.distance - 225.0)))
+    second = int(np.argmin(np.abs(result.distance - 525.0)))
+    assert result.Q[second, :, ::-1] == pytest.approx(result.Q[first], rel=3e-3)
+    assert np.max(np.abs(result.Y[second, :, ::-1] + result.Y[first])) < 150.0
+    assert np.abs(result.Y[first]).max() > 10e3
+
+
+# irregularities -----------------------------------------------------------------------------------
+
+
+def harmonic(wavelength, amplitude, length=200.0, rails=("left", "right")):
+    s = np.arange(20.0, length, wavelength / 40.0)
+    z = amplitude * np.sin(2.0 * np.pi * (s - 20.0) / wavelength)
+    rows = [(a, 0.0, b * ("left" in rails), 0.0, b * ("right" in rails))
+            for a, b in zip(s.tolist(), z.tolist(), strict=True)]
+    return {"type": "measured", "rows": rows, "fade": 10.0}
+
+
+def test_wheels_follow_a_slow_vertical_wave(coach):
+    """At 5 m/s over 10 m waves (0.5 Hz) the wheelsets ride the wave, height for height.
+
+    Heights count from those before the wave.  What is left is the change of the contact's elastic
+    approach, 1 um for a load change of 2 %.
+    """
+    irregular = track(irregularities=[harmonic(10.0, 3e-3)])
+    result = simulate(coach, irregular, speed=5.0, until=150.0)
+    bodies = list(result.coordinates["body"])
+    axles = [bodies.index(name) for name in result.coordinates["wheelset"]]
+    z = result.body_position[:, axles, 2]
+    place = result.wheelset_distance
+    inside = (place > 40.0) & (place < 140.0)
+    wave = 3e-3 * np.sin(2.0 * np.pi * (place - 20.0) / 10.0)
+    assert np.max(np.abs(z - z[0] - wave)[inside]) < 5e-6
+
+
+def test_rates_of_irregularities_reach_the_contact():
+    """A single wheelset is thrown up with the rail's vertical velocity: m z'' = Q - m g.
+
+    Over waves of 5 m at 10 m/s z'' = 1 mm (2 pi 2 Hz)^2 = 0.158 m/s2, 1.6 % of its weight: the
+    wheel force follows within 2 % of that; without the rail's rate in the contact damping and in
+    the creepage it would not.
+    """
+    wheelset = test_vehicle("single_wheelset")
+    irregular = track(irregularities=[harmonic(5.0, 1e-3)])
+    result = simulate(wheelset, irregular, speed=10.0, until=120.0)
+    s = result.distance
+    inside = (s > 40.0) & (s < 110.0)
+    wave = -1e-3 * (2.0 * np.pi * 2.0) ** 2 * np.sin(2.0 * np.pi * (s - 20.0) / 5.0)
+    force = result.Q.sum(axis=(1, 2)) - 1813.0 * G
+    # down is positive: a downward acceleration takes load off
+    assert np.max(np.abs(force + 1813.0 * wave)[inside]) < 0.02 * 1813.0 * 0.158
+
+
+def test_slow_run_over_a_twist_gives_the_static_change_of_load():
+    """Wagon on linear springs: dQ 2 b0 = k b_s^2 theta, theta the twist over the wheelbase.
+
+    Each axle's springs have the roll stiffness 2 k b_s^2, both are in series over the stiff body.
+    2 b0 = 1.506 m between the contacts of S1002 on 60E1.  The rails are level under the wagon's
+    middle, so that it does not lean to a side as a whole.  Within 2 %: the axles run up to 3 mm
+    beside the middle of the rails with 98 kN on them, against a moment of 26 kN m (1 %), and the
+    contacts turn a little under them (0.6 %).
+    """
+    wagon = test_vehicle("two_axle_wagon")
+    data = wagon.model_dump(exclude_none=True)
+    k = 4.0e6
+    axle = data["assemblies"]["axle"]
+    axle["elements"] = {"spring": {
+        "kind": "bushing", "bodies": ["wagon", "wheelset"], "point": [0.0, 1.0, -0.46],
+        "sides": "both", "stiffness": [5e6, 5e6, k], "damping": [0.0, 0.0, 40e3],
+    }}
+    wagon = type(wagon).model_validate(data)
+    ramp = 1e-3  # cross level per metre
+    s = np.arange(0.0, 80.0, 0.5)
+    level = ramp * (np.abs(s - 37.5) - 17.5) * (s > 20.0)
+    rows = [(a, 0.0, -0.5 * b, 0.0, 0.5 * b)
+            for a, b in zip(s.tolist(), level.tolist(), strict=True)]
+    twisted = track(irregularities=[{"type": "measured", "rows": rows, "fade": 0.0}])
+    result = simulate(wagon, twisted, speed=2.0, until=60.0)
+    row = int(np.argmin(np.abs(result.distance - 55.0)))
+    base = 1.506
+    expected = k * 1.0**2 * (ramp * 10.0 / base) / base
+    change = result.Q[row] - result.Q0
+    # the left rail rises: the front axle, ahead on the twist, is loaded on the left
+    assert change == pytest.approx(np.array([[1, -1], [-1, 1]]) * expected, rel=0.02)
+
+
+def test_irregular_rails_mirrored_give_the_mirrored_result(coach):
+    """Left and right of everything exchanged, through dips, kinks, twists and random rails."""
+    irregular = curve(length=100.0, friction=[0.4, 0.3],
+                      gauge_widening=((0.0, 0.0, 0.0), (100.0, 0.002, 0.001)), irregularities=[
+        {"type": "random", "spectrum": "erri_b176_low", "seed": 5, "begin": 15.0, "end": 150.0},
+        {"type": "dip", "s": 40.0, "length": 2.0, "depth": 0.003, "rail": "left"},
+        {"type": "kink", "s": 60.0, "length": 6.0, "offset": 0.003, "rail": "right"},
+        {"type": "twist", "s": 80.0, "length": 8.0, "height": 0.004},
+    ])
+    here = simulate(coach, irregular, speed=15.0)
+    there = simulate(mirrored_vehicle(coach), mirrored_track(irregular), speed=15.0)
+    # round-off of 1e-16 grows where wheels leave and meet their flanges
+    assert np.max(np.abs(here.Q - there.Q[:, :, ::-1])) < 1e-3
+    assert np.max(np.abs(here.Y + there.Y[:, :, ::-1])) < 1e-3
+    assert np.max(np.abs(here.wheelset_yaw + there.wheelset_yaw)) < 1e-10
+    assert np.ptp(here.Q) > 2e4
