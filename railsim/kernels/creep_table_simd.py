@@ -14,61 +14,70 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 _LANES = 8
-_BLOCK = 4  # neighbouring rows that are added to sums of their own: hides the latency
+_NODES = 4  # weights of a cubic B-spline in each direction
 _DOUBLES = ir.VectorType(ir.DoubleType(), _LANES)
 _FLOATS = ir.VectorType(ir.FloatType(), _LANES)
 _INT = ir.IntType(64)
 
 
 @intrinsic
-def sum_of_rows(typingctx, table, offsets, weights, stride, sums):
-    """Write to sums (16) the sum over i < 16, j < 4 of weights[4 i + j] times a row.
+def sum_of_rows(typingctx, table, start, strides, weights, first, sums):
+    """Write to sums (16) the sum over i, j, k < 4 of three weights times a row of 16 numbers.
 
-    The row begins at table[offsets[i] + j stride]; table: ndarray of float32, one dimension;
-    offsets: ndarray of int64, shape (16,); weights, sums: ndarray, shapes (64,), (16,).
+    The row begins at table[start + i strides[0] + j strides[1] + k strides[2]]; the weights are
+    weights[first + i] weights[first + 4 + j] weights[first + 8 + k].  table: ndarray of float32,
+    one dimension; start, first: int64; strides: three int64; weights, sums: contiguous ndarray of
+    any shape, taken as flat; they may be the same one if what is read and written is apart.
     """
-    signature = types.void(table, offsets, weights, types.intp, sums)
+    signature = types.void(table, types.int64, strides, weights, types.int64, sums)
 
     def codegen(context, builder, sig, args):
         def data(position):
             return context.make_array(sig.args[position])(context, builder, args[position]).data
 
-        _emit(builder, data(0), data(1), data(2), args[3], data(4))
+        begin = builder.gep(data(3), [args[4]])
+        _emit(builder, data(0), args[1], cgutils.unpack_tuple(builder, args[2]), begin, data(5))
         return context.get_dummy_value()
 
     return signature, codegen
 
 
-def _emit(builder, table, offsets, weights, stride, sums):
+def _emit(builder, table, start, strides, weights, sums):
     kind = ir.FunctionType(_DOUBLES, [_DOUBLES] * 3)
     fma = cgutils.get_or_insert_function(builder.module, kind, "llvm.fma.v8f64")
     zero = ir.Constant(_DOUBLES, [0.0] * _LANES)
     mask = ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
 
-    def splat(value):
-        single = builder.insert_element(zero, value, ir.Constant(ir.IntType(32), 0))
-        return builder.shuffle_vector(single, zero, mask)
+    def weight(number):
+        single = builder.load(builder.gep(weights, [number]))
+        filled = builder.insert_element(zero, single, ir.Constant(ir.IntType(32), 0))
+        return builder.shuffle_vector(filled, zero, mask)
 
-    parts = [[cgutils.alloca_once_value(builder, zero) for _ in range(2)] for _ in range(_BLOCK)]
-    for pair in parts:
-        for slot in pair:
-            builder.store(zero, slot)
-    with cgutils.for_range(builder, ir.Constant(_INT, 16)) as loop:
-        start = builder.load(builder.gep(offsets, [loop.index]))
-        first_weight = builder.mul(loop.index, ir.Constant(_INT, _BLOCK))
-        for j in range(_BLOCK):
-            place = builder.add(start, builder.mul(stride, ir.Constant(_INT, j)))
-            number = builder.add(first_weight, ir.Constant(_INT, j))
-            weight = splat(builder.load(builder.gep(weights, [number])))
-            for half in range(2):
-                at = builder.add(place, ir.Constant(_INT, _LANES * half))
-                pointer = builder.bitcast(builder.gep(table, [at]), ir.PointerType(_FLOATS))
-                row = builder.fpext(builder.load(pointer, align=4), _DOUBLES)
-                slot = parts[j][half]
-                builder.store(builder.call(fma, [weight, row, builder.load(slot)]), slot)
+    def constant(number):
+        return ir.Constant(_INT, number)
+
+    totals = [cgutils.alloca_once_value(builder, zero) for _ in range(2)]
+    inner = [weight(constant(2 * _NODES + k)) for k in range(_NODES)]
+    middle = [weight(constant(_NODES + j)) for j in range(_NODES)]
+    with cgutils.for_range(builder, constant(_NODES)) as loop:
+        plane = builder.add(start, builder.mul(strides[0], loop.index))
+        sums_j = [zero, zero]
+        for j in range(_NODES):
+            place = builder.add(plane, builder.mul(strides[1], constant(j)))
+            sums_k = [zero, zero]
+            for k in range(_NODES):
+                row = builder.add(place, builder.mul(strides[2], constant(k)))
+                for half in range(2):
+                    at = builder.add(row, constant(_LANES * half))
+                    pointer = builder.bitcast(builder.gep(table, [at]), ir.PointerType(_FLOATS))
+                    values = builder.fpext(builder.load(pointer, align=4), _DOUBLES)
+                    sums_k[half] = builder.call(fma, [inner[k], values, sums_k[half]])
+            sums_j = [builder.call(fma, [middle[j], sums_k[h], sums_j[h]]) for h in range(2)]
+        outer = weight(loop.index)
+        for half in range(2):
+            present = builder.load(totals[half])
+            builder.store(builder.call(fma, [outer, sums_j[half], present]), totals[half])
     for half in range(2):
-        total = zero
-        for j in range(_BLOCK):
-            total = builder.fadd(total, builder.load(parts[j][half]))
-        at = builder.gep(sums, [ir.Constant(_INT, _LANES * half)])
-        builder.store(total, builder.bitcast(at, ir.PointerType(_DOUBLES)), align=8)
+        at = builder.gep(sums, [constant(_LANES * half)])
+        pointer = builder.bitcast(at, ir.PointerType(_DOUBLES))
+        builder.store(builder.load(totals[half]), pointer, align=8)

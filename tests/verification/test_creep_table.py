@@ -90,19 +90,30 @@ def test_splines_reproduce_a_smooth_force():
 def test_both_sums_of_rows_agree():
     rng = np.random.default_rng(1)
     table = rng.normal(size=5000).astype(np.float32)
-    offsets = rng.integers(0, 4000, 16)
-    weights = rng.normal(size=64)
+    weights = rng.normal(size=20)
+    strides = (1100, 320, 92)
     sums = np.zeros((2, 16))
-    kernel._sum_of_rows_plain(table, offsets, weights, 92, sums[0])
+    kernel._sum_of_rows_plain(table, 37, strides, weights, 5, sums[0])
 
     from railsim.kernels import jit
 
     @jit
-    def compiled(table, offsets, weights, stride, sums):
-        kernel._sum_of_rows(table, offsets, weights, stride, sums)
+    def compiled(table, start, strides, weights, first, sums):
+        kernel._sum_of_rows(table, start, strides, weights, first, sums)
 
-    compiled(table, offsets, weights, 92, sums[1])
+    compiled(table, 37, strides, weights, 5, sums[1])
     np.testing.assert_allclose(sums[1], sums[0], rtol=1e-12, atol=1e-12)
+
+
+def test_many_patches_at_once_are_each_one_by_itself():
+    rng = np.random.default_rng(4)
+    n = 37  # more than two blocks
+    a, b = rng.uniform(2e-3, 9e-3, (2, n))
+    xi = rng.normal(size=(3, n)) * np.array([[2e-3], [2e-3], [0.5]])
+    together = creep_force(a, b, N, MU, *xi, law="table")
+    for i in range(n):
+        alone = creep_force(a[i], b[i], N, MU, *xi[:, i], law="table")
+        assert [t[i] for t in together] == [float(t) for t in alone]
 
 
 @pytest.mark.parametrize(("i_ratio", "i_theta"), [(7, 0)])
