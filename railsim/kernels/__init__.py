@@ -3,6 +3,11 @@
 Only math, numpy, numba and each other are imported here.  Compiled code is cached on disk in a
 folder named after a hash of *all* kernel sources: numba itself notices an edit only in the file
 that holds the compiled function, so that a caller would keep running an old callee.
+
+Every compiled function holds its callees for itself.  By numba's own choice the callees of one
+name, compiled alone or within several callers, are merged when they are loaded: the first one
+wins.  They are optimised differently, sums are reordered, and the last bits of a run would depend
+on what the process compiled or called before.
 """
 
 import hashlib
@@ -11,7 +16,10 @@ import shutil
 from pathlib import Path
 
 import numba
+from llvmlite.binding import Linkage
 from numba.core import config as _config
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 
 # The subset of fastmath that keeps NaN and infinity visible to the blow-up checks.
 FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
@@ -54,13 +62,36 @@ def _is_stale(old: Path, current: Path) -> bool:
 _FOLDER = os.environ.get("NUMBA_CACHE_DIR") or _cache_folder()  # a user's choice comes first
 
 
+class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
+    """Compiled code whose callees are invisible to all other code."""
+
+    def _finalize_final_module(self):
+        self._finalized = True  # no more is added: what callers link is taken before
+        self._get_module_for_linking()
+        for function in self._final_module.functions:
+            if function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._finalize_final_module()
+
+
+class _Compiler(Compiler):  # type: ignore[misc]
+    def compile_extra(self, func):
+        self.state.library = _SelfContained(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
+        return super().compile_extra(func)
+
+
 def _compiled(function, **options):
     """Compile into the cache of these sources, leaving numba's own choice to everybody else."""
     before = _config.CACHE_DIR
     _config.CACHE_DIR = str(_FOLDER or before)
     try:
         return numba.njit(
-            cache=_FOLDER is not None, error_model="numpy", fastmath=FASTMATH, **options
+            cache=_FOLDER is not None,
+            error_model="numpy",
+            fastmath=FASTMATH,
+            pipeline_class=_Compiler,
+            **options,
         )(function)
     finally:
         _config.CACHE_DIR = before

@@ -26,6 +26,16 @@ assert locate_frames(track, np.zeros(1), 0, 0.5, frames, *cells) == 0
 print(frames[0, 12], sum(locate_frames.stats.cache_misses.values()))
 """
 
+# of all functions in the compiled code of `locate_frames`: those that other code could be bound to
+VISIBLE = """
+from llvmlite.binding import Linkage
+(compiled,) = locate_frames.overloads.values()
+functions = list(compiled.library.get_defined_functions())
+visible = [function.name for function in functions if function.linkage != Linkage.internal]
+assert any("track_frame" in function.name.partition("B")[0] for function in functions)
+print(*(name.partition("B")[0] for name in visible))
+"""
+
 
 @pytest.fixture
 def copied_kernels(tmp_path):
@@ -36,18 +46,23 @@ def copied_kernels(tmp_path):
     return package / "kernels"
 
 
-def run(folder, **variables):
+def output(program, folder, **variables):
     environment = {name: text for name, text in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     environment |= {"RAILSIM_CACHE_DIR": str(folder / "cache"), **variables}
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", program],
         cwd=folder,  # where the copy is imported from
         env=environment,
         stdout=subprocess.PIPE,
         text=True,
         check=True,
     )
-    number, misses = done.stdout.split()
+    return done.stdout.splitlines()
+
+
+def run(folder, **variables):
+    (line,) = output(PROGRAM, folder, **variables)
+    number, misses = line.split()
     return float(number), int(misses)
 
 
@@ -81,3 +96,11 @@ def test_folder_that_a_user_chose_for_numba_is_used(copied_kernels, tmp_path):
 def test_without_a_folder_to_write_to_kernels_run_uncached(copied_kernels, tmp_path):
     (tmp_path / "file").touch()
     run(copied_kernels.parent.parent, RAILSIM_CACHE_DIR=str(tmp_path / "file" / "cache"))
+
+
+@pytest.mark.slow
+def test_no_other_code_is_bound_to_the_callees_of_a_function(copied_kernels):
+    """Else results depend on which function was compiled or called first, see `railsim.kernels`."""
+    _, names = output(PROGRAM + VISIBLE, copied_kernels.parent.parent)
+    assert "locate_frames" in names
+    assert "track_frame" not in names
