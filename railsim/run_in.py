@@ -1,9 +1,12 @@
-"""Starting within a curve: the vehicle settles on an auxiliary track that leads into it.
+"""The state in which a run starts: anywhere along a track, in curves and on irregular rails.
 
-The equilibrium on straight track is no state for a curve: put there, the wheelsets would climb.
-An auxiliary track begins straight, takes up curvature and cant of the starting place over a
-transition, and keeps them until the vehicle has settled; the state at its end, relative to the
-track frames, is the state at the start.
+The equilibrium on straight smooth track is no state for a curve or for rails that lean: put there,
+the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
+
+- into a curve over an auxiliary track, which begins straight, takes up curvature and cant of the
+  place over a transition, and keeps them until the vehicle has settled; the state at its end,
+  relative to the track frames, is the state at the place;
+- onto irregular rails over the last seconds of the real track before the start.
 """
 
 import math
@@ -13,12 +16,15 @@ from numpy.typing import NDArray
 
 from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
 from railsim.definitions.track import Track
-from railsim.equilibrium import Equilibrium
-from railsim.errors import Fault, InputError
+from railsim.equilibrium import Equilibrium, initial_state
+from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
+from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST, time_loop
+from railsim.kernels.track_frame import rail_state
 from railsim.time_step import empty_recorder
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import CANT_BASE, Alignment
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -26,6 +32,129 @@ Floats = NDArray[np.float64]
 STRAIGHT = 20.0  # m
 TRANSITION_TIME, SETTLING_TIME = 4.0, 6.0  # s; several periods of the car body
 NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that need no run-in
+APPROACH_TIME, APPROACH = 3.0, 30.0  # s and m at least of irregular rails before the start
+SMOOTH = 10.0  # m before the track's beginning where the approach may begin, beside the vehicle
+
+
+def start_state(
+    model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int
+) -> Floats:
+    """State of the undisturbed vehicle at `start`.
+
+    Parameters
+    ----------
+    start : float
+        Arc length of the reference body [m].
+    step, scheme : float, int
+        Time step [s] and scheme of the run.
+
+    Returns
+    -------
+    float64[n_state]
+        At time 0 and exactly at `start`.
+
+    Raises
+    ------
+    InputError
+        The vehicle does not stay on the track there.
+    ModelError
+        The vehicle is longer than the track's table.
+    """
+    speed = float(balance.state[-1])
+    steps = _approach(model, start, speed, step)
+    place = start - steps * speed * step
+    state = settled(model, balance, track, place, step)
+    if state is None:
+        work = _located(model, place)
+        state = initial_state(model, balance, place, work.frames)
+    state[-2] = place
+    if steps:
+        follow_rails(model, state)
+        system = model.system._replace(
+            drive=CONSTANT_SPEED, loads=model.system.loads._replace(
+                body=model.system.loads.body[:0]),
+        )
+        _run(model, system, state, step, steps, scheme, start, "irregular rails")
+    state[-3:] = 0.0, start, speed
+    return state
+
+
+def _friction(track: Track, place: float) -> tuple[float, float]:
+    """Coefficients of friction of the left and right rail at a place."""
+    if track.friction_table is None:
+        return track.friction
+    table = np.array(track.friction_table)
+    left, right = (float(np.interp(place, table[:, 0], table[:, k])) for k in (1, -1))
+    return left, right
+
+
+def _approach(model: Model, start: float, speed: float, step: float) -> int:
+    """Steps to drive on irregular rails before the start, 0 on smooth ones."""
+    system = model.system
+    if not system.track.has_irregularity:
+        return 0
+    work = _located(model, start)
+    rails = np.zeros((2, 4))
+    smooth = True
+    for body in system.contact.body:
+        smooth &= not _rails(system, work, body, rails).any()
+    if smooth:
+        return 0
+    behind = -float(np.min(system.frame_offset))
+    room = start - system.track.s_start - behind - SMOOTH
+    return max(0, math.floor(min(max(APPROACH_TIME * speed, APPROACH), room) / (speed * step)))
+
+
+def _located(model: Model, place: float) -> Work:
+    """Work arrays with the track frames of a vehicle at `place`."""
+    system = model.system
+    work = work_arrays(system)
+    reference = system.bodies.frame[system.bodies.reference]
+    if locate_frames(system.track, system.frame_offset, reference, place, work.frames, work.cell,
+                     work.cell_u) != RUNNING:
+        raise ModelError("the vehicle is longer than the track's table allows")
+    return work
+
+
+def _rails(system: System, work: Work, body: int, rails: Floats) -> Floats:
+    """Displacements and slopes of both rails under a wheelset: y, z, dy/ds, dz/ds by rail."""
+    frame = system.bodies.frame[body]
+    for side in range(2):
+        rail_state(system.track, work.cell[frame], work.cell_u[frame], side, rails[side])
+    return rails
+
+
+def follow_rails(model: Model, state: Floats) -> None:
+    """Put the wheelsets on irregular rails, moving as the rails lead them."""
+    system, speed = model.system, state[-1]
+    work = _located(model, float(state[-2]))
+    half_base = 0.5 * CANT_BASE
+    n = model.index.n_bodies
+    rails = np.zeros((2, 4))
+    for body in system.contact.body:
+        _rails(system, work, body, rails)
+        y, z, y_slope, z_slope = rails.mean(axis=0)
+        _, height, _, height_slope = rails[1] - rails[0]
+        state[6 * body + 1 : 6 * body + 4] += y, z, 0.5 * height / half_base
+        place = 6 * n + 6 * body
+        state[place + 1 : place + 3] += speed * y_slope, speed * z_slope
+        state[place + 3] += speed * 0.5 * height_slope / half_base
+
+
+def _run(
+    model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
+    start: float, where: str,
+) -> None:
+    """Advance a state; InputError if the vehicle leaves the track."""
+    status, *_ = time_loop(
+        system, work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
+        empty_recorder(model, 1), scheme, step, 1, steps, steps + 2,
+    )
+    if status != RUNNING:
+        raise InputError([Fault(
+            "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "
+            f"{where}, at {state[-1]:g} m/s", "a start on straight track or a lower speed",
+        )])
 
 
 def settled(
@@ -70,7 +199,8 @@ def settled(
             {"type": "LIR", "length": transition},
             {"type": "CST", "length": rest, "cant": cant},
         ],
-        vertical=[], irregularities=[],
+        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
+        friction=_friction(track, start),
     )
     system = model.system._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED, loads=model.system.loads._replace(
@@ -78,14 +208,6 @@ def settled(
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)
-    status, *_ = time_loop(
-        system, work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
-        empty_recorder(model, 1), FAST, step, 1, steps - 1, steps + 1,
-    )
-    if status != RUNNING:
-        raise InputError([Fault(
-            "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "
-            f"R {radius:.0f} m, at {speed:g} m/s", "a start on straight track or a lower speed",
-        )])
+    _run(model, system, state, step, steps - 1, FAST, start, f"R {radius:.0f} m")
     state[-3:] = balance.state[-3:]
     return state

@@ -19,19 +19,16 @@ from railsim.assembly import Model, assemble, level_track_with_friction, work_ar
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import Equilibrium, equilibrium, initial_state
-from railsim.errors import Fault, InputError, ModelError, nearest
-from railsim.kernels.rhs import locate_frames, right_hand_side
+from railsim.equilibrium import Equilibrium, equilibrium
+from railsim.errors import Fault, InputError, nearest
+from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
-from railsim.kernels.system import Work
 from railsim.kernels.time_loop import record_state, time_loop
-from railsim.kernels.track_frame import rail_state
 from railsim.outputs import OutputPlan
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
-from railsim.run_in import settled
+from railsim.run_in import start_state
 from railsim.time_step import SCHEMES, choose_step
-from railsim.track.alignment import CANT_BASE
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -222,9 +219,10 @@ def prepare(
     model = balance.model
     pace = Pace(model, settings, {speed: balance.state})
     step, _ = pace.at(speed)
-    state = settled(model, balance, track, start, step)
+    state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
+    _disturb(model, settings, state)
     return Preparation(
-        model, balance, _start(model, balance, settings, start, state),
+        model, balance, state,
         end_time=math.inf if duration is None else duration,
         end_distance=track.length if until is None else until,
         pace=pace,
@@ -307,20 +305,9 @@ def output_interval(settings: Settings, speed: float) -> float:
     return 1.0 / settings.output_rate
 
 
-def _start(
-    model: Model, balance: Equilibrium, settings: Settings, start: float, state: Floats | None
-) -> Floats:
-    """Initial state at `start`: `state` or steady rolling, disturbed as the settings say."""
-    work = work_arrays(model.system)
-    bodies = model.system.bodies
-    if locate_frames(model.system.track, model.system.frame_offset, bodies.frame[bodies.reference],
-                     start, work.frames, work.cell, work.cell_u) != RUNNING:
-        raise ModelError("the vehicle is longer than the track's table allows")
-    if state is None:
-        state = initial_state(model, balance, start, work.frames)
-    state[-2] = start
+def _disturb(model: Model, settings: Settings, state: Floats) -> None:
+    """Add the initial disturbance of the settings to a state."""
     n = model.index.n_bodies
-    _follow_rails(model, work, state)
     for name, change in settings.initial.items():
         if name not in model.index.bodies:
             raise InputError([Fault(
@@ -334,25 +321,6 @@ def _start(
         state[6 * n + place : 6 * n + place + 6] += (
             change.vx, change.vy, change.vz, change.vroll, change.vpitch, change.vyaw,
         )
-    return state
-
-
-def _follow_rails(model: Model, work: Work, state: Floats) -> None:
-    """Put the wheelsets on rails that are irregular at the start, moving as the rails lead them."""
-    system, speed = model.system, state[-1]
-    half_base = 0.5 * CANT_BASE
-    n = model.index.n_bodies
-    for body in system.contact.body if system.track.has_irregularity else ():
-        frame = system.bodies.frame[body]
-        rails = np.zeros((2, 4))
-        for side in range(2):
-            rail_state(system.track, work.cell[frame], work.cell_u[frame], side, rails[side])
-        y, z, y_slope, z_slope = rails.mean(axis=0)
-        _, height, _, height_slope = rails[1] - rails[0]
-        state[6 * body + 1 : 6 * body + 4] += y, z, 0.5 * height / half_base
-        place = 6 * n + 6 * body
-        state[place + 1 : place + 3] += speed * y_slope, speed * z_slope
-        state[place + 3] += speed * 0.5 * height_slope / half_base
 
 
 def _loop(
