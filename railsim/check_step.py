@@ -15,10 +15,7 @@ FULL, HALF = "step", "half"
 
 
 def half_step(
-    result: Result,
-    *,
-    resume: Result | None = None,
-    progress: Callable[[float], None] | None = None,
+    result: Result, *, progress: Callable[[float], None] | None = None
 ) -> Result:
     """Run the inputs of a result again at half its step.
 
@@ -26,8 +23,6 @@ def half_step(
     ----------
     result : Result
         A run; it stays as it is.
-    resume : Result, optional
-        The result that `result` went on from.
     progress : callable, optional
         Called with the finished fraction now and then.
 
@@ -40,24 +35,9 @@ def half_step(
     ------
     InputError, ModelError : as `railsim.simulate`.
     """
-    settings = result.settings().replace(step=0.5 * float(result.attributes["step"]))
-    return simulate(
-        result.vehicle(),
-        result.track(),
-        speed=result.speed,
-        start=float(result.attributes["start"]),
-        duration=_asked(result, "duration"),
-        until=_asked(result, "until"),
-        settings=settings,
-        profiles=result.profiles,
-        resume=resume,
-        progress=progress,
-    )
-
-
-def _asked(result: Result, end: str) -> float | None:
-    value = result.attributes.get(f"asked_{end}")
-    return None if value is None else float(value)
+    inputs = result.inputs()
+    inputs["settings"] = inputs["settings"].replace(step=0.5 * float(result.attributes["step"]))
+    return simulate(**inputs, progress=progress)
 
 
 def step_differences(result: Result, half: Result) -> tuple[Comparison, ...]:

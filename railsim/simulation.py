@@ -36,6 +36,8 @@ Progress = Callable[[float], None]
 _LOG = logging.getLogger(__name__)
 ROWS = 500  # outputs per chunk: some hundredths of a second of computing
 SPEED_RANGE = (0.5, 150.0)  # m/s
+# settings that a continued run may have of its own; it has no initial disturbance
+OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial")
 
 
 @dataclass
@@ -74,7 +76,7 @@ def simulate(
     sink: Sink | None = None,
     progress: Progress | None = None,
     profiles: Mapping[str, Profile] | None = None,
-    resume: Result | None = None,
+    resume: Result | Floats | None = None,
 ) -> Result:
     """Run one vehicle over one track.
 
@@ -98,8 +100,10 @@ def simulate(
         Called with the finished fraction now and then.
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
-    resume : Result, optional
-        A result of the same vehicle, track and settings whose end is the beginning of this run.
+    resume : Result or float64[n_state], optional
+        A result of the same vehicle, track and settings (outputs apart) whose end is the beginning
+        of this run, or the state itself (``result.groups["state"]["end"]``); either gives speed and
+        start.
 
     Returns
     -------
@@ -124,13 +128,14 @@ def simulate(
     """
     started = time.perf_counter()
     settings = settings or Settings()
-    if resume is not None:
-        speed, start = float(resume.groups["state"]["state"][-1]), resume_place(resume)
+    before = None if resume is None else state_before(vehicle, track, settings, resume)
+    if before is not None:
+        speed, start = float(before[-1]), float(before[-2])
     speed = initial_speed(settings, speed, start)
     check_range(track, speed, start, duration, until)
     prepared = prepare(vehicle, track, settings, speed, start, duration, until, profiles)
-    if resume is not None:
-        take_up(prepared, resume, duration)
+    if before is not None:
+        take_up(prepared, before, duration)
     sink = sink or MemorySink()
     plan = OutputPlan(prepared.model, settings, track)
     sink.begin(plan.coordinates, plan.quantities)
@@ -163,7 +168,7 @@ def simulate(
         attributes,
         {"Q0": prepared.balance.Q0},
         prepared.model.profiles,
-        {"state": {"state": state}},
+        {"state": {"end": state} | ({} if before is None else {"start": before})},
     )
     for remark in result.remarks:
         _LOG.warning(remark)
@@ -229,21 +234,49 @@ def prepare(
     )
 
 
-def resume_place(resume: Result) -> float:
-    """Arc length at which a result ended [m]."""
-    return float(resume.groups["state"]["state"][-2])
+def state_before(
+    vehicle: Vehicle, track: Track, settings: Settings, resume: Result | Floats
+) -> Floats:
+    """State with which a run goes on from another one.
+
+    Raises
+    ------
+    InputError
+        The result holds no state, or is of another vehicle, track or other settings: going on would
+        not give what an undisturbed run gives.
+    """
+    if not isinstance(resume, Result):
+        return np.array(resume, dtype=float)
+    faults = []
+    if "end" not in resume.groups.get("state", {}):
+        faults.append(Fault("--continue", "", "the result holds no state at its end",
+                            "a result of `railsim run`"))
+    for kind, text in (("vehicle", vehicle.to_toml()), ("track", track.to_toml())):
+        if text != resume.attributes[f"{kind}_toml"]:
+            faults.append(Fault("--continue", "", f"the result is of another {kind}",
+                                f"the {kind} and the --set {kind}... of the result"))
+    here, there = settings.model_dump(mode="json"), resume.settings().model_dump(mode="json")
+    faults += [
+        Fault("--continue", f"settings.{key}", f"found {here[key]}",
+              f"{there[key]}, as in the result (--settings, --set)")
+        for key in here
+        if key not in OUTPUT_SETTINGS and here[key] != there[key]
+    ]
+    if faults:
+        raise InputError(faults)
+    return np.array(resume.groups["state"]["end"])
 
 
-def take_up(prepared: Preparation, resume: Result, duration: float | None) -> None:
-    """Let a prepared run begin where `resume` ended."""
-    state = resume.groups["state"]["state"]
-    if len(state) != len(prepared.state):
+def take_up(prepared: Preparation, before: Floats, duration: float | None) -> None:
+    """Let a prepared run begin in the state `before`."""
+    if before.shape != prepared.state.shape:
         raise InputError([Fault(
-            "--continue", "", "the result is of another vehicle", "the same vehicle and track",
+            "--continue", "", f"a state of {before.size} values",
+            f"{prepared.state.size} values, those of this vehicle",
         )])
-    prepared.state = np.array(state)
+    prepared.state = before.copy()
     if duration is not None:
-        prepared.end_time = float(state[-3]) + duration
+        prepared.end_time = float(before[-3]) + duration
 
 
 class Pace:

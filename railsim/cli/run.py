@@ -17,7 +17,7 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from railsim.compare import Comparison
     from railsim.definitions.settings import Settings
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.argument("track", metavar="TRACK")
 @click.option("--speed", type=float, metavar="V", help="Speed in m/s.")
 @click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
-@click.option("--start", type=float, default=0.0, metavar="S", help="Start in m along the track.")
+@click.option("--start", type=float, metavar="S", help="Start in m along the track; default 0.")
 @click.option("--duration", type=float, metavar="T", help="Length of the run in s.")
 @click.option("--until", type=float, metavar="S", help="End of the run in m along the track.")
 @click.option(
@@ -49,7 +49,7 @@ def command(
     track: str,
     speed: float | None,
     out: str | None,
-    start: float,
+    start: float | None,
     duration: float | None,
     until: float | None,
     before: str | None,
@@ -78,11 +78,11 @@ def command(
     from railsim.studies.run import run_case
 
     how = {"settings": settings, "duration": duration, "until": until, "assignments": assignments}
-    resume = _opened(before) if before else None
+    resume = _opened(before, {"--speed": speed, "--start": start}) if before else None
     if resume:
-        speed, how["start"] = _end_of(resume)
-    else:
-        how["start"] = start
+        end = resume.groups["state"]["end"]
+        speed, start = float(end[-1]), float(end[-2])
+    how["start"] = start or 0.0
     case, path = _checked((vehicle, track, speed), how, out, plots, overwrite)
     if not quiet:
         for remark in track_remarks(case.track):
@@ -102,7 +102,7 @@ def command(
         from railsim.check_step import difference_record, half_step, step_differences
 
         with progress_bar("half the step", quiet=quiet) as progress:
-            half = half_step(result, resume=resume, progress=progress)
+            half = half_step(result, progress=progress)
         differences = step_differences(result, half)
         record["half_step"] = [difference_record(row) for row in differences]
         lines += ["", *_step_lines(result, differences)]
@@ -113,23 +113,26 @@ def command(
     return DONE if result.status == "complete" else ENDED_EARLY
 
 
-def _opened(before: str) -> "Result":
+def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
+    """Open a result to go on from, which says speed and place itself."""
     from railsim.errors import Fault, InputError
     from railsim.result import open_result
 
-    result = open_result(before)
-    if "state" not in result.groups:
-        raise InputError(
-            [Fault("--continue", "", f"{before} holds no state", "run it again first")]
-        )
+    faults = [
+        Fault(option, "", "given together with --continue", "one of the two")
+        for option, value in given.items()
+        if value is not None
+    ]
+    result = None
+    try:
+        result = open_result(before)
+        if "end" not in result.groups.get("state", {}):
+            faults.append(Fault("--continue", "", f"{before} holds no state", "run it again first"))
+    except InputError as error:
+        faults.extend(error.faults)
+    if faults or result is None:
+        raise InputError(faults)
     return result
-
-
-def _end_of(result: "Result") -> tuple[float, float]:
-    """Return speed and place at the end of a result [m/s], [m]."""
-    from railsim.simulation import resume_place
-
-    return float(result.groups["state"]["state"][-1]), resume_place(result)
 
 
 def _checked(

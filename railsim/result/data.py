@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import ModelError, nearest
+from railsim.errors import nearest
 from railsim.notation import Quantity
 from railsim.profiles.profile import Profile
 
@@ -47,7 +47,8 @@ class Result:
     profiles : mapping of str to Profile
         Every wheel and rail profile that was used, by its name in the vehicle or track.
     groups : mapping of str to mapping of str to ndarray
-        Further arrays by group, such as the state at the end in ``state``.
+        Further arrays by group: ``state`` holds the whole state at the ``end`` of the run, and the
+        one at its ``start`` where that went on from another run.
 
     Examples
     --------
@@ -181,7 +182,7 @@ class Result:
 
     @property
     def groups(self) -> Mapping[str, Mapping[str, Array]]:
-        """Further arrays by group, such as the state at the end in ``state``."""
+        """Further arrays by group: the states at the ``end`` and ``start`` in ``state``."""
         return self._groups
 
     @property
@@ -229,15 +230,9 @@ class Result:
         return Settings.model_validate(json.loads(str(self._attributes["settings_json"])))
 
     def inputs(self) -> dict[str, Any]:
-        """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again.
-
-        Raises
-        ------
-        ModelError : the run went on from another one, whose end it does not carry.
-        """
+        """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""
         facts = self._attributes
-        if "continues" in facts:
-            raise ModelError(f"this run went on from '{facts['continues']}': run that one first")
+        states: Mapping[str, Array] = self._groups.get("state", {})
         return {
             "vehicle": self.vehicle(),
             "track": self.track(),
@@ -247,6 +242,7 @@ class Result:
             "duration": facts.get("asked_duration"),
             "until": facts.get("asked_until"),
             "profiles": self.profiles,
+            "resume": states.get("start"),
         }
 
     # -- elsewhere ----------------------------------------------------------------------------

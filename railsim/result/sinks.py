@@ -68,7 +68,7 @@ class Sink(Protocol):
         profiles : mapping of str to Profile
             Every profile that was used, by its name in the vehicle or track.
         groups : mapping of str to mapping of str to ndarray
-            Further arrays, such as the state at the end in the group ``state``.
+            Further arrays, such as the states at start and end in the group ``state``.
         """
 
     def abort(self) -> None:

@@ -43,21 +43,80 @@ def test_result_runs_again_from_itself_to_the_same_arrays(written):
         np.testing.assert_array_equal(again[name], result[name])
 
 
-def test_run_that_is_continued_equals_an_undisturbed_one(written, tmp_path):
-    parts = [tmp_path / "first.h5", tmp_path / "second.h5"]
-    options = ["--set", "settings.output_rate=100", "--quiet"]
-    first = [*COACH, "--speed", "20", "--until", "6", "--out", str(parts[0]), *options]
-    second = [*COACH, "--continue", str(parts[0]), "--until", "10", "--out", str(parts[1])]
-    assert main(first) == 0
-    assert main([*second, *options]) == 0
+def continued(folder, ends, options=()):
+    """Files of a run in parts, each the continuation of the one before."""
+    rate = ["--set", "settings.output_rate=100", "--quiet"]
+    paths = [folder / f"{end}.h5" for end in ends]
+    assert main([*COACH, "--speed", "20", "--until", ends[0], "--out", str(paths[0]), *rate]) == 0
+    for before, path, end in zip(paths, paths[1:], ends[1:], strict=False):
+        begin = ["--continue", str(before), "--until", end]
+        assert main([*COACH, *begin, "--out", str(path), *rate, *options]) == 0
+    return paths
+
+
+def test_run_that_is_continued_twice_equals_an_undisturbed_one(written, tmp_path):
     whole = railsim.open_result(written)
-    begin, end = (railsim.open_result(part) for part in parts)
-    count = len(end.time)
-    np.testing.assert_array_equal(end.Q, whole.Q[-count:])
-    np.testing.assert_array_equal(end.body_position, whole.body_position[-count:])
-    assert begin.distance[-1] == end.distance[0]
-    with pytest.raises(railsim.ModelError, match="run that one first"):
-        end.inputs()
+    parts = [railsim.open_result(path) for path in continued(tmp_path, ["4", "6", "10"])]
+    rows = 0
+    for part in parts:
+        for name in ("time", "distance", "Q", "Y", "body_position", "body_acceleration"):
+            there = whole[name][rows : rows + len(part.time)]
+            np.testing.assert_array_equal(part[name], there)
+        rows += len(part.time) - 1  # the instant where two parts meet is in both
+    assert rows == len(whole.time) - 1
+    np.testing.assert_array_equal(
+        parts[-1].groups["state"]["end"], whole.groups["state"]["end"])
+
+
+def test_continued_run_runs_again_from_itself(tmp_path):
+    """The file holds the state that it went on from: the first part is not needed."""
+    first, second = continued(tmp_path, ["4", "6"])
+    first.unlink()
+    result = railsim.open_result(second)
+    again = railsim.simulate(**result.inputs())
+    for name in result:
+        np.testing.assert_array_equal(again[name], result[name])
+    assert result.attributes["continues"] == "coach_manchester_curve_r250_20"
+
+
+def test_step_of_a_continued_run_is_checked(tmp_path, capsys):
+    continued(tmp_path, ["4", "6"], ["--check-step"])
+    assert "Check of the step" in capsys.readouterr().out
+
+
+def test_continued_run_ends_after_its_own_duration(written, tmp_path):
+    path = tmp_path / "run.h5"
+    given = ["--continue", str(written), "--duration", "0.25", "--out", str(path)]
+    assert main([*COACH, *given, "--set", "settings.output_rate=100", "--quiet"]) == 0
+    result = railsim.open_result(path)
+    assert result.time[[0, -1]] == pytest.approx([0.5, 0.75])
+    assert result.distance[-1] == pytest.approx(15.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--speed", "20"], "--speed: given together with --continue"),
+        (["--start", "5"], "--start: given together with --continue"),
+        (["--set", "vehicle.bodies.carbody.mass=4e4"], "of another vehicle"),
+        (["--set", "track.friction=0.3"], "of another track"),
+        (["--set", "settings.scheme=heun"], "settings.scheme: found heun"),
+        (["--until", "5"], "more than the start, 10 m"),
+    ],
+)
+def test_continuation_of_something_else_is_refused(written, tmp_path, capsys, change, words):
+    path = tmp_path / "run.h5"
+    given = [*COACH, "--continue", str(written), "--out", str(path), *change]
+    assert main([*given, "--quiet"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Traceback" not in error
+    assert not path.exists()
+
+
+def test_continuation_of_no_result_is_refused(tmp_path, capsys):
+    assert main([*COACH, "--continue", str(tmp_path / "none.h5"), "--quiet"]) == 2
+    assert "there is no such file" in capsys.readouterr().err
 
 
 def test_run_may_start_anywhere(tmp_path):

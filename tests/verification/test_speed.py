@@ -35,7 +35,7 @@ def test_speed_table_is_met(bogie, straight, scheme):
     """V(s) of the table at every output, by the state's own speed: round-off of the table."""
     result = simulate(bogie, straight, settings=in_table(scheme=scheme), until=200.0)
     assert result.status == "complete"
-    end = result.groups["state"]["state"]
+    end = result.groups["state"]["end"]
     assert end[-1] == pytest.approx(np.interp(end[-2], *np.array(RAMP).T), abs=1e-6)
     middle = 0.5 * (result.distance[1:] + result.distance[:-1])
     smooth = (np.abs(middle - 50.0) > 1.0) & (np.abs(middle - 150.0) > 1.0)
