@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 PICTURES = ("profiles.png", "functions.png", "conicity.png", "patches.png")
 TABLES = ("functions.csv", "conicity.csv", "patches.csv")
+OTHER_NORMAL = {"hertz": "kik-piotrowski", "kik-piotrowski": "hertz"}
 STEP = 5e-5
 """Step of the lateral displacement [m]."""
 
@@ -69,7 +70,7 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
 )
 @click.option(
     "--normal",
-    type=click.Choice(["hertz", "kik-piotrowski"]),
+    type=click.Choice(list(OTHER_NORMAL)),
     default="hertz",
     show_default=True,
     help="Normal contact of the table; with --exact both are compared.",
@@ -166,7 +167,7 @@ def command(
         _write_tables(folder, geometry, amplitudes, conicity, contacts, solutions)
         other = _other_table(pairs[1], radius_pair, geometry, list(contacts), load, normal, exact)
         _write_pictures(
-            folder, geometry, pairs, amplitudes, conicity, contacts, load, solutions, other
+            folder, geometry, pairs, amplitudes, conicity, contacts, load, normal, solutions, other
         )
     if as_json:
         data = _data(geometry, amplitudes, conicity, contacts, solutions, notes)
@@ -327,8 +328,7 @@ def _other_table(
     """Patches with the other kind of normal contact, for the comparison."""
     if not wanted:
         return None
-    other = "kik-piotrowski" if normal == "hertz" else "hertz"
-    return _loaded(_table(pair, radii, other), geometry, places, load)
+    return _loaded(_table(pair, radii, OTHER_NORMAL[normal]), geometry, places, load)
 
 
 def _write_pictures(
@@ -339,6 +339,7 @@ def _write_pictures(
     conicity: "np.ndarray[Any, Any]",
     contacts: dict[float, "LoadedContact"],
     load: float,
+    normal: str,
     solutions: dict[float, "ExactContact"],
     other: dict[float, "LoadedContact"] | None,
 ) -> None:
@@ -350,7 +351,9 @@ def _write_pictures(
         plot.profiles_figure(geometry, pairs),
         plot.functions_figure(geometry),
         plot.conicity_figure({" / ".join(names): (amplitudes, conicity)}),
-        plot.patches_figure(contacts, load, solutions, other),
+        plot.patches_figure(
+            contacts, load, solutions, other, (f"table, {normal}", f"table, {OTHER_NORMAL[normal]}")
+        ),
     )
     for name, figure in zip(PICTURES, figures, strict=True):
         save(figure, folder / name, overwrite=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 SIDES = ("left", "right")
 WHEEL, RAIL = DISTINCT[0], "0.35"
 SIDE_COLOURS = {"left": DISTINCT[1], "right": DISTINCT[0]}
+ZONE_COLOURS = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DISTINCT[1]}
+TABLE_LINES = ("-", "--")
 LIFT = 14.0
 """Height at which the wheel is drawn above its rail [mm]."""
 
@@ -76,6 +79,8 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
             axes = figure.add_subplot(grid[0, side])
             _draw_pair(axes, geometry, pair, side)
             axes.set_title(f"{name}: {pair.wheel.name} on {pair.rail.name}")
+            if side == 0:
+                _explain(axes)
         if unique:
             _draw_smoothing(figure.add_subplot(grid[1, :]), unique)
     return figure
@@ -103,11 +108,12 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
         x_rail = 1e3 * geometry.contact_y[i, side]
         height = -1e3 * np.interp(1e-3 * abs(x_rail), head.Y, head.z)
         axes.plot([x_wheel, x_rail], [-1e3 * heights[i] + LIFT, height], color="0.6", lw=0.6)
-        if abs(x_wheel - last_label) < 3.6:
+        number = f"{millimetres:.0f}".replace("-", "−")
+        if abs(x_wheel - last_label) < 2.0 + 1.8 * len(number):
             continue  # the number would lie on its neighbour
         last_label = x_wheel
         axes.annotate(
-            f"{millimetres:.0f}".replace("-", "−"),
+            number,
             (x_wheel, -1e3 * heights[i] + LIFT),
             xytext=(0, 3),
             textcoords="offset points",
@@ -121,6 +127,20 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
     axes.set_aspect("equal")
     axes.set_xlabel("lateral place $y$ (mm)")
     axes.set_ylabel("height (mm)")
+
+
+def _explain(axes: Axes) -> None:
+    """Say within the rail's head what lines and numbers are."""
+    axes.annotate(
+        "lines join points that touch,\nnumbers are the wheelset's\ndisplacement to the right (mm);"
+        f"\nthe wheel is raised by {LIFT:.0f} mm",
+        (0.5, 0.16),
+        xycoords="axes fraction",
+        ha="center",
+        va="center",
+        fontsize=6.5,
+        color="0.3",
+    )
 
 
 def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
@@ -223,6 +243,7 @@ def patches_figure(
     load: float,
     exact: Mapping[float, ExactContact] | None = None,
     other: Mapping[float, LoadedContact] | None = None,
+    labels: tuple[str, str] = ("contact table", "second table"),
 ) -> Figure:
     """Contact patches of the right wheel, seen from above, one picture for each displacement.
 
@@ -236,21 +257,25 @@ def patches_figure(
         Pressure by boundary elements, drawn beneath.
     other : mapping of displacement [m] to LoadedContact, optional
         From a second table, drawn dashed.
+    labels : tuple of str
+        What both tables are called.
     """
     with styled():
         columns = 4
         rows = -(-len(contacts) // columns)
-        height = 1.75 * rows + 0.9
+        height = 1.75 * rows + 1.1
         figure = Figure(figsize=(9.6, height))
         figure.subplots_adjust(
             left=0.06,
             right=0.90 if exact else 0.99,
             bottom=0.45 / height,
-            top=1.0 - 0.65 / height,
+            top=1.0 - 0.85 / height,
             wspace=0.08,
             hspace=0.32,
         )
-        figure.suptitle(f"Contact patches of the right wheel under {1e-3 * load:.0f} kN")
+        title = f"Contact patches of the right wheel under {1e-3 * load:.0f} kN"
+        figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
+        _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
         axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
         places = [patch.y for contact in contacts.values() for patch in contact.patches]
         low, high = 1e3 * min(places) - 14.0, 1e3 * max(places) + 14.0
@@ -262,9 +287,9 @@ def patches_figure(
                 image = panel.pcolormesh(
                     1e3 * solution.Y, 1e3 * solution.x, shown, cmap="YlOrBr", vmin=0.0, vmax=2500.0
                 )
-            _draw_ellipses(panel, contact, "-")
+            _draw_ellipses(panel, contact, TABLE_LINES[0])
             if other is not None:
-                _draw_ellipses(panel, other[y], "--")
+                _draw_ellipses(panel, other[y], TABLE_LINES[1])
             panel.set_title(f"$y$ = {1e3 * y:g} mm".replace("-", "−"))
             panel.set_xlim(low, high)
             panel.set_ylim(-22.0, 22.0)
@@ -277,12 +302,24 @@ def patches_figure(
             panel.set_xlabel("lateral place (mm)")
         if image is not None:
             bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
-            figure.colorbar(image, cax=bar, label="pressure (MPa)")
+            figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")
     return figure
 
 
+def _explain_lines(figure: Figure, top: float, labels: Sequence[str]) -> None:
+    """One row of a legend: the zones' colours, and the line of each table."""
+    zones = [Line2D([], [], color=colour, label=zone) for zone, colour in ZONE_COLOURS.items()]
+    lines = [
+        Line2D([], [], color="0.3", ls=line, label=label)
+        for line, label in zip(TABLE_LINES, labels, strict=False)
+    ]
+    handles = [*zones, *lines]
+    figure.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(0.05, top), ncols=len(handles)
+    )
+
+
 def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:
-    colours = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DISTINCT[1]}
     for patch in contact.patches:
         # seen from above, the patch's width is foreshortened by its angle
         width = 2e3 * patch.b * np.cos(patch.angle)
@@ -294,6 +331,6 @@ def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:
                 fill=False,
                 ls=line,
                 lw=1.2,
-                color=colours[patch.zone],
+                color=ZONE_COLOURS[patch.zone],
             )
         )
