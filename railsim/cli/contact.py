@@ -24,6 +24,16 @@ OTHER_NORMAL = {"hertz": "kik-piotrowski", "kik-piotrowski": "hertz"}
 STEP = 5e-5
 """Step of the lateral displacement [m]."""
 
+RANGES = {
+    "gauge": (0.3, 2.5, "m"),
+    "inclination": (0.0, 0.2, "(1:40 is 0.025)"),
+    "back_to_back": (0.2, 2.4, "m"),
+    "radius": (0.05, 1.5, "m"),
+    "load": (1.0, 1e6, "N"),
+    "max_shift": (0.001, 0.020, "m"),
+}
+"""What an option's number may be, and its unit."""
+
 PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
 """Displacements at which patches are shown, over the largest one."""
 
@@ -88,7 +98,13 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
     is_flag=True,
     help="Only compute the table of the creep law `table` anew (hours; goes on where it was).",
 )
-@click.option("--workers", default=2, show_default=True, help="Processes, for --build-creep-table.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=2,
+    show_default=True,
+    help="Processes, for --build-creep-table.",
+)
 @click.option("--out", metavar="DIR", help="Folder for pictures and tables; made if need be.")
 @overwrite_option
 @json_option
@@ -133,7 +149,15 @@ def command(
     if build_creep_table:
         creep_part.build_table(out, workers, as_json, quiet)
         return
-    _check_numbers(wheels, rails, radii, load, max_shift)
+    _check_counts(wheel=wheels, rail=rails, radius=radii)
+    _check_ranges(
+        gauge=gauge,
+        inclination=inclination,
+        back_to_back=back_to_back,
+        radius=radii,
+        load=load,
+        max_shift=max_shift,
+    )
     written = (*PICTURES, *TABLES, *((*creep_part.PICTURES, *creep_part.TABLES) if creep else ()))
     folder = _checked_folder(out, overwrite, written) if out else None
     wheel_pair, rail_pair = _profiles(wheels, "wheel"), _profiles(rails, "rail")
@@ -184,27 +208,30 @@ def command(
         click.echo(f"wrote {', '.join(written)} to {folder}", err=True)
 
 
-def _check_numbers(
-    wheels: Sequence[str],
-    rails: Sequence[str],
-    radii: Sequence[float],
-    load: float,
-    max_shift: float,
-) -> None:
-    """Refuse numbers that mean nothing, all at once."""
+def _check_counts(**given: Sequence[Any]) -> None:
+    """Refuse more values than there are sides."""
     from railsim.errors import Fault, InputError
 
     faults = [
-        Fault(option, "", f"given {len(values)} times", "give it once, or for left and right")
-        for option, values in (("--wheel", wheels), ("--rail", rails), ("--radius", radii))
+        Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for left and right")
+        for name, values in given.items()
         if len(values) > 2
     ]
-    if not all(0.05 <= radius <= 1.5 for radius in radii):
-        faults.append(Fault("--radius", "", str(list(radii)), "0.05 to 1.5 m"))
-    if not 1.0 <= load <= 1e6:
-        faults.append(Fault("--load", "", f"{load:g}", "1 to 1e6 N"))
-    if not 0.001 <= max_shift <= 0.020:
-        faults.append(Fault("--max-shift", "", f"{max_shift:g}", "0.001 to 0.020 m"))
+    if faults:
+        raise InputError(faults)
+
+
+def _check_ranges(**given: float | Sequence[float]) -> None:
+    """Refuse numbers that mean nothing, all at once."""
+    from railsim.errors import Fault, InputError
+
+    faults = []
+    for name, values in given.items():
+        low, high, unit = RANGES[name]
+        for value in values if isinstance(values, Sequence) else (values,):
+            if not low <= value <= high:
+                option = "--" + name.replace("_", "-")
+                faults.append(Fault(option, "", f"found {value:g}", f"{low:g} to {high:g} {unit}"))
     if faults:
         raise InputError(faults)
 

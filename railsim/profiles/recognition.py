@@ -35,6 +35,8 @@ FLANGE_HEIGHTS = (0.015, 0.050)
 TREAD_WIDTH = 0.030
 GAUGE_SIDE_DEPTH = 0.0140
 STANDARD_INCLINATIONS = (1 / 20, 1 / 30, 1 / 40)
+UPRIGHT = 4e-3
+"""Lean that measuring noise and wear may feign [1]."""
 
 CURVATURE_NOISE = 3.0
 """Curvature that noise may leave after smoothing [1/m], some 4 % of a gauge corner's."""
@@ -374,7 +376,7 @@ def _orient_rail(work: _Work) -> float:
             f"the gauge side is needed down to {1e3 * GAUGE_SIDE_DEPTH:.0f} mm, where gauge is "
             "measured",
         )
-    elif inclination is not None and inclination < 0.0:
+    elif inclination is not None and inclination < -UPRIGHT:
         mirror, why = True, "a rail leans to the gauge side"
     if mirror:
         work.y = -work.y
@@ -384,7 +386,7 @@ def _orient_rail(work: _Work) -> float:
         work.notes.append("cannot tell from the head alone whether inclined: taken as upright")
         return 0.0
     inclination = abs(inclination)
-    if inclination < 4e-3:
+    if inclination < UPRIGHT:
         return 0.0
     standards = np.array(STANDARD_INCLINATIONS)
     nearest = float(standards[np.argmin(np.abs(standards - inclination))])

@@ -163,6 +163,15 @@ def test_inclined_rail_is_recognised_and_not_inclined_twice(tmp_path, inclinatio
     assert same_contact(profile, "60E1") < 1.5e-6
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_upright_rail_stays_as_it_was_measured_whatever_the_noise(tmp_path, seed):
+    y, z = RAIL
+    noise = np.random.default_rng(seed).normal(0.0, 0.01, y.size)
+    profile = load_profile(written(tmp_path, "rail.csv", csv_mm(y, z + noise)), "rail")
+    assert profile.inclination == 0.0
+    assert not any("mirrored" in line for line in profile.notes)
+
+
 def test_rail_measured_on_the_gauge_side_only_is_turned_to_it(tmp_path):
     y, z = RAIL
     part = (y > -20.0) & (z < 20.0)  # crown and right flank, here the gauge side
