@@ -22,7 +22,7 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.element_arrays import ElementArrays
 from railsim.errors import ModelError
-from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH
+from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.creep import LAW_NUMBERS
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.system import (
@@ -40,7 +40,7 @@ from railsim.kernels.system import (
     Work,
 )
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
-from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
+from railsim.kernels.wheel_rail import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.tables import track_tables
@@ -105,7 +105,7 @@ class Model:
     @property
     def n_state(self) -> int:
         """Length of the state vector."""
-        return 12 * self.index.n_bodies + len(self.system.internal.kind) + N_SCALARS
+        return 18 * self.index.n_bodies + 2 * len(self.system.internal.kind) + N_SCALARS
 
 
 def assemble(
@@ -180,14 +180,15 @@ def work_arrays(system: System) -> Work:
         W=np.zeros((n, 3)),
         F=np.zeros((n, 3)),
         M=np.zeros((n, 3)),
-        S=np.zeros((n, 4)),
+        S=np.zeros((n, 5)),
         C=np.zeros((n, 9)),
         rail_force=np.zeros((n, 6)),
         acceleration=np.zeros((n, 6)),
         drive=np.zeros((len(system.internal.kind), 2)),
         decay=np.zeros(len(system.internal.kind)),
-        spin_damping=np.zeros(n),
+        contact_jacobian=np.zeros((n, CONTACT_JACOBIAN)),
         look_up=np.zeros(N_PATCH * LOOK_UP_SIZE),
+        weights=np.zeros(N_WEIGHT),
         stiffness=np.zeros(N_PATCH),
         approach=np.zeros(N_PATCH),
         rail=np.zeros(4),

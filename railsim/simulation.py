@@ -23,7 +23,7 @@ from railsim.equilibrium import Equilibrium, equilibrium
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
-from railsim.kernels.time_loop import record_state, time_loop
+from railsim.kernels.time_loop import record_state, remember, time_loop
 from railsim.outputs import OutputPlan
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
@@ -226,6 +226,9 @@ def prepare(
     step, _ = pace.at(speed)
     state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
     _disturb(model, settings, state)
+    if settings.scheme == "fast":
+        # a state outside the contact table stops the run at its first step, with its reason
+        remember(model.system, work_arrays(model.system), state, np.zeros_like(state), step)
     return Preparation(
         model, balance, state,
         end_time=math.inf if duration is None else duration,

@@ -6,7 +6,7 @@ predicted: the sum of the parts is a lower bound of what they take in the time l
 """
 
 from railsim.kernels import jit
-from railsim.kernels.contact_table import INSIDE, locate, look_up
+from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, right_hand_side
@@ -145,7 +145,8 @@ def many_look_ups(system, work, state, derivative, n):
         where, iy, ir, iw, ty, tr, tw = locate(contact, table, state[6 * b + 1], state[6 * b + 3],
                                                yaw * yaw)
         if where == INSIDE:
-            look_up(contact, table, 0, iy, ir, iw, ty, tr, tw, work.look_up)
+            cell_weights(contact, ty, tr, work.weights)
+            look_up(contact, table, 0, iy, ir, iw, tw, work.weights, work.look_up)
             done += 1
     return done
 

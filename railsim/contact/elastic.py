@@ -20,7 +20,9 @@ from railsim.kernels.contact_table import (
     K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
+    N_WEIGHT,
     TAN_GAMMA,
+    cell_weights,
     coupled_approaches,
     locate,
     look_up,
@@ -122,15 +124,16 @@ def loaded_contact(
         table.droll,
         table.dw,
     )
-    where, *cell = locate(arrays, 0, y, roll, yaw * yaw)
+    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, yaw * yaw)
     if where != INSIDE:
         raise ModelError(
             f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad and yaw {1e3 * yaw:.2f} mrad "
             "lies outside of the contact table"
         )
-    flat = np.empty(N_PATCH * LOOK_UP_SIZE)
+    weights, flat = np.empty(N_WEIGHT), np.empty(N_PATCH * LOOK_UP_SIZE)
+    cell_weights(arrays, ty, tr, weights)
     for patch in range(N_PATCH):
-        look_up(arrays, 0, patch, *cell, flat, patch * LOOK_UP_SIZE)
+        look_up(arrays, 0, patch, iy, ir, iw, tw, weights, flat, patch * LOOK_UP_SIZE)
     fields = flat.reshape(N_PATCH, LOOK_UP_SIZE)
     compliance = coupling(table.values, table.G, table.nu)[None]
     stiffness = np.ascontiguousarray(fields[:, 1])

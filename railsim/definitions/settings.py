@@ -100,9 +100,8 @@ class Settings(FileDefinition):
 
     format: Literal["railsim-settings/1"] = "railsim-settings/1"
     """Kind and version of the file"""
-    scheme: Literal["fast", "heun", "rk4"] = "fast"
-    """Integration scheme: `fast` of order one, `heun` of order two at twice the cost, `rk4` as the
-    reference"""
+    scheme: Literal["fast", "rk4"] = "fast"
+    """Integration scheme: `fast`, or `rk4` as the reference"""
     step: Positive | None = None
     """Time step [s]; by default chosen from vehicle and speed"""
     output_rate: Positive = 200.0

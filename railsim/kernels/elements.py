@@ -22,7 +22,7 @@ from railsim.kernels import jit, jit_inline
 from railsim.kernels.internal import AIR, PAD, curve_value
 
 
-@jit
+@jit_inline
 def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all point-to-point elements to `F`, `M`."""
     for e in range(links.body.shape[0]):
@@ -174,7 +174,7 @@ def rotation_moment(mounts, e, i, j, R, W, M):
     M[j, 2] -= mz
 
 
-@jit
+@jit_inline
 def mount_forces(mounts, internal, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all three-axis elements to `F`, `M`."""
     for e in range(mounts.body.shape[0]):

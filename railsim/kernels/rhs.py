@@ -21,7 +21,7 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from railsim.kernels import jit
+from railsim.kernels import jit, jit_inline
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.rotation import sine_cosine
@@ -33,7 +33,7 @@ from railsim.kernels.wheel_rail import wheel_rail
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@jit
+@jit_inline
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -64,7 +64,7 @@ def euler_rates(kind, sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     return w1, w2 - yaw_rate * sin_roll, yaw_rate
 
 
-@jit
+@jit_inline
 def attitudes(bodies, state, S, C):
     """C = Rz(yaw) Rx(roll) Ry(pitch) of all bodies but axleboxes; a wheelset's without Ry."""
     for b in range(bodies.kind.shape[0]):
@@ -86,7 +86,7 @@ def attitudes(bodies, state, S, C):
         C[b, 8] = cr * cp
 
 
-@jit
+@jit_inline
 def kinematics(bodies, frames, speed, state, S, C, R, X, V, W, rates):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
@@ -170,7 +170,7 @@ def axlebox_dynamics(b, p, n, inertia, R, F, M, rates, derivative):
     rates[b, 4] = moment / inertia
 
 
-@jit
+@jit_inline
 def dynamics(bodies, frames, speed, gravity, state, C, R, F, M, rail_force, rates, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 

@@ -7,6 +7,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
     6n .. 12n     velocities: x', y', z' in the axes of the track frame (m/s), then the absolute
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
+    then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
@@ -233,7 +234,7 @@ class Work(NamedTuple):
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
     decay : float64[m]          see `internal.constant_decays`
-    spin_damping : float64[n]   estimate of -d(u_2')/d(u_2) of each wheelset [1/s]
+    contact_jacobian : float64[n, 8]  see `wheel_rail`
     patch_* : per active patch, see `wheel_rail`
     events : int64[2]           loaded patches so far, and how many of them were outside the range
                                 of the creep law
@@ -254,8 +255,9 @@ class Work(NamedTuple):
     acceleration: np.ndarray
     drive: np.ndarray
     decay: np.ndarray
-    spin_damping: np.ndarray
+    contact_jacobian: np.ndarray
     look_up: np.ndarray
+    weights: np.ndarray
     stiffness: np.ndarray
     approach: np.ndarray
     rail: np.ndarray

@@ -1,14 +1,9 @@
 """The time loop: integrators and recording, one compiled call per chunk of steps.
 
-`fast`: semi-implicit (symplectic) Euler; velocities first, positions with the new velocities.
-Internal states of elements are advanced exactly for a constant drive (see `internal`), so that
-their short time constants do not limit the step; the spin of each wheelset is taken linearly
-implicit (its creep force is the stiffest mode of the vehicle), which changes no other mode.
-
-`heun`: two evaluations a step, of order two: positions as in velocity Verlet, velocities by the
-mean of the accelerations at both ends (Heun), the spin by a two-stage Rosenbrock method that stays
-of order two with any estimate of its stiffness (ROS2: Verwer, Spee, Blom, Hundsdorfer 1999),
-internal states exactly for the mean drive.
+`fast`: one evaluation a step, of order two: velocity Verlet for the springs, velocities in it
+extrapolated by Adams and Bashforth for dampers, contact forces that stiffen as 1/V taken linearly
+implicit (`soften_contact`), internal states of elements advanced exactly for the drive in the
+middle of the step (see `internal`).  The state keeps accelerations and drives of the step before.
 
 `rk4`: the classical Runge-Kutta method of order four on the whole state; the reference.
 """
@@ -17,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit
+from railsim.kernels import jit, jit_inline
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.internal import (
     MAXWELL_CURVE,
@@ -29,9 +24,22 @@ from railsim.kernels.internal import (
 from railsim.kernels.rhs import euler_rates, mechanics, right_hand_side, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING
 from railsim.kernels.system import AXLEBOX, TABLE, WHEELSET
+from railsim.kernels.wheel_rail import (
+    J_ACROSS,
+    J_ACROSS_LEVER,
+    J_ALONG,
+    J_ALONG_LEVER,
+    J_ROLL,
+    J_Y,
+    J_YAW,
+    J_Z,
+)
 
-FAST, RK4, HEUN = range(3)
-GAMMA = 1.0 - 0.5 * 2.0**0.5  # of ROS2: L-stable
+FAST, RK4 = range(2)
+# Weight of the last acceleration in the smoothed one, by which speeds are extrapolated: high enough
+# to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
+# at 200 Hz, which errors of the estimated damping would feed.
+SMOOTHING = 0.3
 
 
 class Recorder(NamedTuple):
@@ -93,119 +101,133 @@ def record_patches(out, row, work, n_patches):
             out[row, w, side, k, c] = work.patch[c, i]
 
 
-@jit
-def step_fast(system, work, state, derivative, decay, h):
-    """Advance `state` by `h` with the derivative already evaluated there."""
-    bodies, S = system.bodies, work.S
-    n = bodies.kind.shape[0]
-    for b in range(n):
-        q = 6 * b
-        v = 6 * n + q
-        kind = bodies.kind[b]
-        if kind == AXLEBOX:
-            state[v + 4] += h * derivative[v + 4]
-            state[q + 4] += h * state[v + 4]
-            continue
-        d1, d2, d3 = h * derivative[v + 3], h * derivative[v + 4], h * derivative[v + 5]
-        if kind == WHEELSET:
-            d2 /= 1.0 + h * work.spin_damping[b]
-        for k in range(3):
-            state[v + k] += h * derivative[v + k]
-            state[q + k] += h * state[v + k]
-        state[v + 3] += d1
-        state[v + 4] += d2
-        state[v + 5] += d3
-        r1, r2, r3 = euler_rates(kind, S[b, 0], S[b, 1], S[b, 2], S[b, 3], d1, d2, d3)
-        state[q + 3] += h * (derivative[q + 3] + r1)
-        state[q + 4] += h * (derivative[q + 4] + r2)
-        state[q + 5] += h * (derivative[q + 5] + r3)
-    for i in range(system.internal.kind.shape[0]):
-        k = 12 * n + i
-        state[k] = advanced(system.internal, system.curves, i, state[k], work.drive[i, 0],
-                            work.drive[i, 1], h, decay[i])
-    advance_place(system.drive, state, derivative, h)
+@jit_inline
+def implicitness(z):
+    """Share of the new value at h times the damping rate: the trapezoid's 1/2, for large z 1 - 1/z.
 
-
-@jit
-def advance_place(drive, state, derivative, h):
-    """Time, place and speed after a step; a speed table is met exactly."""
-    state[-1] += h * derivative[-1]
-    state[-2] += h * state[-1]
-    state[-3] += h
-    if drive.mode == TABLE:
-        state[-1], _ = table_value_slope(drive.table, state[-2])
-
-
-@jit
-def predict(bodies, S, state, derivative, trial, spin, h):
-    """First stage of `step_heun`: coordinates to second, velocities to first order into `trial`.
-
-    `spin` holds what damps the wheelsets' spin; their spin's derivative is replaced by its stage.
+    The former is of order two, the latter damps what is too fast to be followed.
     """
-    n = bodies.kind.shape[0]
-    for b in range(n):
-        q = 6 * b
-        v = 6 * n + q
-        kind = bodies.kind[b]
-        if kind == WHEELSET:
-            derivative[v + 4] /= 1.0 + GAMMA * h * spin[b]
-        a1, a2, a3 = derivative[v + 3], derivative[v + 4], derivative[v + 5]
-        if kind != AXLEBOX:
-            a1, a2, a3 = euler_rates(kind, S[b, 0], S[b, 1], S[b, 2], S[b, 3], a1, a2, a3)
-        for k in range(6):
-            trial[v + k] = state[v + k] + h * derivative[v + k]
-            trial[q + k] = state[q + k] + h * derivative[q + k]
-        half = 0.5 * h * h
-        for k in range(3):
-            trial[q + k] += half * derivative[v + k]
-        trial[q + 3] += half * a1
-        trial[q + 4] += half * a2
-        trial[q + 5] += half * a3
+    return 0.5 if z < 2.0 else 1.0 - 1.0 / z
+
+
+@jit_inline
+def soften(rate, before, i, damping, inverse, h):
+    """Take a damper of one coordinate linearly implicit; `inverse`: 1/mass."""
+    z = h * damping * inverse
+    theta_z = implicitness(z) * z
+    rate[i] = (rate[i] + theta_z * before[i]) / (1.0 + theta_z)
+
+
+@jit_inline
+def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
+    """Take a damper of the speed of coordinate i + lever times that of j linearly implicit."""
+    z = h * damping * (inverse_i + lever * lever * inverse_j)
+    theta = implicitness(z)
+    slip = rate[i] - before[i] + lever * (rate[j] - before[j])
+    force = theta * h * damping / (1.0 + theta * z) * slip
+    rate[i] -= force * inverse_i
+    rate[j] -= force * lever * inverse_j
+
+
+@jit_inline
+def soften_contact(bodies, jacobian, b, rate, before, h):
+    """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
+
+    The explicit acceleration a is evaluated with the extrapolated velocity; the acceleration a_n of
+    the step solves a_n + theta h M^-1 D (a_n - a_(n-1)) = a with an estimate D of the damping
+    (linearly implicit methods: Hairer and Wanner, Solving ODE II, IV.7): exact D gives the
+    trapezoidal rule, and an error of D counts with h^2.  D of rank one for each of: slip along the
+    track, of x and spin; slip across, of y and roll; yaw; contact damping in z, y, roll.
+    """
+    v = 6 * b
+    mass, roll = 1.0 / bodies.mass[b], 1.0 / bodies.inertia[b, 0]
+    along, across = jacobian[b, J_ALONG], jacobian[b, J_ACROSS]
+    if along > 0.0:
+        soften_slip(rate, before, v, v + 4, jacobian[b, J_ALONG_LEVER] / along, along, mass,
+                    1.0 / bodies.inertia[b, 1], h)
+    if across > 0.0:
+        soften_slip(rate, before, v + 1, v + 3, -jacobian[b, J_ACROSS_LEVER] / across, across, mass,
+                    roll, h)
+    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.inertia[b, 2], h)
+    soften(rate, before, v + 1, jacobian[b, J_Y], mass, h)
+    soften(rate, before, v + 2, jacobian[b, J_Z], mass, h)
+    soften(rate, before, v + 3, jacobian[b, J_ROLL], roll, h)
 
 
 @jit
-def step_heun(system, work, state, derivative, stages, decay, h):
-    """Advance `state` by `h`; `derivative` holds the first stage."""
-    bodies, internal, curves, drive = system.bodies, system.internal, system.curves, system.drive
-    n, m, end = bodies.kind.shape[0], internal.kind.shape[0], state.shape[0]
-    trial, rate = stages[0], stages[1]
-    spin, before = stages[2, :n], stages[2, n:n + m]
-    for b in range(n):
-        spin[b] = work.spin_damping[b]
-    predict(bodies, work.S, state, derivative, trial, spin, h)
-    for i in range(m):
-        k = 12 * n + i
-        before[i] = work.drive[i, 0]
-        trial[k] = advanced(internal, curves, i, state[k], before[i], work.drive[i, 1], h, decay[i])
-    trial[end - 1] = state[end - 1] + h * derivative[end - 1]
-    trial[end - 2] = state[end - 2] + h * (state[end - 1] + 0.5 * h * derivative[end - 1])
-    trial[end - 3] = state[end - 3] + h
-    if drive.mode == TABLE:
-        trial[end - 1], _ = table_value_slope(drive.table, trial[end - 2])
-    status, where, _ = mechanics(system, work, trial, rate)
+def remember(system, work, state, derivative, h):
+    """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
+    n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
+    first = 12 * n + m
+    before = state[first:first + 6 * n]
+    for k in range(6 * n):
+        before[k] = 0.0
+    status, where, _ = mechanics(system, work, state, derivative)
     if status != RUNNING:
         return status, where
+    rate = derivative[6 * n:12 * n]
     for b in range(n):
-        if bodies.kind[b] == WHEELSET:
-            # u + h (3/2 k_1 + 1/2 k_2) with (1 + gamma h lambda) k_2 = f_2 - 2 k_1
-            k = 6 * n + 6 * b + 4
-            second = (rate[k] - 2.0 * derivative[k]) / (1.0 + GAMMA * h * spin[b])
-            rate[k] = 2.0 * derivative[k] + second
-    for k in range(12 * n):
-        state[k] += 0.5 * h * (derivative[k] + rate[k])
+        if system.bodies.kind[b] == WHEELSET:
+            soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h)
+    for k in range(6 * n):
+        before[k] = rate[k]
     for i in range(m):
-        k = 12 * n + i
-        state[k] = advanced(internal, curves, i, state[k], 0.5 * (before[i] + work.drive[i, 0]),
-                            work.drive[i, 1], h, decay[i])
-    state[-2] += 0.5 * h * (state[-1] + trial[end - 1])
-    state[-1] += 0.5 * h * (derivative[end - 1] + rate[end - 1])
-    state[-3] += h
-    if drive.mode == TABLE:
-        state[-1], _ = table_value_slope(drive.table, state[-2])
+        state[first + 6 * n + i] = work.drive[i, 0]
     return RUNNING, 0
 
 
-@jit
+@jit_inline
+def step_fast(system, work, state, derivative, decay, h):
+    """Advance `state` by `h` with the derivative already evaluated there.
+
+    With the accelerations a of this step and of the one before: u = v + h (a_n - a_(n-1)/2),
+    q <- q + h u, v <- u + h/2 a_n.
+    """
+    bodies, S = system.bodies, work.S
+    n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
+    first = 12 * n + m
+    rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
+    for b in range(n):
+        q = 6 * b
+        v = 6 * n + q
+        kind = bodies.kind[b]
+        if kind == WHEELSET:
+            soften_contact(bodies, work.contact_jacobian, b, rate, before, h)
+        d1 = h * (rate[q + 3] - 0.5 * before[q + 3])
+        d2 = h * (rate[q + 4] - 0.5 * before[q + 4])
+        d3 = h * (rate[q + 5] - 0.5 * before[q + 5])
+        if kind != AXLEBOX:
+            d1, d2, d3 = euler_rates(kind, S[b, 0], S[b, 1], S[b, 2], S[b, 3], d1, d2, d3)
+        for k in range(3):
+            state[q + k] += h * (state[v + k] + h * (rate[q + k] - 0.5 * before[q + k]))
+        state[q + 3] += h * (derivative[q + 3] + d1)
+        state[q + 4] += h * (derivative[q + 4] + d2)
+        state[q + 5] += h * (derivative[q + 5] + d3)
+        for k in range(6):
+            change = rate[q + k] - before[q + k]
+            state[v + k] += h * (rate[q + k] + 0.5 * SMOOTHING * change)
+            before[q + k] += SMOOTHING * change
+    drives = first + 6 * n
+    for i in range(m):
+        k = 12 * n + i
+        drive = 1.5 * work.drive[i, 0] - 0.5 * state[drives + i]
+        state[drives + i] = work.drive[i, 0]
+        state[k] = advanced(system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h,
+                            decay[i])
+    advance_place(system.drive, state, derivative, h)
+
+
+@jit_inline
+def advance_place(drive, state, derivative, h):
+    """Time, place and speed after a step; a speed table is met exactly."""
+    state[-2] += h * (state[-1] + 0.5 * h * derivative[-1])
+    state[-1] += h * derivative[-1]
+    state[-3] += h
+    if drive.mode == TABLE:
+        state[-1], _ = table_value_slope(drive.table, state[-2])
+
+
+@jit_inline
 def settle_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
@@ -216,7 +238,7 @@ def settle_limits(internal, curves, first, drive, state):
             state[k] = within_table(curves, internal.curve[i], state[k])
 
 
-@jit
+@jit_inline
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
@@ -283,8 +305,6 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
                 rows += 1
             if scheme == FAST:
                 step_fast(system, work, state, derivative, decay, h)
-            elif scheme == HEUN:
-                status, where = step_heun(system, work, state, derivative, stages, decay, h)
             else:
                 status, where = step_rk4(system, work, state, derivative, stages, h)
         if status != RUNNING or step % every == 0:

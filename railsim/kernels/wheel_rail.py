@@ -19,7 +19,7 @@ from math import sqrt
 
 import numpy as np
 
-from railsim.kernels import jit
+from railsim.kernels import jit, jit_inline
 from railsim.kernels.contact_table import (
     ABOVE_Y,
     BELOW_Y,
@@ -34,6 +34,7 @@ from railsim.kernels.contact_table import (
     N_PATCH,
     OUTSIDE_ROLL,
     TAN_GAMMA,
+    cell_weights,
     coupled_approaches,
     is_far,
     locate,
@@ -62,11 +63,18 @@ PATCH_ROWS = 20
 W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL = range(8)
 WHEEL_COLUMNS = 8
 
+# columns of Work.contact_jacobian[b], what the contact takes from the wheelset's speeds, for the
+# implicit part of the step: creep forces along the track [N s/m], the same times the lever c_z
+# [N s], across [N s/m], times c_z [N s], in yaw [N m s]; normal forces in y, z [N s/m] and roll
+# [N m s]
+J_ALONG, J_ALONG_LEVER, J_ACROSS, J_ACROSS_LEVER, J_YAW, J_Y, J_Z, J_ROLL = range(8)
+CONTACT_JACOBIAN = 8
+
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
 
-@jit
+@jit_inline
 def normal_contact(system, work, speed, state):
     """Look up all wheels, add elastic normal forces, list the active patches.
 
@@ -77,7 +85,8 @@ def normal_contact(system, work, speed, state):
     """
     contact = system.contact
     force, wheel, column, t = work.rail_force, work.wheel, work.patch, work.look_up
-    stiffness, approach = work.stiffness, work.approach
+    jacobian = work.contact_jacobian
+    stiffness, approach, weights = work.stiffness, work.approach, work.weights
     n_bodies = system.bodies.kind.shape[0]
     n = 0
     for w in range(contact.body.shape[0]):
@@ -85,6 +94,8 @@ def normal_contact(system, work, speed, state):
         f = system.bodies.frame[b]
         for k in range(6):
             force[b, k] = 0.0
+        for k in range(CONTACT_JACOBIAN):
+            jacobian[b, k] = 0.0
         yaw = state[6 * b + 5]
         y_rate = state[6 * n_bodies + 6 * b + 1]
         z_rate = state[6 * n_bodies + 6 * b + 2]
@@ -103,6 +114,7 @@ def normal_contact(system, work, speed, state):
             where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, yaw * yaw)
             if where != INSIDE:
                 return outside(where), w, n
+            cell_weights(contact, ty, tr, weights)
             normal = 0.0
             lateral = 0.0
             lift = 1.0
@@ -112,7 +124,7 @@ def normal_contact(system, work, speed, state):
                 if is_far(contact, table, patch, iy, ir, iw, tr, z):
                     continue
                 first = patch * LOOK_UP_SIZE
-                look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, t, first)
+                look_up(contact, table, patch, iy, ir, iw, tw, weights, t, first)
                 stiffness[patch] = t[first + 1]
                 approach[patch] = z - t[first]
                 lift = min(lift, -approach[patch])
@@ -134,6 +146,11 @@ def normal_contact(system, work, speed, state):
                 cos_2 = 1.0 / (1.0 + tangent * tangent)
                 fade = min(1.0, p / FADE)
                 vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
+                if vertical > 0.0:
+                    damping = contact.damping * cos_2 * fade
+                    jacobian[b, J_Z] += damping
+                    jacobian[b, J_Y] += damping * t[k + G_Y] * t[k + G_Y]
+                    jacobian[b, J_ROLL] += damping * t[k + G_ROLL] * t[k + G_ROLL]
                 stretch = 0.4 * p * p * root
                 q_y = sign * (vertical * t[k + G_Y] - stretch * t[k + K_Y])
                 force[b, 0] -= q_y * work.rail[2] - vertical * work.rail[3]
@@ -196,7 +213,7 @@ def outside(where):
     return YAW_RANGE
 
 
-@jit
+@jit_inline
 def creepages(system, work, n, speed, state):
     """Creepages of the active patches, see the module's equations."""
     patch, C, frames = work.patch, work.C, work.frames
@@ -232,13 +249,34 @@ def creepages(system, work, n, speed, state):
         patch[PHI, k] = (a2 * s + a3 * c) / speed
 
 
-@jit
+@jit_inline
+def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
+    """Slopes of the creep force along and across over the creepage in that direction [N].
+
+    Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
+    (mu N) <= 3 (Vermeulen and Johnson 1964, spin as in the linear theory): an estimate that serves
+    the time step and does not enter the forces.
+    """
+    x = G * ab * c11 * xi_x / mu_N
+    y = G * ab * (c22 * xi_y + c23 * sqrt(ab) * phi) / mu_N
+    square = x * x + y * y
+    u = sqrt(square)
+    secant, tangent = 1.0, 1.0
+    if u >= 3.0:
+        secant, tangent = 1.0 / u, 0.0
+    elif u > 1e-9:
+        secant, tangent = 1.0 - u / 3.0 + square / 27.0, (1.0 - u / 3.0) ** 2
+    share = x * x / (square + 1e-300)
+    along = share * tangent + (1.0 - share) * secant
+    across = share * secant + (1.0 - share) * tangent
+    return G * ab * c11 * along, G * ab * c22 * across
+
+
+@jit_inline
 def add_creep_forces(system, work, n, speed):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
     patch, force, wheel = work.patch, work.rail_force, work.wheel
-    for w in range(contact.body.shape[0]):
-        work.spin_damping[contact.body[w]] = 0.0
     for k in range(n):
         w, side = work.patch_index[k, 0], work.patch_index[k, 1]
         b = contact.body[w]
@@ -264,13 +302,19 @@ def add_creep_forces(system, work, n, speed):
             wheel[w, side, W_XI_Y] = patch[XI_Y, k]
             wheel[w, side, W_PHI] = patch[PHI, k]
         if patch[MU_N, k] > 0.0:
-            work.spin_damping[b] += (
-                contact.reduction * contact.shear_modulus * patch[A, k] * patch[B, k]
-                * patch[C11, k] * cz * cz / (speed * system.bodies.inertia[b, 1])
-            )
+            along, across = creep_slopes(
+                patch[A, k] * patch[B, k], patch[C11, k], patch[C22, k], patch[C23, k],
+                contact.reduction * contact.shear_modulus, patch[MU_N, k], patch[XI_X, k],
+                patch[XI_Y, k], patch[PHI, k])
+            along, across = along / speed, across * c * c / speed
+            work.contact_jacobian[b, J_ALONG] += along
+            work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
+            work.contact_jacobian[b, J_ACROSS] += across
+            work.contact_jacobian[b, J_ACROSS_LEVER] += across * cz
+            work.contact_jacobian[b, J_YAW] += along * cy * cy
 
 
-@jit
+@jit_inline
 def wheel_rail(system, work, speed, state):
     """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
 

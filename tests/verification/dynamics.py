@@ -7,7 +7,7 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
-from railsim.kernels.contact_table import LOOK_UP_SIZE, locate, look_up
+from railsim.kernels.contact_table import LOOK_UP_SIZE, N_WEIGHT, cell_weights, locate, look_up
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.system import AXLEBOX, WHEELSET
 from railsim.kernels.time_loop import time_loop
@@ -162,15 +162,16 @@ def _mount_energy(system, pose):
 def _contact_energy(system, work, state):
     contact = system.contact
     total = 0.0
-    out = np.zeros(LOOK_UP_SIZE)
+    out, weights = np.zeros(LOOK_UP_SIZE), np.zeros(N_WEIGHT)
     for w, b in enumerate(contact.body):
         for side, sign in ((0, -1.0), (1, 1.0)):
             y, z, roll, _, yaw = state[6 * b + 1 : 6 * b + 6]
             table = contact.table[w, side]
             _, iy, ir, iw, ty, tr, tw = locate(contact, table, sign * y, sign * roll, yaw**2)
+            cell_weights(contact, ty, tr, weights)
             p, K = np.zeros(3), np.zeros(3)
             for patch in range(3):
-                look_up(contact, table, patch, iy, ir, iw, ty, tr, tw, out)
+                look_up(contact, table, patch, iy, ir, iw, tw, weights, out)
                 p[patch], K[patch] = z - out[0], out[1]
             total += _patch_energy(p, K, contact.coupling[table])
     return total
