@@ -1,6 +1,9 @@
-"""Time of the creep laws per contact patch and call, all patches of a vehicle together.
+"""Time of the creep laws: per contact patch and call, and of a whole step in the time loop.
 
 ``python benchmarks/creep_laws.py [--patches 10] [--json]``
+
+All patches of a vehicle are computed together: first random ones, stick and slip, then whole time
+steps of a coach in the middle of the curve R 250 m, where everything else belongs to the step too.
 """
 
 import argparse
@@ -11,13 +14,20 @@ import time
 import numba
 import numpy as np
 
+from railsim import load_settings, load_track, load_vehicle
+from railsim.assembly import work_arrays
 from railsim.contact.creep_table import creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels import fastsim_simd
 from railsim.kernels.creep import LAW_NUMBERS, creep_forces
 from railsim.kernels.fastsim import fastsim_workspace
+from railsim.kernels.time_loop import FAST, time_loop
+from railsim.simulation import prepare
+from railsim.time_step import empty_recorder
 
 GRIDS = (5, 10, 20, 50)
+CURVE = ("coach_manchester", "curve_r250", 20.0, 396.0)  # vehicle, track, m/s, middle of the curve
+STEPS = 50
 
 
 @numba.njit
@@ -59,6 +69,30 @@ def nanoseconds(law, n, grid, inputs, rounds=25):
     return 1e9 * best / times / n
 
 
+def step_microseconds(rounds=200):
+    """Least time of a step of the fast scheme by law, measured in turns; and the chosen steps."""
+    vehicle, track, speed, place = CURVE
+    never = 1 << 40
+    cases, chosen = {}, {}
+    for law in LAW_NUMBERS:
+        settings = load_settings(overrides=[f'creep_law="{law}"'])
+        prepared = prepare(load_vehicle(vehicle), load_track(track), settings, speed)
+        system, state = prepared.model.system, prepared.state.copy()
+        step, _ = prepared.pace.at(speed)
+        arrays = (work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
+                  empty_recorder(prepared.model, 1))  # fmt: skip
+        time_loop(system, *arrays, FAST, step, 1, int(place / speed / step), never)
+        cases[law], chosen[law] = (system, arrays, state.copy(), step), step
+    best = dict.fromkeys(cases, np.inf)
+    for _ in range(rounds):
+        for law, (system, arrays, state, step) in cases.items():
+            arrays[1][:] = state
+            begin = time.perf_counter()
+            time_loop(system, *arrays, FAST, step, 1, STEPS, never)
+            best[law] = min(best[law], (time.perf_counter() - begin) / STEPS)
+    return {law: 1e6 * value for law, value in best.items()}, chosen
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--patches", type=int, default=10)
@@ -75,6 +109,7 @@ def main():
             for law in ("table", "fastrip", "polach", "linear")
         },
     }
+    found["step_us"], found["step_s"] = step_microseconds()
     if options.json:
         print(json.dumps(found))
         return
@@ -85,6 +120,10 @@ def main():
     for law, value in found["other_laws_ns"].items():
         print(f"{law:8} {'10 x 10' if law == 'fastrip' else '       '}: {value:8.1f}   "
               f"{value / reference:.2f} of fastsim 10 x 10")  # fmt: skip
+    print("a step of the coach in the curve, us, and the step that was chosen, ms")
+    for law, value in found["step_us"].items():
+        print(f"{law:8} {value:8.2f}   {value / found['step_us']['fastsim']:.2f} of fastsim   "
+              f"{1e3 * found['step_s'][law]:g}")  # fmt: skip
 
 
 if __name__ == "__main__":

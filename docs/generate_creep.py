@@ -17,6 +17,7 @@ from railsim.contact.creep import LAWS, CreepForce, creep_force
 from railsim.contact.creep_table import linear_coefficients
 from railsim.contact.exact_creep import exact_creep_force
 from railsim.contact.kalker import kalker_coefficients
+from railsim.notation import QUANTITIES
 from railsim.plot.creep import CASES, Patch, creep_curves_figure, exact_force, traction_figure
 from railsim.plot.style import save
 
@@ -25,7 +26,7 @@ PAGE = DOCS / "validation" / "creep.md"
 REFERENCE = Path(os.environ.get("RAILSIM_REFERENCE", DOCS.parent.parent / "shared" / "reference"))
 sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
 from creep_curves import creep_curves  # noqa: E402
-from curving_study import measured, published  # noqa: E402
+from curving_study import COACHES, measured, published  # noqa: E402
 
 CURVES = creep_curves(REFERENCE)
 RATIOS = (0.3, 1.0, 3.0)
@@ -149,31 +150,42 @@ def coefficients_table():
     return rows(("a/b", "c11", "c22", "c23", "c33"), body)
 
 
+RUNS = (("fastsim", 10), ("fastsim", 50), *((name, 10) for name in LAWS if name != "fastsim"))
+
+
 def curving_table():
-    """The curving study with every law."""
-    body, base = [], None
-    names = list(published("manchester"))
-    runs = [("fastsim, 10 × 10", "fastsim", 10), ("fastsim, 50 × 50", "fastsim", 50)]
-    runs += [(name, name, 10) for name in LAWS if name != "fastsim"]
-    for title, name, n in runs:
-        settings = load_settings(overrides=[f'creep_law="{name}"', f"fastsim_grid=[{n},{n}]"])
-        result = simulate(
-            load_vehicle("coach_manchester"), load_track("curve_r250"), speed=20.0,
-            settings=settings,
-        )  # fmt: skip
-        values = [measured(result, quantity) for quantity in names]
-        if base is None:
-            base = values
-            scales, digits = (100.0, 1e-3, 1.0, 1e3, 1e3, 1e3), (2, 2, 3, 3, 2, 3)
-            shown = [f"{s * v:.{d}f}" for v, s, d in zip(values, scales, digits, strict=True)]
-        else:
-            shown = [f"{100 * (v / b - 1):+.1f} %" for v, b in zip(values, base, strict=True)]
-        body.append((title, *shown))
-        print(body[-1], flush=True)
-    header = (
-        "creep law", "dQ/Q0, %", "sum abs Y, kN", "Y/Q", "roll, mrad", "yaw, mrad", "lateral, mm",
-    )  # fmt: skip
-    return rows(header, body)
+    """The published curving study with every law: values, and what changes against FASTSIM."""
+    names = list(published(COACHES[0]))
+    quantities = [QUANTITIES[name] for name in names]
+    body = []
+    for coach in COACHES:
+        body.append((f"**{coach}**, SIMPACK", *map(shown, quantities, published(coach).values())))
+        base = None
+        for law_name, n in RUNS:
+            settings = load_settings(
+                overrides=[f'creep_law="{law_name}"', f"fastsim_grid=[{n},{n}]"]
+            )
+            result = simulate(
+                load_vehicle(f"coach_{coach}"), load_track("curve_r250"), speed=20.0,
+                settings=settings,
+            )  # fmt: skip
+            values = [measured(result, name) for name in names]
+            cells = list(map(shown, quantities, values))
+            if base is None:
+                base = values
+            else:
+                changes = [100.0 * (v / b - 1.0) for v, b in zip(values, base, strict=True)]
+                cells = [f"{c} ({d:+.1f} %)" for c, d in zip(cells, changes, strict=True)]
+            grid = f", {n} × {n}" if law_name in ("fastsim", "fastrip") else ""
+            body.append((f"`{law_name}`{grid}", *cells))
+            print(body[-1], flush=True)
+    return rows(("", *(quantity.words for quantity in quantities)), body)
+
+
+def shown(quantity, value):
+    """A value in the quantity's usual unit."""
+    value *= quantity.scale
+    return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.3f}"
 
 
 def pictures():

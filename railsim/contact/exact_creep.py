@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-6  # turn of the tractions at which Newton's method ends [rad]
 _ITERATIONS = 60
+# At once, or where that does not converge (fine grids, spin against lateral creepage) step by step.
+_WAYS = ((1.0,), (0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0))
 
 
 class RollingGrid(NamedTuple):
@@ -217,12 +219,16 @@ def normalised_traction(
     across = (xi_x - phi * grid.y).ravel()
     rigid_middle = np.stack([across, (xi_y + phi * grid.x_middle).ravel()])
     rigid_centre = np.stack([across, (xi_y + phi * grid.x).ravel()])
-    p, slip = np.zeros((2, n)), np.zeros((2, n))
-    sticks = np.ones(n, dtype=np.int64)
-    status, _ = rolling_traction(
-        grid.middle, grid.centre, rigid_middle, rigid_centre, grid.bound.ravel(), p, sticks, slip,
-        _TOLERANCE, _ITERATIONS,
-    )  # fmt: skip
+    for shares in _WAYS:
+        p, slip = np.zeros((2, n)), np.zeros((2, n))
+        sticks = np.ones(n, dtype=np.int64)
+        for share in shares:
+            status, _ = rolling_traction(
+                grid.middle, grid.centre, share * rigid_middle, share * rigid_centre,
+                grid.bound.ravel(), p, sticks, slip, _TOLERANCE, _ITERATIONS,
+            )  # fmt: skip
+        if status == CONVERGED:
+            break
     return (
         p.reshape(2, *shape),
         slip.reshape(2, *shape),

@@ -18,6 +18,7 @@ _STRIP_SPIN = 1.05
 _SPIN_ARM = 0.6
 _TINY = 1e-30
 _HUGE = 1e9
+_NO_LOAD = 1e-200  # a bound below this is none: its inverse would overflow [N]
 _EXCESS_POINTS = 16
 
 
@@ -136,7 +137,7 @@ def _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, wo
     10 integral of the ellipse over the slipping part of the cell that the stick zone cuts.
     """
     for i in range(n):
-        loaded = mu_N[i] > 0.0 and a[i] > 0.0 and b[i] > 0.0
+        loaded = mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0
         bound = mu_N[i] if loaded else 1.0
         aa = a[i] if loaded else 1.0
         bb = b[i] if loaded else 1.0

@@ -29,6 +29,8 @@ WORK_ROWS = 11
 _COLUMNS_MIN = 24  # least number of strips that a march takes (three vectors of eight)
 # Added under the root: the least traction (relative to the bound) that counts is 1e-15.
 _TINY = 1e-30
+# A bound below this is none: its inverse would overflow [N].
+_NO_LOAD = 1e-200
 # Growth per cell relative to the bound beyond which the patch is in full sliding at once.
 _GROWTH_MAX = 1e9
 
@@ -94,7 +96,7 @@ def _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, 
     spin_a = dx phi a/(L3 p0), spin_b = dx phi b/(L3 p0).  Zero without contact or friction.
     """
     for i in range(n):
-        loaded = mu_N[i] > 0.0 and a[i] > 0.0 and b[i] > 0.0
+        loaded = mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0
         unit = math.pi * G * a[i] * b[i] / ((mu_N[i] if loaded else 1.0) * nx)
         slip = 0.375 * unit
         spin = (

@@ -21,8 +21,9 @@ from . import jit_outside
 CONVERGED = 0
 NOT_CONVERGED = 1
 _MAX_TURN = 0.7  # largest turn of a traction's direction in one iteration [rad]
-_SETTLED = 15  # most cases need 5 to 11 iterations; after this many, cells that still
-_MAX_RETURNS = 2  # go to and fro are kept in stick at their next return but one
+# Most cases need 5 to 11 iterations.  After _SETTLED of them, where only a share of _FEW of the cells
+# still changes sides, those that go to and fro are kept in stick at their _MAX_RETURNS-th return.
+_SETTLED, _FEW, _MAX_RETURNS = 15, 0.05, 2
 
 
 @jit_outside
@@ -231,6 +232,7 @@ def rolling_traction(
         CONVERGED or NOT_CONVERGED, number of iterations.
     """
     n = bound.size
+    moved = n
     returns = np.zeros(n, np.int64)
     slip_middle = np.empty((2, n))
     _slips(middle, p, rigid_middle, slip_middle)
@@ -260,6 +262,7 @@ def rolling_traction(
             p[1, cell] = shrink * py
         _slips(middle, p, rigid_middle, slip_middle)
         _slips(centre, p, rigid_centre, slip)
+        settled = 1 if count > _SETTLED and moved <= _FEW * n else 0
         moved = 0
         for i in range(n):
             if sticks[i] == 1:
@@ -271,7 +274,7 @@ def rolling_traction(
                     moved += 1
             elif p[0, i] * slip[0, i] + p[1, i] * slip[1, i] < 0.0:
                 sticks[i] = 1
-                returns[i] += 1 if count > _SETTLED else 0
+                returns[i] += settled
                 moved += 1
         if moved == 0 and largest < tolerance:
             _cut_back(p, bound)

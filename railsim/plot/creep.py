@@ -154,7 +154,10 @@ def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: in
     ):
         if shown:
             values = forces[:, column] / (patch.mu * patch.N)
-            panel.plot(sizes, values, "o", ms=3.6, mfc="none", mec="0.1", mew=0.9, label=label)
+            panel.plot(
+                sizes, values, "o", ms=3.6, mfc="none", mec="0.1", mew=0.9, label=label,
+                clip_on=False,
+            )  # fmt: skip
             label = "_"
 
 

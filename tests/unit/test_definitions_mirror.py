@@ -12,6 +12,8 @@ from railsim.track.tables import track_tables
 RICH = {
     "rail": ("60E1", "54E1"),
     "friction_table": [[0.0, 0.3, 0.4], [200.0, 0.1, 0.2]],
+    "friction_falling": {"rest": 0.4, "decay": 0.6},
+    "third_body": (0.3, 0.1),
     "gauge_widening": [[290.0, 0.0, 0.0], [310.0, 0.0, 0.01]],
     "cant_rotation": "inner_rail",
     "irregularities": [

@@ -158,6 +158,16 @@ def test_cant_list_shorter_than_the_plan_is_usual():
         {"irregularities": [{**RANDOM, "channels": ["lateral", "lateral"]}]},
         {"irregularities": [{**RANDOM, "begin": 50.0, "end": 50.0}]},
         {"irregularities": [{**RANDOM, "fade": -1.0}]},
+        {"third_body": 0.0},
+        {"third_body": 1.1},
+        {"third_body": [0.3, 0.5]},  # softer in adhesion than in slip
+        {"third_body": [0.3, 0.2, 0.1]},
+        {"friction_falling": 0.4},
+        {"friction_falling": {"rest": 0.4}},
+        {"friction_falling": {"rest": 0.0, "decay": 0.6}},
+        {"friction_falling": {"rest": 1.2, "decay": 0.6}},
+        {"friction_falling": {"rest": 0.4, "decay": -0.6}},
+        {"friction_falling": {"rest": 0.4, "decay": 0.6, "static": 0.5}},
     ],
 )
 def test_wrong_value_is_refused(change):
@@ -169,6 +179,7 @@ def test_wrong_value_is_refused(change):
     "change",
     [
         {"scheme": "euler"},
+        {"creep_law": "kalker"},
         {"step": 0.0},
         {"output_rate": -1.0},
         {"fastsim_grid": [0, 10]},
@@ -201,6 +212,22 @@ def test_rows_given_for_both_sides_are_kept_as_pairs():
     assert wide.friction_table == ((0.0, 0.3, 0.3),)
     assert wide.gauge_widening == ((0.0, 0.005, 0.005),)
     assert load_track_text(wide.to_toml()) == wide
+
+
+def test_friction_that_falls_and_a_third_body_are_read_back():
+    wet = track([STRAIGHT], friction_falling={"rest": 0.4, "decay": 0.6}, third_body=0.7)
+    assert wet.third_body == (0.7, 0.7)
+    assert (wet.friction_falling.rest, wet.friction_falling.decay) == (0.4, 0.6)
+    assert load_track_text(wet.to_toml()) == wet
+
+
+def test_falling_friction_may_be_assigned_key_by_key():
+    changes = ["friction_falling.rest=0.5", "friction_falling.decay=0.2", "third_body=[0.3, 0.1]"]
+    changed = load_track("straight", changes)
+    assert (changed.friction_falling.rest, changed.friction_falling.decay) == (0.5, 0.2)
+    assert changed.third_body == (0.3, 0.1)
+    with pytest.raises(InputError, match="decay"):
+        load_track("straight", changes[:1])
 
 
 def test_settings_for_a_table_and_for_free_running():

@@ -34,6 +34,28 @@ def test_huge_creepage_is_full_sliding(law, size):
     assert np.isfinite([*spin, *mixed]).all()
 
 
+@pytest.mark.parametrize(
+    ("law", "arm"),
+    # mean radius of the patch over a, weighted with the bound: Hertz's 3 pi/16, the parabola's 8/15
+    [("table", 3 * np.pi / 16), ("fastrip", 3 * np.pi / 16), ("fastsim", 8 / 15), ("polach", 0.0)],
+)
+def test_huge_pure_spin_turns_without_pushing(law, arm):
+    force = creep_force(a=A, b=A, N=N, mu=MU, xi_x=0.0, xi_y=0.0, phi=1e4, law=law, nx=100, ny=100)
+    # polach: no moment at all
+    assert force.M_z == pytest.approx(arm * MU * N * A, rel=2e-3, abs=1e-9)
+    # with cells the slip is that of half a cell upstream: the pole of the spin is off by 1/100
+    allowed = 0.015 if law in ("fastsim", "fastrip") else 2e-3
+    assert np.hypot(force.T_x, force.T_y) < allowed * MU * N
+
+
+@laws
+@pytest.mark.parametrize("mu_N", [1e-3, 1e-12, 1e-100, 1e-250, 5e-324])
+def test_vanishing_load_gives_vanishing_force(law, mu_N):
+    force = creep_force(a=A, b=B, N=mu_N, mu=1.0, xi_x=1e-3, xi_y=-1e-3, phi=0.5, law=law)
+    assert np.isfinite(force).all()
+    assert np.hypot(force.T_x, force.T_y) <= 1.017 * mu_N
+
+
 @laws
 @pytest.mark.parametrize("ratio", [1e-3, 0.04, 30.0, 1e3])
 @pytest.mark.filterwarnings("ignore:creep law 'table'")
