@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 STRAIGHT = 20.0  # m
 TRANSITION_TIME, SETTLING_TIME = 4.0, 6.0  # s; several periods of the car body
 NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that need no run-in
-APPROACH_TIME, APPROACH = 3.0, 30.0  # s and m at least of irregular rails before the start
+APPROACH_TIME, APPROACH = 4.0, 30.0  # s and m at least of irregular rails before the start
 SMOOTH = 10.0  # m before the track's beginning where the approach may begin, beside the vehicle
 
 

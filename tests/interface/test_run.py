@@ -100,7 +100,7 @@ def test_continued_run_ends_after_its_own_duration(written, tmp_path):
         (["--start", "5"], "--start: given together with --continue"),
         (["--set", "vehicle.bodies.carbody.mass=4e4"], "of another vehicle"),
         (["--set", "track.friction=0.3"], "of another track"),
-        (["--set", "settings.scheme=heun"], "settings.scheme: found heun"),
+        (["--set", "settings.scheme=rk4"], "settings.scheme: found rk4"),
         (["--until", "5"], "more than the start, 10 m"),
     ],
 )
