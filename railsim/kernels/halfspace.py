@@ -21,7 +21,7 @@ from . import jit_outside
 CONVERGED = 0
 NOT_CONVERGED = 1
 _MAX_TURN = 0.7  # largest turn of a traction's direction in one iteration [rad]
-# Most cases need 5 to 11 iterations.  After _SETTLED of them, where only a share of _FEW of the cells
+# Most cases need 5 to 11 iterations.  After _SETTLED of them, where only a share _FEW of the cells
 # still changes sides, those that go to and fro are kept in stick at their _MAX_RETURNS-th return.
 _SETTLED, _FEW, _MAX_RETURNS = 15, 0.05, 2
 

@@ -46,7 +46,7 @@ def in_curve(vehicle, law, track=None, **more):
 def patches(vehicle, law, track, result):
     """Work arrays at the end of a run, and how many patches carry load."""
     system = prepare(vehicle, track, settings(law), SPEED).model.system
-    work, _ = evaluate(system, result.groups["state"]["state"])
+    work, _ = evaluate(system, result.groups["state"]["end"])
     return system, work, int(work.events[0])
 
 
@@ -175,7 +175,11 @@ def test_error_of_the_step_with_the_table_is_that_with_fastsim(coach):
                      settings=settings(law, step=step))
             for step in (1e-3, 2.5e-4)
         ]  # fmt: skip
-        errors[law] = [np.abs(runs[0][name] - runs[1][name]).max() for name in ("wheelset_yaw", "Y")]
+        # rms: the maximum is that of one instant, at which the flange strikes
+        errors[law] = [
+            np.sqrt(np.mean((runs[0][name] - runs[1][name]) ** 2))
+            for name in ("wheelset_yaw", "wheelset_lateral", "Y", "Q")
+        ]
     # the motions themselves differ by some per cent
     assert (np.array(errors["table"]) < 1.1 * np.array(errors["fastsim"])).all()
 
