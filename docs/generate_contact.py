@@ -1,7 +1,7 @@
 """Fill the tables of `docs/validation/contact_geometry.md`.
 
-``python docs/generate_contact.py`` takes some minutes: it runs the curving study with twelve contact
-tables, boundary elements at a dozen places, and an independent rigid search.
+``python docs/generate_contact.py`` takes some minutes: it runs the curving study with twelve
+contact tables, boundary elements at a dozen places, and an independent rigid search.
 """
 
 import dataclasses
