@@ -195,9 +195,8 @@ def check_range(
         faults.append(Fault("--speed", "", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s"))
     if not (math.isfinite(start) and 0.0 <= start < track.length):
         faults.append(Fault("--start", "", f"found {start:g} m", f"0 to {track.length:g} m"))
-    for option, value in (("--duration", duration), ("--until", until)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            faults.append(Fault(option, "", f"found {value:g}", "a positive number"))
+    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
+        faults.append(Fault("--duration", "", f"found {duration:g} s", "a positive number"))
     if duration is not None and until is not None:
         faults.append(Fault("--duration", "", "given together with --until", "one of the two"))
     if until is not None and not start < until <= track.length:

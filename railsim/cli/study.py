@@ -1,6 +1,5 @@
 """``railsim study``: every combination of vehicles, tracks and speeds."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -171,15 +170,15 @@ def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[f
 
 def _stored_inputs(folder: Path) -> dict[str, Any]:
     from railsim.errors import Fault, InputError
+    from railsim.studies.summary import read_index
 
     try:
-        inputs: dict[str, Any] = json.loads((folder / "study.json").read_text())["inputs"]
-        inputs.pop("railsim_version")
-    except (OSError, ValueError, KeyError):
+        inputs: dict[str, Any] = read_index(folder / "study.json")["inputs"]
+    except InputError:
         found = f"no study in {folder} to resume"
         allowed = "give --vehicles, --tracks and --speeds"
         raise InputError([Fault("--resume", "", found, allowed)]) from None
-    return inputs
+    return {name: value for name, value in inputs.items() if name != "railsim_version"}
 
 
 def _print_record(record: "Record") -> None:

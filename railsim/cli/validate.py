@@ -82,6 +82,11 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         from railsim.result import open_result
 
         return f"result, {open_result(file).status}", []
+    if suffix == ".json":
+        from railsim.studies.summary import check_index
+
+        index = check_index(Path(file))
+        return f"study of {len(index['runs'])} runs, {index['status']}", []
 
     from railsim.definitions.loading import load_any
     from railsim.errors import InputError

@@ -3,13 +3,14 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.overrides import split_overrides
+from railsim.definitions.overrides import OVERRIDE, split_overrides
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.simulation import check_range, initial_speed
@@ -17,6 +18,7 @@ from railsim.studies.case import Case, run_name, short_name
 
 T = TypeVar("T")
 Grid = Mapping[str, Sequence[str]]
+KINDS: dict[Any, str] = {load_vehicle: "vehicle", load_track: "track", load_settings: "settings"}
 
 
 def load_case(
@@ -97,7 +99,7 @@ def combinations(
         try:
             return load(path, own)
         except InputError as error:
-            faults.extend(error.faults)
+            faults.extend(_as_written(fault, KINDS[load], grid) for fault in error.faults)
             return None
 
     cases: list[Case] = []
@@ -145,6 +147,15 @@ def combinations(
     if faults:
         raise InputError(dict.fromkeys(faults))
     return cases
+
+
+def _as_written(fault: Fault, kind: str, grid: Grid) -> Fault:
+    """Return the fault of an assignment with its key and option as they were given."""
+    if fault.file != OVERRIDE:
+        return fault
+    key = f"{kind}.{fault.key}"
+    of_grid = any(key == name or key.startswith(f"{name}.") for name in grid)
+    return replace(fault, file="--grid" if of_grid else OVERRIDE, key=key)
 
 
 def _profile_faults(cases: Sequence[Case]) -> list[Fault]:

@@ -4,7 +4,6 @@ A run whose file is there with the same inputs is not computed again, so an inte
 on where it was when it is started again.
 """
 
-import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,13 @@ from railsim.result import Result, open_result
 from railsim.studies.case import Case
 from railsim.studies.combine import combinations
 from railsim.studies.execute import Job, cluster, in_processes, in_this_process, on_cluster
-from railsim.studies.summary import Record, finished_record, waiting_record, write_index
+from railsim.studies.summary import (
+    Record,
+    finished_record,
+    read_index,
+    waiting_record,
+    write_index,
+)
 from railsim.version import __version__
 
 
@@ -237,8 +242,8 @@ def _finished(cases: Sequence[Case], folder: Path, *, resume: bool) -> dict[str,
 
 def _refuse_another_study(folder: Path, inputs: Mapping[str, object]) -> None:
     try:
-        there = json.loads((folder / "study.json").read_text(encoding="utf-8"))["inputs"]
-    except (OSError, ValueError, KeyError, TypeError):
+        there = read_index(folder / "study.json")["inputs"]
+    except InputError:
         return
     differing = [name for name, value in inputs.items() if there.get(name) != value]
     if differing:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from railsim.errors import Fault, InputError
 from railsim.result import Result, mid_curves, peaks
 from railsim.studies.case import Case
 
@@ -63,6 +64,47 @@ def write_index(
     index = {"format": FORMAT, "status": status, "inputs": dict(inputs), "runs": list(records)}
     _replace(folder / "study.json", json.dumps(index, indent=1) + "\n")
     _replace(folder / "summary.csv", summary_csv(records))
+
+
+def read_index(path: Path) -> dict[str, Any]:
+    """Return what a ``study.json`` holds.
+
+    Raises
+    ------
+    InputError : it cannot be read, or is not the index of a study.
+    """
+    try:
+        index: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        fault = Fault(str(path), "", f"cannot be read ({error})", "give the study.json of a study")
+        raise InputError([fault]) from None
+    except json.JSONDecodeError as error:
+        fault = Fault(str(path), f"line {error.lineno}", f"broken JSON: {error.msg}", "")
+        raise InputError([fault]) from None
+    found = index.get("format") if isinstance(index, dict) else None
+    if found != FORMAT:
+        raise InputError([Fault(str(path), "format", repr(found), f"allowed: {FORMAT}")])
+    checked: dict[str, Any] = index
+    return checked
+
+
+def check_index(path: Path) -> dict[str, Any]:
+    """Return what a ``study.json`` holds; every run that it calls done must have its result.
+
+    Raises
+    ------
+    InputError : as `read_index`, or results are not there.
+    """
+    index = read_index(path)
+    allowed = "the same study with --resume computes it again"
+    faults = [
+        Fault(str(path), run["file"], "the result is not there", allowed)
+        for run in index["runs"]
+        if run["status"] not in ("waiting", "failed") and not (path.parent / run["file"]).exists()
+    ]
+    if faults:
+        raise InputError(faults)
+    return index
 
 
 def summary_csv(records: Sequence[Record]) -> str:

@@ -211,6 +211,14 @@ def test_json_holds_every_record(tmp_path, simulated, capsys):
             "vehicle., track. or settings.",
         ),
         (
+            ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--grid", "track.frction=1"],
+            "--grid: track.frction: unknown key; did you mean 'friction'?",
+        ),
+        (
+            ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--set", "settings.step=-1"],
+            "--set: settings.step: -1",
+        ),
+        (
             ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--grid", "track.friction"],
             "key.path=a,b,c",
         ),
@@ -237,6 +245,27 @@ def test_foreign_file_is_not_replaced(tmp_path, simulated, capsys):
     foreign.write_text("a letter")
     assert main(arguments(tmp_path, 20, more=["--resume"])) == 2
     assert foreign.read_text() == "a letter"
+
+
+def test_validate_knows_the_index_of_a_study_and_misses_its_results(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 10, 20)) == 0
+    capsys.readouterr()
+    path = str(tmp_path / "study.json")
+    assert main(["validate", path]) == 0
+    assert "study of 2 runs, complete, no faults" in capsys.readouterr().out
+    (tmp_path / f"{COACH}_{CURVE}_20.h5").unlink()
+    assert main(["validate", path]) == 2
+    assert f"{COACH}_{CURVE}_20.h5: the result is not there" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [('{"format":', "line 1: broken JSON"), ("[]", "format"), ('{"format": "x/1"}', "'x/1'")],
+)
+def test_validate_refuses_what_is_no_index(tmp_path, text, words, capsys):
+    (tmp_path / "study.json").write_text(text)
+    assert main(["validate", str(tmp_path / "study.json")]) == 2
+    assert words in capsys.readouterr().err
 
 
 def test_missing_dask_is_answered_with_the_install_command(tmp_path, monkeypatch, capsys):
