@@ -30,9 +30,31 @@ def validation_faults(
         if detail["type"] == "too_short" and detail["ctx"]["actual_length"] < len(detail["input"]):
             continue  # members with faults of their own do not count
         path = _written_path(detail, source.data)
-        found, allowed = _wording(detail, model)
+        found, allowed = _wording(_as_written(detail, path, source.data), model)
         faults.append(Fault(source.file_of(path), ".".join(path), found, allowed))
-    return faults
+    # a number that stands for both sides is objected to twice, the second time at its row
+    return [
+        fault
+        for fault in faults
+        if not any(
+            other.key.startswith(f"{fault.key}.")
+            and (other.found, other.allowed) == (fault.found, fault.allowed)
+            for other in faults
+        )
+    ]
+
+
+def _as_written(detail: Any, path: Sequence[str], data: Any) -> Any:
+    """Return pydantic's finding with the number as it stands in the file, not as it was shared."""
+    node = data
+    for item in path:
+        node = node[int(item)] if isinstance(node, list) else node.get(item)
+    numbers = int | float
+    if isinstance(node, list) and len(node) == 2 and isinstance(detail["input"], numbers):
+        node = node[1]  # a row of place and value
+    if not (isinstance(node, numbers) and isinstance(detail["input"], numbers)):
+        return detail
+    return {**detail, "input": node}
 
 
 def _written_path(detail: Any, data: Any) -> tuple[str, ...]:
@@ -80,12 +102,15 @@ def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
         case "tuple_type":
             return _shown(value), _list_of(_annotation_at(model, detail["loc"]))
         case "too_long" | "too_short" if isinstance(value, list | tuple):
-            return _counted(value), _list_of(_annotation_at(model, detail["loc"]))
+            allowed = _list_of(_annotation_at(model, detail["loc"]))
+            if allowed == "a list" and kind == "too_short":
+                allowed = f"a list of {context['min_length']} at least"
+            return _counted(value), allowed
         case "model_type" | "model_attributes_type" | "dict_type":
             return _shown(value), "must be a table"
         case "value_error":
             message = message.removeprefix("Value error, ")
-            if isinstance(value, dict | list | tuple):
+            if isinstance(value, dict) or len(repr(value)) > 60:
                 return message, ""
     return _shown(value), message
 

@@ -39,7 +39,10 @@ def _band(wavelengths: tuple[float, float]) -> tuple[float, float]:
 
 
 Wavelengths = Annotated[
-    tuple[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.2)], Positive],
+    tuple[
+        Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.2)],
+        Annotated[float, Field(strict=True, allow_inf_nan=False, le=1000.0)],
+    ],
     AfterValidator(_band),
 ]
 
@@ -148,12 +151,9 @@ class Random(Definition):
     """Seed of the random phases: the same seed gives the same track"""
     wavelengths: Wavelengths = (3.0, 70.0)
     """Shortest and longest wavelength [m]; the variance is the integral of the spectrum between"""
-    channels: tuple[Literal["lateral", "vertical", "cross_level", "gauge"], ...] = (
-        "lateral",
-        "vertical",
-        "cross_level",
-        "gauge",
-    )
+    channels: Annotated[
+        tuple[Literal["lateral", "vertical", "cross_level", "gauge"], ...], Field(min_length=1)
+    ] = ("lateral", "vertical", "cross_level", "gauge")
     """Which of the four irregularities are generated"""
     begin: Finite = 0.0
     """Arc length where it begins [m]"""

@@ -78,7 +78,7 @@ FORMATS: dict[str, Format] = {
         free=("friction_falling",),
         prepare=embed_measured,
     ),
-    SETTINGS_FORMAT: Format("settings", Settings, free=("initial",)),
+    SETTINGS_FORMAT: Format("settings", Settings, free=("initial", "drive", "outputs")),
     SPRING_FORMAT: Format(
         "spring",
         TrailingArmSuspension,
