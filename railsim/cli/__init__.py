@@ -78,12 +78,12 @@ def _has(folder: Path, module: str) -> bool:
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="railsim")
 def railsim() -> None:
-    r"""Simulate the dynamics of rail vehicles.
+    """Simulate the dynamics of rail vehicles.
 
     \b
     Example:
       railsim run coach_manchester curve_r250 --speed 20
-    """
+    """  # noqa: D301 - click reads the escape
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -13,7 +13,7 @@ from railsim.cli.progress import progress_bar
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress bar.")
 def command(quick: bool, as_json: bool, quiet: bool) -> None:
-    r"""Measure how fast railsim is on this machine, and how right at that speed.
+    """Measure how fast railsim is on this machine, and how right at that speed.
 
     The study's runs in multiples of real time with their errors against RK4 at 0.125 ms; the parts
     of the right-hand side; FASTSIM over its grid; one core and two; start-up, whole commands and
@@ -23,7 +23,7 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
     Example:
       railsim bench
       railsim bench --quick --json > bench.json
-    """
+    """  # noqa: D301 - click reads the escape
     from railsim.bench.report import FULL, QUICK, benchmark, tables
 
     with progress_bar("bench", quiet=quiet) as progress:

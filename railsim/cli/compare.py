@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def command(
     files: tuple[str, ...], out: str | None, over: str, overwrite: bool, as_json: bool, quiet: bool
 ) -> None:
-    r"""Print peaks and mid-curve values of results side by side.
+    """Print peaks and mid-curve values of results side by side.
 
     The first result is what the others are compared with; differences are those of magnitudes.
     With --out the table and a picture of the leading wheelset's quantities are written.
@@ -38,7 +38,7 @@ def command(
     \b
     Example:
       railsim compare manchester.h5 flexicoil.h5 --out comparison --overwrite
-    """
+    """  # noqa: D301 - click reads the escape
     from railsim.compare import compare
 
     results = _opened(files)

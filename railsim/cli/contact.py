@@ -129,7 +129,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    r"""Contact geometry of a wheelset on its rails.
+    """Contact geometry of a wheelset on its rails.
 
     Prints rolling radius difference, contact angles and places over the lateral displacement, the
     equivalent conicity of EN 15302, and the contact patches of the right wheel under a load.
@@ -139,7 +139,7 @@ def command(
       railsim contact --wheel S1002 --rail 60E1 --inclination 0.025 --out s1002_60e1
       railsim contact --wheel measured.whl --rail 54E1 --exact --json
       railsim contact --creep --friction 0.35 --out creep
-    """
+    """  # noqa: D301 - click reads the escape
     import numpy as np
 
     from railsim.cli import creep as creep_part

@@ -10,6 +10,7 @@ from railsim.cli.common import table
 if TYPE_CHECKING:
     from railsim.definitions.elements import Element
     from railsim.definitions.layout import Section
+    from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Assembly, Vehicle
     from railsim.result import Result
@@ -188,6 +189,51 @@ def static_lines(static: dict[str, Any]) -> list[str]:
     return [*lines, "", *table(["preload, kN", "tension, or x y z on body 1"], rows)]
 
 
+# springs ------------------------------------------------------------------------------------------
+
+
+def spring_lines(suspension: "TrailingArmSuspension") -> list[str]:
+    """Return a spring file in a screenful: arm, springs, loads, and what else it holds."""
+    arm, material = suspension.arm, suspension.material
+    lines = [
+        f"{suspension.name}",
+        f"  arm {arm.length:g} m, seat {1e3 * arm.seat_height:g} mm above the axle, bush "
+        f"{arm.bush_torsional_stiffness:g} N m/rad, moment of the nest by '{arm.equilibrium}'",
+        f"  G {material.G / 1e9:g} GPa, E {material.E / 1e9:g} GPa, {material.density:g} kg/m3",
+    ]
+    lines += [f"  source: {suspension.source}"] if suspension.source else []
+    rows = [
+        [
+            name,
+            *(
+                "" if value is None else f"{scale * value:.6g}"
+                for scale, value in (
+                    (1e3, spring.mean_diameter),
+                    (1e3, spring.wire_diameter),
+                    (1.0, spring.active_coils),
+                    (1e3, spring.free_height),
+                    (1e3, seat),
+                )
+            ),
+        ]
+        for (name, spring), seat in zip(
+            suspension.springs.items(), suspension.seat_heights, strict=True
+        )
+    ]
+    header = ["spring", "D mm", "d mm", "active coils", "free height mm", "seat mm"]
+    lines += ["", *table(header, rows)]
+    if suspension.engagement:
+        lines.append(f"the inner spring works from {1e3 * suspension.engagement:g} mm on")
+    points = [("mounting", suspension.mounting), ("target", suspension.target)]
+    wanted = {point.load: (name, point.deflection) for name, point in points if point is not None}
+    loads = [[name, f"{load / 1e3:g}", ""] for name, load in suspension.loads.items()]
+    loads += [[name, f"{load / 1e3:g}", f"{1e3 * s:g}"] for load, (name, s) in wanted.items()]
+    lines += ["", *table(["load", "kN", "wanted deflection mm"], loads)]
+    others = ("fatigue", "search", "tolerances", "vehicle")
+    present = [name for name in others if getattr(suspension, name) is not None]
+    return [*lines, "", f"tables besides: {', '.join(present) or 'none'}"]
+
+
 # tracks -------------------------------------------------------------------------------------------
 
 
@@ -205,6 +251,9 @@ def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
         "rail": track.rail,
         "inclination": track.inclination,
         "friction": track.friction,
+        "friction_table": track.friction_table,
+        "gauge_widening": track.gauge_widening,
+        "cant_rotation": track.cant_rotation,
         "friction_falling": track.friction_falling and track.friction_falling.model_dump(),
         "third_body": track.third_body,
         "rounding": track.rounding,
@@ -263,8 +312,14 @@ def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
         f"{track.name}",
         f"  {track.length:g} m, gauge {1e3 * track.gauge:g} mm, rail {_either(track.rail)} "
         f"1:{1.0 / track.inclination if track.inclination else math.inf:g}, "
-        f"friction {_either(track.friction)}, rounded over {track.rounding:g} m",
+        f"friction {'by table' if track.friction_table else _either(track.friction)}, "
+        f"rounded over {track.rounding:g} m",
     ]
+    if track.cant_rotation == "inner_rail":
+        lines.append("  cant turns the track about the inner rail")
+    if track.gauge_widening:
+        widest = max(left + right for _, left, right in track.gauge_widening)
+        lines.append(f"  gauge widened by up to {1e3 * widest:g} mm")
     if track.friction_falling:
         falling = track.friction_falling
         lines.append(f"  friction falls to {falling.rest:g} of it by {falling.decay:g} s/m of slip")

@@ -38,13 +38,13 @@ def command(
     assignments: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    r"""Show what a vehicle, track, settings or result file holds.
+    """Show what a vehicle, track, settings or result file holds.
 
     \b
     Example:
       railsim info coach_manchester --draw coach.png --overwrite
       railsim info curve_r250 --speed 20 --speed 25
-    """
+    """  # noqa: D301 - click reads the escape
     if Path(file).suffix.lower() in RESULT_SUFFIXES:
         _show_result(file, as_json)
         return
@@ -78,6 +78,7 @@ def _description(
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a definition as data and as lines."""
     from railsim.cli import describe
+    from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
@@ -86,6 +87,8 @@ def _description(
         return data, describe.track_lines(definition, speeds)
     if not isinstance(definition, Vehicle):
         data = {"kind": kind, **definition.model_dump()}
+        if isinstance(definition, TrailingArmSuspension):
+            return data, describe.spring_lines(definition)
         return data, definition.to_toml().splitlines()
     data, lines = describe.vehicle_data(definition), describe.vehicle_lines(definition)
     if static:

@@ -48,7 +48,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    r"""Draw quantities of a result, or a track with its curvature and cant.
+    """Draw quantities of a result, or a track with its curvature and cant.
 
     Without a QUANTITY: wheel load change, lateral force, derailment quotient, roll, lateral
     displacement and yaw.  A QUANTITY may name places: Y:1:left is the left wheel of the leading
@@ -59,7 +59,7 @@ def command(
       railsim plot coach_manchester_curve_r250_20.h5 --overwrite
       railsim plot run.h5 Y Q:1 --over time --by wheelset --out forces.pdf
       railsim plot curve_r250 --out curve.png
-    """
+    """  # noqa: D301 - click reads the escape
     path = Path(out) if out else Path(file).with_suffix(".png")
     if Path(file).suffix.lower() in RESULT_ENDINGS:
         figure = _result_figure(file, selections, over, by, between, path, overwrite)

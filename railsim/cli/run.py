@@ -61,7 +61,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    r"""Run one vehicle over one track and print its largest values.
+    """Run one vehicle over one track and print its largest values.
 
     VEHICLE and TRACK are files or names of shipped ones.  The run ends with the track unless
     --duration or --until says otherwise.  Paths of --set begin with vehicle., track. or settings.
@@ -72,7 +72,7 @@ def command(
       railsim run coach_manchester curve_r250 --speed 20 --overwrite
       railsim run my_coach.toml curve_r250 --speed 20 --set track.friction=0.3 --out dry.h5
       railsim run coach_manchester curve_r250 --speed 20 --check-step --overwrite
-    """
+    """  # noqa: D301 - click reads the escape
     from railsim.cli import DONE, ENDED_EARLY
     from railsim.definitions.layout import track_remarks
     from railsim.studies.run import run_case

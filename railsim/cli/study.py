@@ -94,7 +94,7 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> int:
-    r"""Run every combination of vehicles, tracks, speeds and the values of a grid.
+    """Run every combination of vehicles, tracks, speeds and the values of a grid.
 
     One HDF5 file a run, summary.csv and study.json go to DIR.  A run that is there with the same
     inputs is not computed again, so the same command can be typed again after an interruption.
@@ -102,11 +102,11 @@ def command(
 
     \b
     Example:
-      railsim study --vehicles coach_manchester --tracks curve_r250 curve_r500 \
+      railsim study --vehicles coach_manchester --tracks curve_r250 curve_r500 \\
           --speeds 15 20 --out curves --plots
-      railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \
+      railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \\
           --grid track.friction=0.3,0.4,0.5 --out friction
-    """
+    """  # noqa: D301 - click reads the escape
     from railsim.studies import study
 
     inputs: dict[str, Any] = {

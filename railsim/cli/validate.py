@@ -22,7 +22,7 @@ PROFILE_SUFFIXES = {".csv", ".prw", ".prr", ".ban", ".whl"}
 @json_option
 @quiet_option
 def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
-    r"""Check vehicle, track, settings, spring, study and profile files.
+    """Check vehicle, track, settings, spring, study and profile files.
 
     Every fault is listed with file, key, what was found and what is allowed; remarks point to what
     is allowed but unusual.  Shipped files may be given by name.
@@ -30,7 +30,7 @@ def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
     \b
     Example:
       railsim validate my_coach.toml curve_r250
-    """
+    """  # noqa: D301 - click reads the escape
     from railsim.cli import DONE, WRONG_INPUT
 
     reports = [_report(file) for file in files]

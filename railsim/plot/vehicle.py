@@ -1,12 +1,14 @@
 """A vehicle as a picture: side, top and front view with every element, to see wrong coordinates."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 
 from railsim.definitions.base import Vector
 from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
@@ -17,6 +19,7 @@ SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
 TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
 LABELS = ("$x$ (m), forward", "$y$ (m), to the right", "$z$ (m), down")
 BODY, WHEEL, LEVER = "0.25", "0.55", "0.78"
+BOX: Any = {"ls": "", "marker": "s", "ms": 7, "mfc": "none", "mec": "0.35", "mew": 1.0}
 # The leading wheelset and those as near to it as this are shown once more in detail [m].
 BOGIE = 4.0
 
@@ -24,8 +27,9 @@ BOGIE = 4.0
 def vehicle_figure(vehicle: Vehicle) -> Figure:
     """Draw a vehicle in three views with its elements.
 
-    Bodies are crosses at their centres of gravity, wheels circles or lines; every element is drawn
-    between its points, with a thin line from each point to the body that it holds on to.
+    Bodies are crosses at their centres of gravity, axleboxes squares, wheels circles or lines;
+    every element is drawn between its points, with a thin line from each point to the body that it
+    holds on to.
 
     Returns
     -------
@@ -79,13 +83,18 @@ def _draw_view(
         _draw_wheelset(axes, body, across, upright)
     for element in flat.elements:
         _draw_element(axes, element, flat, view, colours[_kind(element)])
+    for body in flat.of_kind("axlebox"):
+        axes.plot(body.position[across], body.position[upright], **BOX)
     for body in flat.of_kind("body"):
         x, y = body.position[across], body.position[upright]
         axes.plot(x, y, marker="+", ms=10, mew=1.8, color=BODY, zorder=4)
         if across == 0 and (limits is None or limits[0] < x < limits[1]):
-            axes.annotate(
-                body.name, (x, y), (5, 5), textcoords="offset points", fontsize=7, color=BODY
+            above = 18 if upright == 2 else 10  # points; out of the way of springs
+            label = axes.annotate(
+                body.name, (x, y), (0, above), textcoords="offset points", ha="center",
+                fontsize=7, color=BODY, zorder=6,
             )
+            label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     axes.set_title(TITLES[view] + (", leading end" if limits else ""))
     axes.set_xlabel(LABELS[across])
     axes.set_ylabel(LABELS[upright])
@@ -105,13 +114,15 @@ def _draw_element(
         if name:
             _line(axes, (flat.body(name).position, point), *view, color=LEVER, lw=0.5)
     ends = (element.point1, element.point2)
+    _line(axes, ends, *view, color=colour, zorder=3, **_look(element))
+
+
+def _look(element: FlatElement) -> dict[str, Any]:
     if element.definition.end_points() is None:
-        _line(axes, ends, *view, color=colour, lw=1.2, ls=":", zorder=3)
-    elif element.point1 == element.point2:
-        x, y = element.point1[view[0]], element.point1[view[1]]
-        axes.plot(x, y, ls="", marker="o", ms=8, mfc="none", mew=1.4, color=colour, zorder=3)
-    else:
-        _line(axes, ends, *view, color=colour, lw=1.6, marker="o", ms=2.5, zorder=3)
+        return {"ls": ":", "lw": 1.2}
+    if element.point1 == element.point2:
+        return {"ls": "", "marker": "o", "ms": 8, "mfc": "none", "mew": 1.4}
+    return {"lw": 1.6, "marker": "o", "ms": 2.5}
 
 
 def _draw_wheelset(axes: Axes, body: FlatBody, across: int, upright: int) -> None:
@@ -138,7 +149,9 @@ def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D]:
     yield Line2D([], [], ls="", marker="+", ms=9, mew=1.8, color=BODY, label="centre of gravity")
     yield Line2D([], [], color=WHEEL, lw=2.0, label="wheelset")
     yield Line2D([], [], color=LEVER, lw=0.8, label="holds on to")
+    if flat.of_kind("axlebox"):
+        yield Line2D([], [], **BOX, label="axlebox")
     for kind, colour in colours.items():
-        number = sum(_kind(element) == kind for element in flat.elements)
-        label = f"{kind.replace('_', ' ')} ({number})"
-        yield Line2D([], [], color=colour, lw=1.6, marker="o", ms=3, label=label)
+        of_kind = [element for element in flat.elements if _kind(element) == kind]
+        label = f"{kind.replace('_', ' ')} ({len(of_kind)})"
+        yield Line2D([], [], color=colour, label=label, **_look(of_kind[0]))

@@ -79,13 +79,35 @@ def test_irregularities_are_shown(capsys):
     assert "seed 7" in lines[-1]
 
 
+def test_friction_and_widening_along_the_track_are_shown(capsys, tmp_path):
+    path = tmp_path / "t.toml"
+    path.write_text('format = "railsim-track/1"\nname = "t"\ncant_rotation = "inner_rail"\n'
+                    'plan = [{type="STR", length=50.0}]\nfriction_table = [[0.0, 0.3]]\n'
+                    'gauge_widening = [[0.0, 0.0], [50.0, 0.012]]\n')
+    text = "\n".join(lines_of(capsys, str(path)))
+    assert "friction by table" in text
+    assert "gauge widened by up to 12 mm" in text
+    assert "about the inner rail" in text
+
+
 def test_remarks_are_shown(capsys):
     lines = lines_of(capsys, "curve_r250", "--set", "rounding=80.0")
     assert any(line.startswith("remark: plan.1") for line in lines)
 
 
-def test_spring_file_is_shown(capsys):
-    assert "railsim-spring/1" in lines_of(capsys, "turasas_axlebox")[0]
+def test_spring_file_fits_on_a_screen(capsys):
+    lines = lines_of(capsys, "turasas_axlebox")
+    assert len(lines) < 25
+    assert max(map(len, lines)) < 110
+    assert any(line.startswith("outer ") for line in lines)
+    assert lines[-1].startswith("tables besides: fatigue, search")
+
+
+def test_spring_as_json_holds_the_whole_file(capsys):
+    assert cli.main(["info", "turasas_axlebox", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["kind"] == "spring"
+    assert {"arm", "outer", "loads", "search"} <= set(data)
 
 
 @pytest.mark.parametrize("name", ["coach_manchester", "curve_r250"])

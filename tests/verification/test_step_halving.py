@@ -1,7 +1,7 @@
-"""On irregular track a run at the chosen step is converged: half of it changes nothing to speak of.
+"""On irregular track a run at the chosen step is converged: half of it changes next to nothing.
 
-1 km at 60 m/s reaches the flanges (8 mm) near the critical speed, where a scheme of first order would
-need a tenth of the step.
+1 km at 60 m/s reaches the flanges (8 mm) near the critical speed, where a scheme of first order
+would need a tenth of the step.
 """
 
 import numpy as np
