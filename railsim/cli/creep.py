@@ -115,11 +115,16 @@ def lines_of(patch: "Patch", rows: Sequence[dict[str, Any]]) -> list[str]:
         [
             case,
             f"{size:g}",
-            *(f"{by_law[law]['T_x']:.3f} {by_law[law]['T_y']:.3f}" for law in LAWS),
+            *(f"{_shown(by_law[law]['T_x'])} {_shown(by_law[law]['T_y'])}" for law in LAWS),
         ]
         for (case, size), by_law in by_place.items()
     ]
     return ["", head, *table(["T_x, T_y by", "creepage", *LAWS], body)]
+
+
+def _shown(value: float) -> str:
+    """Three digits, without a sign where they are zero."""
+    return f"{round(value, 3) + 0.0:.3f}"
 
 
 def build_table(out: str | None, workers: int, as_json: bool, quiet: bool) -> None:

@@ -322,7 +322,7 @@ def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
         lines.append(f"  gauge widened by up to {1e3 * widest:g} mm")
     if track.friction_falling:
         falling = track.friction_falling
-        lines.append(f"  friction falls to {falling.rest:g} of it by {falling.decay:g} s/m of slip")
+        lines.append(f"  friction with slip down to {falling.rest:g} of it, {falling.decay:g} s/m")
     if track.third_body != (1.0, 1.0):
         lines.append(f"  third body: Kalker's coefficients times {_either(track.third_body)}")
     lines += [f"  source: {track.source}"] if track.source else []

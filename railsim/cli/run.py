@@ -212,7 +212,7 @@ def _friction(track: "Track") -> str:
         text = "by table"
     if track.friction_falling is not None:
         falling = track.friction_falling
-        text += f" falling to {falling.rest:g} of it by {falling.decay:g} s/m"
+        text += f" (with slip down to {falling.rest:g} of it, {falling.decay:g} s/m)"
     if track.third_body != (1.0, 1.0):
         text += f", third body {_listed(f'{k:g}' for k in track.third_body)}"
     return text

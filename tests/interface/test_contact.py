@@ -140,3 +140,50 @@ def test_wrong_input_is_named_with_status_2(arguments, words, capsys):
 def test_help_shows_an_example(capsys):
     assert cli.main(["contact", "--help"]) == 0
     assert "railsim contact --wheel S1002" in capsys.readouterr().out
+
+
+def test_creep_has_a_row_for_each_law_direction_and_size(capsys):
+    rows = as_json(capsys, "--creep", "--friction", "0.35")["creep"]
+    from railsim.contact.creep import LAWS
+
+    assert {row["law"] for row in rows} == set(LAWS)
+    places = {(row["case"], row["size"]) for row in rows}
+    assert len(rows) == len(places) * len(LAWS)
+    sizes = np.array([np.hypot(row["T_x"], row["T_y"]) for row in rows])
+    assert (sizes < 1.016).all()  # 10 x 10 cells exceed mu N by up to 1.6 %
+    assert cli.main(["contact", "--creep"]) == 0
+    printed = capsys.readouterr().out
+    assert "Creep force over mu N" in printed
+    assert "-0.000" not in printed
+
+
+def test_creep_refuses_a_friction_that_means_nothing(capsys):
+    for friction in ("0", "-0.3", "nan", "1.5"):
+        assert cli.main(["contact", "--creep", "--friction", friction]) == 2
+        assert "--friction" in capsys.readouterr().err
+
+
+def test_creep_table_is_built_from_the_rows_that_are_there(tmp_path, capsys):
+    from railsim.contact.creep_table import shipped_nodes
+
+    nodes = shipped_nodes()
+    ratios, thetas = nodes.force.shape[:2]
+    for i in range(ratios):
+        for j in range(thetas):
+            with open(tmp_path / f"row_{i:02d}_{j:02d}.npz", "wb") as stream:
+                np.savez(stream, row=nodes.force[i, j], kalker=nodes.kalker[i], failures=0)
+    found = as_json(capsys, "--build-creep-table", "--out", str(tmp_path))
+    assert found["largest_difference"] == 0.0
+    with np.load(found["file"]) as written:
+        np.testing.assert_array_equal(written["force"], nodes.force)
+
+
+@pytest.mark.slow
+def test_creep_pictures_are_written(tmp_path, capsys):
+    out = tmp_path / "creep"
+    assert cli.main(["contact", "--creep", "--out", str(out), "--quiet"]) == 0
+    for name in ("creep_curves.png", "traction.png"):
+        with Image.open(out / name) as picture:
+            assert min(picture.size) > 600
+    with (out / "creep_curves.csv").open() as file:
+        assert {"law", "T_x", "T_y", "M_z"} <= set(next(csv.DictReader(file)))

@@ -1,16 +1,18 @@
 """Every creep law in the time loop: the law of `creep_force`, limits, friction of the track."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from dynamics import Settings, evaluate, load_track, load_vehicle
-from rig import test_vehicle
+from rig import DATA, test_vehicle
 
-from railsim import simulation
+from railsim import cli, simulation
 from railsim.contact.creep import LAWS, creep_force
 from railsim.definitions.mirror import mirrored_track
 from railsim.kernels import wheel_rail as columns
+from railsim.result import open_result
 from railsim.simulation import prepare, simulate
 
 SPEED = 20.0
@@ -184,9 +186,9 @@ def test_error_of_the_step_with_the_table_is_that_with_fastsim(coach):
     assert (np.array(errors["table"]) < 1.1 * np.array(errors["fastsim"])).all()
 
 
-@laws
-def test_ellipses_beyond_the_range_are_counted_and_told(law, bogie, monkeypatch, caplog):
-    """Patches made 60 times as long: the run goes on with the end of the range, and says so."""
+@pytest.fixture
+def long_patches(monkeypatch):
+    """Runs whose patches are made 60 times as long, over their width, as they are."""
     assemble = simulation.assemble
 
     def with_long_patches(*arguments):
@@ -196,12 +198,14 @@ def test_ellipses_beyond_the_range_are_counted_and_told(law, bogie, monkeypatch,
         values[..., 6] /= 60.0**0.5
         values.setflags(write=model.system.contact.values.flags.writeable)  # else compiled anew
         contact = model.system.contact._replace(values=values)
-        return type(model)(
-            model.system._replace(contact=contact), model.index, model.flat, model.tables,
-            model.profiles,
-        )  # fmt: skip
+        return replace(model, system=model.system._replace(contact=contact))
 
     monkeypatch.setattr(simulation, "assemble", with_long_patches)
+
+
+@laws
+def test_ellipses_beyond_the_range_are_counted_and_told(law, bogie, long_patches, caplog):
+    """The run goes on with the end of the range, and says so."""
     with caplog.at_level(logging.WARNING):
         result = simulate(bogie, load_track("straight"), speed=SPEED, duration=0.1,
                           settings=settings(law))  # fmt: skip
@@ -212,6 +216,15 @@ def test_ellipses_beyond_the_range_are_counted_and_told(law, bogie, monkeypatch,
     (remark,) = result.remarks
     assert "range of a/b" in remark
     assert remark in caplog.text
+
+
+def test_command_says_once_that_the_range_was_left(long_patches, tmp_path, capsys):
+    file = tmp_path / "run.h5"
+    assert cli.main(["run", str(DATA / "single_bogie.toml"), "straight", "--speed", "20",
+                     "--duration", "0.1", "--out", str(file), "--quiet"]) == 0  # fmt: skip
+    printed = "".join(capsys.readouterr())
+    assert printed.count("range of a/b") == 1
+    assert open_result(file).remarks[0] in printed
 
 
 def test_run_within_the_range_has_no_remark(bogie):
