@@ -224,13 +224,13 @@ def rotation(arm: Arm, P: ArrayLike) -> Values:
     arm : Arm
         The arm with its springs.
     P : float or ndarray
-        Load at the axle [N].
+        Load at the axle, positive [N].
 
     Returns
     -------
     phi : ndarray
         Rotation; nan where no rotation between lift-off and a spring pressed to a tenth of its
-        free height carries the load.
+        free height carries the load; one of them where near lift-off on high seats several do.
     """
     P = np.asarray(P, dtype=float)
     low, high = rotation_range(arm)
