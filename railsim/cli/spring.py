@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from railsim.springs.design import Design
     from railsim.springs.search import SearchResult
     from railsim.springs.tolerance import RideHeight
-    from railsim.springs.verification import Check, Fatigue, Verification
+    from railsim.springs.verification import Fatigue, Verification
 
 REPORT = "report.html"
 
@@ -375,124 +375,34 @@ def _design_lines(suspension: "TrailingArmSuspension", result: "Design") -> list
 
 
 def _search_lines(result: "SearchResult") -> list[str]:
-    rows = []
-    for rank, nest in enumerate(result.nests, start=1):
-        springs = [
-            f"{spring.wire_diameter * 1e3:.6g} x {spring.mean_diameter * 1e3:.6g}, "
-            f"{spring.active_coils:.6g}"
-            for spring in (nest.outer, nest.inner)
-        ]
-        errors = (nest.mounting_error * 1e3, nest.target_error * 1e3)
-        rows.append(
-            [
-                str(rank),
-                *springs,
-                f"{nest.outer.free_height * 1e3:.6g}/{nest.inner.free_height * 1e3:.6g}",
-                f"{nest.mass:.2f}",
-                f"{nest.fatigue_margin:.3f}",
-                f"{errors[0]:+.2f}/{errors[1]:+.2f}",
-            ]
-        )
-    header = [
-        "rank",
-        "outer d x D, n",
-        "inner d x D, n",
-        "H0 / mm",
-        "kg",
-        "fatigue",
-        "error / mm",
-    ]
-    active = ["active limits", *(", ".join(nest.active) or "none" for nest in result.nests)]
-    lines = table(header, rows)
+    from railsim.springs.tables import search_table
+
+    header, rows = search_table(result)
+    lines = table(header[:-1], [row[:-1] for row in rows])
+    limits = [row[-1] for row in (header, *rows)]
     return [
         f"{result.tried} nests tried, {result.feasible} within all limits before refinement; "
         f"ranked by {result.objective}",
-        *(f"{line}  {limits}" for line, limits in zip(lines, active, strict=True)),
+        *(f"{line}  {active}" for line, active in zip(lines, limits, strict=True)),
     ]
 
 
 def _verification_lines(result: "Verification") -> list[str]:
-    springs = list(result.cases[0].springs)
-    header = [
-        "load case",
-        "P / kN",
-        "rotation / deg",
-        "dz / mm",
-        "K_sys / (N/mm)",
-        "rate / (N/mm)",
-        *(f"H {name} / mm" for name in springs),
-        "dx / mm",
-        "K_L / (N/mm)",
-        "K_C / (kNm/rad)",
-    ]
-    rows = [
-        [
-            case.name,
-            f"{case.load * 1e-3:.3f}",
-            _without_minus_zero(f"{math.degrees(case.rotation):.4f}"),
-            f"{case.deflection * 1e3:.3f}",
-            f"{case.K_sys * 1e-3:.3f}",
-            f"{case.rate * 1e-3:.1f}",
-            *(f"{float(state.height) * 1e3:.2f}" for state in case.springs.values()),
-            _without_minus_zero(f"{float(case.springs['outer'].lateral) * 1e3:.3f}"),
-            f"{case.K_L * 1e-3:.2f}",
-            f"{case.K_C * 1e-3:.3f}",
-        ]
-        for case in result.cases
-    ]
-    checks = [_check_cells(check) for check in result.checks]
-    return [
-        *table(header, rows),
-        "",
-        *table(["check", "value", "must be", "unit", "met"], checks),
-    ]
+    from railsim.springs.tables import case_table, check_table
 
-
-def _without_minus_zero(text: str) -> str:
-    return text.removeprefix("-") if float(text) == 0.0 else text
-
-
-def _check_cells(check: "Check") -> list[str]:
-    unit, scale = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}[check.unit]
-    digits = 3 if check.unit == "1" else 1
-    sign = ">" if check.sense == "above" else "<"
-    return [
-        check.name,
-        f"{check.value * scale:.{digits}f}",
-        f"{sign} {check.limit * scale:.{digits}f}",
-        unit,
-        "yes" if check.ok else "NO",
-    ]
+    return [*table(*case_table(result)), "", *table(*check_table(result.checks))]
 
 
 def _ride_height_lines(results: Sequence["RideHeight"]) -> list[str]:
-    if not results:
-        return []
-    rows = [
-        [
-            result.name,
-            f"{result.load * 1e-3:.3f}",
-            f"+-{result.random * 1e3:.2f}",
-            f"{result.lowest * 1e3:+.2f} to {result.highest * 1e3:+.2f}",
-        ]
-        for result in results
-    ]
-    return ["", *table(["ride height", "P / kN", "random / mm", "worst case / mm"], rows)]
+    from railsim.springs.tables import ride_height_table
+
+    return ["", *table(*ride_height_table(results))] if results else []
 
 
 def _fatigue_lines(result: Mapping[str, "Fatigue"], loads: Mapping[str, float]) -> list[str]:
-    rows = [
-        [
-            name,
-            f"{spring.tau_min * 1e-6:.1f}",
-            f"{spring.tau_max * 1e-6:.1f}",
-            f"{spring.limit * 1e-6:.1f}",
-            f"{spring.margin:.3f}",
-        ]
-        for name, spring in result.items()
-    ]
-    header = ["spring", "tau_min / MPa", "tau_max / MPa", "allowable / MPa", "margin"]
+    from railsim.springs.tables import fatigue_table
+
     return [
         f"between {loads['min_load'] * 1e-3:.3f} and {loads['max_load'] * 1e-3:.3f} kN",
-        *table(header, rows),
+        *table(*fatigue_table(result)),
     ]

@@ -3,6 +3,7 @@
 `collected` computes everything that the file allows, `figures` draws it, `page` writes it down.
 """
 
+import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,9 +20,16 @@ from railsim.errors import InputError
 from railsim.plot import springs as pictures
 from railsim.plot.style import styled
 from railsim.springs.design import Design, design
+from railsim.springs.tables import (
+    Texts,
+    case_table,
+    check_table,
+    fatigue_table,
+    ride_height_table,
+    search_table,
+)
 from railsim.springs.tolerance import RideHeight, ride_heights
 from railsim.springs.verification import (
-    Check,
     Fatigue,
     Verification,
     dynamic_loads,
@@ -33,7 +41,6 @@ from railsim.version import __version__
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
 
-SHOWN_UNITS = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}
 DPI = 130
 
 METHOD = (
@@ -262,62 +269,20 @@ def _design(
 
 
 def _cases(result: Verification, drawn: Mapping[str, bytes]) -> Section:
-    names = list(result.cases[0].springs)
-    header = [
-        "load case",
-        "load / kN",
-        "rotation / °",
-        "deflection / mm",
-        "K_sys / (N/mm)",
-        "rate / (N/mm)",
-        *(f"height {name} / mm" for name in names),
-        "sideways / mm",
-        "K_L / (N/mm)",
-        "K_C / (kNm/rad)",
-    ]
-    rows = [
-        [
-            case.name,
-            f"{case.load * 1e-3:.3f}",
-            f"{_signed(np.degrees(case.rotation), 4)}",
-            f"{case.deflection * 1e3:.2f}",
-            f"{case.K_sys * 1e-3:.2f}",
-            f"{case.rate * 1e-3:.1f}",
-            *(f"{float(state.height) * 1e3:.2f}" for state in case.springs.values()),
-            f"{_signed(float(case.springs['outer'].lateral) * 1e3, 2)}",
-            f"{case.K_L * 1e-3:.1f}",
-            f"{case.K_C * 1e-3:.2f}",
-        ]
-        for case in result.cases
-    ]
     pictures_shown = [
         *_picture(drawn, "stiffness", "System stiffness over load and over deflection."),
         *_picture(drawn, "deflection", "Deflection, rotation and heights over the load."),
         *_picture(drawn, "arm", "The arm in its load cases, to scale, seen from the side."),
     ]
-    return Section("Load cases", [], [Table(header, rows)], pictures_shown)
+    return Section("Load cases", [], [_typeset(case_table(result))], pictures_shown)
 
 
 def _checks(result: Verification) -> Section:
-    rows = [check_row(check) for check in result.checks]
+    header, rows = check_table(result.checks)
+    rows = [[*row, check.note] for row, check in zip(rows, result.checks, strict=True)]
     failed = frozenset(i for i, check in enumerate(result.checks) if not check.ok)
-    header = ["check", "value", "must be", "unit", "met", "what it compares"]
-    return Section("Checks", [], [Table(header, rows, words=frozenset({0, 5}), failed=failed)])
-
-
-def check_row(check: Check) -> list[str]:
-    """Name, value, limit, unit, answer and note of a check, as shown to a reader."""
-    unit, scale = SHOWN_UNITS[check.unit]
-    digits = 3 if check.unit == "1" else 1
-    sign = ">" if check.sense == "above" else "<"
-    return [
-        check.name,
-        f"{check.value * scale:.{digits}f}",
-        f"{sign} {check.limit * scale:.{digits}f}",
-        unit,
-        "yes" if check.ok else "NO",
-        check.note,
-    ]
+    shown = _typeset(([*header, "what it compares"], rows), words=frozenset({0, 5}), failed=failed)
+    return Section("Checks", [], [shown])
 
 
 def _fatigue(
@@ -330,20 +295,12 @@ def _fatigue(
         f"Between {loads['min_load'] * 1e-3:.2f} and {loads['max_load'] * 1e-3:.2f} kN; stresses "
         "with the factor for the curvature of the wire and the lateral load."
     )
-    rows = [
-        [
-            name,
-            f"{spring.tau_min * 1e-6:.1f}",
-            f"{spring.tau_max * 1e-6:.1f}",
-            f"{spring.limit * 1e-6:.1f}",
-            f"{spring.margin:.3f}",
-        ]
-        for name, spring in result.items()
-    ]
-    header = ["spring", "tau_min / MPa", "tau_max / MPa", "allowable / MPa", "margin"]
     caption = "Goodman-Smith diagram: stress range of each spring against the material's line."
     return Section(
-        "Fatigue", [text], [Table(header, rows)], _picture(drawn, "goodman_smith", caption)
+        "Fatigue",
+        [text],
+        [_typeset(fatigue_table(result))],
+        _picture(drawn, "goodman_smith", caption),
     )
 
 
@@ -353,21 +310,11 @@ def _ride_heights(results: Sequence[RideHeight], drawn: Mapping[str, bytes]) -> 
         "deviate within their tolerances. Random: root of the sum of squares of the single "
         "deviations. Worst case: all at their limits, combined as badly as possible."
     )
-    rows = [
-        [
-            result.name,
-            f"{result.load * 1e-3:.2f}",
-            f"± {result.random * 1e3:.2f}",
-            f"{_signed(result.lowest * 1e3, 2)} to {_signed(result.highest * 1e3, 2)}",
-        ]
-        for result in results
-    ]
-    header = ["load case", "load / kN", "random / mm", "worst case / mm"]
     caption = "What each tolerance does to the ride height, and the range under every load."
     return Section(
         "Scatter of the ride height",
         [text],
-        [Table(header, rows)],
+        [_typeset(ride_height_table(results))],
         _picture(drawn, "ride_height", caption),
     )
 
@@ -378,34 +325,8 @@ def _search(result: "SearchResult", drawn: Mapping[str, bytes]) -> Section:
         f"refined; ranked by {result.objective}. Dimensions are rounded to what is made, limits "
         "are those that hold each optimum in place."
     )
-    header = [
-        "",
-        "outer d × D, n / mm",
-        "inner d × D, n / mm",
-        "free height / mm",
-        "mass / kg",
-        "fatigue margin",
-        "deflection error / mm",
-        "active limits",
-    ]
-    rows = [
-        [
-            str(rank),
-            *(
-                f"{spring.wire_diameter * 1e3:.6g} × {spring.mean_diameter * 1e3:.6g}, "
-                f"{spring.active_coils:.6g}"
-                for spring in (nest.outer, nest.inner)
-            ),
-            f"{nest.outer.free_height * 1e3:.6g} / {nest.inner.free_height * 1e3:.6g}",
-            f"{nest.mass:.2f}",
-            f"{nest.fatigue_margin:.3f}",
-            f"{_signed(nest.mounting_error * 1e3, 2)} / {_signed(nest.target_error * 1e3, 2)}",
-            ", ".join(nest.active).replace("_", " ") or "none",
-        ]
-        for rank, nest in enumerate(result.nests, start=1)
-    ]
     caption = "Mass and fatigue margin of the nests; the numbers are the ranks of the table."
-    table = Table(header, rows, words=frozenset({7}))
+    table = _typeset(search_table(result), words=frozenset({7}))
     return Section("Nests that fit", [text], [table], _picture(drawn, "search", caption))
 
 
@@ -413,8 +334,20 @@ def _or_dash(value: float | None, scale: float) -> str:
     return "-" if value is None else f"{value * scale:.6g}"
 
 
-def _signed(value: float, digits: int) -> str:
-    """A number with its sign, a true minus, and no sign on what rounds to zero."""
-    if abs(value) < 0.5 * 10.0**-digits:
-        return f"{0.0:.{digits}f}"
-    return f"{value:+.{digits}f}".replace("-", "−")
+def _typeset(
+    texts: Texts,
+    words: frozenset[int] = frozenset({0}),
+    failed: frozenset[int] = frozenset(),
+) -> Table:
+    """A table of the page from one in ASCII, with true signs."""
+
+    def typeset(cell: str) -> str:
+        cell = cell.replace("+-", "± ").replace(" x ", " × ")
+        return re.sub(r"(?<![\w.])-(?=\d)", "−", cell)
+
+    header, rows = texts
+    cells = [
+        [cell if column in words else typeset(cell) for column, cell in enumerate(row)]
+        for row in rows
+    ]
+    return Table([typeset(title) for title in header], cells, words=words, failed=failed)

@@ -13,6 +13,7 @@ search             feasible nests ranked by mass or fatigue margin, with the lim
 tolerance          scatter of the ride height from wire, coils, heights, material, bush
 vehicle_table      the suspension as a part of a vehicle file
 summary            results as plain numbers by name: ``--json``
+tables             results as texts in the field's units: for the terminal and the page
 =================  ==============================================================================
 
 `railsim.definitions.spring` is the file format, `railsim.plot.springs` draws,
