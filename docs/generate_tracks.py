@@ -44,10 +44,12 @@ def convergence():
     found, heads, times = [], [], []
     for speed, until in CASES:
         full = irregular_run(speed, until)
-        found.append(changes(full, half_as_long(full)))
-        step = 1e3 * full.attributes["step"]
-        heads.append(f"{speed:g} m/s, {step:.3g} ms: peak, rms (%)")
-        times.append(f"{full.attributes['real_time_factor']:.0f}")
+        exact = irregular_run(speed, until, scheme="rk4")
+        found += [changes(full, half_as_long(full)), changes(full, exact)]
+        step, short = (1e3 * result.attributes["step"] for result in (full, exact))
+        heads.append(f"{speed:g} m/s, {step:.3g} ms against half: peak, rms (%)")
+        heads.append(f"against `rk4`, {short:.2g} ms: peak, rms (%)")
+        times += [f"{result.attributes['real_time_factor']:.0f}" for result in (full, exact)]
     body = []
     for name in found[0]:
         words = QUANTITIES[name].words.partition(" (")[0]
@@ -108,7 +110,8 @@ def picture(omega, density):
             ax.plot(omega[shown], density[name][shown], color=DISTINCT[k], lw=1.6, label=words)
             ax.plot(exact[band], wanted[band], color="black", lw=0.9, ls=(0, (4, 2)))
         for ax, unit in zip(axes, ("m²/(rad/m)", "rad²/(rad/m)"), strict=True):
-            ax.set(xscale="log", yscale="log", xlim=(0.06, 3.0), xlabel="Ω (rad/m)", ylabel=f"S ({unit})")
+            ax.set(xscale="log", yscale="log", xlim=(0.06, 3.0))
+            ax.set(xlabel="Ω (rad/m)", ylabel=f"S ({unit})")
             ax.legend(loc="lower left")
         axes[0].set_ylim(1e-11, 1e-4)
         axes[1].set_ylim(1e-11, 1e-5)
