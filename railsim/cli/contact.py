@@ -96,7 +96,7 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
 @click.option(
     "--build-creep-table",
     is_flag=True,
-    help="Only compute the table of the creep law `table` anew (half an hour; goes on where it was).",
+    help="Only compute the table of the creep law `table` anew (half an hour; may be interrupted).",
 )
 @click.option(
     "--workers",
