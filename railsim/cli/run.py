@@ -201,8 +201,25 @@ def _assumption_lines(case: "Case") -> list[str]:
         f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
         f"  track     transitions rounded over {track.rounding:g} m, cant about the "
         f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
+        *_irregularity_lines(track),
         f"  time      scheme {settings.scheme}, step {step}, output {rate}",
     ]
+
+
+def _irregularity_lines(track: "Track") -> list[str]:
+    """Say what displaces the rails, in one line; nothing where they are smooth."""
+    words = []
+    for part in track.irregularities:
+        if part.type == "random":
+            low, high = part.wavelengths
+            words.append(f"{part.spectrum}, seed {part.seed}, {low:g} to {high:g} m")
+        elif part.type == "measured":
+            words.append(f"measured, {len(part.rows or ())} places")
+        else:
+            words.append(f"{part.type} at {part.s:g} m")
+    if len(words) > 3:
+        words[2:] = [f"{len(words) - 2} more"]
+    return [f"  rails     {'; '.join(words)}"] if words else []
 
 
 def _friction(track: "Track") -> str:

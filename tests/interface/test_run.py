@@ -119,6 +119,15 @@ def test_continuation_of_no_result_is_refused(tmp_path, capsys):
     assert "there is no such file" in capsys.readouterr().err
 
 
+def test_irregular_rails_are_told(tmp_path, capsys):
+    dips = ", ".join(f'{{type="dip", s={s}.0, length=2.0, depth=0.001}}' for s in (2, 5, 8))
+    rails = f'track.irregularities=[{{type="random", spectrum="erri_b176_low", seed=7}}, {dips}]'
+    given = [*SHORT, "--set", rails, "--out", str(tmp_path / "run.h5")]
+    assert main(given) == 0
+    expected = "rails     erri_b176_low, seed 7, 3 to 70 m; dip at 2 m; 2 more"
+    assert expected in capsys.readouterr().out
+
+
 def test_run_may_start_anywhere(tmp_path):
     path = tmp_path / "run.h5"
     given = [*COACH, "--speed", "20", "--start", "100", "--until", "110", "--out", str(path)]

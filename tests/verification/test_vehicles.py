@@ -95,7 +95,9 @@ def losses(vehicle, h, duration, speed=15.0):
 
 
 def test_energy_lost_by_the_wagon_is_the_work_of_friction():
-    lost, work, stored = losses(test_vehicle("two_axle_wagon"), 0.25e-3, 1.0)
+    """Its pads alone, without the viscous share that leaves and links have while they stick."""
+    lost, work, stored = losses(undamped(test_vehicle("two_axle_wagon")), 0.25e-3, 1.0)
+    assert work > 100.0
     assert lost == pytest.approx(work, rel=1e-3)
     assert stored < 0.2 * work
 
