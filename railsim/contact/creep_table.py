@@ -381,11 +381,13 @@ def _parity_spline(n: int, first: int, last: int) -> Array:
         index, sign = folded(k)
         spread[k + 1, index] += sign
     matrix = (spread[:-2] + 4.0 * spread[1:-1] + spread[2:]) / 6.0
-    for end, parity in ((0, first), (n, last)):
-        if parity < 0:  # the value there is zero
-            matrix[end] = 0.0
-            matrix[end, end] = 1.0
-    return np.asarray(spread @ np.linalg.inv(matrix))
+    odd = [end for end, parity in ((0, first), (n, last)) if parity < 0]
+    matrix[odd] = np.eye(n + 1)[odd]
+    inverse = np.linalg.inv(matrix)
+    # value and coefficient there are zero, to the last bit: else zero creepage had a small force
+    inverse[odd] = 0.0
+    inverse[:, odd] = 0.0
+    return np.asarray(spread @ inverse)
 
 
 def _periodic_spline(n: int, sign: int) -> Array:

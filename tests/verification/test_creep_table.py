@@ -181,6 +181,17 @@ def test_force_and_slope_are_continuous_over_the_seams():
         assert np.abs(np.diff(slopes, axis=0)).max() < 0.04
 
 
+def test_no_creepage_along_or_across_no_force_there():
+    ratio = np.array([0.06, 0.3, 1.0, 2.0, 7.0])
+    a, b = SIZE * np.sqrt(ratio), SIZE / np.sqrt(ratio)
+    spinning = creep_force(a, b, N, MU, 0.0, 1e-3, 3.0, law="table")
+    along = creep_force(a, b, N, MU, 2e-3, 0.0, 0.0, law="table")
+    # round-off of the angle, that of one part in 1e15 of a right angle
+    assert np.abs(spinning.T_x).max() < 1e-10 * MU * N
+    assert np.abs(along.T_y).max() < 1e-10 * MU * N
+    assert np.abs(along.M_z).max() < 1e-10 * MU * N * SIZE
+
+
 def test_ratio_beyond_the_table_warns_and_takes_the_nearest():
     def force(ratio):
         a, b = SIZE * np.sqrt(ratio), SIZE / np.sqrt(ratio)
