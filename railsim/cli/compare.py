@@ -5,13 +5,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option, table
+from railsim.cli.common import (
+    check_folder,
+    json_option,
+    make_folder,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    table,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from railsim.compare import Comparison
     from railsim.result import Result
+
+FILES = ("compare.csv", "compare.json", "compare.png")
 
 
 @click.command()
@@ -42,7 +52,9 @@ def command(
     from railsim.compare import compare
 
     results = _opened(files)
-    folder = _checked_folder(out, overwrite) if out else None
+    folder = Path(out) if out else None
+    if folder:
+        check_folder(folder, FILES, overwrite=overwrite)
     rows = compare(results)
     written = _write(folder, rows, results, over) if folder else []
     if as_json:
@@ -77,26 +89,6 @@ def _opened(files: tuple[str, ...]) -> "dict[str, Result]":
     return results
 
 
-FILES = ("compare.csv", "compare.json", "compare.png")
-
-
-def _checked_folder(out: str, overwrite: bool) -> Path:
-    from railsim.errors import Fault, InputError
-    from railsim.result.hdf5 import check_target
-
-    folder = Path(out)
-    if folder.is_dir():
-        for name in FILES:
-            check_target(folder / name, overwrite=overwrite, option="--out")
-        return folder
-    try:
-        folder.mkdir()
-    except OSError as error:
-        found = f"cannot create the folder {folder} ({error.strerror})"
-        raise InputError([Fault("--out", "", found, "choose another")]) from None
-    return folder
-
-
 def _write(
     folder: Path, rows: "Sequence[Comparison]", results: "dict[str, Result]", over: str
 ) -> list[Path]:
@@ -106,6 +98,7 @@ def _write(
     from railsim.plot.overlay import overlay
     from railsim.plot.style import save
 
+    make_folder(folder)
     table_file, record_file, picture = (folder / name for name in FILES)
     table_file.write_text(comparison_csv(rows), encoding="utf-8")
     record = {"results": list(results), "rows": [row.record() for row in rows]}

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option, table
+from railsim.cli.common import (
+    check_folder,
+    json_option,
+    make_folder,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    table,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -159,7 +167,9 @@ def command(
         max_shift=max_shift,
     )
     written = (*PICTURES, *TABLES, *((*creep_part.PICTURES, *creep_part.TABLES) if creep else ()))
-    folder = _checked_folder(out, overwrite, written) if out else None
+    folder = Path(out) if out else None
+    if folder:
+        check_folder(folder, written, overwrite=overwrite)
     wheel_pair, rail_pair = _profiles(wheels, "wheel"), _profiles(rails, "rail")
     radius_pair = (radii[0], radii[-1])
     steps = max(round(max_shift / STEP), 10)
@@ -185,6 +195,8 @@ def command(
     notes = _notes(pairs)
     patch = creep_part.patch_of(contacts, friction) if creep else None
     creep_rows = creep_part.rows_of(patch) if patch else []
+    if folder:
+        make_folder(folder)
     if folder and patch:
         creep_part.write(folder, patch, creep_rows)
     if folder:
@@ -234,23 +246,6 @@ def _check_ranges(**given: float | Sequence[float]) -> None:
                 faults.append(Fault(option, "", f"found {value:g}", f"{low:g} to {high:g} {unit}"))
     if faults:
         raise InputError(faults)
-
-
-def _checked_folder(out: str, overwrite: bool, names: Sequence[str]) -> Path:
-    """Make the folder; refuse files that may not be replaced."""
-    from railsim.errors import Fault, InputError
-
-    folder = Path(out)
-    taken = [name for name in names if (folder / name).exists()]
-    if taken and not overwrite:
-        found = f"{folder} holds {', '.join(taken)}"
-        raise InputError([Fault("--out", "", found, "give --overwrite or another folder")])
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        fault = Fault("--out", "", f"cannot make {folder} ({error.strerror})", "choose another")
-        raise InputError([fault]) from None
-    return folder
 
 
 def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from railsim.cli.common import (
+    check_folder,
     json_option,
+    make_folder,
     overwrite_option,
     print_json,
     quiet_option,
@@ -284,33 +286,13 @@ def _write_pages(
     results = collected(suspension, search)
     drawn = {name: as_png(figure) for name, figure in figures(results).items()}
     folder = Path(out)
-    files = {folder / f"{name}.png": png for name, png in drawn.items()}
-    files[folder / REPORT] = page(results, drawn).encode()
-    _check_folder(folder, files, overwrite)
-    for path, content in files.items():
-        path.write_bytes(content)
-    return list(files)
-
-
-def _check_folder(folder: Path, files: Iterable[Path], overwrite: bool) -> None:
-    from railsim.errors import Fault, InputError
-
-    there = [path.name for path in files if path.exists()]
-    fault = None
-    if folder.exists() and not folder.is_dir():
-        fault = Fault("--out", "", f"{folder} is a file", "give the name of a folder")
-    elif there and not overwrite:
-        found = f"{folder} already holds {', '.join(there)}"
-        fault = Fault("--out", "", found, "give --overwrite or another folder")
-    if fault is None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            fault = Fault("--out", "", f"{folder} cannot be made ({error.strerror})", "another")
-    if fault is None and not os.access(folder, os.W_OK):
-        fault = Fault("--out", "", f"{folder} cannot be written to", "choose another folder")
-    if fault is not None:
-        raise InputError([fault])
+    files = {f"{name}.png": png for name, png in drawn.items()}
+    files[REPORT] = page(results, drawn).encode()
+    check_folder(folder, files, overwrite=overwrite)
+    make_folder(folder)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in files]
 
 
 def _write_text(path: Path, text: str, overwrite: bool) -> None:
