@@ -1,7 +1,7 @@
 """An estimate of a run's error from its time step: the run again at half the step.
 
-The scheme `fast` is of first order: the difference between both runs is about the error of the
-second one, and half the error of the first.
+The scheme `fast` is of order two: the difference between both runs is about three quarters of the
+error of the first one, and three times that of the second.
 """
 
 from collections.abc import Callable
