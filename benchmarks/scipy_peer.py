@@ -17,7 +17,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.time_loop import record_state
+from railsim.kernels.time_loop import RK4, time_loop
 from railsim.outputs import quantities
 from railsim.simulation import Preparation, prepare
 from railsim.time_step import empty_recorder
@@ -78,10 +78,12 @@ class Peer:
         model = self.prepared.model
         work = work_arrays(model.system)
         derivative = np.zeros_like(self.prepared.state)
+        stages = np.zeros((3, len(derivative)))
         recorder = empty_recorder(model, 1)
         rows = []
         for state in states:
-            record_state(model.system, work, np.ascontiguousarray(state), derivative, recorder)
+            time_loop(model.system, work, np.ascontiguousarray(state), derivative, stages,
+                      recorder, RK4, 1.0, 0, 0, 1, 0, 1)
             values = quantities(model, recorder, 1, self.prepared.balance.Q0)
             rows.append({name: np.array(value) for name, value in values.items()})
         return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

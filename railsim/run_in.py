@@ -148,7 +148,7 @@ def _run(
     """Advance a state; InputError if the vehicle leaves the track."""
     status, *_ = time_loop(
         system, work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
-        empty_recorder(model, 1), scheme, step, 1, steps, steps + 2,
+        empty_recorder(model, 1), scheme, step, 1, steps, steps + 2, 1, 0,
     )
     if status != RUNNING:
         raise InputError([Fault(

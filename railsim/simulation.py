@@ -23,7 +23,7 @@ from railsim.equilibrium import Equilibrium, equilibrium
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
-from railsim.kernels.time_loop import record_state, remember, time_loop
+from railsim.kernels.time_loop import time_loop
 from railsim.outputs import OutputPlan
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
@@ -54,6 +54,8 @@ class Preparation:
         Where the run ends, whichever comes first [s], [m].
     pace : Pace
         Step and output interval at any speed.
+    fresh : bool
+        Whether nothing was before the initial state.
     """
 
     model: Model
@@ -62,6 +64,7 @@ class Preparation:
     end_time: float
     end_distance: float
     pace: "Pace"
+    fresh: bool = True
 
 
 def simulate(
@@ -225,9 +228,6 @@ def prepare(
     step, _ = pace.at(speed)
     state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
     _disturb(model, settings, state)
-    if settings.scheme == "fast":
-        # a state outside the contact table stops the run at its first step, with its reason
-        remember(model.system, work_arrays(model.system), state, np.zeros_like(state), step)
     return Preparation(
         model, balance, state,
         end_time=math.inf if duration is None else duration,
@@ -277,6 +277,7 @@ def take_up(prepared: Preparation, before: Floats, duration: float | None) -> No
             f"{prepared.state.size} values, those of this vehicle",
         )])
     prepared.state = before.copy()
+    prepared.fresh = False
     if duration is not None:
         prepared.end_time = float(before[-3]) + duration
 
@@ -375,6 +376,7 @@ def _loop(
     scheme = SCHEMES[settings.scheme]
     status, where, cpu_time, every = RUNNING, 0, 0.0, 1
     whole = _left(prepared, prepared.state)
+    fresh = int(prepared.fresh)
     in_distance = prepared.pace.varies and settings.output_spacing is not None
     while status == RUNNING and (left := _left(prepared, state)) > 1e-9:
         begin = time.process_time()
@@ -387,14 +389,15 @@ def _loop(
         goal = state[-2] + (settings.output_spacing or 0.0)
         status, where, steps, rows = time_loop(
             model.system, work, state, derivative, stages, recorder, scheme, step, 0,
-            n_steps - last, every,
+            n_steps - last, every, fresh, 0,
         )
+        fresh = int(fresh and steps == 0)
         if last and status == RUNNING:
             # the last step of an interval of distance ends where the interval ends
             rest = _duration(goal - state[-2], state[-1], derivative[-1])
             status, where, more, first = time_loop(
                 model.system, work, state, derivative, stages, recorder, scheme, rest, steps, 1,
-                every,
+                every, fresh, 0,
             )
             steps, rows = steps + more, rows + first
         cpu_time += time.process_time() - begin
@@ -403,8 +406,11 @@ def _loop(
         if progress is not None:
             progress(min(1.0, 1.0 - _left(prepared, state) / whole))
     if status == RUNNING and steps % every == 0:
-        status, where = record_state(model.system, work, state, derivative, recorder)
-        sink.append(plan.chunk(recorder, 1, prepared.balance.Q0))
+        status, where, _, rows = time_loop(
+            model.system, work, state, derivative, stages, recorder, scheme, step, 0, 0, every, 0,
+            1,
+        )
+        sink.append(plan.chunk(recorder, rows, prepared.balance.Q0))
     return status, where, state, cpu_time, work.events
 
 

@@ -115,7 +115,7 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
     def step(trial: Floats) -> Floats:
         after = trial.copy()
         time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme], h, 1, 1,
-                  _NEVER)
+                  _NEVER, 0, 0)
         return after
 
     radius = np.max(np.abs(np.linalg.eigvals(_jacobian(step, state))))

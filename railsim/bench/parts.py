@@ -59,7 +59,7 @@ def state_at(vehicle: str, track: str, speed: float, place: float) -> tuple[Prep
     steps = int(place / speed / step)
     time_loop(system, work_arrays(system), state, np.zeros_like(state),
               np.zeros((3, len(state))), empty_recorder(prepared.model, 1), FAST, step, 1, steps,
-              1 << 40)
+              1 << 40, 1, 0)
     return prepared, state
 
 
@@ -124,7 +124,8 @@ def _step_time(prepared: Preparation, state: Floats, repetitions: int) -> float:
 
     def some_steps() -> None:
         trial[:] = state
-        time_loop(system, work, trial, derivative, stages, recorder, FAST, step, 1, CALLS, 1 << 40)
+        time_loop(system, work, trial, derivative, stages, recorder, FAST, step, 1, CALLS, 1 << 40,
+                  0, 0)
 
     return least_time(some_steps, repetitions, CALLS)
 

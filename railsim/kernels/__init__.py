@@ -19,7 +19,8 @@ import numba
 from llvmlite.binding import Linkage
 from numba.core import config as _config
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
+from numba.core.registry import CPUDispatcher
 
 # The subset of fastmath that keeps NaN and infinity visible to the blow-up checks.
 FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
@@ -74,8 +75,25 @@ class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
         super()._finalize_final_module()
 
 
+class _Flags(Flags):  # type: ignore[misc]
+    """Compiler flags that are compared by those that are set.
+
+    Numba looks up each operator under a key with the flags; its own comparison goes through all
+    thirty of them in Python, some 400 000 times for the time loop: a quarter of its compilation.
+    """
+
+    def __hash__(self):
+        return hash(frozenset(self._values))
+
+    def __eq__(self, other):
+        if isinstance(other, _Flags):
+            return self._values == other._values
+        return super().__eq__(other)
+
+
 class _Compiler(Compiler):  # type: ignore[misc]
     def compile_extra(self, func):
+        self.state.flags = _Flags(self.state.flags)
         self.state.library = _SelfContained(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
         return super().compile_extra(func)
@@ -91,6 +109,7 @@ def _compiled(function, **options):
             error_model="numpy",
             fastmath=FASTMATH,
             pipeline_class=_Compiler,
+            no_cfunc_wrapper=True,
             **options,
         )(function)
     finally:
@@ -100,6 +119,25 @@ def _compiled(function, **options):
 def jit(function):
     """Compile for the time loop: numpy error model, NaN-preserving fastmath, no allocation."""
     return _compiled(function, _nrt=False)
+
+
+class _Internal(CPUDispatcher):  # type: ignore[misc]
+    """Compiled function without an entry for Python, where a call of it would crash."""
+
+    def __call__(self, *args):
+        raise TypeError(f"{self.py_func.__name__} can be called from compiled code only")
+
+
+def jit_internal(function):
+    """As `jit`, for a function that only other compiled code calls.
+
+    The entry for Python, which takes a `System` apart into its arrays, costs more to compile than
+    many a function itself.
+    """
+    compiled = _compiled(function, _nrt=False, no_cpython_wrapper=True)
+    if not _config.DISABLE_JIT:
+        compiled.__class__ = _Internal
+    return compiled
 
 
 def jit_inline(function):

@@ -5,7 +5,7 @@ The laws are those of `elements`, evaluated again at the recorded state.
 
 from math import sqrt
 
-from railsim.kernels import jit
+from railsim.kernels import jit, jit_internal
 from railsim.kernels.elements import axis_force
 from railsim.kernels.internal import curve_value
 
@@ -17,7 +17,7 @@ DEFLECTION, ANGLE, FORCE, MOMENT, POWER = 0, 3, 6, 9, 12
 ELEMENT_COLUMNS = 13
 
 
-@jit
+@jit_internal
 def element_outputs(system, work, inner, chosen, out):
     """Outputs of the elements ``chosen[e] = (group, index)`` into ``out[e, ELEMENT_COLUMNS]``."""
     for e in range(chosen.shape[0]):
@@ -45,7 +45,7 @@ def end_point(work, b, x, y, z):
     )
 
 
-@jit
+@jit_internal
 def link_output(system, work, inner, index, e, out):
     """Elongation, force (tension positive) and power of a link."""
     links, curves = system.links, system.curves
@@ -71,7 +71,7 @@ def link_output(system, work, inner, index, e, out):
     out[e, POWER] = force * rate
 
 
-@jit
+@jit_internal
 def mount_output(system, work, inner, index, e, out):
     """Deflections, angles, forces, moments (on body 1, its axes) and power of a mount."""
     mounts, curves, internal = system.mounts, system.curves, system.internal
@@ -101,7 +101,7 @@ def mount_output(system, work, inner, index, e, out):
     rotation_output(mounts, index, i, j, R, W, e, out)
 
 
-@jit
+@jit_internal
 def rotation_output(mounts, index, i, j, R, W, e, out):
     """Angles (antisymmetric part of R_1^T R_2), moments and their power."""
     k = mounts.rotation

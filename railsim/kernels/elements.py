@@ -18,11 +18,11 @@ states (see `internal`).
 
 from math import sqrt
 
-from railsim.kernels import jit, jit_inline
+from railsim.kernels import jit_inline, jit_internal
 from railsim.kernels.internal import AIR, PAD, curve_value
 
 
-@jit_inline
+@jit_internal
 def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all point-to-point elements to `F`, `M`."""
     for e in range(links.body.shape[0]):
@@ -174,23 +174,21 @@ def rotation_moment(mounts, e, i, j, R, W, M):
     M[j, 2] -= mz
 
 
-@jit_inline
+@jit_internal
 def mount_forces(mounts, internal, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all three-axis elements to `F`, `M`."""
     for e in range(mounts.body.shape[0]):
         i, j = mounts.body[e, 0], mounts.body[e, 1]
-        if mounts.flags[e, 0]:
-            both = mounts.flags[e, 1]
-            translation_force(mounts, internal, curves, e, i, j, 0, 0.5 if both else 1.0, inner,
-                              drive, R, X, V, W, F, M)
-            if both:
-                translation_force(mounts, internal, curves, e, j, i, 1, 0.5, inner, drive,
-                                  R, X, V, W, F, M)
+        # one turn for each body in whose axes a share of the force acts
+        ends = mounts.flags[e, 0] * (1 + mounts.flags[e, 1])
+        for p in range(ends):
+            translation_force(mounts, internal, curves, e, j if p else i, i if p else j, p,
+                              1.0 / ends, inner, drive, R, X, V, W, F, M)
         if mounts.flags[e, 2]:
             rotation_moment(mounts, e, i, j, R, W, M)
 
 
-@jit
+@jit_internal
 def load_component(table, first, last, time, k):
     """Component `k` of a load at `time`: linear between its rows, constant beyond them."""
     if time <= table[first, 0]:
@@ -204,7 +202,7 @@ def load_component(table, first, last, time, k):
     return table[i, k] + share * (table[i + 1, k] - table[i, k])
 
 
-@jit
+@jit_internal
 def load_forces(loads, time, bodies, frames, R, F, M):
     """Add the given forces and torques at `time` to `F`, `M`."""
     for e in range(loads.body.shape[0]):

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit
+from railsim.kernels import jit, jit_internal
 
 MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
 
@@ -76,7 +76,7 @@ def speed_on_branch(curves, i, f, flat):
     return curves.x[i] + (f - curves.f[i]) * (curves.x[i + 1] - curves.x[i]) / rise
 
 
-@jit
+@jit_internal
 def curve_advanced(curves, index, k_s, f, v, h):
     """Force of a damper with the table `index` behind a spring `k_s` after a step at constant `v`.
 

@@ -21,7 +21,7 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from railsim.kernels import jit, jit_inline
+from railsim.kernels import jit, jit_internal
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.rotation import sine_cosine
@@ -33,7 +33,7 @@ from railsim.kernels.wheel_rail import wheel_rail
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@jit_inline
+@jit
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -64,7 +64,7 @@ def euler_rates(kind, sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     return w1, w2 - yaw_rate * sin_roll, yaw_rate
 
 
-@jit_inline
+@jit_internal
 def attitudes(bodies, state, S, C):
     """C = Rz(yaw) Rx(roll) Ry(pitch) of all bodies but axleboxes; a wheelset's without Ry."""
     for b in range(bodies.kind.shape[0]):
@@ -86,7 +86,7 @@ def attitudes(bodies, state, S, C):
         C[b, 8] = cr * cp
 
 
-@jit_inline
+@jit
 def kinematics(bodies, frames, speed, state, S, C, R, X, V, W, rates):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
@@ -135,7 +135,7 @@ def kinematics(bodies, frames, speed, state, S, C, R, X, V, W, rates):
             V[b, i] = a1 * v1 + a2 * v2 + a3 * v3
 
 
-@jit
+@jit_internal
 def axlebox_kinematics(b, p, n, state, R, X, V, W, rates):
     """Pose of axlebox `b`: that of its wheelset `p`, turned by its own pitch about the axle."""
     s, c = sine_cosine(state[6 * b + 4])
@@ -151,7 +151,7 @@ def axlebox_kinematics(b, p, n, state, R, X, V, W, rates):
         W[b, i] = W[p, i] + R[p, k + 1] * rate
 
 
-@jit
+@jit_internal
 def axlebox_dynamics(b, p, n, inertia, R, F, M, rates, derivative):
     """Pitch acceleration of axlebox `b`; everything else it hands to its wheelset `p`."""
     moment = 0.0
@@ -170,7 +170,7 @@ def axlebox_dynamics(b, p, n, inertia, R, F, M, rates, derivative):
     rates[b, 4] = moment / inertia
 
 
-@jit_inline
+@jit_internal
 def dynamics(bodies, frames, speed, gravity, state, C, R, F, M, rail_force, rates, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
@@ -257,7 +257,7 @@ def table_value_slope(table, x):
     return table[i, 1] + slope * (x - table[i, 0]), slope
 
 
-@jit
+@jit_internal
 def add_traction(drive, bodies, frames, speed, F):
     """Traction less running resistance of a free-running vehicle, on the reference body."""
     force, _ = table_value_slope(drive.table, speed)
@@ -268,7 +268,7 @@ def add_traction(drive, bodies, frames, speed, F):
         F[b, k] += force * frames[f, 3 + 3 * k]
 
 
-@jit
+@jit_internal
 def speed_change(drive, bodies, frames, state, derivative):
     """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
     if drive.mode == TABLE:
@@ -285,7 +285,7 @@ def speed_change(drive, bodies, frames, state, derivative):
     return 0.0
 
 
-@jit
+@jit_internal
 def apply_speed_change(bodies, frames, state, rate, derivative):
     """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
     n = bodies.kind.shape[0]
@@ -303,7 +303,7 @@ def apply_speed_change(bodies, frames, state, rate, derivative):
         derivative[v + 2] -= rate * (w1 * y - w2 * x)
 
 
-@jit
+@jit_internal
 def hold_reference(bodies, C, acceleration, derivative):
     """Keep the reference body's x; the force that holds it is part of its acceleration."""
     n = bodies.kind.shape[0]

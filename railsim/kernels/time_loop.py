@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline
+from railsim.kernels import jit, jit_inline, jit_internal
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.internal import (
     MAXWELL_CURVE,
@@ -65,7 +65,7 @@ class Recorder(NamedTuple):
     element: np.ndarray
 
 
-@jit
+@jit_internal
 def record(recorder, row, system, state, derivative, work, n_patches):
     """Copy the state and the by-products of its evaluation into row `row`."""
     for k in range(recorder.state.shape[1]):
@@ -87,7 +87,7 @@ def record(recorder, row, system, state, derivative, work, n_patches):
                         recorder.chosen, recorder.element[row])
 
 
-@jit
+@jit_internal
 def record_patches(out, row, work, n_patches):
     """Copy the active contact patches to their places; the others are zero."""
     for w in range(out.shape[1]):
@@ -154,18 +154,14 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     soften(rate, before, v + 3, jacobian[b, J_ROLL], roll, h)
 
 
-@jit
+@jit_inline
 def remember(system, work, state, derivative, h):
     """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
-    before = state[first:first + 6 * n]
+    rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
     for k in range(6 * n):
         before[k] = 0.0
-    status, where, _ = mechanics(system, work, state, derivative)
-    if status != RUNNING:
-        return status, where
-    rate = derivative[6 * n:12 * n]
     for b in range(n):
         if system.bodies.kind[b] == WHEELSET:
             soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h)
@@ -173,7 +169,6 @@ def remember(system, work, state, derivative, h):
         before[k] = rate[k]
     for i in range(m):
         state[first + 6 * n + i] = work.drive[i, 0]
-    return RUNNING, 0
 
 
 @jit_inline
@@ -262,7 +257,7 @@ def step_rk4(system, work, state, derivative, stages, h):
     return RUNNING, 0
 
 
-@jit
+@jit_internal
 def all_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
     for k in range(state.shape[0]):
@@ -273,7 +268,7 @@ def all_finite(state):
 
 @jit
 def time_loop(system, work, state, derivative, stages, recorder, scheme, h, first_step, n_steps,
-              every):
+              every, fresh, closing):
     """Advance by `n_steps` steps of length `h` [s], recording every `every`-th state.
 
     Parameters
@@ -285,6 +280,10 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     first_step : int
         Number of steps already taken; states are recorded where the count is a multiple of
         `every`, before the step.
+    fresh : int
+        1 where nothing was before `state`: the memory of the fast scheme begins here.
+    closing : int
+        1 to evaluate and record the state after the last step as well.
 
     Returns
     -------
@@ -293,9 +292,10 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     """
     decay = work.decay
     constant_decays(system.internal, h, decay)
-    rows = 0
-    for step in range(first_step, first_step + n_steps):
-        if scheme != RK4:
+    rows = np.int64(0)
+    end = first_step + n_steps
+    for step in range(first_step, end + closing):
+        if scheme == FAST:
             status, where, patches = mechanics(system, work, state, derivative)
         else:
             status, where, patches = right_hand_side(system, work, state, derivative)
@@ -303,7 +303,11 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
             if step % every == 0:
                 record(recorder, rows, system, state, derivative, work, patches)
                 rows += 1
+            if step == end:
+                return RUNNING, 0, n_steps, rows
             if scheme == FAST:
+                if fresh and step == first_step:
+                    remember(system, work, state, derivative, h)
                 step_fast(system, work, state, derivative, decay, h)
             else:
                 status, where = step_rk4(system, work, state, derivative, stages, h)
@@ -314,12 +318,3 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
         if status != RUNNING:
             return status, where, step - first_step, rows
     return RUNNING, 0, n_steps, rows
-
-
-@jit
-def record_state(system, work, state, derivative, recorder):
-    """Evaluate and record a state without a step: the end of a run.  Status and wheelset."""
-    status, where, patches = right_hand_side(system, work, state, derivative)
-    if status == RUNNING:
-        record(recorder, 0, system, state, derivative, work, patches)
-    return status, where

@@ -19,7 +19,7 @@ from math import sqrt
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline
+from railsim.kernels import jit, jit_inline, jit_internal
 from railsim.kernels.contact_table import (
     ABOVE_Y,
     BELOW_Y,
@@ -88,7 +88,7 @@ def normal_contact(system, work, speed, state):
     jacobian = work.contact_jacobian
     stiffness, approach, weights = work.stiffness, work.approach, work.weights
     n_bodies = system.bodies.kind.shape[0]
-    n = 0
+    n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
     for w in range(contact.body.shape[0]):
         b = contact.body[w]
         f = system.bodies.frame[b]
@@ -352,7 +352,7 @@ def wheel_rail(system, work, speed, state):
     return RUNNING, 0, n
 
 
-@jit
+@jit_internal
 def complete_normal_force(b, bodies, frames, C, S, state, force):
     """Moment vector from the generalised moments, and the force along the track.
 

@@ -55,6 +55,7 @@ def advance(system, state, h, n_steps, scheme="rk4", model=None):
     status, _, steps, _ = time_loop(
         system, work_arrays(system), after, np.zeros_like(state), np.zeros((3, len(state))),
         empty_recorder(model, 1), SCHEMES[scheme], h, 1, n_steps, NEVER,
+        1, 0,
     )
     assert (status, steps) == (0, n_steps)
     return after

@@ -191,8 +191,9 @@ def step_by_step(model, state, h, n_steps, scheme="rk4"):
     work = work_arrays(model.system)
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     recorder = empty_recorder(model, 1)
-    for _ in range(n_steps):
+    for step in range(n_steps):
         status, *_ = time_loop(model.system, work, state, derivative, stages, recorder,
-                               RK4 if scheme == "rk4" else FAST, h, 1, 1, 1 << 40)
+                               RK4 if scheme == "rk4" else FAST, h, 1, 1, 1 << 40,
+                               int(step == 0), 0)
         assert status == 0
         yield state
