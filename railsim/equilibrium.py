@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 
 RESIDUAL = 1e-7  # largest acceleration left in equilibrium (m/s2, rad/s2)
 UNBALANCED = 1e-6  # share of the weight that may stay unbalanced by preloads (round-off)
+ONE_SIDED = 0.01  # least friction of a rail in the balance, as a share of the other's
 _STEPS = 60
 
 
@@ -198,10 +199,15 @@ def _check_balance(model: Model, conditions: list[tuple[int, int]], rest: Floats
 
 
 def _with_friction(level: System, system: System):  # type: ignore[no-untyped-def]
-    """Level track with the friction that the real track has at s = 0."""
+    """Level track with the friction that the real track has at s = 0.
+
+    A rail with next to none counts as a share of the other one: without friction on one side
+    alone nothing guides the wheelsets, and steady rolling is somewhere in the flange.
+    """
     rail = level.track.rail.copy()
     row = min(max(int(-system.track.s_start / system.track.ds), 0), len(system.track.rail) - 1)
-    rail[:, MU_LEFT : MU_LEFT + 2, 0] = system.track.rail[row, MU_LEFT : MU_LEFT + 2, 0]
+    friction = system.track.rail[row, MU_LEFT : MU_LEFT + 2, 0]
+    rail[:, MU_LEFT : MU_LEFT + 2, 0] = np.maximum(friction, ONE_SIDED * np.max(friction))
     return level.track._replace(rail=rail)
 
 

@@ -114,6 +114,15 @@ def test_friction_counts_by_side_and_along_the_track(coach):
     assert np.max(wear[:, 0, 0][in_curve[:, 0]]) > 10.0
 
 
+def test_coach_runs_with_one_rail_without_friction(coach):
+    """Nothing guides the wheelsets then; they drift, slowly, and their loads stay."""
+    result = simulate(coach, track(friction=[0.4, 0.0]), speed=20.0, until=200.0)
+    assert result.status == "complete"
+    assert np.all(result.T_gamma[:, :, 1] == 0.0)
+    assert np.max(np.abs(result.wheelset_lateral)) < 5e-3
+    assert np.max(np.abs(result.dQ_over_Q0)) < 0.05
+
+
 def test_creep_forces_stay_within_friction(coach):
     balance = steady(coach, curve(friction=[0.4, 0.2]), Settings(), 20.0)
     model = balance.model
