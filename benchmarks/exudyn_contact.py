@@ -67,7 +67,7 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
     for k in range(forces.shape[0]):
         forces[k] = 0.0
     for f in range(system.frame_offset.shape[0]):
-        work.cell[f], work.cell_u[f] = track_frame(system.track, s + system.frame_offset[f],
+        work.cell[f], work.cell_u[f] = track_frame(system.track, s + system.frame_offset[f], 0.0,
                                                    work.frames, f)
         if work.cell[f] < 0:
             return -1

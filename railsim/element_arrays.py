@@ -253,14 +253,17 @@ class ElementArrays:
         """Arrays of all three-axis elements."""
         rows = self.mount_rows
         floats = ("stiffness", "damping", "preload", "rotation", "rotation_damping")
+        internal = _column(rows, "internal", (3,), np.int64)
+        curve = _column(rows, "curve", (3,), np.int64)
+        special = ((internal >= 0) | (curve >= 0)).any(axis=1).astype(np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
             point=_column(rows, "point", (2, 3)),
             **{key: _column(rows, key, (3,)) for key in floats},
             friction=_column(rows, "friction", (3, 2)),
-            internal=_column(rows, "internal", (3,), np.int64),
-            curve=_column(rows, "curve", (3,), np.int64),
-            flags=_column(rows, "flags", (4,), np.int64),
+            internal=internal,
+            curve=curve,
+            flags=np.column_stack([_column(rows, "flags", (4,), np.int64), special]),
         )
 
     def loads(self) -> Loads:

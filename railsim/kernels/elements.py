@@ -92,56 +92,73 @@ def axis_force(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
 
 
 @jit_inline
-def translation_force(mounts, internal, curves, e, i, j, p, scale, inner, drive,
-                      R, X, V, W, F, M):
-    """Force of a mount in the axes of body `i` (its point `p` first), at the point of body `j`.
+def translation_force(mounts, internal, curves, e, i, j, inner, drive, R, X, V, W, F, M):
+    """Force of a mount in the axes of body `i`, of a shear spring half of it in those of `j`.
 
-    `scale` is the share of the element taken in these axes: 1, or 1/2 for a shear spring.
+    With the gap g = P_j - P_i and its global rate w, the deflection in a body's axes is R^T g, its
+    rate R^T (w - omega x g), and the gradient of the potential puts the moment g x f on the body
+    whose axes they are, besides the forces +-f at the points.
     """
-    px, py, pz = mounts.point[e, p, 0], mounts.point[e, p, 1], mounts.point[e, p, 2]
+    px, py, pz = mounts.point[e, 0, 0], mounts.point[e, 0, 1], mounts.point[e, 0, 2]
     ax = R[i, 0] * px + R[i, 1] * py + R[i, 2] * pz
     ay = R[i, 3] * px + R[i, 4] * py + R[i, 5] * pz
     az = R[i, 6] * px + R[i, 7] * py + R[i, 8] * pz
-    px, py, pz = mounts.point[e, 1 - p, 0], mounts.point[e, 1 - p, 1], mounts.point[e, 1 - p, 2]
+    px, py, pz = mounts.point[e, 1, 0], mounts.point[e, 1, 1], mounts.point[e, 1, 2]
     bx = R[j, 0] * px + R[j, 1] * py + R[j, 2] * pz
     by = R[j, 3] * px + R[j, 4] * py + R[j, 5] * pz
     bz = R[j, 6] * px + R[j, 7] * py + R[j, 8] * pz
-    # lever of the point of body j from the centre of body i
-    lx, ly, lz = X[j, 0] - X[i, 0] + bx, X[j, 1] - X[i, 1] + by, X[j, 2] - X[i, 2] + bz
-    # seen from body 2 the deflection is -d: preload and odd tables keep their sign through `sign`
-    sign = 1.0 if p == 0 else -1.0
-    gx, gy, gz = sign * (lx - ax), sign * (ly - ay), sign * (lz - az)
-    vx = sign * (V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * lz + W[i, 2] * ly)
-    vy = sign * (V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * lx + W[i, 0] * lz)
-    vz = sign * (V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ly + W[i, 1] * lx)
-    dx = R[i, 0] * gx + R[i, 3] * gy + R[i, 6] * gz
-    dy = R[i, 1] * gx + R[i, 4] * gy + R[i, 7] * gz
-    dz = R[i, 2] * gx + R[i, 5] * gy + R[i, 8] * gz
-    rx = R[i, 0] * vx + R[i, 3] * vy + R[i, 6] * vz
-    ry = R[i, 1] * vx + R[i, 4] * vy + R[i, 7] * vz
-    rz = R[i, 2] * vx + R[i, 5] * vy + R[i, 8] * vz
-    normal = 0.0
-    if mounts.flags[e, 3]:
-        normal = mounts.preload[e, 2] + mounts.stiffness[e, 2] * dz
-    share = scale * sign
-    tx = share * axis_force(mounts, internal, curves, e, 0, dx, rx, normal, inner, drive)
-    ty = share * axis_force(mounts, internal, curves, e, 1, dy, ry, normal, inner, drive)
-    tz = share * axis_force(mounts, internal, curves, e, 2, dz, rz, normal, inner, drive)
-    fx = R[i, 0] * tx + R[i, 1] * ty + R[i, 2] * tz
-    fy = R[i, 3] * tx + R[i, 4] * ty + R[i, 5] * tz
-    fz = R[i, 6] * tx + R[i, 7] * ty + R[i, 8] * tz
-    F[i, 0] += fx
-    F[i, 1] += fy
-    F[i, 2] += fz
-    M[i, 0] += ly * fz - lz * fy
-    M[i, 1] += lz * fx - lx * fz
-    M[i, 2] += lx * fy - ly * fx
-    F[j, 0] -= fx
-    F[j, 1] -= fy
-    F[j, 2] -= fz
-    M[j, 0] -= by * fz - bz * fy
-    M[j, 1] -= bz * fx - bx * fz
-    M[j, 2] -= bx * fy - by * fx
+    gx = X[j, 0] - X[i, 0] + bx - ax
+    gy = X[j, 1] - X[i, 1] + by - ay
+    gz = X[j, 2] - X[i, 2] + bz - az
+    wx = V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * az + W[i, 2] * ay
+    wy = V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * ax + W[i, 0] * az
+    wz = V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ay + W[i, 1] * ax
+    sx, sy, sz = 0.0, 0.0, 0.0
+    ends = 1 + mounts.flags[e, 1]
+    share = 1.0 / ends
+    for end in range(ends):
+        c = j if end else i
+        vx = wx - W[c, 1] * gz + W[c, 2] * gy
+        vy = wy - W[c, 2] * gx + W[c, 0] * gz
+        vz = wz - W[c, 0] * gy + W[c, 1] * gx
+        dx = R[c, 0] * gx + R[c, 3] * gy + R[c, 6] * gz
+        dy = R[c, 1] * gx + R[c, 4] * gy + R[c, 7] * gz
+        dz = R[c, 2] * gx + R[c, 5] * gy + R[c, 8] * gz
+        rx = R[c, 0] * vx + R[c, 3] * vy + R[c, 6] * vz
+        ry = R[c, 1] * vx + R[c, 4] * vy + R[c, 7] * vz
+        rz = R[c, 2] * vx + R[c, 5] * vy + R[c, 8] * vz
+        if mounts.flags[e, 4]:
+            normal = 0.0
+            if mounts.flags[e, 3]:
+                normal = mounts.preload[e, 2] + mounts.stiffness[e, 2] * dz
+            tx = axis_force(mounts, internal, curves, e, 0, dx, rx, normal, inner, drive)
+            ty = axis_force(mounts, internal, curves, e, 1, dy, ry, normal, inner, drive)
+            tz = axis_force(mounts, internal, curves, e, 2, dz, rz, normal, inner, drive)
+        else:
+            tx = mounts.preload[e, 0] + mounts.stiffness[e, 0] * dx + mounts.damping[e, 0] * rx
+            ty = mounts.preload[e, 1] + mounts.stiffness[e, 1] * dy + mounts.damping[e, 1] * ry
+            tz = mounts.preload[e, 2] + mounts.stiffness[e, 2] * dz + mounts.damping[e, 2] * rz
+        fx = share * (R[c, 0] * tx + R[c, 1] * ty + R[c, 2] * tz)
+        fy = share * (R[c, 3] * tx + R[c, 4] * ty + R[c, 5] * tz)
+        fz = share * (R[c, 6] * tx + R[c, 7] * ty + R[c, 8] * tz)
+        M[c, 0] += gy * fz - gz * fy
+        M[c, 1] += gz * fx - gx * fz
+        M[c, 2] += gx * fy - gy * fx
+        sx += fx
+        sy += fy
+        sz += fz
+    F[i, 0] += sx
+    F[i, 1] += sy
+    F[i, 2] += sz
+    M[i, 0] += ay * sz - az * sy
+    M[i, 1] += az * sx - ax * sz
+    M[i, 2] += ax * sy - ay * sx
+    F[j, 0] -= sx
+    F[j, 1] -= sy
+    F[j, 2] -= sz
+    M[j, 0] -= by * sz - bz * sy
+    M[j, 1] -= bz * sx - bx * sz
+    M[j, 2] -= bx * sy - by * sx
 
 
 @jit_inline
@@ -179,11 +196,8 @@ def mount_forces(mounts, internal, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all three-axis elements to `F`, `M`."""
     for e in range(mounts.body.shape[0]):
         i, j = mounts.body[e, 0], mounts.body[e, 1]
-        # one turn for each body in whose axes a share of the force acts
-        ends = mounts.flags[e, 0] * (1 + mounts.flags[e, 1])
-        for p in range(ends):
-            translation_force(mounts, internal, curves, e, j if p else i, i if p else j, p,
-                              1.0 / ends, inner, drive, R, X, V, W, F, M)
+        if mounts.flags[e, 0]:
+            translation_force(mounts, internal, curves, e, i, j, inner, drive, R, X, V, W, F, M)
         if mounts.flags[e, 2]:
             rotation_moment(mounts, e, i, j, R, W, M)
 

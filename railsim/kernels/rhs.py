@@ -21,13 +21,15 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
+from math import cos, sin
+
 from railsim.kernels import jit, jit_internal
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.rotation import sine_cosine
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.system import AXLEBOX, FREE, TABLE, WHEELSET
-from railsim.kernels.track_frame import GRAVITY, OMEGA, OMEGA_S, track_frame
+from railsim.kernels.track_frame import GRAVITY, OMEGA, OMEGA_S, heading, track_frame
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
@@ -37,17 +39,21 @@ STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
-    Origins are taken relative to that of frame `origin`: elements are stiff, and the round-off of
-    coordinates counted from the start of the track would be forces of micronewtons.
+    Origins and axes are those of frame `origin`, on the level: elements are stiff, and the
+    round-off of coordinates counted from the start of the track would be forces of micronewtons;
+    and the angles between the frames are small, which makes their sines cheap.
     """
+    turn = heading(track, s + offset[origin])
     for f in range(offset.shape[0]):
-        cell[f], cell_u[f] = track_frame(track, s + offset[f], frames, f)
+        cell[f], cell_u[f] = track_frame(track, s + offset[f], turn, frames, f)
         if cell[f] < 0:
             return END_OF_TRACK
     x, y, z = frames[origin, 0], frames[origin, 1], frames[origin, 2]
+    sine, cosine = sin(turn), cos(turn)
     for f in range(offset.shape[0]):
-        frames[f, 0] -= x
-        frames[f, 1] -= y
+        east, north = frames[f, 0] - x, frames[f, 1] - y
+        frames[f, 0] = cosine * east + sine * north
+        frames[f, 1] = cosine * north - sine * east
         frames[f, 2] -= z
     return RUNNING
 

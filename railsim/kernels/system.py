@@ -133,8 +133,8 @@ class Mounts(NamedTuple):
                                  spring force [1]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
-    flags : int64[e, 4]          1 if: translational part, both-ended axes (shear), rotational part,
-                                 friction pads
+    flags : int64[e, 5]          1 if: translational part, both-ended axes (shear), rotational part,
+                                 friction pads, tables or internal states
     """
 
     body: np.ndarray

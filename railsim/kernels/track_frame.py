@@ -8,7 +8,6 @@ Tables hold one cubic polynomial per cell and quantity, so that the position is 
 where the plan is a straight, a circle or a clothoid, whatever the table's spacing.
 """
 
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -64,8 +63,20 @@ def cell_of(track, s):
 
 
 @jit
-def track_frame(track, s, frames, f):
+def heading(track, s):
+    """Heading of the track at arc length `s` [rad], 0 outside the table."""
+    i, u = cell_of(track, s)
+    c = track.coefficients
+    if i < 0:
+        return 0.0
+    return c[i, PSI, 0] + u * (c[i, PSI, 1] + u * (c[i, PSI, 2] + u * c[i, PSI, 3]))
+
+
+@jit
+def track_frame(track, s, turn, frames, f):
     """Evaluate the track frame at arc length `s` [m] into ``frames[f, FRAME_SIZE]``.
+
+    Its attitude is given in axes that are turned by the heading `turn` [rad] about the vertical.
 
     With s the arc length, the frame turns by omega = vee(A^T dA/ds) per metre; for the Euler angles
     psi, theta, phi (z, y, x) omega_1 = phi' - psi' sin theta, omega_2 = theta' cos phi
@@ -84,7 +95,7 @@ def track_frame(track, s, frames, f):
     c = track.coefficients
     for k in range(3):
         frames[f, ORIGIN + k] = c[i, k, 0] + u * (c[i, k, 1] + u * (c[i, k, 2] + u * c[i, k, 3]))
-    psi = c[i, PSI, 0] + u * (c[i, PSI, 1] + u * (c[i, PSI, 2] + u * c[i, PSI, 3]))
+    psi = c[i, PSI, 0] - turn + u * (c[i, PSI, 1] + u * (c[i, PSI, 2] + u * c[i, PSI, 3]))
     psi_1 = c[i, PSI, 1] + u * (2.0 * c[i, PSI, 2] + u * 3.0 * c[i, PSI, 3])
     psi_2 = 2.0 * c[i, PSI, 2] + 6.0 * u * c[i, PSI, 3]
     theta = c[i, THETA, 0] + u * (c[i, THETA, 1] + u * (c[i, THETA, 2] + u * c[i, THETA, 3]))
@@ -94,7 +105,7 @@ def track_frame(track, s, frames, f):
     phi_1 = c[i, PHI, 1] + u * (2.0 * c[i, PHI, 2] + u * 3.0 * c[i, PHI, 3])
     phi_2 = 2.0 * c[i, PHI, 2] + 6.0 * u * c[i, PHI, 3]
 
-    sp, cp = sin(psi), cos(psi)
+    sp, cp = sine_cosine(psi)
     st, ct = sine_cosine(theta)
     sf, cf = sine_cosine(phi)
     frames[f, 3] = cp * ct

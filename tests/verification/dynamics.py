@@ -72,7 +72,7 @@ def evaluate(system, state):
 def absolute_frame(system, s):
     """Track frame with its origin in global axes."""
     frames = np.zeros((1, FRAME_SIZE))
-    track_frame(system.track, s, frames, 0)
+    track_frame(system.track, s, 0.0, frames, 0)
     return frames[0]
 
 
