@@ -41,6 +41,7 @@ from railsim.kernels.contact_table import (
     look_up,
 )
 from railsim.kernels.creep import creep_forces, falling_friction
+from railsim.kernels.cube_root import cube_root
 from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.status import (
     DERAILED,
@@ -164,9 +165,8 @@ def normal_contact(system, work, speed, state):
                 N = vertical / cos_g
                 if N <= 0.0:
                     continue
-                third = np.cbrt(N)
-                column[A, n] = t[k + 5] * third
-                column[B, n] = t[k + 6] * third
+                column[A, n] = t[k + 5]
+                column[B, n] = t[k + 6]
                 column[NORMAL, n] = N
                 column[MU_N, n] = mu * N
                 column[ANGLE_COS, n] = cos_g
@@ -332,6 +332,10 @@ def wheel_rail(system, work, speed, state):
         b = system.contact.body[k]
         complete_normal_force(b, system.bodies, work.frames, work.C, work.S, state, work.rail_force)
     patch = work.patch
+    for k in range(n):  # here and not above, where each patch would wait for its root
+        third = cube_root(patch[NORMAL, k])
+        patch[A, k] *= third
+        patch[B, k] *= third
     creepages(system, work, n, speed, state)
     contact = system.contact
     beyond = kalker_lookup(n, patch[A], patch[B], contact.creep, patch[C11], patch[C22],
