@@ -19,13 +19,23 @@ Vehicle System Dynamics 11, 1-13; three flexibilities and signs as in docs/theor
 
 import math
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from . import fastsim_simd, jit
+from .fastsim_simd import (
+    BOUNDS,
+    PER_L,
+    RESULTS,
+    W_ACROSS,
+    W_ALONG,
+    W_SUM,
+    Y_PER_L,
+)
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
-WORK_ROWS = 11
+WORK_ROWS = 16
 _COLUMNS_MIN = 24  # least number of strips that a march takes (three vectors of eight)
 # Added under the root: the least traction (relative to the bound) that counts is 1e-15.
 _TINY = 1e-30
@@ -35,18 +45,31 @@ _NO_LOAD = 1e-200
 _GROWTH_MAX = 1e9
 
 
-def fastsim_workspace(n_patch: int, ny: int, nx: int = 0) -> NDArray[np.float64]:
-    """Work array of `fastsim` for up to n_patch patches of ny strips and nx <= 128 or nx cells.
+def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
+    """Work array of `fastsim` for up to n_patch patches of nx by ny cells.
+
+    Its last rows hold what depends on the grid only: the bound over a strip, 1/l of each strip
+    (half of its length over a) and y/l, the weights of its sums.
 
     Returns
     -------
     work : ndarray, shape (WORK_ROWS, n_columns)
         Starts on a cache line: the SIMD loads of an unaligned array cost a third more.
     """
-    columns = max((n_patch * ny + 7) // 8 * 8, (nx + 7) // 8 * 8, 128)
+    # eight more: the last block of patches runs over the last strip
+    columns = max((n_patch * ny + 7) // 8 * 8 + 8, (max(nx, ny) + 7) // 8 * 8, 128)
     block = np.zeros(WORK_ROWS * columns + 8)
     first = -(block.ctypes.data // 8) % 8
-    return block[first : first + WORK_ROWS * columns].reshape(WORK_ROWS, columns)
+    work = block[first : first + WORK_ROWS * columns].reshape(WORK_ROWS, columns)
+    work[BOUNDS, :nx] = 1.0 - (1.0 - (2.0 * np.arange(nx) + 1.0) / nx) ** 2
+    y = (2.0 * np.arange(ny) + 1.0 - ny) / ny
+    l2 = 1.0 - y * y
+    work[PER_L, :ny] = 1.0 / np.sqrt(l2)
+    work[Y_PER_L, :ny] = y / np.sqrt(l2)
+    work[W_SUM, :ny] = l2 * np.sqrt(l2)
+    work[W_ALONG, :ny] = 2.0 / nx * l2 * l2
+    work[W_ACROSS, :ny] = l2 * np.sqrt(l2) * y
+    return work
 
 
 @jit
@@ -168,6 +191,29 @@ def _march_simd(work, m, nx, bounds):
 _march = _march_simd if fastsim_simd.available() else _march_plain
 
 
+def _spread_plain(work, n, ny):
+    """Growth per cell in x, y and by spin of all strips (rows 0 to 2) from that of the patches."""
+    for j in range(ny):
+        strips = slice(j * n, (j + 1) * n)
+        work[0, strips] = work[3, :n] * work[PER_L, j] - work[6, :n] * work[Y_PER_L, j]
+        work[1, strips] = work[4, :n] * work[PER_L, j]
+        work[2, strips] = work[5, :n]
+
+
+def _gather_plain(work, n, ny):
+    """Weighted sums over the strips of each patch into the rows `RESULTS`."""
+    x, y, m = (work[k, :n * ny].reshape(ny, n) for k in (3, 4, 5))
+    w, along, across = (work[k, :ny] for k in (W_SUM, W_ALONG, W_ACROSS))
+    for k, value in zip(RESULTS, (w @ x, w @ y, along @ m, along @ y, across @ x), strict=True):
+        work[k, :n] = value
+
+
+_spread, _gather = (
+    (_spread_plain, _gather_plain) if numba.config.DISABLE_JIT
+    else (fastsim_simd.spread, fastsim_simd.gather)
+)
+
+
 @jit
 def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x, T_y, M_z):
     """Tangential forces on the rail of n elliptic contact patches by FASTSIM.
@@ -191,7 +237,7 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
         Creepages, wheel minus rail (contact frame: x forward, t to the right, n into the rail)
         [1, 1, 1/m].
     work : ndarray, shape (WORK_ROWS, >= n ny and >= nx)
-        From `fastsim_workspace`; contents before the call do not matter.
+        From `fastsim_workspace`, for the same nx and ny.
     T_x, T_y, M_z : ndarray, shape (>= n,), written
         Force on the rail and moment about n at the patch centre [N, N, N m].
 
@@ -203,56 +249,20 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     """
     columns = n * ny
     padded = max((columns + 7) // 8 * 8, _COLUMNS_MIN)
-    gx, gy, gs = work[0], work[1], work[2]
-    sx, sy, spin_a, spin_b = work[3], work[4], work[5], work[6]
-    _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, spin_a, spin_b)
-    for j in range(ny):
-        y = (2 * j + 1 - ny) / ny
-        per_l = 1.0 / math.sqrt(1.0 - y * y)
-        y_per_l = y * per_l
-        for i in range(n):
-            gx[j * n + i] = sx[i] * per_l - spin_b[i] * y_per_l
-            gy[j * n + i] = sy[i] * per_l
-            gs[j * n + i] = spin_a[i]
+    _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work[3], work[4], work[5],
+                  work[6])
+    _spread(work, n, ny)
     for c in range(columns, padded):
-        gx[c] = gy[c] = gs[c] = 0.0
-    bounds = work[9]
-    for k in range(nx):
-        centre = 1.0 - (2 * k + 1) / nx
-        bounds[k] = 1.0 - centre * centre
-    _march(work, padded, nx, bounds)
-    _sum_of_strips(n, nx, ny, a, b, mu_N, work, T_x, T_y, M_z)
-
-
-@jit
-def _sum_of_strips(n, nx, ny, a, b, mu_N, work, T_x, T_y, M_z):
-    """Force and moment of every patch from the sums along its strips.
-
-    The x-weighted sum of y traction follows from the sum of its running sum:
-    sum_k x_k q_k = 2/nx (sum_k sum_(i<=k) q_i) - (1 + 1/nx) sum_k q_k, x_k = 1 - (2 k + 1)/nx.
-    """
-    sum_x, sum_y, sum_m = work[3], work[4], work[5]
-    tx, ty, mz = work[6], work[7], work[8]
+        work[0, c] = work[1, c] = work[2, c] = 0.0
+    _march(work, padded, nx, work[BOUNDS])
+    _gather(work, n, ny)
+    sum_x, sum_y, running, along, across = RESULTS
     for i in range(n):
-        tx[i] = ty[i] = mz[i] = 0.0
-    for j in range(ny):
-        y = (2 * j + 1 - ny) / ny
-        l2 = 1.0 - y * y
-        weight = l2 * math.sqrt(l2)
-        weight_a = 2.0 / nx * l2 * l2
-        weight_b = weight * y
-        # one loop per result: each one is vectorised, all in one is not
-        for i in range(n):
-            tx[i] += weight * sum_x[j * n + i]
-        for i in range(n):
-            ty[i] += weight * sum_y[j * n + i]
-        for i in range(n):
-            c = j * n + i
-            arm_sum = sum_m[c] - 0.5 * (nx + 1) * sum_y[c]
-            mz[i] += weight_a * a[i] * arm_sum - weight_b * b[i] * sum_x[c]
-    for i in range(n):
-        # p0 times the area of a cell at the middle: 2 mu N/(pi a b) (2 a/nx) (2 b/ny)
+        # p0 times the area of a cell at the middle: 2 mu N/(pi a b) (2 a/nx) (2 b/ny).  The
+        # x-weighted sum of y traction follows from the sum of its running sum:
+        # sum_k x_k q_k = 2/nx (sum_k sum_(i<=k) q_i) - (1 + 1/nx) sum_k q_k, x_k = 1 - (2k + 1)/nx
         unit = max(mu_N[i], 0.0) * 8.0 / (math.pi * nx * ny)
-        T_x[i] = unit * tx[i]
-        T_y[i] = unit * ty[i]
-        M_z[i] = unit * mz[i]
+        T_x[i] = unit * work[sum_x, i]
+        T_y[i] = unit * work[sum_y, i]
+        M_z[i] = unit * (a[i] * (work[running, i] - 0.5 * (nx + 1) * work[along, i])
+                         - b[i] * work[across, i])

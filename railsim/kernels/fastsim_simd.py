@@ -11,6 +11,8 @@ The algorithm is that of :func:`railsim.kernels.fastsim._march_plain`, which is 
 AVX-512 is missing or compilation is switched off; a test holds both to the same result.
 """
 
+from contextlib import contextmanager
+
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
@@ -24,6 +26,11 @@ _VECTOR = ir.VectorType(_DOUBLE, LANES)
 _VECTOR_POINTER = ir.PointerType(_VECTOR)
 _BYTE = ir.IntType(8)
 _INT = ir.IntType(64)
+
+# rows of the work array that hold what depends on the grid only, see `fastsim.fastsim_workspace`
+BOUNDS, PER_L, Y_PER_L, W_SUM, W_ALONG, W_ACROSS = 9, 11, 12, 13, 14, 15
+# rows that receive the sums over the strips
+RESULTS = (6, 7, 8, 10, 0)
 
 
 def available() -> bool:
@@ -138,3 +145,91 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
 march_3 = _block_march(3)
 march_4 = _block_march(4)
 march_5 = _block_march(5)
+
+
+@intrinsic
+def spread(typingctx, work, n, ny):
+    """Spread the growth per cell of n patches over their ny strips, see `fastsim._spread_plain`.
+
+    Blocks of eight patches: the last one runs over into the next strip, which is written after it.
+    """
+
+    def codegen(context, builder, sig, args):
+        load, row = _rows(context, builder, sig, args[0])
+        with _strips(builder, args[1], args[2]) as (strip, first, place):
+            per_l = load(PER_L, strip, splat=True)
+            y_per_l = load(Y_PER_L, strip, splat=True)
+            x, y = load(3, first), load(4, first)
+            spin_a, spin_b = load(5, first), load(6, first)
+            grow_x = builder.fsub(builder.fmul(x, per_l), builder.fmul(spin_b, y_per_l))
+            for k, value in enumerate((grow_x, builder.fmul(y, per_l), spin_a)):
+                builder.store(value, row(k, place), align=8)
+        return context.get_dummy_value()
+
+    return types.void(work, types.intp, types.intp), codegen
+
+
+@intrinsic
+def gather(typingctx, work, n, ny):
+    """Add up the strips of n patches, see `fastsim._gather_plain`."""
+
+    def codegen(context, builder, sig, args):
+        load, row = _rows(context, builder, sig, args[0])
+        terms = ((W_SUM, 3), (W_SUM, 4), (W_ALONG, 5), (W_ALONG, 4), (W_ACROSS, 3))
+        with _blocks(builder, args[1]) as first:
+            zero = ir.Constant(_VECTOR, [0.0] * LANES)
+            slots = [cgutils.alloca_once(builder, _VECTOR) for _ in terms]
+            for slot in slots:
+                builder.store(zero, slot)
+            with cgutils.for_range(builder, args[2]) as loop:
+                place = builder.add(builder.mul(loop.index, args[1]), first)
+                weights = {k: load(k, loop.index, splat=True) for k in (W_SUM, W_ALONG, W_ACROSS)}
+                sums = {k: load(k, place) for k in (3, 4, 5)}
+                for slot, (weight, k) in zip(slots, terms, strict=True):
+                    product = builder.fmul(weights[weight], sums[k])
+                    builder.store(builder.fadd(builder.load(slot), product), slot)
+            for k, slot in zip(RESULTS, slots, strict=True):
+                builder.store(builder.load(slot), row(k, first), align=8)
+        return context.get_dummy_value()
+
+    return types.void(work, types.intp, types.intp), codegen
+
+
+def _rows(context, builder, sig, work):
+    """Functions that load from a row of the work array, and that point into it."""
+    array = context.make_array(sig.args[0])(context, builder, work)
+    columns = cgutils.unpack_tuple(builder, array.shape)[1]
+    zero = ir.Constant(_VECTOR, [0.0] * LANES)
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+
+    def element(k, column):
+        offset = builder.add(builder.mul(ir.Constant(_INT, k), columns), column)
+        return builder.gep(array.data, [offset])
+
+    def row(k, column):
+        return builder.bitcast(element(k, column), _VECTOR_POINTER)
+
+    def load(k, column, splat=False):
+        if not splat:
+            return builder.load(row(k, column), align=8)
+        value = builder.load(element(k, column))
+        single = builder.insert_element(zero, value, ir.Constant(ir.IntType(32), 0))
+        return builder.shuffle_vector(single, zero, mask)
+
+    return load, row
+
+
+@contextmanager
+def _blocks(builder, n):
+    """Loop over blocks of eight patches: the number of the first one."""
+    lanes = ir.Constant(_INT, LANES)
+    count = builder.sdiv(builder.add(n, ir.Constant(_INT, LANES - 1)), lanes)
+    with cgutils.for_range(builder, count) as loop:
+        yield builder.mul(loop.index, lanes)
+
+
+@contextmanager
+def _strips(builder, n, ny):
+    """Loop over strips and blocks of patches: strip, first patch, its column."""
+    with cgutils.for_range(builder, ny) as loop, _blocks(builder, n) as first:
+        yield loop.index, first, builder.add(builder.mul(loop.index, n), first)

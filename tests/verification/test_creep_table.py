@@ -80,7 +80,7 @@ def test_splines_reproduce_a_smooth_force():
     outside = kernel.table_forces(
         n, np.sqrt(ratio), 1.0 / np.sqrt(ratio), np.ones(n), 1.0,
         *(np.ascontiguousarray(q[:, k]) for k in range(3)), *table, np.zeros(16, dtype=np.int64),
-        fastsim_workspace(1, 1), *out,
+        fastsim_workspace(1, 1, 1), *out,
     )  # fmt: skip
     assert outside == 0
     # fourth order of the nodes' distance, 9 degrees and 1/20
@@ -210,7 +210,7 @@ def test_nan_stays_visible():
         creepages[k][0] = np.nan
         kernel.table_forces(
             1, one, one, one, 1.0, *creepages, *creep_table(), np.zeros(16, dtype=np.int64),
-            fastsim_workspace(1, 1), *out,
+            fastsim_workspace(1, 1, 1), *out,
         )  # fmt: skip
         assert np.isnan(out[0, 0])
 
