@@ -61,7 +61,9 @@ def errors(result: Result, reference: Result) -> dict[str, float]:
     """
 
     def values(name: str, kind: str = "abs") -> tuple[float, float]:
-        return peak(result, name, kind).value, peak(reference, name, kind).value
+        found = peak(result, name, kind).value, peak(reference, name, kind).value
+        # magnitudes: of two equal peaks of opposite sign either may be the larger by round-off
+        return (abs(found[0]), abs(found[1])) if kind == "abs" else found
 
     unloading = [values("dQ_over_Q0", kind) for kind in ("max", "min")]
     pairs = [*unloading, *(values(name) for name in RELATIVE)]
