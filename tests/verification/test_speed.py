@@ -69,7 +69,7 @@ def test_runs_from_1_to_100_m_s(straight, speed):
 
 
 def test_jump_at_low_speed_is_off_by_the_square_of_the_step(straight):
-    """Creep forces stiffen as 1/V: at 3 m/s a wheelset 2 mm aside falls into its place within 0.1 s.
+    """Creep forces stiffen as 1/V: at 3 m/s a wheelset 2 mm aside falls into place in 0.1 s.
 
     The first milliseconds of that jump, which no vehicle makes, are shorter than the step.  What
     they leave behind is off by 2 % of the largest force at the default step, and by a quarter of
