@@ -17,6 +17,11 @@ import click
 from railsim.errors import InputError, ModelError
 from railsim.version import __version__
 
+# Matrices here have at most some hundred rows: threads of the linear algebra library gain nothing,
+# and after each call they spin for a while on the core that another run could have.  It reads this
+# when numpy is imported, which no command has done yet.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 DONE, FAILED, WRONG_INPUT, ENDED_EARLY, INTERRUPTED = 0, 1, 2, 3, 130
 
 # name of a command: its module in this package, and what it does
