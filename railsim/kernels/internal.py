@@ -154,7 +154,10 @@ def internal_rate(internal, curves, i, x, drive, limit):
     if internal.kind[i] == MAXWELL_CURVE:
         speed = curve_speed(curves, internal.curve[i], x, drive)
         return internal.parameter[i, 1] * (drive - speed)
-    return (steady_value(internal, i, drive) - x) / relaxation_time(internal, i)
+    p = internal.parameter
+    if internal.kind[i] == MAXWELL:
+        return p[i, 1] * (drive - x / p[i, 0])
+    return (p[i, 0] * (drive - x) - p[i, 1] * x) / p[i, 2]
 
 
 @jit
