@@ -118,7 +118,7 @@ def scipy_candidates(track: Any, choice: tuple[tuple[str, float], ...]) -> dict[
     n = peer.prepared.model.index.n_bodies
     size = np.concatenate([
         np.full(6 * n, LENGTH), np.full(6 * n, VELOCITY),
-        np.full(len(peer.prepared.state) - 12 * n - 3, FORCE), [1.0, 1.0, 1.0],
+        np.full(len(peer.kept) - 12 * n - 3, FORCE), [1.0, 1.0, 1.0],
     ])
 
     def solve(method: str, tolerance: float) -> dict[str, Any]:

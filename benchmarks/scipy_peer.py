@@ -47,22 +47,32 @@ class Peer:
         times = np.linspace(0.0, duration, round(200.0 * duration) + 1)
         return cls(prepared, duration, times)
 
+    @property
+    def kept(self) -> np.ndarray:
+        """Places in the state but for the memory of railsim's own scheme."""
+        system = self.prepared.model.system
+        n = 12 * len(system.bodies.kind) + len(system.internal.kind)
+        size = len(self.prepared.state)
+        return np.r_[:n, size - 3:size]
+
     def solve(self, method: str, **options: Any) -> dict[str, Any]:
         """Integrate and return CPU time, number of evaluations and the outputs."""
         from scipy.integrate import solve_ivp
 
         system = self.prepared.model.system
         models = numba.typed.List([(system, work_arrays(system))])
-        derivative = np.zeros_like(self.prepared.state)
-        rate(models, self.prepared.state, derivative)
+        state, derivative = self.prepared.state.copy(), np.zeros_like(self.prepared.state)
+        kept = self.kept
+        rate(models, state, derivative)
 
         def function(t, y):
-            rate(models, y, derivative)
-            return derivative.copy()
+            state[kept] = y
+            rate(models, state, derivative)
+            return derivative[kept]
 
         begin = time.process_time()
         solution = solve_ivp(
-            function, (0.0, self.duration), self.prepared.state, method=method,
+            function, (0.0, self.duration), self.prepared.state[kept], method=method,
             t_eval=self.output_times, **options,
         )
         cpu = time.process_time() - begin
@@ -81,9 +91,11 @@ class Peer:
         stages = np.zeros((3, len(derivative)))
         recorder = empty_recorder(model, 1)
         rows = []
-        for state in states:
-            time_loop(model.system, work, np.ascontiguousarray(state), derivative, stages,
+        state = self.prepared.state.copy()
+        for values in states:
+            state[self.kept] = values
+            time_loop(model.system, work, state, derivative, stages,
                       recorder, RK4, 1.0, 0, 0, 1, 0, 1)
-            values = quantities(model, recorder, 1, self.prepared.balance.Q0)
-            rows.append({name: np.array(value) for name, value in values.items()})
+            found = quantities(model, recorder, 1, self.prepared.balance.Q0)
+            rows.append({name: np.array(value) for name, value in found.items()})
         return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
