@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 SCHEMES = {"fast": FAST, "rk4": RK4}
 # s; beyond them accuracy, not stability, decides
 LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
+# m of track a step: the shortest waves of irregular track, 3 m, are followed in fifty steps
+LONGEST_TRAVEL = 0.06
 SHORTEST_STEP = 1e-6  # s
 # a step is taken if one longer by this factor is stable too: a wheel load of twice the static one
 # raises the frequency of the contact by 2^(1/6) = 1.12
@@ -79,7 +81,8 @@ def choose_step(
         No step longer than `SHORTEST_STEP` is stable.
     """
     growth = max(0.0, _vehicle_growth(model, system, state)) + GROWTH
-    n = max(1, int(np.ceil(interval / LONGEST_STEP[scheme] * (1.0 - 1e-9))))
+    longest = min(LONGEST_STEP[scheme], LONGEST_TRAVEL / float(state[-1]))
+    n = max(1, int(np.ceil(interval / longest * (1.0 - 1e-9))))
     while interval / n >= SHORTEST_STEP:
         h = MARGIN * interval / n
         if _step_growth(model, system, state, scheme, h) <= growth:
