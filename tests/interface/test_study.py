@@ -317,7 +317,11 @@ def test_processes_give_the_same_arrays_as_one_run(tmp_path):
 def test_interrupt_leaves_only_whole_files(tmp_path, everyone):
     given = arguments(tmp_path / "study", 2, 3, 4, 5)[:-2]
     given += ["--set", "settings.scheme=rk4", "--set", "settings.step=1e-4", "--workers", "2"]
-    call = "import sys; from railsim.cli import main; sys.exit(main())"
+    # a background job of a shell is started with the interrupt ignored: here it counts
+    call = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "from railsim.cli import main; sys.exit(main())"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", call, *given],
         stdout=subprocess.DEVNULL,
