@@ -22,6 +22,23 @@ from railsim.kernels import jit_inline, jit_internal
 from railsim.kernels.internal import AIR, PAD, curve_value
 
 
+@jit_inline
+def push_pair(F, M, i, j, ax, ay, az, bx, by, bz, fx, fy, fz):
+    """Put a force on body `i` at the arm a from its centre, the opposite on body `j` at b."""
+    F[i, 0] += fx
+    F[i, 1] += fy
+    F[i, 2] += fz
+    M[i, 0] += ay * fz - az * fy
+    M[i, 1] += az * fx - ax * fz
+    M[i, 2] += ax * fy - ay * fx
+    F[j, 0] -= fx
+    F[j, 1] -= fy
+    F[j, 2] -= fz
+    M[j, 0] -= by * fz - bz * fy
+    M[j, 1] -= bz * fx - bx * fz
+    M[j, 2] -= bx * fy - by * fx
+
+
 @jit_internal
 def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
     """Add the forces of all point-to-point elements to `F`, `M`."""
@@ -56,18 +73,7 @@ def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
         if links.curve[e, 1] >= 0:
             force += curve_value(curves, links.curve[e, 1], rate)
         fx, fy, fz = force * nx, force * ny, force * nz
-        F[i, 0] += fx
-        F[i, 1] += fy
-        F[i, 2] += fz
-        M[i, 0] += ay * fz - az * fy
-        M[i, 1] += az * fx - ax * fz
-        M[i, 2] += ax * fy - ay * fx
-        F[j, 0] -= fx
-        F[j, 1] -= fy
-        F[j, 2] -= fz
-        M[j, 0] -= by * fz - bz * fy
-        M[j, 1] -= bz * fx - bx * fz
-        M[j, 2] -= bx * fy - by * fx
+        push_pair(F, M, i, j, ax, ay, az, bx, by, bz, fx, fy, fz)
 
 
 @jit_inline
@@ -147,18 +153,7 @@ def translation_force(mounts, internal, curves, e, i, j, inner, drive, R, X, V, 
         sx += fx
         sy += fy
         sz += fz
-    F[i, 0] += sx
-    F[i, 1] += sy
-    F[i, 2] += sz
-    M[i, 0] += ay * sz - az * sy
-    M[i, 1] += az * sx - ax * sz
-    M[i, 2] += ax * sy - ay * sx
-    F[j, 0] -= sx
-    F[j, 1] -= sy
-    F[j, 2] -= sz
-    M[j, 0] -= by * sz - bz * sy
-    M[j, 1] -= bz * sx - bx * sz
-    M[j, 2] -= bx * sy - by * sx
+    push_pair(F, M, i, j, ax, ay, az, bx, by, bz, sx, sy, sz)
 
 
 @jit_inline

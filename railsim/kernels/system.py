@@ -235,7 +235,11 @@ class Work(NamedTuple):
     drive : float64[m, 2]       what drives each internal state, and its limit
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, 8]  see `wheel_rail`
-    patch_* : per active patch, see `wheel_rail`
+    look_up, weights, stiffness, approach, rail : of the wheel at hand, see `contact_table`
+    patch_index : int64[p, 3]   wheelset, side and patch of each active contact patch
+    patch : float64[PATCH_ROWS, p]  see `wheel_rail`
+    fastsim : float64[WORK_ROWS, ...];  offsets : int64[16]   scratch of the creep laws
+    wheel : float64[w, 2, WHEEL_COLUMNS]  see `wheel_rail`
     events : int64[2]           loaded patches so far, and how many of them were outside the range
                                 of the creep law
     """

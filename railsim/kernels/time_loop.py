@@ -3,7 +3,7 @@
 `fast`: one evaluation a step, of order two: velocity Verlet for the springs, velocities in it
 extrapolated by Adams and Bashforth for dampers, contact forces that stiffen as 1/V taken linearly
 implicit (`soften_contact`), internal states of elements advanced exactly for the drive in the
-middle of the step (see `internal`).  The state keeps accelerations and drives of the step before.
+middle of the step (see `internal`).  The state keeps smoothed accelerations and the last drives.
 
 `rk4`: the classical Runge-Kutta method of order four on the whole state; the reference.
 """
@@ -134,8 +134,8 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
     The explicit acceleration a is evaluated with the extrapolated velocity; the acceleration a_n of
-    the step solves a_n + theta h M^-1 D (a_n - a_(n-1)) = a with an estimate D of the damping
-    (linearly implicit methods: Hairer and Wanner, Solving ODE II, IV.7): exact D gives the
+    the step solves a_n + theta h M^-1 D (a_n - b) = a, b as in `step_fast`, D an estimate of that
+    damping (linearly implicit methods: Hairer and Wanner, Solving ODE II, IV.7): exact D gives the
     trapezoidal rule, and an error of D counts with h^2.  D of rank one for each of: slip along the
     track, of x and spin; slip across, of y and roll; yaw; contact damping in z, y, roll.
     """
@@ -175,8 +175,8 @@ def remember(system, work, state, derivative, h):
 def step_fast(system, work, state, derivative, decay, h):
     """Advance `state` by `h` with the derivative already evaluated there.
 
-    With the accelerations a of this step and of the one before: u = v + h (a_n - a_(n-1)/2),
-    q <- q + h u, v <- u + h/2 a_n.
+    With the acceleration a of this step and b, the smoothed one of the steps before:
+    u = v + h (a - b/2), q <- q + h u, b <- b + SMOOTHING (a - b), v <- u + h/2 b.
     """
     bodies, S = system.bodies, work.S
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
