@@ -35,7 +35,7 @@ def repeated(times, law, n, nx, ny, inputs, G, table, scale, offsets, work, out)
     a, b, mu_N, c11, c22, c23, c33, xi_x, xi_y, phi = inputs
     for _ in range(times):
         creep_forces(law, n, nx, ny, a, b, mu_N, c11, c22, c23, c33, G, 1.0, 1.0, xi_x, xi_y, phi,
-                     table, scale, offsets, work, out[0], out[1], out[2])  # fmt: skip
+                     table, scale, offsets, work, out[0], out[1], out[2], out[3])  # fmt: skip
 
 
 def patches(n):
@@ -56,7 +56,7 @@ def nanoseconds(law, n, grid, inputs, rounds=25):
     """Least time per patch and call."""
     table, scale = creep_table()
     work, offsets = fastsim_workspace(n, grid, grid), np.zeros(16, dtype=np.int64)
-    out = [np.zeros(n) for _ in range(3)]
+    out = [np.zeros(n) for _ in range(4)]
     times = max(10, 200_000 // (grid * grid * n))
     arguments = (LAW_NUMBERS[law], n, grid, grid, inputs, 82e9, table, scale, offsets, work,
                  tuple(out))  # fmt: skip

@@ -196,7 +196,7 @@ def work_arrays(system: System) -> Work:
         patch=np.zeros((PATCH_ROWS, n_patches)),
         fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
         offsets=np.zeros(16, dtype=np.int64),
-        events=np.zeros(2, dtype=np.int64),
+        events=np.zeros((n_wheelsets, 2), dtype=np.int64),
         wheel=np.zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
     )
 
@@ -258,7 +258,7 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
         inertia=np.array([_inertia(body) for body in flat.bodies]),
         nominal=np.array([[body.position[1], body.position[2]] for body in flat.bodies]),
         radius=np.array([_nominal_radius(body) for body in flat.bodies]),
-        reference=names.index(flat.reference),
+        references=np.array([names.index(flat.reference)], dtype=np.int64),
     )
     return bodies, np.array(offsets)
 

@@ -243,7 +243,7 @@ class _Balance:
         self._equations: list[int] = []
         for body, kind in enumerate(system.bodies.kind):
             for component in _components(int(kind)):
-                if body == system.bodies.reference and component == 0:
+                if body in system.bodies.references and component == 0:
                     continue
                 spin = kind == WHEELSET and component == 4
                 if spin and not rolling:

@@ -109,7 +109,7 @@ def _located(model: Model, place: float) -> Work:
     """Work arrays with the track frames of a vehicle at `place`."""
     system = model.system
     work = work_arrays(system)
-    reference = system.bodies.frame[system.bodies.reference]
+    reference = system.bodies.frame[system.bodies.references[0]]
     if locate_frames(system.track, system.frame_offset, reference, place, work.frames, work.cell,
                      work.cell_u) != RUNNING:
         raise ModelError("the vehicle is longer than the track's table allows")

@@ -163,8 +163,8 @@ def simulate(
         "scheme": settings.scheme,
         "wall_time": time.perf_counter() - started,
         "cpu_time": cpu_time,
-        "patches_evaluated": int(events[0]),
-        "patches_out_of_range": int(events[1]),
+        "patches_evaluated": int(events[:, 0].sum()),
+        "patches_out_of_range": int(events[:, 1].sum()),
         "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
     }
     result = sink.close(

@@ -11,6 +11,7 @@ from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, right_hand_side
 from railsim.kernels.wheel_rail import (
+    BEYOND,
     C11,
     C22,
     C23,
@@ -48,7 +49,7 @@ def many_mechanics(system, work, state, derivative, n):
 @jit
 def many_frames(system, work, state, derivative, n):
     """Track frames of all bodies."""
-    origin = system.bodies.frame[system.bodies.reference]
+    origin = system.bodies.frame[system.bodies.references[0]]
     for _ in range(n):
         locate_frames(system.track, system.frame_offset, origin, state[-2], work.frames, work.cell,
                       work.cell_u)
@@ -105,7 +106,7 @@ def many_creepages(system, work, state, patches, n):
     for _ in range(n):
         creepages(system, work, patches, state[-1], state)
         kalker_lookup(patches, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
-                      patch[C23], patch[C33])
+                      patch[C23], patch[C33], patch[BEYOND])
 
 
 @jit

@@ -167,15 +167,15 @@ def creep_force(
     if friction_rest < 1.0:
         falling_friction(n, bound, *creepages[:2], speed, friction_rest, friction_decay)
     table = creep_table(nu) if law == "table" else NO_TABLE
-    T_x, T_y, M_z = np.zeros(n), np.zeros(n), np.zeros(n)
-    outside = creep_forces(
+    T_x, T_y, M_z, beyond = np.zeros((4, n))
+    creep_forces(
         LAW_NUMBERS[law], n, nx, ny, semi_a, semi_b, bound,
         *kalker_coefficients(semi_a / semi_b, nu), G, reduction, k_slip, *creepages,
-        *table, np.zeros(16, dtype=np.int64), fastsim_workspace(n, ny, nx), T_x, T_y, M_z,
+        *table, np.zeros(16, dtype=np.int64), fastsim_workspace(n, ny, nx), T_x, T_y, M_z, beyond,
     )  # fmt: skip
-    if outside:
+    if beyond.any():
         warnings.warn(
-            f"creep law 'table': {outside} of {n} patches have a/b outside 1/{RATIO_MAX:g} to "
+            f"creep law 'table': {int(beyond.sum())} of {n} patches have a/b outside 1/{RATIO_MAX:g} to "
             f"{RATIO_MAX:g} and got the force of the nearest ratio",
             stacklevel=2,
         )

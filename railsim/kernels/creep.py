@@ -54,7 +54,7 @@ def falling_friction(n, mu_N, xi_x, xi_y, speed, rest, decay):
 @jit
 def creep_forces(
     law, n, nx, ny, a, b, mu_N, c11, c22, c23, c33, G, k_adhesion, k_slip, xi_x, xi_y, phi,
-    table, scale, offsets, work, T_x, T_y, M_z,
+    table, scale, offsets, work, T_x, T_y, M_z, outside,
 ):  # fmt: skip
     """Tangential forces on the rail of n patches by the law of that number.
 
@@ -72,20 +72,18 @@ def creep_forces(
     offsets : ndarray of int64, shape (16,)
         Scratch of the table's look-up.
 
-    Others as in `railsim.kernels.fastsim.fastsim`.
+    outside : ndarray, shape (>= n,)
+        Written by `table` only: 1 where a loaded patch is outside the law's range (a/b beyond
+        1/20..20), else 0.
 
-    Returns
-    -------
-    outside : int
-        Number of patches outside the law's range (`table` only: a/b beyond 1/20..20).
+    Others as in `railsim.kernels.fastsim.fastsim`.
     """
-    outside = 0
     if law == FASTSIM:
         fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, k_adhesion * G, xi_x, xi_y, phi, work,
                 T_x, T_y, M_z)  # fmt: skip
     elif law == TABLE:
-        outside = table_forces(n, a, b, mu_N, k_adhesion * G, xi_x, xi_y, phi, table, scale,
-                               offsets, work, T_x, T_y, M_z)  # fmt: skip
+        table_forces(n, a, b, mu_N, k_adhesion * G, xi_x, xi_y, phi, table, scale, offsets, work,
+                     T_x, T_y, M_z, outside)  # fmt: skip
     elif law == FASTRIP:
         fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, k_adhesion * G, xi_x, xi_y, phi, work,
                 T_x, T_y, M_z)  # fmt: skip
@@ -95,4 +93,3 @@ def creep_forces(
     else:
         linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, k_adhesion * G, xi_x, xi_y, phi,
                          T_x, T_y, M_z)  # fmt: skip
-    return outside

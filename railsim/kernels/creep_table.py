@@ -104,7 +104,9 @@ _sum_of_rows = _sum_of_rows_plain if numba.config.DISABLE_JIT else sum_of_rows
 
 
 @jit
-def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work, T_x, T_y, M_z):
+def table_forces(
+    n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work, T_x, T_y, M_z, outside
+):  # fmt: skip
     """Tangential forces on the rail of n elliptic contact patches by the tabulated full theory.
 
     Parameters
@@ -123,18 +125,14 @@ def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work,
         Scratch: that of `railsim.kernels.fastsim.fastsim_workspace` will do.
     T_x, T_y, M_z : ndarray, shape (>= n,), written
         Force on the rail and moment about the normal [N, N, N m].
-
-    Returns
-    -------
-    outside : int
-        Number of loaded patches whose ratio a/b is outside the table; they got the values of its
-        end.
+    outside : ndarray, shape (>= n,), written
+        1 for a loaded patch whose ratio a/b is outside the table, else 0; it got the values of the
+        table's end.
 
     Notes
     -----
     Source: Kalker's full theory by our own solver; docs/validation/creep.md has the errors.
     """
-    outside = 0
     width = work.shape[1]
     for first in range(0, n, _BLOCK):
         count = min(_BLOCK, n - first)
@@ -142,6 +140,7 @@ def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work,
         for m in range(count):
             i = first + m
             row, at = 1 + (m >> 2), (m & 3) * _RECORD
+            outside[i] = 0.0
             if not (mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0):
                 offsets[m] = 0
                 for k in range(16):
@@ -152,7 +151,7 @@ def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work,
                 continue
             log_ratio = math.log(a[i] / b[i])
             if abs(log_ratio) > _LOG_MAX + _ROUND_OFF:
-                outside += 1
+                outside[i] = 1.0
             r, r0, r1, r2, r3 = _weights((log_ratio / _LOG_MAX + 1.0) * (0.5 * N_RATIO), N_RATIO)
             unit = G * a[i] * b[i] / mu_N[i]
             size = math.sqrt(a[i] * b[i])
@@ -205,4 +204,3 @@ def table_forces(n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work,
             T_x[i] = work[row, at + 16] * x
             T_y[i] = work[row, at + 17] * y
             M_z[i] = work[row, at + 18] * z
-    return outside

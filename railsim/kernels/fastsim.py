@@ -73,7 +73,7 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
 
 
 @jit
-def kalker_lookup(n, a, b, table, c11, c22, c23, c33):
+def kalker_lookup(n, a, b, table, c11, c22, c23, c33, outside):
     """Kalker's coefficients of n patches from the table of `railsim.contact.kalker.creep_tables`.
 
     Parameters
@@ -87,20 +87,15 @@ def kalker_lookup(n, a, b, table, c11, c22, c23, c33):
     c11, c22, c23, c33 : ndarray, shape (>= n,), written
         Coefficients, linear between the nodes; outside the table its end values [1].
         For a = b = 0 (no contact) those of the circle.
-
-    Returns
-    -------
-    outside : int
-        Number of patches outside the table.
+    outside : ndarray, shape (>= n,), written
+        1 for a patch outside the table, else 0.
     """
-    outside = 0
     last = table.shape[0] - 1
     scale = 0.5 * last / KALKER_U_MAX
     for i in range(n):
         total = a[i] + b[i]
         u = (a[i] - b[i]) / total if total > 0.0 else 0.0
-        if abs(u) > KALKER_U_MAX:
-            outside += 1
+        outside[i] = 1.0 if abs(u) > KALKER_U_MAX else 0.0
         place = min(max((u + KALKER_U_MAX) * scale, 0.0), float(last))
         node = min(int(place), last - 1)
         w = place - node
@@ -108,7 +103,6 @@ def kalker_lookup(n, a, b, table, c11, c22, c23, c33):
         c22[i] = table[node, 1] + w * (table[node + 1, 1] - table[node, 1])
         c23[i] = table[node, 2] + w * (table[node + 1, 2] - table[node, 2])
         c33[i] = table[node, 3] + w * (table[node + 1, 3] - table[node, 3])
-    return outside
 
 
 @jit

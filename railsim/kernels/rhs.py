@@ -268,7 +268,7 @@ def add_traction(drive, bodies, frames, speed, F):
     """Traction less running resistance of a free-running vehicle, on the reference body."""
     force, _ = table_value_slope(drive.table, speed)
     force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
-    b = bodies.reference
+    b = bodies.references[0]
     f = bodies.frame[b]
     for k in range(3):
         F[b, k] += force * frames[f, 3 + 3 * k]
@@ -282,7 +282,7 @@ def speed_change(drive, bodies, frames, state, derivative):
         _, slope = table_value_slope(drive.table, state[-2])
         return state[-1] * slope
     if drive.mode == FREE:
-        b = bodies.reference
+        b = bodies.references[0]
         f = bodies.frame[b]
         y = state[6 * b + 1] + bodies.nominal[b, 0]
         z = state[6 * b + 2] + bodies.nominal[b, 1]
@@ -311,14 +311,15 @@ def apply_speed_change(bodies, frames, state, rate, derivative):
 
 @jit_internal
 def hold_reference(bodies, C, acceleration, derivative):
-    """Keep the reference body's x; the force that holds it is part of its acceleration."""
+    """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
     n = bodies.kind.shape[0]
-    b = bodies.reference
-    held = 6 * n + 6 * b
-    for i in range(3):
-        acceleration[b, i] -= derivative[held] * C[b, i]
-    derivative[6 * b] = 0.0
-    derivative[held] = 0.0
+    for k in range(bodies.references.shape[0]):
+        b = bodies.references[k]
+        held = 6 * n + 6 * b
+        for i in range(3):
+            acceleration[b, i] -= derivative[held] * C[b, i]
+        derivative[6 * b] = 0.0
+        derivative[held] = 0.0
 
 
 @jit
@@ -356,7 +357,7 @@ def mechanics(system, work, state, derivative):
     time, s, speed = state[-3], state[-2], state[-1]
     if not speed > STANDSTILL_SPEED:
         return STANDSTILL, 0, 0
-    status = locate_frames(system.track, system.frame_offset, bodies.frame[bodies.reference],
+    status = locate_frames(system.track, system.frame_offset, bodies.frame[bodies.references[0]],
                            s, work.frames, work.cell, work.cell_u)
     if status != RUNNING:
         return status, 0, 0

@@ -30,7 +30,7 @@ N_SCALARS = 3  # t, s, V at the end of the state
 
 
 class Bodies(NamedTuple):
-    """Bodies; index order: rigid bodies, wheelsets from the leading end, axleboxes.
+    """Bodies, vehicle by vehicle; within one: rigid bodies, wheelsets from the front, axleboxes.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Bodies(NamedTuple):
     inertia : float64[n, 3]  principal moments [kg m2]; an axlebox uses the second only
     nominal : float64[n, 2]  y and z of the centre of gravity in the track frame [m]
     radius : float64[n]      nominal rolling radius of a wheelset [m], else 1
-    reference : int          the body whose frame is `s`; its x is held
+    references : int64[v]    one body of each vehicle, whose frame is `s`; its x is held
     """
 
     kind: np.ndarray
@@ -51,7 +51,7 @@ class Bodies(NamedTuple):
     inertia: np.ndarray
     nominal: np.ndarray
     radius: np.ndarray
-    reference: int
+    references: np.ndarray
 
 
 class Contact(NamedTuple):
@@ -190,7 +190,8 @@ class Drive(NamedTuple):
     ----------
     mode : int                CONSTANT, TABLE or FREE
     table : float64[k, 2]     TABLE: arc length [m], speed [m/s]; FREE: speed [m/s], traction [N]
-    resistance : float64[3]   FREE: a + b V + c V^2 on the reference body [N, N s/m, N s2/m2]
+    resistance : float64[3]   FREE: a + b V + c V^2 on the reference body [N, N s/m, N s2/m2];
+                              a system that runs freely has one vehicle
     """
 
     mode: int
@@ -240,8 +241,8 @@ class Work(NamedTuple):
     patch : float64[PATCH_ROWS, p]  see `wheel_rail`
     fastsim : float64[WORK_ROWS, ...];  offsets : int64[16]   scratch of the creep laws
     wheel : float64[w, 2, WHEEL_COLUMNS]  see `wheel_rail`
-    events : int64[2]           loaded patches so far, and how many of them were outside the range
-                                of the creep law
+    events : int64[w, 2]        of each wheelset: loaded patches so far, and how many of them were
+                                outside the range of the creep law
     """
 
     frames: np.ndarray

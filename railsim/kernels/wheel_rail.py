@@ -56,9 +56,9 @@ from railsim.kernels.track_frame import OMEGA, rail_state
 # rows of Work.patch: one column per active patch
 (
     A, B, NORMAL, MU_N, ANGLE_SIN, ANGLE_COS, C_X, C_Y, C_Z, XI_X, XI_Y, PHI,
-    C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION,
-) = range(20)
-PATCH_ROWS = 20
+    C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION, BEYOND,
+) = range(21)
+PATCH_ROWS = 21
 
 # columns of Work.wheel[w, side]
 W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL = range(8)
@@ -312,6 +312,8 @@ def add_creep_forces(system, work, n, speed):
             work.contact_jacobian[b, J_ACROSS] += across
             work.contact_jacobian[b, J_ACROSS_LEVER] += across * cz
             work.contact_jacobian[b, J_YAW] += along * cy * cy
+        work.events[w, 0] += 1
+        work.events[w, 1] += int(patch[BEYOND, k])
 
 
 @jit_inline
@@ -338,20 +340,18 @@ def wheel_rail(system, work, speed, state):
         patch[B, k] *= third
     creepages(system, work, n, speed, state)
     contact = system.contact
-    beyond = kalker_lookup(n, patch[A], patch[B], contact.creep, patch[C11], patch[C22],
-                           patch[C23], patch[C33])
+    kalker_lookup(n, patch[A], patch[B], contact.creep, patch[C11], patch[C22], patch[C23],
+                  patch[C33], patch[BEYOND])
     if contact.friction_rest < 1.0:
         falling_friction(n, patch[MU_N], patch[XI_X], patch[XI_Y], speed, contact.friction_rest,
                          contact.friction_decay)
-    outside_law = creep_forces(
+    creep_forces(
         contact.law, n, contact.n_x, contact.n_y, patch[A], patch[B], patch[MU_N],
         patch[C11], patch[C22], patch[C23], patch[C33], contact.shear_modulus,
         contact.reduction, contact.slip_reduction, patch[XI_X], patch[XI_Y], patch[PHI],
         contact.law_table, contact.law_scale, work.offsets, work.fastsim, patch[T_X],
-        patch[T_Y], patch[M_Z],
+        patch[T_Y], patch[M_Z], patch[BEYOND],
     )
-    work.events[0] += n
-    work.events[1] += max(beyond, outside_law)
     add_creep_forces(system, work, n, speed)
     return RUNNING, 0, n
 

@@ -49,7 +49,7 @@ def patches(vehicle, law, track, result):
     """Work arrays at the end of a run, and how many patches carry load."""
     system = prepare(vehicle, track, settings(law), SPEED).model.system
     work, _ = evaluate(system, result.groups["state"]["end"])
-    return system, work, int(work.events[0])
+    return system, work, int(work.events[:, 0].sum())
 
 
 @laws

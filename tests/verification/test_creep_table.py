@@ -76,13 +76,13 @@ def test_splines_reproduce_a_smooth_force():
     t = rng.uniform(0.0, 1.0, n)
     q = e * (T_HALF * t / (1.0 - t))[:, None]
     q[:, 2] /= spin_scale(ratio, np.ones(n), np.ones(n))
-    out = np.zeros((3, n))
-    outside = kernel.table_forces(
+    out, outside = np.zeros((3, n)), np.ones(n)
+    kernel.table_forces(
         n, np.sqrt(ratio), 1.0 / np.sqrt(ratio), np.ones(n), 1.0,
         *(np.ascontiguousarray(q[:, k]) for k in range(3)), *table, np.zeros(16, dtype=np.int64),
-        fastsim_workspace(1, 1, 1), *out,
+        fastsim_workspace(1, 1, 1), *out, outside,
     )  # fmt: skip
-    assert outside == 0
+    assert not outside.any()
     # fourth order of the nodes' distance, 9 degrees and 1/20
     np.testing.assert_allclose(out.T, smooth(log_ratio, e, t) * t[:, None], atol=2e-4)
 
@@ -203,7 +203,7 @@ def test_ratio_beyond_the_table_warns_and_takes_the_nearest():
 
 
 def test_nan_stays_visible():
-    out = np.zeros((3, 1))
+    out = np.zeros((4, 1))
     one = np.ones(1)
     for k in range(3):
         creepages = [np.zeros(1) for _ in range(3)]
