@@ -14,6 +14,7 @@ from pathlib import Path
 
 import click
 
+from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
 from railsim.errors import InputError, ModelError
 from railsim.version import __version__
 
@@ -22,7 +23,7 @@ from railsim.version import __version__
 # when numpy is imported, which no command has done yet.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-DONE, FAILED, WRONG_INPUT, ENDED_EARLY, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, FAILED, WRONG_INPUT, ENDED_EARLY = 0, 1, 2, 3
 
 # name of a command: its module in this package, and what it does
 COMMANDS = {
@@ -102,32 +103,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted, 1 anything
-        else.  Unforeseen exceptions pass: Python prints their traceback and ends with 1.
+        0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted by Ctrl-C (143
+        by SIGTERM), 1 anything else.  Unforeseen exceptions pass: Python prints their traceback
+        and ends with 1.
     """
     # the commands print themselves what the library logs
     logging.getLogger("railsim").addHandler(logging.NullHandler())
-    try:
-        status = _called(sys.argv[1:] if arguments is None else list(arguments))
-        sys.stdout.flush()
-        return status
-    except InputError as error:
-        for fault in error.faults:
-            click.echo(str(fault), err=True)
-        return WRONG_INPUT
-    except ModelError as error:
-        click.echo(f"railsim: {error}", err=True)
-        return WRONG_INPUT
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("railsim: interrupted", err=True)
-        return INTERRUPTED
-    except BrokenPipeError:
-        # the reader of a pipe has seen enough; keep the interpreter from flushing into it again
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
+    with remembered_interrupts():
+        try:
+            status = _called(sys.argv[1:] if arguments is None else list(arguments))
+            sys.stdout.flush()
+            return status
+        except InputError as error:
+            for fault in error.faults:
+                click.echo(str(fault), err=True)
+            return WRONG_INPUT
+        except ModelError as error:
+            click.echo(f"railsim: {error}", err=True)
+            return WRONG_INPUT
+        except KeyboardInterrupt as interrupt:
+            request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
+            click.echo(f"railsim: {request}", err=True)
+            return request.status
+        except BrokenPipeError:
+            # the reader of a pipe has seen enough; keep the interpreter from flushing into it again
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return DONE
 
 
 def _called(arguments: list[str]) -> int:
+    """Call a command; where it goes wrong after a lost interrupt, that is the reason."""
+    try:
+        status = _invoked(arguments)
+    except Exception:
+        obey()
+        raise
+    if status not in (DONE, ENDED_EARLY):
+        obey()
+    return status
+
+
+def _invoked(arguments: list[str]) -> int:
     try:
         with railsim.make_context("railsim", arguments) as context:
             status = railsim.invoke(context)

@@ -1,4 +1,7 @@
-"""Progress on stderr: a bar on a terminal, and a word when the first run takes its time."""
+"""Progress on stderr: a bar on a terminal, and a word when the first run takes its time.
+
+Whoever tells its progress also hears of an interrupt that was lost, see `railsim.cli.interrupts`.
+"""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -6,6 +9,8 @@ from contextlib import contextmanager
 from threading import Timer
 
 import click
+
+from railsim.cli.interrupts import obey
 
 PATIENCE = 5.0  # seconds without progress before the user is told why
 FIRST_RUN = (
@@ -25,8 +30,9 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     quiet : bool
         Show nothing at all.  Without a terminal there is no bar either.
     """
+    obey()
     if quiet:
-        yield lambda _: None
+        yield lambda _: obey()
         return
     from tqdm import tqdm
 
@@ -44,6 +50,7 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     )
 
     def show(fraction: float) -> None:
+        obey()
         if fraction > 0.0:
             notice.cancel()
         bar.update(fraction - bar.n)

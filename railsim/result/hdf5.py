@@ -83,6 +83,9 @@ class Hdf5Sink(SinkContext):
         except OSError as error:
             fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another place")
             raise InputError([fault]) from None
+        except BaseException:  # an interrupt, before a `with` can see to it
+            self._partial.unlink(missing_ok=True)
+            raise
 
     def begin(
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
@@ -139,8 +142,10 @@ class Hdf5Sink(SinkContext):
 
     def abort(self) -> None:
         """Remove what was written so far; harmless after `close`."""
-        self._file.close()
-        self._partial.unlink(missing_ok=True)
+        try:
+            self._file.close()
+        finally:
+            self._partial.unlink(missing_ok=True)
 
 
 def partial_path(path: Path, process: int) -> Path:

@@ -2,12 +2,14 @@
 
 A job that goes wrong becomes a record that says so; the others go on.  On Ctrl-C running jobs are
 told to stop and leave nothing behind; a process that does not answer, because it is compiling, is
-ended after a moment.
+ended after a moment.  Processes whose study is no more end by themselves.
 """
 
 import multiprocessing
+import os
 import signal
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -90,9 +92,11 @@ def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Itera
     stop = context.Event()
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(workers, context, _begin, (fractions, stop))
+    processes: set[BaseProcess] = set()
     try:
-        with _deaf_to_interrupts():  # the processes inherit it
+        with _interrupts_later():  # the processes inherit it
             jobs_of = {pool.submit(_work, index, job): job for index, job in enumerate(jobs)}
+            processes = set(multiprocessing.active_children()) - others
         waiting: set[Future[Record]] = set(jobs_of)
         while waiting:
             done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
@@ -102,10 +106,13 @@ def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Itera
     except BaseException:
         stop.set()
         pool.shutdown(wait=False, cancel_futures=True)
-        _end(set(multiprocessing.active_children()) - others, jobs)
+        _end(processes)
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+        for process in processes:  # one that was killed has left what it was writing
+            for job in jobs:
+                partial_path(job.path, process.pid or 0).unlink(missing_ok=True)
 
 
 def cluster(address: str) -> Any:
@@ -157,6 +164,17 @@ _shared: Any = None
 def _begin(fractions: Any, stop: Any) -> None:
     global _shared
     _shared = fractions, stop
+    threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
+
+
+def _end_with_parent(stop: Any) -> None:
+    """Wait until the study's process is gone, however that came; then stop as on Ctrl-C."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        stop.set()
+        time.sleep(GRACE)
+        os._exit(1)
 
 
 def _work(index: int, job: Job) -> Record:
@@ -170,27 +188,22 @@ def _work(index: int, job: Job) -> Record:
     return perform(job, progress)
 
 
-def _end(processes: set[BaseProcess], jobs: Sequence[Job]) -> None:
-    """Wait a moment for processes to end, end the rest, and remove what they were writing."""
-    with _deaf_to_interrupts():
+def _end(processes: set[BaseProcess]) -> None:
+    """Wait a moment for processes to end and end the rest."""
+    with _interrupts_later():
         for process in processes:
             process.join(GRACE / max(1, len(processes)))
         for process in processes:
             if process.is_alive():
                 process.terminate()
                 process.join()
-            for job in jobs:
-                partial_path(job.path, process.pid or 0).unlink(missing_ok=True)
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C within the block; in a thread other than the main one do nothing."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _interrupts_later() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of the block; processes that begin in it never hear it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -312,10 +312,9 @@ def test_processes_give_the_same_arrays_as_one_run(tmp_path):
         np.testing.assert_array_equal(shared[name], alone[name])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("everyone", [False, True], ids=["parent only", "whole group"])
-def test_interrupt_leaves_only_whole_files(tmp_path, everyone):
-    given = arguments(tmp_path / "study", 2, 3, 4, 5)[:-2]
+def begun(folder):
+    """A study of four runs of a minute each on two workers, each of which has begun a run."""
+    given = arguments(folder, 2, 3, 4, 5)[:-2]
     given += ["--set", "settings.scheme=rk4", "--set", "settings.step=1e-4", "--workers", "2"]
     # a background job of a shell is started with the interrupt ignored: here it counts
     call = (
@@ -329,13 +328,31 @@ def test_interrupt_leaves_only_whole_files(tmp_path, everyone):
         text=True,
         start_new_session=True,
     )
-    time.sleep(5.0)
-    (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
+    while len(list(folder.glob(".*.partial"))) < 2:
+        time.sleep(0.2)
+    time.sleep(1.0)
+    return process
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("everyone", [False, True], ids=["parent only", "whole group"])
+@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_interrupt_leaves_only_whole_files(tmp_path, everyone, name, status):
+    process = begun(tmp_path)
+    (os.killpg if everyone else os.kill)(process.pid, getattr(signal, name))
     _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == status
     assert "Traceback" not in errors
-    assert sorted(os.listdir(tmp_path / "study")) == ["study.json", "summary.csv"]
-    assert index(tmp_path / "study")["status"] == "interrupted"
+    assert sorted(os.listdir(tmp_path)) == ["study.json", "summary.csv"]
+    assert index(tmp_path)["status"] == "interrupted"
+
+
+@pytest.mark.slow
+def test_processes_end_after_a_study_that_was_killed(tmp_path):
+    process = begun(tmp_path)
+    process.kill()
+    process.communicate(timeout=60)  # the standard error stays open as long as one of them lives
+    assert sorted(os.listdir(tmp_path)) == ["study.json", "summary.csv"]
 
 
 def test_python_raises_what_the_command_prints(tmp_path):

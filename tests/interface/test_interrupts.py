@@ -1,0 +1,89 @@
+"""Ctrl-C and SIGTERM end a command, also where Python loses the exception that they raise."""
+
+import signal
+
+import pytest
+
+import railsim.simulation
+from railsim.cli import main
+from railsim.cli.interrupts import remembered_interrupts
+
+RUN = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10", "--quiet"]
+STUDY = ["study", "--vehicles", "coach_manchester", "--tracks", "curve_r250", "--speeds", "20"]
+STUDY += ["--until", "10", "--workers", "1", "--quiet"]
+
+
+class Finalised:
+    """A signal comes in a finaliser, where Python prints and forgets what it raises."""
+
+    def __init__(self, number):
+        self.number = number
+
+    def __del__(self):
+        signal.raise_signal(self.number)
+
+
+def lost(number):
+    Finalised(number)
+
+
+def turned_into_another(number):
+    """As the import of a library compiled from C++ does."""
+    try:
+        signal.raise_signal(number)
+    except KeyboardInterrupt:
+        raise ImportError("initialization failed") from None
+
+
+@pytest.fixture
+def comes(monkeypatch):
+    """Let a signal come, in one of the ways above, while a run is prepared."""
+
+    def during_preparation(way, number):
+        prepare = railsim.simulation.prepare
+
+        def interrupted(*arguments):
+            way(number)
+            return prepare(*arguments)
+
+        monkeypatch.setattr(railsim.simulation, "prepare", interrupted)
+
+    return during_preparation
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("way", [lost, turned_into_another])
+@pytest.mark.parametrize(
+    ("name", "status", "words"),
+    [("SIGINT", 130, "railsim: interrupted\n"), ("SIGTERM", 143, "railsim: ended by SIGTERM\n")],
+)
+def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name, status, words):
+    comes(way, getattr(signal, name))
+    assert main([*RUN, "--out", str(tmp_path / "run.h5")]) == status
+    assert capsys.readouterr().err == words
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("way", [lost, turned_into_another])
+def test_study_obeys_a_signal_that_python_loses(tmp_path, comes, way):
+    comes(way, signal.SIGINT)
+    assert main([*STUDY, "--out", str(tmp_path)]) == 130
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["study.json", "summary.csv"]
+
+
+def test_signal_that_the_caller_ignores_stays_ignored(tmp_path, comes, monkeypatch):
+    """So `nohup railsim ...` goes on when its terminal is closed."""
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        comes(lost, signal.SIGTERM)
+        assert main([*RUN, "--out", str(tmp_path / "run.h5")]) == 0
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_handlers_of_the_caller_come_back():
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with remembered_interrupts(), pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGTERM)
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
