@@ -121,7 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except ModelError as error:
             click.echo(f"railsim: {error}", err=True)
             return WRONG_INPUT
-        except KeyboardInterrupt as interrupt:
+        except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
             click.echo(f"railsim: {request}", err=True)
             return request.status

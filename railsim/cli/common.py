@@ -1,9 +1,7 @@
 """What the commands share: options, tables, machine-readable output."""
 
 import json
-import os
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import click
@@ -37,43 +35,6 @@ def set_option(function: F) -> F:
         metavar="KEY.PATH=VALUE",
         help="Replace one value of the input; may be given several times.",
     )(function)
-
-
-def check_folder(folder: Path, names: Iterable[str], *, overwrite: bool) -> None:
-    """Refuse a folder for output before anything is computed or written.
-
-    Raises
-    ------
-    InputError : it is a file, cannot be written to, or holds one of `names` already.
-    """
-    from railsim.errors import Fault, InputError
-
-    there = [name for name in names if (folder / name).exists()]
-    if folder.exists() and not folder.is_dir():
-        found, allowed = f"{folder} is a file", "give the name of a folder"
-    elif folder.exists() and not os.access(folder, os.W_OK):
-        found, allowed = f"{folder} cannot be written to", "choose another folder"
-    elif there and not overwrite:
-        found, allowed = f"{folder} holds {', '.join(there)}", "give --overwrite or another folder"
-    else:
-        return
-    raise InputError([Fault("--out", "", found, allowed)])
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder for output, with those above it.
-
-    Raises
-    ------
-    InputError : it cannot be made.
-    """
-    from railsim.errors import Fault, InputError
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        found = f"cannot make {folder} ({error.strerror})"
-        raise InputError([Fault("--out", "", found, "choose another folder")]) from None
 
 
 def print_json(data: Any) -> None:

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli.common import (
-    check_folder,
     json_option,
-    make_folder,
     overwrite_option,
     print_json,
     quiet_option,
     table,
 )
+from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -100,9 +99,11 @@ def _write(
 
     make_folder(folder)
     table_file, record_file, picture = (folder / name for name in FILES)
-    table_file.write_text(comparison_csv(rows), encoding="utf-8")
     record = {"results": list(results), "rows": [row.record() for row in rows]}
-    record_file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    with whole_file(table_file) as partial:
+        partial.write_text(comparison_csv(rows), encoding="utf-8")
+    with whole_file(record_file) as partial:
+        partial.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     save(overlay(results, over=over), picture, overwrite=True)
     return [table_file, record_file, picture]
 

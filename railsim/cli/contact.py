@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
-    check_folder,
     json_option,
-    make_folder,
     overwrite_option,
     print_json,
     quiet_option,
     table,
 )
+from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -465,7 +464,10 @@ def _write_tables(
         ),
     )
     for name, (header, rows) in zip(TABLES, contents, strict=True):
-        with (folder / name).open("w", newline="", encoding="utf-8") as file:
+        with (
+            whole_file(folder / name) as partial,
+            partial.open("w", newline="", encoding="utf-8") as file,
+        ):
             writer = csv.writer(file)
             writer.writerow(header)
             writer.writerows(rows)

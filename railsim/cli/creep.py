@@ -9,6 +9,7 @@ import click
 
 from railsim.cli.common import print_json, table
 from railsim.cli.progress import progress_bar
+from railsim.files import check_folder, whole_file
 
 if TYPE_CHECKING:
     from railsim.contact.elastic import LoadedContact
@@ -92,7 +93,10 @@ def write(folder: Path, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
     for name, figure in zip(PICTURES, figures, strict=True):
         save(figure, folder / name, overwrite=True)
-    with (folder / TABLES[0]).open("w", newline="", encoding="utf-8") as file:
+    with (
+        whole_file(folder / TABLES[0]) as partial,
+        partial.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(
@@ -142,6 +146,7 @@ def build_table(out: str | None, workers: int, as_json: bool, quiet: bool) -> No
     from railsim.contact.creep_table import build_nodes, gather_nodes, shipped_nodes, write_nodes
 
     folder = Path(out or "creep_table")
+    check_folder(folder)
     with progress_bar("creep table", quiet=quiet) as show:
         for done, count in build_nodes(folder, workers):
             show(done / count)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import json_option, overwrite_option, print_json, set_option
-from railsim.cli.validate import RESULT_SUFFIXES
+from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
     from railsim.definitions.base import FileDefinition
@@ -45,7 +45,9 @@ def command(
       railsim info coach_manchester --draw coach.png --overwrite
       railsim info curve_r250 --speed 20 --speed 25
     """  # noqa: D301 - click reads the escape
-    if Path(file).suffix.lower() in RESULT_SUFFIXES:
+    if Path(file).suffix.lower() in RESULTS:
+        if draw is not None:
+            raise click.UsageError("--draw is for vehicles and tracks; see `railsim plot`")
         _show_result(file, as_json)
         return
     from railsim.definitions.loading import load_any
@@ -100,9 +102,9 @@ def _description(
 def _draw(definition: "FileDefinition", path: Path, overwrite: bool) -> None:
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
-    from railsim.plot.style import check_picture, save
+    from railsim.plot.style import save
 
-    check_picture(path, overwrite=overwrite)
+    check_file(path, overwrite=overwrite, option="--draw", endings=PICTURES)
     if isinstance(definition, Vehicle):
         from railsim.plot.vehicle import vehicle_figure
 

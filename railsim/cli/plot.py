@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option
+from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-RESULT_ENDINGS = {".h5", ".hdf5"}
 
 
 @click.command()
@@ -61,10 +60,11 @@ def command(
       railsim plot curve_r250 --out curve.png
     """  # noqa: D301 - click reads the escape
     path = Path(out) if out else Path(file).with_suffix(".png")
-    if Path(file).suffix.lower() in RESULT_ENDINGS:
-        figure = _result_figure(file, selections, over, by, between, path, overwrite)
+    check_file(path, overwrite=overwrite, endings=PICTURES)
+    if Path(file).suffix.lower() in RESULTS:
+        figure = _result_figure(file, selections, over, by, between)
     else:
-        figure = _track_figure(file, selections, path, overwrite)
+        figure = _track_figure(file, selections)
     from railsim.plot.style import save
 
     save(figure, path, overwrite=overwrite)
@@ -80,25 +80,18 @@ def _result_figure(
     over: str,
     by: str,
     between: tuple[float, float] | None,
-    path: Path,
-    overwrite: bool,
 ) -> "Figure":
     from railsim.plot.histories import STUDY, histories
-    from railsim.plot.style import check_picture
     from railsim.result import open_result
 
-    check_picture(path, overwrite=overwrite)
-    result = open_result(file)
-    return histories(result, selections or STUDY, over=over, by=by, between=between)
+    return histories(open_result(file), selections or STUDY, over=over, by=by, between=between)
 
 
-def _track_figure(file: str, selections: tuple[str, ...], path: Path, overwrite: bool) -> "Figure":
+def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":
     from railsim.definitions.loading import load_track
     from railsim.errors import Fault, InputError
-    from railsim.plot.style import check_picture
     from railsim.plot.track import track_figure
 
-    check_picture(path, overwrite=overwrite)
     if selections:
         found = f"'{selections[0]}' asked of a track"
         raise InputError([Fault("QUANTITY", "", found, "quantities belong to results (.h5)")])

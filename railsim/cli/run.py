@@ -144,7 +144,7 @@ def _checked(
 ) -> "tuple[Case, Path]":
     """Load the case and settle its file; everything that is wrong with either at once."""
     from railsim.errors import Fault, InputError
-    from railsim.result.hdf5 import check_target
+    from railsim.files import PICTURES, RESULTS, check_file
     from railsim.studies.combine import load_case
 
     faults: list[Fault] = []
@@ -156,9 +156,12 @@ def _checked(
     name = out or (case.file_name if case else None)
     if name:
         path = Path(name)
-        for target in (path, path.with_suffix(".png")) if plots else (path,):
+        targets: list[tuple[Path, Sequence[str]]] = [(path, RESULTS)]
+        if plots and path.name:
+            targets.append((path.with_suffix(".png"), PICTURES))
+        for target, endings in targets:
             try:
-                check_target(target, overwrite=overwrite, option="--out")
+                check_file(target, overwrite=overwrite, endings=endings)
             except InputError as error:
                 faults.extend(error.faults)
     if faults or case is None or name is None:

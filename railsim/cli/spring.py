@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from railsim.cli.common import (
-    check_folder,
     json_option,
-    make_folder,
     overwrite_option,
     print_json,
     quiet_option,
     set_option,
     table,
 )
+from railsim.files import TABLES, check_file, check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
@@ -221,6 +220,8 @@ def vehicle(
     from railsim.springs.vehicle_table import vehicle_part, vehicle_text
 
     suspension = _loaded(file, assignments)
+    if out:
+        check_file(Path(out), overwrite=overwrite, endings=TABLES)
     with _faults_in(file, suspension):
         if load is not None and load not in suspension.loads:
             _refuse("--load", f"no load '{load}' in [loads]", load, suspension.loads)
@@ -228,7 +229,8 @@ def vehicle(
         base, removed = _base(suspension, extends, out)
         text = vehicle_text(suspension, part, base, removed)
         if out:
-            _write_text(Path(out), text, overwrite)
+            with whole_file(Path(out)) as partial:
+                partial.write_text(text, encoding="utf-8")
     if as_json:
         print_json(
             {
@@ -291,15 +293,9 @@ def _write_pages(
     check_folder(folder, files, overwrite=overwrite)
     make_folder(folder)
     for name, content in files.items():
-        (folder / name).write_bytes(content)
+        with whole_file(folder / name) as partial:
+            partial.write_bytes(content)
     return [folder / name for name in files]
-
-
-def _write_text(path: Path, text: str, overwrite: bool) -> None:
-    from railsim.result.hdf5 import check_target
-
-    check_target(path, overwrite=overwrite, option="--out")
-    path.write_text(text, encoding="utf-8")
 
 
 def _base(

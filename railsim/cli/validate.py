@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import json_option, print_json, quiet_option
+from railsim.files import RESULTS
 
 if TYPE_CHECKING:
     from railsim.definitions.vehicle import Assembly, Vehicle
     from railsim.errors import Fault
     from railsim.profiles.profile import Kind
 
-RESULT_SUFFIXES = {".h5", ".hdf5"}
 PROFILE_SUFFIXES = {".csv", ".prw", ".prr", ".ban", ".whl"}
 
 
@@ -78,7 +78,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         return f"{profile.kind} profile", [
             {"key": "points", "text": note} for note in profile.notes
         ]
-    if suffix in RESULT_SUFFIXES:
+    if suffix in RESULTS:
         from railsim.result import open_result
 
         return f"result, {open_result(file).status}", []

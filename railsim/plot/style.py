@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 
 from railsim.definitions.layout import Section
 from railsim.errors import Fault, InputError
+from railsim.files import PICTURES, check_file, whole_file
 from railsim.result.data import Array
-from railsim.result.hdf5 import check_target
 
 STYLE: Any = {
     "axes.axisbelow": True,
@@ -162,20 +162,11 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
         none that can be drawn.
     """
     path = Path(path)
-    check_picture(path, overwrite=overwrite)
+    check_file(path, overwrite=overwrite, endings=PICTURES)
     try:
-        figure.savefig(path)
+        with whole_file(path) as partial:
+            figure.savefig(partial, format=path.suffix[1:].lower())
     except OSError as error:
         fault = Fault(str(path), "", f"cannot write it ({error})", "choose another place")
         raise InputError([fault]) from None
     return path
-
-
-def check_picture(path: Path, *, overwrite: bool, option: str = "--out") -> None:
-    """Refuse a name that no picture can be written to; see `save`."""
-    endings = sorted(Figure().canvas.get_supported_filetypes())
-    if path.suffix.lstrip(".") not in endings:
-        found = f"{path.name} ends in '{path.suffix}'"
-        allowed = "a picture's name ends in one of: " + ", ".join(f".{end}" for end in endings)
-        raise InputError([Fault(option, "", found, allowed)])
-    check_target(path, overwrite=overwrite, option=option)

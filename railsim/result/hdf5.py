@@ -24,6 +24,7 @@ import h5py
 import numpy as np
 
 from railsim.errors import Fault, InputError
+from railsim.files import check_file, partial_path
 from railsim.notation import QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result.data import Array, Attributes, FrozenArrays, Result, frozen
@@ -72,7 +73,7 @@ class Hdf5Sink(SinkContext):
         option: str = "--out",
     ) -> None:
         self.path = Path(path)
-        check_target(self.path, overwrite=overwrite, option=option)
+        check_file(self.path, overwrite=overwrite, option=option)
         self._attributes = dict(attributes)
         self._partial = partial_path(self.path, os.getpid())
         self._quantities: dict[str, Quantity] = {}
@@ -148,11 +149,6 @@ class Hdf5Sink(SinkContext):
             self._partial.unlink(missing_ok=True)
 
 
-def partial_path(path: Path, process: int) -> Path:
-    """Return the hidden name of a result file that a process is writing."""
-    return path.with_name(f".{path.name}.{process}.partial")
-
-
 def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a result to a file; see `Result.to_hdf5`."""
     with Hdf5Sink(path, overwrite=overwrite, option=str(path)) as sink:
@@ -163,29 +159,6 @@ def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
         }
         sink.close(result.attributes, statics, result.profiles, result.groups)
     return sink.path
-
-
-def check_target(path: Path, *, overwrite: bool, option: str) -> None:
-    """Refuse an output file that may not or cannot be written.
-
-    Raises
-    ------
-    InputError : it exists and may not be overwritten, is a folder, or its folder cannot be
-        written to.
-    """
-    fault = None
-    if path.is_dir():
-        fault = Fault(option, "", f"{path} is a folder", "give the name of a file")
-    elif not path.parent.is_dir():
-        fault = Fault(option, "", f"there is no folder {path.parent}", "create it first")
-    elif not os.access(path.parent, os.W_OK):
-        fault = Fault(
-            option, "", f"the folder {path.parent} cannot be written to", "choose another"
-        )
-    elif path.exists() and not overwrite:
-        fault = Fault(option, "", f"{path} exists", "give --overwrite or another name")
-    if fault:
-        raise InputError([fault])
 
 
 def open_result(path: str | Path) -> Result:

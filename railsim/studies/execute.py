@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError, RailsimError
-from railsim.result.hdf5 import partial_path
+from railsim.files import partial_path
 from railsim.studies.case import Case
 from railsim.studies.run import run_case
 from railsim.studies.summary import Record, failed_record, finished_record

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError
+from railsim.files import check_folder, make_folder
 from railsim.result import Result, open_result
 from railsim.studies.case import Case
 from railsim.studies.combine import combinations
@@ -92,7 +93,7 @@ def study(
     speeds : sequence of float
         Speeds [m/s].
     out : str or Path
-        Folder of the study; its parent must exist.
+        Folder of the study; made if need be.
     grid : mapping of str to values, optional
         Values of further keys, ``{"track.friction": [0.3, 0.4]}``.
     settings : str or Path, optional
@@ -138,6 +139,8 @@ def study(
     >>> [record["status"] for record in outcome.records]
     ['complete']
     """
+    folder = Path(out)
+    check_folder(folder)
     written = {key: [str(value) for value in values] for key, values in (grid or {}).items()}
     cases = combinations(
         vehicles,
@@ -150,7 +153,6 @@ def study(
         until=until,
         assignments=assignments,
     )
-    folder = Path(out)
     inputs = {
         "railsim_version": __version__,
         "vehicles": [str(vehicle) for vehicle in vehicles],
@@ -167,7 +169,7 @@ def study(
         _refuse_another_study(folder, inputs)
     finished = {} if overwrite else _finished(cases, folder, resume=resume)
     client = None if scheduler is None else cluster(scheduler)
-    _prepare(folder)
+    make_folder(folder)
     tell = on_record or (lambda _: None)
     records = {case.name: waiting_record(case) for case in cases}
     for case in cases:
@@ -250,16 +252,3 @@ def _refuse_another_study(folder: Path, inputs: Mapping[str, object]) -> None:
         found = f"{folder} holds a study with other " + ", ".join(differing)
         allowed = "--resume goes on with these inputs, --overwrite computes everything; or another"
         raise InputError([Fault("--out", "", found, f"{allowed} --out")])
-
-
-def _prepare(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError([Fault("--out", "", f"{folder} is a file", "give the name of a folder")])
-    try:
-        folder.mkdir(exist_ok=True)
-        probe = folder / f".{os.getpid()}.probe"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        found = f"cannot write to the folder {folder} ({error.strerror})"
-        raise InputError([Fault("--out", "", found, "choose another")]) from None

@@ -7,12 +7,12 @@ values; ``summary.csv`` holds one line a run for spreadsheets.  All numbers are 
 import csv
 import io
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError
+from railsim.files import whole_file
 from railsim.result import Result, mid_curves, peaks
 from railsim.studies.case import Case
 
@@ -141,9 +141,5 @@ def _row(record: Record) -> dict[str, Any]:
 
 
 def _replace(path: Path, text: str) -> None:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Folders that commands write to: refused before anything is written, and never half full."""
+"""Files and folders that commands write: refused before anything is, and never half full."""
 
 import pytest
 from example_result import example_result
@@ -48,3 +48,68 @@ def test_full_folder_is_kept_without_overwrite(tmp_path, inputs, capsys, command
 def test_bad_input_leaves_no_folder(tmp_path, given):
     assert main([*given, "--out", str(tmp_path / "new")]) == 2
     assert not (tmp_path / "new").exists()
+
+
+@pytest.fixture
+def commands(tmp_path):
+    """Commands that write a file, and the option that names it."""
+    result = tmp_path / "a.h5"
+    example_result().to_hdf5(result)
+    return {
+        "run": ["run", "coach_manchester", "curve_r250", "--speed", "20", "--out"],
+        "plot": ["plot", str(result), "--out"],
+        "info": ["info", "coach_manchester", "--draw"],
+        "spring vehicle": ["spring", "vehicle", "turasas_axlebox", "--out"],
+    }
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "found", "allowed"),
+    [
+        ("run", "x.csv", "x.csv ends in '.csv'", "the name must end in .h5 or .hdf5"),
+        ("run", "x", "x has no ending", ".h5 or .hdf5"),
+        ("run", "x.png", "x.png ends in '.png'", ".h5 or .hdf5"),
+        ("plot", "x.h5", "x.h5 ends in '.h5'", "the name must end in .png or .svg or .pdf"),
+        ("plot", "x", "x has no ending", ".png or .svg or .pdf"),
+        ("info", "x.csv", "x.csv ends in '.csv'", ".png or .svg or .pdf"),
+        ("spring vehicle", "x.json", "x.json ends in '.json'", "the name must end in .toml"),
+    ],
+)
+def test_file_of_another_kind_is_refused(tmp_path, commands, capsys, command, name, found, allowed):
+    before = sorted(tmp_path.iterdir())
+    assert main([*commands[command], str(tmp_path / name)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"{commands[command][-1]}: {found}; ")
+    assert allowed in error
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["RUN.H5", "run.hdf5", "a b.h5", "Lauf über Köln.h5"])
+def test_result_may_be_called_so(tmp_path, name):
+    given = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "1", "--quiet"]
+    assert main([*given, "--out", str(tmp_path / name)]) == 0
+    assert main(["info", str(tmp_path / name)]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["x.csv", "x.h5", "X.PNG", "x.html"])
+@pytest.mark.parametrize("command", [*FIRST, "study"])
+def test_folder_is_not_called_like_a_file(tmp_path, inputs, capsys, command, name):
+    inputs["study"] = ["--vehicles", "coach_manchester", "--tracks", "straight", "--speeds", "20"]
+    assert main([*command.split(), *inputs[command], "--out", str(tmp_path / name)]) == 2
+    assert f"--out: {name} is the name of a file; give the name of a folder" in (
+        capsys.readouterr().err
+    )
+    assert not (tmp_path / name).exists()
+
+
+def test_picture_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch, commands):
+    from matplotlib.figure import Figure
+
+    def full_disk(figure, path, **_):
+        path.write_bytes(b"half")
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", full_disk)
+    assert main([*commands["plot"], str(tmp_path / "x.png")]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
