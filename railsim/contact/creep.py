@@ -173,9 +173,10 @@ def creep_force(
         *kalker_coefficients(semi_a / semi_b, nu), G, reduction, k_slip, *creepages,
         *table, np.zeros(16, dtype=np.int64), fastsim_workspace(n, ny, nx), T_x, T_y, M_z, beyond,
     )  # fmt: skip
-    if beyond.any():
+    outside = int(beyond.sum())
+    if outside:
         warnings.warn(
-            f"creep law 'table': {int(beyond.sum())} of {n} patches have a/b outside 1/{RATIO_MAX:g} to "
+            f"creep law 'table': {outside} of {n} patches have a/b outside 1/{RATIO_MAX:g} to "
             f"{RATIO_MAX:g} and got the force of the nearest ratio",
             stacklevel=2,
         )
