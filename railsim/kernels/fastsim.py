@@ -23,7 +23,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from . import fastsim_simd, jit
+from . import fastsim_simd, jit, jit_ordered
 from .fastsim_simd import (
     BOUNDS,
     PER_L,
@@ -72,7 +72,7 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
     return work
 
 
-@jit
+@jit_ordered
 def kalker_lookup(n, a, b, table, c11, c22, c23, c33, outside):
     """Kalker's coefficients of n patches from the table of `railsim.contact.kalker.creep_tables`.
 
@@ -105,7 +105,7 @@ def kalker_lookup(n, a, b, table, c11, c22, c23, c33, outside):
         c33[i] = table[node, 3] + w * (table[node + 1, 3] - table[node, 3])
 
 
-@jit
+@jit_ordered
 def _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, spin_a, spin_b):
     """Growth per cell of the scaled traction of every patch, at the middle strip.
 
@@ -208,7 +208,7 @@ _spread, _gather = (
 )
 
 
-@jit
+@jit_ordered
 def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x, T_y, M_z):
     """Tangential forces on the rail of n elliptic contact patches by FASTSIM.
 
