@@ -78,7 +78,7 @@ FORMATS: dict[str, Format] = {
         free=("friction_falling",),
         prepare=embed_measured,
     ),
-    SETTINGS_FORMAT: Format("settings", Settings, free=("initial", "drive", "outputs")),
+    SETTINGS_FORMAT: Format("settings", Settings, free=("initial",)),
     SPRING_FORMAT: Format(
         "spring",
         TrailingArmSuspension,
@@ -163,7 +163,8 @@ def _loaded(model: type[D], source: Source, overrides: Iterable[str]) -> D:
     if source.data.get("format") != format_name:
         file = source.file_of(("format",))
         raise InputError([_format_fault(file, source.data.get("format"), [format_name])])
-    source = apply_overrides(source, overrides, known.free)
+    defaults = model.model_construct().model_dump(mode="json")
+    source = apply_overrides(source, overrides, known.free, defaults)
     faults = [*known.prepare(source.data), *known.raw_faults(source.data)]
     faults = [_placed(fault, source) for fault in faults]
     try:

@@ -4,9 +4,10 @@ Values are TOML; what is no TOML is taken as text, so that ``rail=60E1`` needs n
 """
 
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 from railsim.definitions.paths import descend, key_path
@@ -16,7 +17,12 @@ from railsim.errors import Fault, InputError
 OVERRIDE = "--set"
 
 
-def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str] = ()) -> Source:
+def apply_overrides(
+    source: Source,
+    overrides: Iterable[str],
+    free: Sequence[str] = (),
+    defaults: Mapping[str, Any] = MappingProxyType({}),
+) -> Source:
     """Return the source with `key.path=value` texts applied in their order.
 
     Parameters
@@ -27,6 +33,8 @@ def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str
         Assignments with TOML values; members of lists are named by their `name`, else by index.
     free : sequence of str
         Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
+    defaults : mapping, optional
+        What holds where the source says nothing, so that `fastsim_grid.0=20` changes one of two.
 
     Raises
     ------
@@ -36,7 +44,7 @@ def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str
     faults = []
     for text in overrides:
         try:
-            _apply(changed, text, free)
+            _apply(changed, text, free, defaults)
         except KeyError as problem:
             key = text.partition("=")[0].strip()
             faults.append(Fault(OVERRIDE, key, str(problem.args[0]), ""))
@@ -45,14 +53,16 @@ def apply_overrides(source: Source, overrides: Iterable[str], free: Sequence[str
     return changed
 
 
-def _apply(source: Source, text: str, free: Sequence[str]) -> None:
+def _apply(
+    source: Source, text: str, free: Sequence[str], defaults: Mapping[str, Any]
+) -> None:
     key, equals, written = text.partition("=")
     if not equals:
         raise KeyError("an assignment key.path=value is needed")
     path = key_path(key.strip())
     if path[0] in free and len(path) > 2:
         path = [path[0], ".".join(path[1:-1]), path[-1]]
-    parent, last = descend(source.data, path, create=path[0] in free)
+    parent, last = descend(source.data, path, path[0] in free, dict(defaults))
     present = parent[last] if not isinstance(parent, dict) or last in parent else None
     parent[last] = _value(written.strip(), isinstance(present, str))
     place = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))

@@ -5,7 +5,8 @@ find is a `KeyError` with a sentence for the user.
 """
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from typing import Any
 
 from railsim.errors import nearest
@@ -34,20 +35,44 @@ def key_path(key: str) -> list[str]:
     return parts
 
 
-def descend(data: Any, path: Sequence[str], create: bool = False) -> tuple[Any, Any]:
-    """Return the table or list that holds the last part of the path, and its key or index."""
+def descend(
+    data: Any, path: Sequence[str], create: bool = False, defaults: Any = None
+) -> tuple[Any, Any]:
+    """Return the table or list that holds the last part of the path, and its key or index.
+
+    Parameters
+    ----------
+    data : dict or list
+        Tables as read.
+    path : sequence of str
+        Keys, names of members, indices.
+    create : bool
+        Make tables that are missing.
+    defaults : dict, optional
+        What holds where `data` says nothing: its tables and lists come into `data` when the path
+        leads through them.
+
+    Raises
+    ------
+    KeyError : the path leads nowhere.
+    """
     node = data
     for depth, part in enumerate(path):
         key = _member(node, part)
         last = depth == len(path) - 1
         if last and (isinstance(node, dict) or key is not None):
             return node, part if isinstance(node, dict) else key
-        if key is None and create and isinstance(node, dict):
-            node[part] = {}
+        others = defaults if isinstance(node, dict) and isinstance(defaults, dict) else {}
+        known = part in others
+        defaults = others.get(part)
+        if key is None and isinstance(node, dict) and (known or create):
+            node[part] = {} if create and not defaults else deepcopy(defaults)
             key = part
         if key is None:
-            raise KeyError(_no_member(node, part, path[:depth]))
+            raise KeyError(_no_member(node, part, path[:depth], others))
         node = node[key]
+        if node is None:
+            raise KeyError(f"'{'.'.join(path[: depth + 1])}' is not given; give it as a whole")
     raise KeyError("a dotted path of keys")
 
 
@@ -64,12 +89,14 @@ def _member(node: Any, part: str) -> str | int | None:
     return None
 
 
-def _no_member(node: Any, part: str, before: Sequence[str]) -> str:
+def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:
     place = ".".join(before) or "the file"
     if isinstance(node, dict):
-        return f"no '{part}' in {place}; {nearest(part, node)}"
+        return f"no '{part}' in {place}; {nearest(part, {*node, *others})}"
     if isinstance(node, list):
         names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
-        known = [str(name) for name in names] or [f"0 to {len(node) - 1}"]
-        return f"no member '{part}' in {place}; {nearest(part, known)}"
+        if names:
+            return f"no member '{part}' in {place}; {nearest(part, map(str, names))}"
+        indices = f"allowed: 0 to {len(node) - 1}" if node else "it is empty"
+        return f"no member '{part}' in {place}; {indices}"
     return f"'{place}' is a value and has no members"

@@ -179,8 +179,14 @@ def _range_faults(
 
 
 def _suffix(point: Mapping[str, str]) -> str:
-    """Return what a point of the grid adds to the name of its run."""
-    last = {key: key.rpartition(".")[2] for key in point}
+    """Return what a point of the grid adds to the name of its run.
+
+    Examples
+    --------
+    >>> _suffix({"track.friction": "0.3", "settings.drive.speed_table.0.1": "12"})
+    '_friction=0.3_speed_table.0.1=12'
+    """
+    last = {key: re.sub(r"^.*\.(?=[^.]*[^.\d])", "", key) for key in point}
     unique = len(set(last.values())) == len(last)
     parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
     return "".join("_" + re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", p)) for p in parts)

@@ -275,6 +275,22 @@ def test_missing_dask_is_answered_with_the_install_command(tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+def test_grid_may_vary_places_in_tables(tmp_path):
+    settings = tmp_path / "s.toml"
+    table = "drive = {mode = 'table', speed_table = [[0.0, 20.0], [300.0, 15.0]]}"
+    settings.write_text(f'format = "railsim-settings/1"\n{table}\n')
+    grid = {"settings.drive.speed_table.1.1": ["10", "12"]}
+    cases = combinations([COACH], [CURVE], [20.0], grid, settings=settings)
+    assert [case.settings.drive.speed_table[1] for case in cases] == [(300.0, 10.0), (300.0, 12.0)]
+    assert cases[0].name == f"{COACH}_{CURVE}_20_speed_table.1.1=10"
+    with pytest.raises(InputError) as caught:
+        combinations([COACH], [CURVE], [20.0], {"settings.drive.speed_table.2.1": ["9"]},
+                     settings=settings)
+    assert str(caught.value).startswith(
+        "--grid: settings.drive.speed_table.2.1: no member '2' in drive.speed_table; allowed: 0 to 1"
+    )
+
+
 def test_grid_values_may_be_lists():
     assert parse_grid("settings.fastsim_grid=[5,5],[10,10]")[1] == ("[5,5]", "[10,10]")
     grid = {"settings.fastsim_grid": ["[5,5]", "[10,10]"]}

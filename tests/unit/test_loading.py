@@ -284,6 +284,44 @@ def test_override_names_members_of_lists_by_name_or_index():
         assert not mine.assemblies["bogie"].placements[1].mirror
 
 
+TABLE = """format = "railsim-settings/1"
+[drive]
+mode = "table"
+speed_table = [[0.0, 20.0], [300.0, 15.0]]
+"""
+
+
+def test_override_names_rows_and_columns_of_tables_by_their_index(write):
+    path = write("s.toml", TABLE)
+    settings = load_settings(path, ["drive.speed_table.0.1=18", "drive.speed_table.1=[400, 12]"])
+    assert settings.drive.speed_table == ((0.0, 18.0), (400.0, 12.0))
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("drive.speed_table.2.1", "no member '2' in drive.speed_table; allowed: 0 to 1"),
+        ("drive.speed_table.-1.1", "no member '-1' in drive.speed_table; allowed: 0 to 1"),
+        ("drive.speed_table.first.1", "no member 'first' in drive.speed_table; allowed: 0 to 1"),
+        ("drive.speed_table.0.2", "no member '2' in drive.speed_table.0; allowed: 0 to 1"),
+        ("drive.speed_table.0.1.0", "'drive.speed_table.0.1' is a value and has no members"),
+        ("drive.traction_table.0.1", "'drive.traction_table' is not given; give it as a whole"),
+        ("outputs.elements.0", "no member '0' in outputs.elements; it is empty"),
+        ("drve.mode", "no 'drve' in the file; did you mean 'drive'?"),
+    ],
+)
+def test_override_of_a_member_that_is_not_there_is_refused(write, key, words):
+    (fault,) = faults(load_settings, write("s.toml", TABLE), [f"{key}=3"])
+    assert str(fault).removesuffix("; ") == f"--set: {key}: {words}"
+
+
+def test_override_changes_one_of_several_default_values():
+    assert load_settings(None, ["fastsim_grid.0=20"]).fastsim_grid == (20, 10)
+    changed = load_settings(None, ["drive.mode=free", "drive.resistance.2=5"])
+    assert changed.drive.resistance == (0.0, 0.0, 5.0)
+    assert load_settings().fastsim_grid == (10, 10)
+
+
 def test_override_of_text_needs_no_quotes_even_if_it_looks_like_a_number():
     assert load_track("straight", ["rail=54E1"]).rail == ("54E1", "54E1")
     assert load_track("straight", ['rail=["60E1", "54E1"]']).rail == ("60E1", "54E1")
