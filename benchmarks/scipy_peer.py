@@ -12,6 +12,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from railsim.advance import Preparation
 from railsim.assembly import work_arrays
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -19,7 +20,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.time_loop import RK4, time_loop
 from railsim.outputs import quantities
-from railsim.simulation import Preparation, prepare
+from railsim.simulation import prepare
 from railsim.time_step import empty_recorder
 
 

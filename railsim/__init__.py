@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from railsim.definitions.loading import load_settings, load_track, load_vehicle
     from railsim.errors import InputError, ModelError
     from railsim.result import Result, mid_curves, open_result, peaks
-    from railsim.simulation import simulate
+    from railsim.simulation import simulate, simulate_together
     from railsim.studies import study
 
 _HOMES = {
@@ -31,6 +31,7 @@ _HOMES = {
     "open_result": "railsim.result",
     "peaks": "railsim.result",
     "simulate": "railsim.simulation",
+    "simulate_together": "railsim.simulation",
     "study": "railsim.studies",
 }
 
@@ -46,6 +47,7 @@ __all__ = [
     "open_result",
     "peaks",
     "simulate",
+    "simulate_together",
     "study",
 ]
 

@@ -113,6 +113,7 @@ def assemble(
     track: Track,
     settings: Settings,
     profiles: Mapping[str, Profile] | None = None,
+    shared: "SharedTables | None" = None,
 ) -> Model:
     """Build the arrays of one vehicle on one track.
 
@@ -123,6 +124,8 @@ def assemble(
     profiles : mapping of str to Profile, optional
         Profiles by name that take precedence over built-in ones and files (a result carries those
         that it used).
+    shared : SharedTables, optional
+        Tables of other models with the same track, settings and profiles; takes those made now.
 
     Returns
     -------
@@ -137,7 +140,10 @@ def assemble(
     """
     flat = flatten(vehicle)
     book = _ProfileBook(dict(profiles or {}))
-    contact, tables = _contact(flat, track, settings, book)
+    shared = shared or SharedTables()
+    if shared.track is None:
+        shared.track = track_tables(track)
+    contact, tables = _contact(flat, track, settings, book, shared.contact)
     elements = ElementArrays({body.name: body for body in flat.bodies})
     for element in flat.elements:
         elements.add(element)
@@ -145,7 +151,7 @@ def assemble(
     system = System(
         bodies=bodies,
         frame_offset=offsets,
-        track=track_tables(track),
+        track=shared.track,
         contact=contact,
         links=elements.links(),
         mounts=elements.mounts(),
@@ -271,6 +277,31 @@ def _nominal_radius(body: FlatBody) -> float:
     return 0.5 * sum(body.wheelset.radius) if body.wheelset else 1.0
 
 
+def side_by_side(tables: Sequence[Floats]) -> Floats:
+    """Contact tables as one array; a single one as it lies in memory (or on disk)."""
+    values = tables[0][None] if len(tables) == 1 else np.stack(tables)
+    values = np.ascontiguousarray(values, dtype=float)
+    # as on disk: for an array that can be written to the time loop would be compiled anew
+    values.setflags(write=False)
+    return values
+
+
+class SharedTables:
+    """Tables of the track and of the contacts that several models on one track share.
+
+    Attributes
+    ----------
+    track : TrackTables or None
+        Once the first model is there.
+    contact : dict
+        Contact tables by what they depend on beside track and settings.
+    """
+
+    def __init__(self) -> None:
+        self.track: TrackTables | None = None
+        self.contact: dict[tuple[Any, ...], ContactTable] = {}
+
+
 class _ProfileBook:
     """Loads each profile once and remembers which ones were used."""
 
@@ -285,7 +316,11 @@ class _ProfileBook:
 
 
 def _contact(
-    flat: FlatVehicle, track: Track, settings: Settings, book: _ProfileBook
+    flat: FlatVehicle,
+    track: Track,
+    settings: Settings,
+    book: _ProfileBook,
+    known: dict[tuple[Any, ...], ContactTable],
 ) -> tuple[Contact, tuple[ContactTable, ...]]:
     """Contact arrays: one table for each different wheel on its rail."""
     wheelsets = flat.of_kind("wheelset")
@@ -298,11 +333,12 @@ def _contact(
         for side in range(2):
             key = (wheelset.profile[side], track.rail[side], wheelset.radius[side],
                    -body.position[2], wheelset.back_to_back, wheelset.tape_circle_distance)
-            if key not in keys:
-                keys[key] = len(tables)
-                tables.append(cached_contact_table(
-                    book.profile(wheelset.profile[side], "wheel"),
-                    book.profile(track.rail[side], "rail"),
+            wheel = book.profile(wheelset.profile[side], "wheel")
+            rail = book.profile(track.rail[side], "rail")
+            if key not in known:
+                known[key] = cached_contact_table(
+                    wheel,
+                    rail,
                     radius=wheelset.radius[side],
                     gauge=track.gauge,
                     inclination=track.inclination,
@@ -312,20 +348,21 @@ def _contact(
                     nu=settings.poisson,
                     centre_height=-body.position[2],
                     normal=settings.normal_contact,
-                ))
+                )
+            if key not in keys:
+                keys[key] = len(tables)
+                tables.append(known[key])
             which[w, side] = keys[key]
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")
     first = tables[0]
     falling = track.friction_falling
     law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
-    # one table is used as it lies in memory (or on disk); several are put side by side
-    values = first.values[None] if len(tables) == 1 else np.stack([t.values for t in tables])
     names = _names(flat.bodies)
     contact = Contact(
         body=np.array([names.index(body.name) for body in wheelsets], dtype=np.int64),
         table=which,
-        values=np.ascontiguousarray(values, dtype=float),
+        values=side_by_side([t.values for t in tables]),
         shear=np.array([t.shear for t in tables]),
         coupling=np.array([
             coupling(t.values, settings.shear_modulus, settings.poisson) for t in tables

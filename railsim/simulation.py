@@ -1,70 +1,42 @@
-"""`simulate`: the story of a run on one page.
+"""`simulate`: the story of a run on one page; `simulate_together`: of several in one call.
 
 Definitions are assembled to arrays, the vehicle finds its equilibrium on straight level track, the
-step is chosen, and the time loop runs in chunks; between two chunks there is time for progress,
-Ctrl-C and for writing.  The outcome goes chunk by chunk to a sink.
+step is chosen, and the time loop runs in chunks (`railsim.advance`).  The outcome goes chunk by
+chunk to a sink.
 """
 
 import json
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, assemble, level_track_with_friction, work_arrays
+from railsim.advance import Preparation, Run, advance
+from railsim.assembly import Model, SharedTables, assemble
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import Equilibrium, equilibrium
+from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, nearest
-from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.status import NOT_FINITE, RUNNING, STATUS
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.status import NOT_FINITE, STATUS
 from railsim.outputs import OutputPlan
+from railsim.pace import Pace
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.run_in import start_state
-from railsim.time_step import SCHEMES, choose_step
+from railsim.time_step import SCHEMES
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 _LOG = logging.getLogger(__name__)
-ROWS = 500  # outputs per chunk: some hundredths of a second of computing
 SPEED_RANGE = (0.5, 150.0)  # m/s
 # settings that a continued run may have of its own; it has no initial disturbance
 OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial")
-
-
-@dataclass
-class Preparation:
-    """Everything that is settled before the time loop starts.
-
-    Attributes
-    ----------
-    model, balance : Model, Equilibrium
-        The assembled vehicle on its track; its rest and steady rolling.
-    state : float64[n_state]
-        Initial state.
-    end_time, end_distance : float
-        Where the run ends, whichever comes first [s], [m].
-    pace : Pace
-        Step and output interval at any speed.
-    fresh : bool
-        Whether nothing was before the initial state.
-    """
-
-    model: Model
-    balance: Equilibrium
-    state: Floats
-    end_time: float
-    end_distance: float
-    pace: "Pace"
-    fresh: bool = True
 
 
 def simulate(
@@ -129,49 +101,192 @@ def simulate(
     >>> result.status
     'complete'
     """
-    started = time.perf_counter()
     settings = settings or Settings()
     before = None if resume is None else state_before(vehicle, track, settings, resume)
     if before is not None:
         speed, start = float(before[-1]), float(before[-2])
+    (outcome,) = outcomes(
+        [vehicle], track, speed=speed, start=start, duration=duration, until=until,
+        settings=settings, sinks=None if sink is None else [sink], progress=progress,
+        profiles=profiles, before=before,
+    )
+    if isinstance(outcome, Exception):
+        raise outcome
+    return outcome
+
+
+def simulate_together(
+    vehicles: Sequence[Vehicle],
+    track: Track,
+    *,
+    speed: float | None = None,
+    start: float = 0.0,
+    duration: float | None = None,
+    until: float | None = None,
+    settings: Settings | None = None,
+    sinks: Sequence[Sink] | None = None,
+    progress: Progress | None = None,
+    profiles: Mapping[str, Profile] | None = None,
+) -> list[Result]:
+    """Run several vehicles over one track, many in one call of the time loop.
+
+    Each result is that of `simulate`; the runs share what a call costs and the vector registers.
+    Vehicles that need another step, and all in free running, run apart.
+
+    Parameters
+    ----------
+    vehicles : sequence of Vehicle
+        Such as one vehicle with different parameters; they do not feel each other.
+    sinks : sequence of Sink, optional
+        One for each vehicle.
+
+    Others as in `simulate`.
+
+    Returns
+    -------
+    list of Result
+        In the order of the vehicles.  `cpu_time` and `wall_time` are the shares of each; the
+        attribute `runs_together` says how many were in one call.
+
+    Raises
+    ------
+    InputError, ModelError
+        As `simulate`; of several vehicles with errors the first one's, when all others are done.
+
+    Examples
+    --------
+    >>> import railsim
+    >>> soft = railsim.load_vehicle("coach_manchester")
+    >>> hard = railsim.load_vehicle("coach_flexicoil")
+    >>> track = railsim.load_track("curve_r250")
+    >>> results = railsim.simulate_together([soft, hard], track, speed=20.0, until=10.0)
+    >>> [result.attributes["runs_together"] for result in results]
+    [2, 2]
+    """
+    results = []
+    for number, outcome in enumerate(outcomes(
+        vehicles, track, speed=speed, start=start, duration=duration, until=until,
+        settings=settings, sinks=sinks, progress=progress, profiles=profiles,
+    )):
+        if isinstance(outcome, Exception):
+            outcome.add_note(f"this was vehicle {number + 1} of {len(vehicles)}")
+            raise outcome
+        results.append(outcome)
+    return results
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """What the runs of one call have in common."""
+
+    track: Track
+    settings: Settings
+    speed: float
+    start: float
+    duration: float | None
+    until: float | None
+
+
+def outcomes(
+    vehicles: Sequence[Vehicle],
+    track: Track,
+    *,
+    speed: float | None = None,
+    start: float = 0.0,
+    duration: float | None = None,
+    until: float | None = None,
+    settings: Settings | None = None,
+    sinks: Sequence[Sink] | None = None,
+    progress: Progress | None = None,
+    profiles: Mapping[str, Profile] | None = None,
+    before: Floats | None = None,
+) -> list[Result | Exception]:
+    """As `simulate_together`, but what goes wrong with a vehicle stands in its result's place.
+
+    Parameters
+    ----------
+    before : float64[n_state], optional
+        State in which the run of a single vehicle begins.
+    """
+    settings = settings or Settings()
     speed = initial_speed(settings, speed, start)
     check_range(track, speed, start, duration, until)
-    prepared = prepare(vehicle, track, settings, speed, start, duration, until, profiles)
+    inputs = _Inputs(track, settings, speed, start, duration, until)
+    shared = SharedTables()
+    found: list[Result | Exception | None] = [None] * len(vehicles)
+    runs: dict[Run, int] = {}
+    for number, sink in enumerate(sinks or [MemorySink() for _ in vehicles]):
+        if progress is not None:
+            progress(0.0)
+        try:
+            run = _begun(vehicles[number], inputs, sink, profiles, before, shared)
+        except Exception as error:
+            found[number] = error
+        else:
+            runs[run] = number
+    for run in advance(list(runs), settings, progress):
+        number = runs[run]
+        try:
+            found[number] = run.error or _ended(run, vehicles[number], inputs, before)
+        except Exception as error:
+            found[number] = error
+    return [outcome for outcome in found if outcome is not None]
+
+
+def _begun(
+    vehicle: Vehicle,
+    inputs: _Inputs,
+    sink: Sink,
+    profiles: Mapping[str, Profile] | None,
+    before: Floats | None,
+    shared: SharedTables,
+) -> Run:
+    """Prepare a run and tell its sink what will come."""
+    began = time.perf_counter()
+    settings = inputs.settings
+    prepared = prepare(vehicle, inputs.track, settings, inputs.speed, inputs.start,
+                       inputs.duration, inputs.until, profiles, shared)
     if before is not None:
-        take_up(prepared, before, duration)
-    sink = sink or MemorySink()
-    plan = OutputPlan(prepared.model, settings, track)
+        take_up(prepared, before, inputs.duration)
+    plan = OutputPlan(prepared.model, settings, inputs.track)
     sink.begin(plan.coordinates, plan.quantities)
-    begin_time = float(prepared.state[-3])
-    status, where, state, cpu_time, events = _loop(prepared, settings, plan, sink, progress)
-    simulated = float(state[-3]) - begin_time
+    return Run(prepared, plan, sink, prepared.state.copy(), prepared.fresh,
+               wall_time=time.perf_counter() - began)
+
+
+def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -> Result:
+    """Close a run: its result, with all facts about it."""
+    began = time.perf_counter()
+    prepared, settings = run.prepared, inputs.settings
+    simulated = float(run.state[-3] - prepared.state[-3])
     attributes: dict[str, str | float | int] = {
-        "status": STATUS[status][0],
-        "status_reason": _sentence(prepared.model, status, where),
+        "status": STATUS[run.status][0],
+        "status_reason": _sentence(prepared.model, run.status, run.where),
         "vehicle_toml": vehicle.to_toml(),
-        "track_toml": track.to_toml(),
+        "track_toml": inputs.track.to_toml(),
         "settings_json": json.dumps(settings.model_dump(mode="json")),
-        "speed": float(speed),
-        "start": float(start),
+        "speed": float(inputs.speed),
+        "start": float(inputs.start),
         "duration": simulated,
         **{
             f"asked_{name}": float(value)
-            for name, value in (("duration", duration), ("until", until))
+            for name, value in (("duration", inputs.duration), ("until", inputs.until))
             if value is not None
         },
         "step": prepared.pace.smallest,
         "scheme": settings.scheme,
-        "wall_time": time.perf_counter() - started,
-        "cpu_time": cpu_time,
-        "patches_evaluated": int(events[:, 0].sum()),
-        "patches_out_of_range": int(events[:, 1].sum()),
-        "real_time_factor": simulated / cpu_time if cpu_time > 0.0 else math.inf,
+        "wall_time": run.wall_time + time.perf_counter() - began,
+        "cpu_time": run.cpu_time,
+        "runs_together": run.together,
+        "patches_evaluated": int(run.events[0]),
+        "patches_out_of_range": int(run.events[1]),
+        "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
     }
-    result = sink.close(
+    result = run.sink.close(
         attributes,
         {"Q0": prepared.balance.Q0},
         prepared.model.profiles,
-        {"state": {"end": state} | ({} if before is None else {"start": before})},
+        {"state": {"end": run.state} | ({} if before is None else {"start": before})},
     )
     for remark in result.remarks:
         _LOG.warning(remark)
@@ -220,9 +335,10 @@ def prepare(
     duration: float | None = None,
     until: float | None = None,
     profiles: Mapping[str, Profile] | None = None,
+    shared: SharedTables | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state."""
-    balance = equilibrium(assemble(vehicle, track, settings, profiles), speed)
+    balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
     model = balance.model
     pace = Pace(model, settings, {speed: balance.state})
     step, _ = pace.at(speed)
@@ -282,65 +398,6 @@ def take_up(prepared: Preparation, before: Floats, duration: float | None) -> No
         prepared.end_time = float(before[-3]) + duration
 
 
-class Pace:
-    """Step and output interval of a run, chosen once for each class of speeds.
-
-    Creep forces stiffen as 1/V: the step of a class is that of its lowest speed.
-    """
-
-    CLASS = 1.2  # ratio of a class's speeds
-
-    def __init__(self, model: Model, settings: Settings, states: dict[float, Floats]) -> None:
-        self._model = model
-        self._settings = settings
-        self._known: dict[tuple[float, float], float] = {}
-        self._states = states
-        self.varies = settings.drive.mode != "constant"
-        self.smallest = math.inf
-
-    def at(self, speed: float, rate: float = 0.0) -> tuple[float, int]:
-        """Step [s] at `speed`, which changes at `rate`, and number of steps to the next output."""
-        interval = output_interval(self._settings, speed)
-        if self._settings.output_spacing is not None:
-            interval = _duration(self._settings.output_spacing, speed, rate)
-        key = speed
-        if self.varies:
-            key = self.CLASS ** math.floor(math.log(speed, self.CLASS))
-        longest = self._known.get((key, 0.0)) or self._choose(key, interval)
-        self._known[key, 0.0] = longest
-        every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
-        self.smallest = min(self.smallest, interval / every)
-        return interval / every, every
-
-    def _choose(self, speed: float, interval: float) -> float:
-        given = self._settings.step
-        if given is None:
-            state = self._states.get(speed)
-            if state is None:
-                state = equilibrium(self._model, speed).state
-            level = level_track_with_friction(self._model.system)
-            return choose_step(self._model, level, state, self._settings.scheme, interval)
-        if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
-            raise InputError([Fault(
-                "settings", "step", f"found {given:g} s",
-                f"a whole part of the output interval {interval:g} s",
-            )])
-        return given
-
-
-def _duration(distance: float, speed: float, rate: float) -> float:
-    """Time to cover `distance` at a speed that changes at `rate` [s]; without it if that stops."""
-    square = speed**2 + 2.0 * rate * distance
-    return 2.0 * distance / (speed + math.sqrt(square)) if square > 0.0 else distance / speed
-
-
-def output_interval(settings: Settings, speed: float) -> float:
-    """Time between two outputs [s]."""
-    if settings.output_spacing is not None:
-        return settings.output_spacing / speed
-    return 1.0 / settings.output_rate
-
-
 def _disturb(model: Model, settings: Settings, state: Floats) -> None:
     """Add the initial disturbance of the settings to a state."""
     n = model.index.n_bodies
@@ -357,67 +414,6 @@ def _disturb(model: Model, settings: Settings, state: Floats) -> None:
         state[6 * n + place : 6 * n + place + 6] += (
             change.vx, change.vy, change.vz, change.vroll, change.vpitch, change.vyaw,
         )
-
-
-def _loop(
-    prepared: Preparation,
-    settings: Settings,
-    plan: OutputPlan,
-    sink: Sink,
-    progress: Progress | None,
-) -> tuple[int, int, Floats, float, NDArray[np.int64]]:
-    """Run the time loop chunk by chunk: status, where, last state, CPU seconds, `Work.events`."""
-    model = prepared.model
-    work = work_arrays(model.system)
-    state = prepared.state.copy()
-    derivative = np.zeros_like(state)
-    stages = np.zeros((3, len(state)))
-    recorder = plan.recorder(ROWS)
-    scheme = SCHEMES[settings.scheme]
-    status, where, cpu_time, every = RUNNING, 0, 0.0, 1
-    whole = _left(prepared, prepared.state)
-    fresh = int(prepared.fresh)
-    in_distance = prepared.pace.varies and settings.output_spacing is not None
-    while status == RUNNING and (left := _left(prepared, state)) > 1e-9:
-        begin = time.thread_time()  # a library's idle threads may still be spinning
-        if in_distance:
-            right_hand_side(model.system, work, state, derivative)
-        step, every = prepared.pace.at(state[-1], derivative[-1])
-        intervals = 1 if prepared.pace.varies else ROWS
-        n_steps = min(intervals * every, math.ceil(left / step * (1.0 - 1e-9)))
-        last = int(in_distance and n_steps == every)
-        goal = state[-2] + (settings.output_spacing or 0.0)
-        status, where, steps, rows = time_loop(
-            model.system, work, state, derivative, stages, recorder, scheme, step, 0,
-            n_steps - last, every, fresh, 0,
-        )
-        fresh = int(fresh and steps == 0)
-        if last and status == RUNNING:
-            # the last step of an interval of distance ends where the interval ends
-            rest = _duration(goal - state[-2], state[-1], derivative[-1])
-            status, where, more, first = time_loop(
-                model.system, work, state, derivative, stages, recorder, scheme, rest, steps, 1,
-                every, fresh, 0,
-            )
-            steps, rows = steps + more, rows + first
-        cpu_time += time.thread_time() - begin
-        if rows:
-            sink.append(plan.chunk(recorder, rows, prepared.balance.Q0))
-        if progress is not None:
-            progress(min(1.0, 1.0 - _left(prepared, state) / whole))
-    if status == RUNNING and steps % every == 0:
-        status, where, _, rows = time_loop(
-            model.system, work, state, derivative, stages, recorder, scheme, step, 0, 0, every, 0,
-            1,
-        )
-        sink.append(plan.chunk(recorder, rows, prepared.balance.Q0))
-    return status, where, state, cpu_time, work.events
-
-
-def _left(prepared: Preparation, state: Floats) -> float:
-    """Time to the end of the run at the present speed [s]."""
-    by_distance = (prepared.end_distance - state[-2]) / state[-1]
-    return float(min(prepared.end_time - state[-3], by_distance))
 
 
 def _sentence(model: Model, status: int, where: int) -> str:

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.advance import Preparation
 from railsim.assembly import work_arrays
 from railsim.bench import loops
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.time_loop import FAST, time_loop
-from railsim.simulation import Preparation, prepare
+from railsim.simulation import prepare
 from railsim.time_step import empty_recorder
 
 Floats = NDArray[np.float64]

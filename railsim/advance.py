@@ -1,0 +1,275 @@
+"""From prepared runs to their ends: the time loop, chunk by chunk.
+
+Between two chunks there is time for progress, Ctrl-C and for writing.  Runs of several vehicles
+over one track advance together in one call (`railsim.ensemble`) for as long as they can; a single
+run is the ensemble of one.
+
+Each run is what it would be alone.  A chunk in which one of several vehicles leaves the range of
+the model is taken back: that vehicle goes on alone, to its own end, and the others without it.
+Runs also part where their steps differ.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, work_arrays
+from railsim.definitions.settings import Settings
+from railsim.ensemble import Ensemble, contact_grid
+from railsim.equilibrium import Equilibrium
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.status import RUNNING
+from railsim.kernels.time_loop import time_loop
+from railsim.outputs import OutputPlan
+from railsim.pace import Pace, duration
+from railsim.result import Sink
+from railsim.time_step import SCHEMES
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+ROWS = 500  # outputs per chunk: some hundredths of a second of computing
+
+
+@dataclass
+class Preparation:
+    """Everything that is settled before the time loop starts.
+
+    Attributes
+    ----------
+    model, balance : Model, Equilibrium
+        The assembled vehicle on its track; its rest and steady rolling.
+    state : float64[n_state]
+        Initial state.
+    end_time, end_distance : float
+        Where the run ends, whichever comes first [s], [m].
+    pace : Pace
+        Step and output interval at any speed.
+    fresh : bool
+        Whether nothing was before the initial state.
+    """
+
+    model: Model
+    balance: Equilibrium
+    state: Floats
+    end_time: float
+    end_distance: float
+    pace: Pace
+    fresh: bool = True
+
+    def left(self, state: Floats) -> float:
+        """Time from `state` to the end of the run at the present speed [s]."""
+        by_distance = (self.end_distance - state[-2]) / state[-1]
+        return float(min(self.end_time - state[-3], by_distance))
+
+
+@dataclass(eq=False)
+class Run:
+    """A run on its way.
+
+    Attributes
+    ----------
+    prepared, plan, sink : Preparation, OutputPlan, Sink
+        Where it begins and ends, what it puts out and where to.
+    state : float64[n_state]
+        Where it is.
+    fresh : bool
+        Whether nothing was before `state`.
+    due : bool
+        Whether `state` is to be recorded.
+    status, where : int
+        How it ended, see `railsim.kernels.status`.
+    events : int64[2]
+        Loaded contact patches so far, and those out of the creep law's range.
+    cpu_time, wall_time : float
+        Its share of what the time loop, and all of the run, took [s].
+    together : int
+        Most runs that have shared a call with it, itself included.
+    error : Exception or None
+        What went wrong with its output.
+    """
+
+    prepared: Preparation
+    plan: OutputPlan
+    sink: Sink
+    state: Floats
+    fresh: bool = True
+    due: bool = True
+    status: int = RUNNING
+    where: int = 0
+    events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, dtype=np.int64))
+    cpu_time: float = 0.0
+    wall_time: float = 0.0
+    together: int = 1
+    error: Exception | None = None
+
+
+def advance(
+    runs: Sequence[Run], settings: Settings, progress: Progress | None = None
+) -> Iterator[Run]:
+    """Take runs to their ends; yields each when it is there.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Of the same track, start and end, and of these settings.
+    progress : callable, optional
+        Called with the finished fraction of all of them now and then.
+    """
+    whole = {run: run.prepared.left(run.state) for run in runs}
+    done = dict.fromkeys(whole, 0.0)
+
+    def tell() -> None:
+        if progress is not None:
+            progress(sum(done.values()) / len(done))
+
+    def moved(some: Sequence[Run], state: Floats) -> None:
+        for run in some:
+            done[run] = min(1.0, 1.0 - run.prepared.left(state) / whole[run])
+        tell()
+
+    waiting = _matching(runs, settings)
+    while waiting:
+        together = waiting.pop(0)
+        apart = _Convoy(together, settings).to_the_end(moved)
+        on_their_way = [run for group in apart for run in group]
+        ended = [run for run in together if run not in on_their_way]
+        done |= dict.fromkeys(ended, 1.0)
+        yield from ended
+        tell()
+        waiting = apart + waiting
+
+
+def _matching(runs: Sequence[Run], settings: Settings) -> list[list[Run]]:
+    """Runs that can be one system: with one speed and one grid of contact tables."""
+    if settings.drive.mode == "free":
+        return [[run] for run in runs]
+    groups: dict[tuple[float | int, ...], list[Run]] = {}
+    for run in runs:
+        groups.setdefault(contact_grid(run.prepared.model), []).append(run)
+    return list(groups.values())
+
+
+class _Convoy:
+    """Runs that advance together, one or several."""
+
+    def __init__(self, runs: Sequence[Run], settings: Settings) -> None:
+        self._runs = runs
+        self._scheme = SCHEMES[settings.scheme]
+        models = [run.prepared.model for run in runs]
+        self._ensemble = Ensemble(models, [run.plan.recorder(ROWS) for run in runs])
+        self._system = self._ensemble.system
+        self._work = work_arrays(self._system)
+        self._state = self._ensemble.state([run.state for run in runs])
+        self._derivative = np.zeros_like(self._state)
+        self._stages = np.zeros((3, len(self._state)))
+        self._fresh, self._due = runs[0].fresh, runs[0].due
+        self._varies = runs[0].prepared.pace.varies
+        # equal steps of distance while the speed changes: every interval is a chunk of its own
+        self._spacing = settings.output_spacing if self._varies else None
+        wheelsets = [len(model.system.contact.body) for model in models]
+        self._shares = [number / sum(wheelsets) for number in wheelsets]
+
+    def to_the_end(self, moved: Callable[[Sequence[Run], Floats], None]) -> list[list[Run]]:
+        """Advance to the end, or to where runs part; return in which groups they go on."""
+        while self._left() > 1e-9 or self._due:
+            begin = time.perf_counter()
+            at_end = self._left() <= 1e-9
+            paces = [] if at_end else self._paces()
+            if len(set(paces)) > 1:
+                return self._parted(paces)
+            before = self._state.copy(), self._fresh, self._due, self._work.events.copy()
+            status, where, rows = self._last_record() if at_end else self._chunk(*paces[0])
+            if status != RUNNING and len(self._runs) > 1:
+                self._state, self._fresh, self._due, self._work.events[:] = before
+                return self._parted(self._ensemble.concerned(status, where))
+            self._write(rows)
+            for run, share in zip(self._runs, self._shares, strict=True):
+                run.status, run.where = status, where
+                run.wall_time += share * (time.perf_counter() - begin)
+            moved(self._runs, self._state)
+            if status != RUNNING:
+                break
+            if any(run.error for run in self._runs):
+                return self._parted([run.error is None for run in self._runs])
+        self._give_back()
+        return []
+
+    def _left(self) -> float:
+        return self._runs[0].prepared.left(self._state)
+
+    def _paces(self) -> list[tuple[float, int]]:
+        """Step and number of steps to the next output of every run."""
+        if self._spacing is not None:
+            right_hand_side(self._system, self._work, self._state, self._derivative)
+        speed, rate = self._state[-1], self._derivative[-1]
+        return [run.prepared.pace.at(speed, rate) for run in self._runs]
+
+    def _chunk(self, step: float, every: int) -> tuple[int, int, int]:
+        """Advance by one chunk: status, where, number of records."""
+        intervals = 1 if self._varies else ROWS
+        n_steps = min(intervals * every, math.ceil(self._left() / step * (1.0 - 1e-9)))
+        last = int(self._spacing is not None and n_steps == every)
+        goal = self._state[-2] + (self._spacing or 0.0)
+        status, where, steps, rows = self._call(step, 0, n_steps - last, every)
+        if last and status == RUNNING:
+            # the last step of an interval of distance ends where the interval ends
+            rest = duration(goal - self._state[-2], self._state[-1], self._derivative[-1])
+            status, where, more, first = self._call(rest, steps, 1, every)
+            steps, rows = steps + more, rows + first
+        self._due = status == RUNNING and steps % every == 0
+        return status, where, rows
+
+    def _last_record(self) -> tuple[int, int, int]:
+        """Record the state at the end: status, where, number of records."""
+        self._due = False
+        status, where, _, rows = self._call(1.0, 0, 0, 1, closing=1)
+        return status, where, rows
+
+    def _call(
+        self, step: float, first: int, n_steps: int, every: int, closing: int = 0
+    ) -> tuple[int, int, int, int]:
+        begin = time.thread_time()  # a library's idle threads may still be spinning
+        status, where, steps, rows = time_loop(
+            self._system, self._work, self._state, self._derivative, self._stages,
+            self._ensemble.recorder, self._scheme, step, first, n_steps, every, int(self._fresh),
+            closing,
+        )
+        spent = time.thread_time() - begin
+        for run, share in zip(self._runs, self._shares, strict=True):
+            run.cpu_time += share * spent
+            run.together = max(run.together, len(self._runs))
+        self._fresh = self._fresh and steps == 0
+        return status, where, steps, rows
+
+    def _write(self, rows: int) -> None:
+        """Hand the records of a chunk to the runs' sinks."""
+        if rows == 0:
+            return
+        for number, run in enumerate(self._runs):
+            records = self._ensemble.records(number, rows)
+            try:
+                run.sink.append(run.plan.chunk(records, rows, run.prepared.balance.Q0))
+            except Exception as error:
+                run.error = error
+
+    def _parted(self, keys: Sequence[object]) -> list[list[Run]]:
+        """Runs with their states, grouped by equal keys; those with an error are at their end."""
+        self._give_back()
+        pairs = list(zip(self._runs, keys, strict=True))
+        groups = [
+            [run for run, other in pairs if other == key and run.error is None]
+            for key in dict.fromkeys(keys)
+        ]
+        return [group for group in groups if group]
+
+    def _give_back(self) -> None:
+        """Let the runs have their states and counts."""
+        for run, part in zip(self._runs, self._ensemble.parts, strict=True):
+            run.state = self._state[part.state]
+            run.fresh, run.due = self._fresh, self._due
+            run.events += self._work.events[part.wheelsets].sum(axis=0)

@@ -1,0 +1,269 @@
+"""Several vehicles on one track as one system: many runs per compiled call.
+
+The vehicles share time, place and speed and do not feel each other; each has its own bodies,
+elements and wheels.  In the time loop FASTSIM then marches the strips of all their wheels side by
+side, and what a call or an evaluation costs by itself is spent once.
+
+Arrays hold vehicle after vehicle, indices are moved on accordingly; a track frame serves all
+vehicles that have a body at its place.  Nothing large is copied: equal contact tables are one, and
+so is the track's table.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, side_by_side
+from railsim.kernels.element_outputs import LINK, MOUNT
+from railsim.kernels.status import (
+    DERAILED,
+    FELL_BETWEEN_RAILS,
+    NOT_FINITE,
+    ROLL_RANGE,
+    WHEEL_LIFT,
+    YAW_RANGE,
+)
+from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, System
+from railsim.kernels.time_loop import Recorder
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Group = TypeVar("Group", bound=tuple[Any, ...])
+
+# the grid of the contact tables, which a system has but one of
+GRID = ("y0", "dy", "roll0", "droll", "dw")
+# statuses that concern a wheelset
+OF_WHEELSET = (DERAILED, FELL_BETWEEN_RAILS, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE)
+
+
+def contact_grid(model: Model) -> tuple[float | int, ...]:
+    """Grid of a model's contact tables; models that differ in it cannot be one system."""
+    contact = model.system.contact
+    return (*(getattr(contact, name) for name in GRID), *contact.values.shape[1:])
+
+
+@dataclass(frozen=True)
+class Part:
+    """Where one vehicle is in the arrays of an ensemble.
+
+    Attributes
+    ----------
+    state : int64[n_state]
+        Places of its own state; the last three, time, place and speed, are those of all.
+    bodies, wheelsets, elements : slice
+        Its bodies, wheelsets and recorded elements.
+    """
+
+    state: Ints
+    bodies: slice
+    wheelsets: slice
+    elements: slice
+
+
+class Ensemble:
+    """Models of several vehicles as one system; a single model's as it is.
+
+    Parameters
+    ----------
+    models : sequence of Model
+        On the same track, with the same settings and the same `contact_grid`.
+    recorders : sequence of Recorder
+        What is recorded of each.
+
+    Attributes
+    ----------
+    system : System
+        Everything that the time loop reads.
+    recorder : Recorder
+        Records of all vehicles.
+    parts : tuple of Part
+        Where each vehicle is.
+    """
+
+    def __init__(self, models: Sequence[Model], recorders: Sequence[Recorder]) -> None:
+        self._recorders = recorders
+        systems = [model.system for model in models]
+        bodies = _slices(len(system.bodies.kind) for system in systems)
+        internal = _slices(len(system.internal.kind) for system in systems)
+        wheelsets = _slices(len(system.contact.body) for system in systems)
+        elements = _slices(len(recorder.chosen) for recorder in recorders)
+        n, m = bodies[-1].stop, internal[-1].stop
+        self.parts = tuple(
+            Part(_places(n, m, own, inner), own, axles, chosen)
+            for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
+        )
+        if len(models) == 1:
+            self.system, self.recorder = systems[0], recorders[0]
+            return
+        self.system = joined_system(models)
+        self.recorder = _joined_recorder(systems, recorders, 18 * n + 2 * m + N_SCALARS)
+
+    def state(self, states: Sequence[Floats]) -> Floats:
+        """State of the ensemble from those of its vehicles."""
+        joint = np.zeros(self.recorder.state.shape[1])
+        for part, state in zip(self.parts, states, strict=True):
+            joint[part.state] = state
+        return joint
+
+    def records(self, number: int, rows: int) -> Recorder:
+        """First `rows` records of one vehicle."""
+        if len(self.parts) == 1:
+            return self.recorder
+        part, joint = self.parts[number], self.recorder
+        return Recorder(
+            state=joint.state[:rows][:, part.state],
+            rates=joint.rates[:rows, 6 * part.bodies.start : 6 * part.bodies.stop],
+            acceleration=joint.acceleration[:rows, part.bodies],
+            wheel=joint.wheel[:rows, part.wheelsets],
+            patch=joint.patch[:rows, part.wheelsets],
+            chosen=self._recorders[number].chosen,
+            element=joint.element[:rows, part.elements],
+        )
+
+    def concerned(self, status: int, where: int) -> list[int]:
+        """Number the vehicles by what a status of the time loop says of them.
+
+        1 for the one that it concerns and 0 for the others; where that is not known, each has a
+        number of its own.
+        """
+        concerned = [False] * len(self.parts)
+        if status == NOT_FINITE:
+            concerned = [where in part.state for part in self.parts]
+        elif status in OF_WHEELSET:
+            concerned = [
+                part.wheelsets.start <= where < part.wheelsets.stop for part in self.parts
+            ]
+        if sum(concerned) != 1:
+            return list(range(len(self.parts)))
+        return [int(this) for this in concerned]
+
+
+def joined_system(models: Sequence[Model]) -> System:
+    """One system of several models, see the module's text."""
+    systems = [model.system for model in models]
+    bodies = _starts(len(system.bodies.kind) for system in systems)
+    internal = _starts(len(system.internal.kind) for system in systems)
+    curves = _starts(len(system.curves.start) - 1 for system in systems)
+    offset = np.unique(np.concatenate([system.frame_offset for system in systems]))
+    first = systems[0]
+    return System(
+        bodies=_joined_bodies(systems, bodies, offset),
+        frame_offset=offset,
+        track=first.track,
+        contact=_joined_contact(models, bodies),
+        links=_joined([system.links for system in systems], body=bodies, internal=internal,
+                      curve=curves),
+        mounts=_joined([system.mounts for system in systems], body=bodies, internal=internal,
+                       curve=curves),
+        curves=Curves(
+            start=_joined_starts([system.curves.start for system in systems]),
+            x=np.concatenate([system.curves.x for system in systems]),
+            f=np.concatenate([system.curves.f for system in systems]),
+        ),
+        internal=_joined([system.internal for system in systems], curve=curves),
+        loads=_joined([system.loads for system in systems], body=bodies)._replace(
+            start=_joined_starts([system.loads.start for system in systems])),
+        drive=first.drive,
+        gravity=first.gravity,
+    )
+
+
+def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bodies:
+    joint = _joined([system.bodies for system in systems], parent=first, references=first)
+    frames = [
+        np.searchsorted(offset, system.frame_offset)[system.bodies.frame] for system in systems
+    ]
+    return joint._replace(frame=np.concatenate(frames))
+
+
+def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
+    """Wheelsets of all models; a table that several of them have is there once."""
+    contacts = [model.system.contact for model in models]
+    rows: dict[int, tuple[Floats, float, Floats]] = {}
+    for model, contact in zip(models, contacts, strict=True):
+        for table, row in zip(
+            model.tables, zip(contact.values, contact.shear, contact.coupling, strict=True),
+            strict=True,
+        ):
+            rows.setdefault(id(table), row)
+    number = {table: k for k, table in enumerate(rows)}
+    values, shear, coupling = zip(*rows.values(), strict=True)
+    return contacts[0]._replace(
+        body=np.concatenate([c.body + shift for c, shift in zip(contacts, first, strict=True)]),
+        table=np.concatenate([
+            np.array([number[id(table)] for table in model.tables])[contact.table]
+            for model, contact in zip(models, contacts, strict=True)
+        ]),
+        values=side_by_side(values) if len(rows) > len(models[0].tables) else contacts[0].values,
+        shear=np.array(shear),
+        coupling=np.array(coupling),
+    )
+
+
+def _joined_recorder(
+    systems: Sequence[System], recorders: Sequence[Recorder], n_state: int
+) -> Recorder:
+    def along(name: str) -> Floats:
+        return np.concatenate([getattr(recorder, name) for recorder in recorders], axis=1)
+
+    first = {
+        LINK: _starts(len(system.links.length) for system in systems),
+        MOUNT: _starts(len(system.mounts.body) for system in systems),
+    }
+    chosen = [
+        (group, index + first[group][k])
+        for k, recorder in enumerate(recorders)
+        for group, index in recorder.chosen.tolist()
+    ]
+    return Recorder(
+        state=np.zeros((len(recorders[0].state), n_state)),
+        rates=along("rates"),
+        acceleration=along("acceleration"),
+        wheel=along("wheel"),
+        patch=along("patch"),
+        chosen=np.array(chosen, dtype=np.int64).reshape(-1, 2),
+        element=along("element"),
+    )
+
+
+def _joined(groups: Sequence[Group], **shifts: Ints) -> Group:
+    """One group of arrays of several; indices of the fields in `shifts` are moved on, but -1."""
+
+    def shifted(name: str, array: NDArray[Any], k: int) -> NDArray[Any]:
+        return np.where(array >= 0, array + shifts[name][k], array) if name in shifts else array
+
+    kind: Any = type(groups[0])
+    joint: Group = kind(*(
+        np.concatenate([shifted(name, array, k) for k, array in enumerate(arrays)])
+        for name, arrays in zip(kind._fields, zip(*groups, strict=True), strict=True)
+    ))
+    return joint
+
+
+def _joined_starts(starts: Sequence[Ints]) -> Ints:
+    """First points of tables of several groups, one group after the other, and the end."""
+    return np.concatenate([[0], np.cumsum(np.concatenate([np.diff(start) for start in starts]))])
+
+
+def _starts(lengths: Iterable[int]) -> Ints:
+    return np.cumsum([0, *lengths])[:-1]
+
+
+def _slices(lengths: Iterable[int]) -> list[slice]:
+    ends = np.cumsum([0, *lengths]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+def _places(n: int, m: int, bodies: slice, internal: slice) -> Ints:
+    """Places of one vehicle's state in that of n bodies and m internal states."""
+    coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
+    inner = np.arange(internal.start, internal.stop)
+    end = 18 * n + 2 * m
+    return np.concatenate([
+        coordinates, 6 * n + coordinates, 12 * n + inner,
+        12 * n + m + coordinates, 18 * n + m + inner, np.arange(end, end + N_SCALARS),
+    ])
