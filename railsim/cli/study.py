@@ -76,6 +76,14 @@ def _is_number(text: str) -> bool:
 @click.option("--settings", metavar="F", help="Settings file for all runs.")
 @set_option
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Default: all cores.")
+@click.option(
+    "--together",
+    type=click.IntRange(min=1),
+    default=1,
+    metavar="N",
+    show_default=True,
+    help="Runs that differ in the vehicle only: up to N in one call.",
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
 @click.option("--resume", is_flag=True, help="Go on with the study in DIR; compute what changed.")
 @overwrite_option

@@ -1,10 +1,12 @@
 """Jobs over the cores of this machine, or over a dask cluster.
 
-A job that goes wrong becomes a record that says so; the others go on.  On Ctrl-C running jobs are
-told to stop and leave nothing behind; a process that does not answer, because it is compiling, is
-ended after a moment.  Processes whose study is no more end by themselves.
+Jobs come in batches, whose runs share a call; a batch mostly holds one job.  A job that goes wrong
+becomes a record that says so; the others go on.  On Ctrl-C running jobs are told to stop and leave
+nothing behind; a process that does not answer, because it is compiling, is ended after a moment.
+Processes whose study is no more end by themselves.
 """
 
+import math
 import multiprocessing
 import os
 import signal
@@ -16,14 +18,16 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import partial_path
+from railsim.result import Result
 from railsim.studies.case import Case
-from railsim.studies.run import run_case
+from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import Record, failed_record, finished_record
 
 GRACE = 3.0  # seconds that running jobs have to stop by themselves
@@ -51,22 +55,72 @@ class Job:
     picture: Path | None = None
 
 
+Batch = tuple[Job, ...]
+
+
 class Stopped(Exception):
     """The study was interrupted."""
 
 
-def perform(job: Job, progress: Progress | None = None) -> Record:
-    """Do a job and return its record, whether it went well or not."""
+def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
+    """Put jobs that can share a call into batches.
+
+    Parameters
+    ----------
+    together : int
+        Most jobs of a batch.
+    workers : int
+        No batch is larger than a worker's share of all jobs: none is to wait for another.
+    """
+    size = min(together, math.ceil(len(jobs) / workers))
+    kinds: list[list[Job]] = []
+    for job in jobs:
+        for kind in kinds:
+            if size > 1 and can_share_a_call(kind[0].case, job.case):
+                kind.append(job)
+                break
+        else:
+            kinds.append([job])
+    found: list[Batch] = []
+    for kind in kinds:
+        parts = math.ceil(len(kind) / size)
+        ends = [len(kind) * part // parts for part in range(parts + 1)]
+        found += [tuple(kind[begin:end]) for begin, end in pairwise(ends)]
+    return found
+
+
+def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
+    """Do the jobs of a batch and return their records, whether they went well or not."""
+    found: list[Result | Exception]
     try:
-        result = run_case(job.case, job.path, overwrite=True, progress=progress)
+        if len(batch) == 1:
+            (job,) = batch
+            found = [run_case(job.case, job.path, overwrite=True, progress=progress)]
+        else:
+            found = run_cases(
+                [job.case for job in batch],
+                [job.path for job in batch],
+                overwrite=True,
+                progress=progress,
+            )
+    except Stopped:
+        raise
+    except Exception as error:
+        found = [error] * len(batch)
+    return [_record(job, outcome) for job, outcome in zip(batch, found, strict=True)]
+
+
+def _record(job: Job, outcome: Result | Exception) -> Record:
+    """Draw the result of a job, and return its record or that of what went wrong."""
+    try:
+        if isinstance(outcome, Exception):
+            raise outcome
         if job.picture is not None:
             from railsim.plot.histories import histories
             from railsim.plot.style import save
 
-            save(histories(result), job.picture, overwrite=True)
-        return finished_record(job.case, result)
-    except Stopped:
-        raise
+            save(histories(outcome), job.picture, overwrite=True)
+        return finished_record(job.case, outcome)
     except RailsimError as error:
         return failed_record(job.case, str(error))
     except Exception as error:
@@ -74,35 +128,39 @@ def perform(job: Job, progress: Progress | None = None) -> Record:
         return failed_record(job.case, reason, traceback.format_exc())
 
 
-def in_this_process(jobs: Sequence[Job], progress: Progress) -> Iterator[Record]:
-    """Do jobs one after the other."""
-    for index, job in enumerate(jobs):
+def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:
+    """Do batches one after the other."""
+    shares = _shares(batches)
+    for index, batch in enumerate(batches):
 
         def share(fraction: float, index: int = index) -> None:
-            progress((index + fraction) / len(jobs))
+            progress(sum(shares[:index]) + fraction * shares[index])
 
-        yield perform(job, share)
+        yield from perform(batch, share)
 
 
-def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Iterator[Record]:
-    """Do jobs on several cores; records come as the jobs end."""
+def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> Iterator[Record]:
+    """Do batches on several cores; records come as the batches end."""
     # "spawn" everywhere: a fork of a process that has run compiled code with threads may hang
     context = multiprocessing.get_context("spawn")
-    fractions = context.Array("d", len(jobs), lock=False)
+    shares = _shares(batches)
+    fractions = context.Array("d", len(batches), lock=False)
     stop = context.Event()
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(workers, context, _begin, (fractions, stop))
     processes: set[BaseProcess] = set()
     try:
         with _interrupts_later():  # the processes inherit it
-            jobs_of = {pool.submit(_work, index, job): job for index, job in enumerate(jobs)}
+            batch_of = {
+                pool.submit(_work, index, batch): batch for index, batch in enumerate(batches)
+            }
             processes = set(multiprocessing.active_children()) - others
-        waiting: set[Future[Record]] = set(jobs_of)
+        waiting: set[Future[list[Record]]] = set(batch_of)
         while waiting:
             done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
-            progress(sum(fractions) / len(jobs))
+            progress(sum(f * share for f, share in zip(fractions, shares, strict=True)))
             for future in done:
-                yield _outcome(future, jobs_of[future])
+                yield from _outcome(future, batch_of[future])
     except BaseException:
         stop.set()
         pool.shutdown(wait=False, cancel_futures=True)
@@ -111,8 +169,15 @@ def in_processes(jobs: Sequence[Job], workers: int, progress: Progress) -> Itera
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
         for process in processes:  # one that was killed has left what it was writing
-            for job in jobs:
-                partial_path(job.path, process.pid or 0).unlink(missing_ok=True)
+            for batch in batches:
+                for job in batch:
+                    partial_path(job.path, process.pid or 0).unlink(missing_ok=True)
+
+
+def _shares(batches: Sequence[Batch]) -> list[float]:
+    """Share of each batch in all jobs."""
+    total = sum(len(batch) for batch in batches)
+    return [len(batch) / total for batch in batches]
 
 
 def cluster(address: str) -> Any:
@@ -135,26 +200,31 @@ def cluster(address: str) -> Any:
         raise InputError([Fault("--scheduler", "", found, "such as tcp://host:8786")]) from None
 
 
-def on_cluster(jobs: Sequence[Job], client: Any, progress: Progress) -> Iterator[Record]:
-    """Do jobs on the workers of a dask cluster, which must see the folder under the same path."""
+def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:
+    """Do batches on the workers of a dask cluster, which must see the folder under its path."""
     from distributed import as_completed
 
     with client:
-        futures = client.map(perform, list(jobs), pure=False)
-        jobs_of = dict(zip((future.key for future in futures), jobs, strict=True))
-        for count, future in enumerate(as_completed(futures), start=1):
-            yield _outcome(future, jobs_of[future.key])
-            progress(count / len(jobs))
+        futures = client.map(perform, list(batches), pure=False)
+        keys = [future.key for future in futures]
+        batch_of = dict(zip(keys, batches, strict=True))
+        share_of = dict(zip(keys, _shares(batches), strict=True))
+        fraction = 0.0
+        for future in as_completed(futures):
+            yield from _outcome(future, batch_of[future.key])
+            fraction += share_of[future.key]
+            progress(min(1.0, fraction))
 
 
-def _outcome(future: Any, job: Job) -> Record:
+def _outcome(future: Any, batch: Batch) -> list[Record]:
     try:
-        record: Record = future.result()
+        records: list[Record] = future.result()
     except BrokenProcessPool:
-        return failed_record(job.case, "its process died, perhaps for want of memory")
+        reason = "its process died, perhaps for want of memory"
+        return [failed_record(job.case, reason) for job in batch]
     except Exception as error:
-        return failed_record(job.case, f"{type(error).__name__}: {error}")
-    return record
+        return [failed_record(job.case, f"{type(error).__name__}: {error}") for job in batch]
+    return records
 
 
 # what a worker process knows: the progress of all jobs, and whether to stop
@@ -177,7 +247,7 @@ def _end_with_parent(stop: Any) -> None:
         os._exit(1)
 
 
-def _work(index: int, job: Job) -> Record:
+def _work(index: int, batch: Batch) -> list[Record]:
     fractions, stop = _shared
 
     def progress(fraction: float) -> None:
@@ -185,7 +255,7 @@ def _work(index: int, job: Job) -> Record:
         if stop.is_set():
             raise Stopped
 
-    return perform(job, progress)
+    return perform(batch, progress)
 
 
 def _end(processes: set[BaseProcess]) -> None:

@@ -1,10 +1,12 @@
-"""A case becomes a file."""
+"""A case becomes a file; several cases become files in one call."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
+from railsim.errors import InputError
 from railsim.result import Hdf5Sink, Result
-from railsim.simulation import simulate
+from railsim.simulation import outcomes, simulate
 from railsim.studies.case import Case
 
 
@@ -53,3 +55,54 @@ def run_case(
             progress=progress,
             resume=resume,
         )
+
+
+def can_share_a_call(one: Case, other: Case) -> bool:
+    """Whether two cases differ in nothing but the vehicle."""
+    return (
+        one.track == other.track
+        and one.settings == other.settings
+        and (one.speed, one.start, one.duration, one.until)
+        == (other.speed, other.start, other.duration, other.until)
+    )
+
+
+def run_cases(
+    cases: Sequence[Case],
+    paths: Sequence[Path],
+    *,
+    overwrite: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> list[Result | Exception]:
+    """Run cases that differ in the vehicle only into their files, all in one call.
+
+    Returns
+    -------
+    list of Result or Exception
+        One for each case; what went wrong with one of them leaves the others alone.
+    """
+    found: dict[int, Result | Exception] = {}
+    sinks: dict[int, Hdf5Sink] = {}
+    first = cases[0]
+    with ExitStack() as stack:
+        for number, (case, path) in enumerate(zip(cases, paths, strict=True)):
+            facts = {"run": case.name, "inputs_hash": case.key}
+            try:
+                sink = Hdf5Sink(path, overwrite=overwrite, attributes=facts)
+            except InputError as error:
+                found[number] = error
+            else:
+                sinks[number] = stack.enter_context(sink)
+        done = outcomes(
+            [cases[number].vehicle for number in sinks],
+            first.track,
+            speed=first.speed,
+            start=first.start,
+            duration=first.duration,
+            until=first.until,
+            settings=first.settings,
+            sinks=list(sinks.values()),
+            progress=progress,
+        )
+    found |= zip(sinks, done, strict=True)
+    return [found[number] for number in range(len(cases))]

@@ -15,7 +15,15 @@ from railsim.files import check_folder, make_folder
 from railsim.result import Result, open_result
 from railsim.studies.case import Case
 from railsim.studies.combine import combinations
-from railsim.studies.execute import Job, cluster, in_processes, in_this_process, on_cluster
+from railsim.studies.execute import (
+    Batch,
+    Job,
+    batches,
+    cluster,
+    in_processes,
+    in_this_process,
+    on_cluster,
+)
 from railsim.studies.summary import (
     Record,
     finished_record,
@@ -77,6 +85,7 @@ def study(
     until: float | None = None,
     assignments: Sequence[str] = (),
     workers: int | None = None,
+    together: int = 1,
     scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -106,6 +115,8 @@ def study(
         ``key.path=value`` for all runs.
     workers : int, optional
         Processes; by default one for each core.
+    together : int
+        How many runs that differ in the vehicle only share a call at most; results are the same.
     scheduler : str, optional
         Address of a dask scheduler whose workers do the runs instead.
     resume : bool
@@ -180,7 +191,7 @@ def study(
     write_index(folder, inputs, "running", list(records.values()))
     status = "interrupted"
     try:
-        for record in _executed(jobs, workers, client, progress or (lambda _: None)):
+        for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
             records[record["name"]] = record
             write_index(folder, inputs, "running", list(records.values()))
             tell(record)
@@ -202,14 +213,18 @@ def _job(case: Case, folder: Path, plots: bool) -> Job:
 
 def _executed(
     jobs: Sequence[Job],
+    together: int,
     workers: int | None,
     client: Any,
     progress: Callable[[float], None],
 ) -> Iterable[Record]:
     if client is not None:
-        return on_cluster(jobs, client, progress)
-    count = min(workers or cores(), len(jobs))
-    return in_processes(jobs, count, progress) if count > 1 else in_this_process(jobs, progress)
+        threads = sum(client.nthreads().values())
+        return on_cluster(batches(jobs, together, max(1, threads)), client, progress)
+    count = workers or cores()
+    work: Sequence[Batch] = batches(jobs, together, count)
+    count = min(count, len(work))
+    return in_processes(work, count, progress) if count > 1 else in_this_process(work, progress)
 
 
 def cores() -> int:
