@@ -25,6 +25,7 @@ from typing import Any
 
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import partial_path
+from railsim.kernels.time_loop import time_loop
 from railsim.result import Result
 from railsim.studies.case import Case
 from railsim.studies.run import can_share_a_call, run_case, run_cases
@@ -140,7 +141,11 @@ def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Re
 
 
 def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> Iterator[Record]:
-    """Do batches on several cores; records come as the batches end."""
+    """Do batches on several cores; records come as the batches end.
+
+    Where the time loop has to be compiled, the first batch begins alone: the others find it done,
+    and no two processes compile the same on cores and memory that they share.
+    """
     # "spawn" everywhere: a fork of a process that has run compiled code with threads may hang
     context = multiprocessing.get_context("spawn")
     shares = _shares(batches)
@@ -149,16 +154,26 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(workers, context, _begin, (fractions, stop))
     processes: set[BaseProcess] = set()
-    try:
+    batch_of: dict[Future[list[Record]], Batch] = {}
+
+    def submitted(some: range) -> set[Future[list[Record]]]:
         with _interrupts_later():  # the processes inherit it
-            batch_of = {
-                pool.submit(_work, index, batch): batch for index, batch in enumerate(batches)
+            new = {
+                pool.submit(_work, index, batches[index]): batches[index] for index in some
             }
-            processes = set(multiprocessing.active_children()) - others
-        waiting: set[Future[list[Record]]] = set(batch_of)
+            processes.update(set(multiprocessing.active_children()) - others)
+        batch_of.update(new)
+        return set(new)
+
+    begun = len(batches) if is_compiled() else 1
+    try:
+        waiting = submitted(range(begun))
         while waiting:
             done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
             progress(sum(f * share for f, share in zip(fractions, shares, strict=True)))
+            if begun < len(batches) and (done or fractions[0] > 0.0):
+                waiting |= submitted(range(begun, len(batches)))
+                begun = len(batches)
             for future in done:
                 yield from _outcome(future, batch_of[future])
     except BaseException:
@@ -178,6 +193,13 @@ def _shares(batches: Sequence[Batch]) -> list[float]:
     """Share of each batch in all jobs."""
     total = sum(len(batch) for batch in batches)
     return [len(batch) / total for batch in batches]
+
+
+def is_compiled() -> bool:
+    """Whether the time loop is there, compiled; also where compiled code is not kept."""
+    kept = getattr(time_loop, "stats", None)  # None: the compiler is switched off
+    folder = kept.cache_path if kept else None
+    return folder is None or any(Path(folder).glob("time_loop.time_loop-*.nbc"))
 
 
 def cluster(address: str) -> Any:

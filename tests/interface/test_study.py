@@ -20,6 +20,7 @@ import railsim
 import railsim.studies.run
 from railsim.cli import main
 from railsim.errors import InputError, ModelError
+from railsim.studies import execute
 from railsim.studies.combine import combinations, parse_grid
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
@@ -326,6 +327,51 @@ def test_processes_give_the_same_arrays_as_one_run(tmp_path):
     shared = outcome.results()[f"{COACH}_{CURVE}_20"]
     for name in alone:
         np.testing.assert_array_equal(shared[name], alone[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiled", [True, False], ids=["compiled before", "first run"])
+def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
+    events = []
+
+    class Pool(execute.ProcessPoolExecutor):
+        def submit(self, work, index, job):
+            events.append(f"begin {index}")
+            return super().submit(work, index, job)
+
+    monkeypatch.setattr(execute, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(execute, "is_compiled", lambda: compiled)
+    show = lambda fraction: events.append("progress" if fraction > 0.0 else "nothing yet")  # noqa: E731
+    outcome = railsim.study(
+        [COACH], [STRAIGHT], [15.0, 20.0, 25.0], out=tmp_path, workers=2, progress=show
+    )
+    assert [record["status"] for record in outcome.records] == ["complete"] * 3
+    begins = [index for index, event in enumerate(events) if event.startswith("begin")]
+    assert [events[index] for index in begins] == ["begin 0", "begin 1", "begin 2"]
+    between = events[begins[0] + 1 : begins[1]]
+    assert between[-1:] == ([] if compiled else ["progress"])
+
+
+@pytest.mark.slow
+def test_compiled_code_is_seen(tmp_path):
+    """An empty cache folder and a full one, each in a process of its own."""
+    look = "from railsim.studies.execute import is_compiled; print(is_compiled())"
+    compile_it = (
+        "import railsim; railsim.simulate(railsim.load_vehicle('coach_manchester'),"
+        "railsim.load_track('straight'), speed=20.0, until=1.0);"
+    )
+
+    def seen(before="", **variables):
+        environment = os.environ | variables
+        return subprocess.run(
+            [sys.executable, "-c", before + look],
+            env=environment, capture_output=True, text=True, check=True,
+        ).stdout.strip()
+
+    assert seen(compile_it) == "True"
+    assert seen(RAILSIM_CACHE_DIR=str(tmp_path)) == "False"
+    assert seen(RAILSIM_CACHE_DIR="/dev/null/none") == "True"  # every process compiles for itself
+    assert seen(NUMBA_DISABLE_JIT="1") == "True"
 
 
 def begun(folder):
