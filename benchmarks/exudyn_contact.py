@@ -11,9 +11,10 @@ from math import asin, atan2, cos, sin
 import numba
 import numpy as np
 
-from railsim.kernels.rhs import kinematics
+from railsim.kernels.rhs import kinematics, locate_frames
 from railsim.kernels.status import RUNNING
-from railsim.kernels.track_frame import OMEGA, track_frame
+from railsim.kernels.system import Y_0, Z_0
+from railsim.kernels.track_frame import OMEGA
 from railsim.kernels.wheel_rail import W_Q, W_Y, wheel_rail
 
 HOLD_STIFFNESS, HOLD_DAMPING = 1e7, 1e6  # N/m, N s/m: keeps the car body at V t
@@ -66,11 +67,9 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
     s = speed * t
     for k in range(forces.shape[0]):
         forces[k] = 0.0
-    for f in range(system.frame_offset.shape[0]):
-        work.cell[f], work.cell_u[f] = track_frame(system.track, s + system.frame_offset[f], 0.0,
-                                                   work.frames, f)
-        if work.cell[f] < 0:
-            return -1
+    if locate_frames(system.track, system.frame_offset, -1, s, work.frames, work.cell,
+                     work.cell_u) != RUNNING:
+        return -1
     angles = np.empty(6)
     for b in range(n):
         for k in range(6):
@@ -98,8 +97,8 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
         w1, w2, w3 = speed * frame[OMEGA], speed * frame[OMEGA + 1], speed * frame[OMEGA + 2]
         roll, yaw = asin(e[2]), atan2(-e[0], e[1])
         state[6 * b] = r[0]
-        state[6 * b + 1] = r[1] - bodies.nominal[b, 0]
-        state[6 * b + 2] = r[2] - bodies.nominal[b, 1]
+        state[6 * b + 1] = r[1] - bodies.row[b, Y_0]
+        state[6 * b + 2] = r[2] - bodies.row[b, Z_0]
         state[6 * b + 3] = roll
         state[6 * b + 4] = 0.0
         state[6 * b + 5] = yaw
@@ -111,8 +110,7 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
         state[j + 3] = cy * u[0] + sy * u[1]
         state[j + 4] = -sy * cr * u[0] + cy * cr * u[1] + sr * u[2]
         state[j + 5] = sy * sr * u[0] - cy * sr * u[1] + cr * u[2]
-    kinematics(bodies, work.frames, speed, state, work.S, work.C, work.R, work.X, work.V, work.W,
-               work.acceleration)
+    kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     status, _, _ = wheel_rail(system, work, speed, state)
     if status != RUNNING:
         return status

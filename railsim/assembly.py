@@ -22,14 +22,19 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.element_arrays import ElementArrays
 from railsim.errors import ModelError
+from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.creep import LAW_NUMBERS
 from railsim.kernels.fastsim import fastsim_workspace
+from railsim.kernels.lanes import LANES
 from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
     FREE,
     N_SCALARS,
+    POSE_SIZE,
+    RATES_SIZE,
+    RELATIVE_SIZE,
     RIGID,
     TABLE,
     WHEELSET,
@@ -177,33 +182,28 @@ def work_arrays(system: System) -> Work:
     n_patches = 2 * N_PATCH * n_wheelsets
     n_frames = len(system.frame_offset)
     return Work(
-        frames=np.zeros((n_frames, FRAME_SIZE)),
-        cell=np.zeros(n_frames, dtype=np.int64),
-        cell_u=np.zeros(n_frames),
-        R=np.zeros((n, 9)),
-        X=np.zeros((n, 3)),
-        V=np.zeros((n, 3)),
-        W=np.zeros((n, 3)),
-        F=np.zeros((n, 3)),
-        M=np.zeros((n, 3)),
-        S=np.zeros((n, 5)),
-        C=np.zeros((n, 9)),
-        rail_force=np.zeros((n, 6)),
-        acceleration=np.zeros((n, 6)),
-        drive=np.zeros((len(system.internal.kind), 2)),
-        decay=np.zeros(len(system.internal.kind)),
-        contact_jacobian=np.zeros((n, CONTACT_JACOBIAN)),
-        look_up=np.zeros(N_PATCH * LOOK_UP_SIZE),
-        weights=np.zeros(N_WEIGHT),
-        stiffness=np.zeros(N_PATCH),
-        approach=np.zeros(N_PATCH),
-        rail=np.zeros(4),
-        patch_index=np.zeros((n_patches, 3), dtype=np.int64),
-        patch=np.zeros((PATCH_ROWS, n_patches)),
+        frames=aligned_zeros((n_frames, FRAME_SIZE)),
+        cell=aligned_zeros(n_frames, np.int64),
+        cell_u=aligned_zeros(n_frames),
+        pose=aligned_zeros((n, POSE_SIZE)),
+        relative=aligned_zeros((n, RELATIVE_SIZE)),
+        rail_force=aligned_zeros((n, RATES_SIZE)),
+        acceleration=aligned_zeros((n, RATES_SIZE)),
+        drive=aligned_zeros((len(system.internal.kind), 2)),
+        laws=aligned_zeros(9 * LANES),
+        decay=aligned_zeros(len(system.internal.kind)),
+        contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
+        look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
+        weights=aligned_zeros(N_WEIGHT),
+        stiffness=aligned_zeros(N_PATCH),
+        approach=aligned_zeros(N_PATCH),
+        rail=aligned_zeros(4),
+        patch_index=aligned_zeros((n_patches, 3), np.int64),
+        patch=aligned_zeros((PATCH_ROWS, n_patches)),
         fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
-        offsets=np.zeros(16, dtype=np.int64),
-        events=np.zeros((n_wheelsets, 2), dtype=np.int64),
-        wheel=np.zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
+        offsets=aligned_zeros(16, np.int64),
+        events=aligned_zeros((n_wheelsets, 2), np.int64),
+        wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
     )
 
 
@@ -253,34 +253,34 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     origin = flat.body(flat.reference).position[0]
     places = [round(body.position[0] - origin, 9) for body in flat.bodies]
     offsets = sorted(set(places))
+    kinds = np.array([_KINDS[body.kind] for body in flat.bodies], dtype=np.int64)
     bodies = Bodies(
-        kind=np.array([_KINDS[body.kind] for body in flat.bodies], dtype=np.int64),
+        kind=kinds,
         frame=np.array([offsets.index(place) for place in places], dtype=np.int64),
         parent=np.array(
             [names.index(body.parent) if body.parent else -1 for body in flat.bodies],
             dtype=np.int64,
         ),
-        mass=np.array([max(body.mass, 1e-9) for body in flat.bodies]),
-        inertia=np.array([_inertia(body) for body in flat.bodies]),
-        nominal=np.array([[body.position[1], body.position[2]] for body in flat.bodies]),
-        radius=np.array([_nominal_radius(body) for body in flat.bodies]),
+        row=aligned(np.array([_body_row(body) for body in flat.bodies])),
+        whole=np.flatnonzero(kinds != AXLEBOX),
+        axleboxes=np.flatnonzero(kinds == AXLEBOX),
         references=np.array([names.index(flat.reference)], dtype=np.int64),
     )
     return bodies, np.array(offsets)
 
 
-def _inertia(body: FlatBody) -> tuple[float, float, float]:
-    return (1.0, body.pitch_inertia, 1.0) if body.kind == "axlebox" else body.inertia
-
-
-def _nominal_radius(body: FlatBody) -> float:
-    return 0.5 * sum(body.wheelset.radius) if body.wheelset else 1.0
+def _body_row(body: FlatBody) -> tuple[float, ...]:
+    inertia = (1.0, body.pitch_inertia, 1.0) if body.kind == "axlebox" else body.inertia
+    radius = 0.5 * sum(body.wheelset.radius) if body.wheelset else 1.0
+    return (max(body.mass, 1e-9), *inertia, body.position[1], body.position[2], radius,
+            float(body.wheelset is not None))
 
 
 def side_by_side(tables: Sequence[Floats]) -> Floats:
     """Contact tables as one array; a single one as it lies in memory (or on disk)."""
     values = tables[0][None] if len(tables) == 1 else np.stack(tables)
-    values = np.ascontiguousarray(values, dtype=float)
+    if values.ctypes.data % CACHE_LINE:
+        values = aligned(values)
     # as on disk: for an array that can be written to the time loop would be compiled anew
     values.setflags(write=False)
     return values

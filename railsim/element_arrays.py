@@ -26,8 +26,16 @@ from railsim.definitions.elements import (
 )
 from railsim.definitions.flatten import FlatBody, FlatElement
 from railsim.errors import ModelError
+from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
-from railsim.kernels.system import Curves, Links, Loads, Mounts
+from railsim.kernels.system import (
+    LINK_SIZE,
+    MOUNT_SIZE,
+    Curves,
+    Links,
+    Loads,
+    Mounts,
+)
 
 Floats = NDArray[np.float64]
 Rows = tuple[tuple[float, float], ...]
@@ -139,6 +147,8 @@ class ElementArrays:
         row |= self._law(law)
         if any(row["rotation"]) or any(row["rotation_damping"]):
             row["flags"] = (*row["flags"][:2], 1, row["flags"][3])
+        translates, both_ends = row["flags"][:2]
+        row["share"] = (0.5, 0.5) if both_ends else (float(translates), 0.0)
         self.mount_rows.append(row)
 
     def _law(self, law: Element) -> dict[str, Any]:
@@ -242,9 +252,7 @@ class ElementArrays:
         rows = self.link_rows
         return Links(
             body=_column(rows, "body", (2,), np.int64),
-            point=_column(rows, "point", (2, 3)),
-            length=_column(rows, "length", ()),
-            spring=_column(rows, "spring", (3,)),
+            row=_table(rows, ("point", "length", "spring"), LINK_SIZE),
             internal=_column(rows, "internal", (), np.int64),
             curve=_column(rows, "curve", (2,), np.int64),
         )
@@ -252,14 +260,14 @@ class ElementArrays:
     def mounts(self) -> Mounts:
         """Arrays of all three-axis elements."""
         rows = self.mount_rows
-        floats = ("stiffness", "damping", "preload", "rotation", "rotation_damping")
+        floats = ("point", "share", "stiffness", "damping", "preload", "rotation",
+                  "rotation_damping")
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
         special = ((internal >= 0) | (curve >= 0)).any(axis=1).astype(np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
-            point=_column(rows, "point", (2, 3)),
-            **{key: _column(rows, key, (3,)) for key in floats},
+            row=_table(rows, floats, MOUNT_SIZE),
             friction=_column(rows, "friction", (3, 2)),
             internal=internal,
             curve=curve,
@@ -304,6 +312,15 @@ def _given(preload: Any) -> Triple:
 
 def _starts(tables: Sequence[Floats]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum([len(table) for table in tables])]).astype(np.int64)
+
+
+def _table(rows: list[dict[str, Any]], keys: Sequence[str], size: int) -> Floats:
+    """Values of all keys side by side, one row an element."""
+    values = [np.concatenate([np.ravel(row[key]) for key in keys]) for row in rows]
+    table = aligned_zeros((len(rows), size))
+    if rows:
+        table[:, : len(values[0])] = values
+    return table
 
 
 def _column(

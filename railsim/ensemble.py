@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.assembly import Model, side_by_side
+from railsim.kernels.aligned import aligned
 from railsim.kernels.element_outputs import LINK, MOUNT
 from railsim.kernels.status import (
     DERAILED,
@@ -173,7 +174,8 @@ def joined_system(models: Sequence[Model]) -> System:
 
 
 def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bodies:
-    joint = _joined([system.bodies for system in systems], parent=first, references=first)
+    joint = _joined([system.bodies for system in systems], parent=first, references=first,
+                    whole=first, axleboxes=first)
     frames = [
         np.searchsorted(offset, system.frame_offset)[system.bodies.frame] for system in systems
     ]
@@ -238,7 +240,7 @@ def _joined(groups: Sequence[Group], **shifts: Ints) -> Group:
 
     kind: Any = type(groups[0])
     joint: Group = kind(*(
-        np.concatenate([shifted(name, array, k) for k, array in enumerate(arrays)])
+        aligned(np.concatenate([shifted(name, array, k) for k, array in enumerate(arrays)]))
         for name, arrays in zip(kind._fields, zip(*groups, strict=True), strict=True)
     ))
     return joint

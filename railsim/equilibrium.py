@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from railsim.assembly import Model, level_track, work_arrays
 from railsim.element_arrays import vertical_support
 from railsim.errors import ModelError
+from railsim.kernels.aligned import aligned
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
@@ -100,16 +101,11 @@ def with_preloads(model: Model) -> Model:
     scaled, *_ = np.linalg.lstsq(matrix * scale, right_side, rcond=1e-10)
     values = scaled * scale
     _check_balance(model, conditions, matrix @ values - right_side)
-    spring = system.links.spring.copy()
-    preload = system.mounts.preload.copy()
+    links = system.links._replace(row=aligned(system.links.row))
+    mounts = system.mounts._replace(row=aligned(system.mounts.row))
     for (group, element), value in zip(unknowns, values, strict=True):
-        if group == "links":
-            spring[element, 2] = value
-        else:
-            preload[element, 2] = value
-    filled = system._replace(
-        links=system.links._replace(spring=spring), mounts=system.mounts._replace(preload=preload)
-    )
+        _set_preload(links, mounts, group, element, value)
+    filled = system._replace(links=links, mounts=mounts)
     return Model(filled, model.index, model.flat, model.tables, model.profiles)
 
 
@@ -146,14 +142,17 @@ def _load(system: System, body: int, component: int) -> float:
 
 
 def _with_unit_preload(system: System, group: str, element: int) -> tuple[Links, Mounts]:
-    spring = system.links.spring.copy()
-    preload = np.zeros_like(system.mounts.preload)
-    spring[:, 2] = 0.0
-    if group == "links":
-        spring[element, 2] = 1.0
-    else:
-        preload[element, 2] = 1.0
-    return system.links._replace(spring=spring), system.mounts._replace(preload=preload)
+    links = system.links._replace(row=aligned(system.links.row))
+    mounts = system.mounts._replace(row=aligned(system.mounts.row))
+    links.spring[:, 2] = 0.0
+    mounts.preload[:] = 0.0
+    _set_preload(links, mounts, group, element, 1.0)
+    return links, mounts
+
+
+def _set_preload(links: Links, mounts: Mounts, group: str, element: int, value: float) -> None:
+    preload = links.spring if group == "links" else mounts.preload
+    preload[element, 2] = value
 
 
 def _preload_forces(

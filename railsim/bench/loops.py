@@ -59,8 +59,8 @@ def many_frames(system, work, state, derivative, n):
 def many_kinematics(system, work, state, derivative, n):
     """Positions, attitudes and velocities of all bodies."""
     for _ in range(n):
-        kinematics(system.bodies, work.frames, state[-1], state, work.S, work.C, work.R, work.X,
-                   work.V, work.W, work.acceleration)
+        kinematics(system.bodies, work.frames, state[-1], state, work.relative, work.pose,
+                   work.acceleration)
 
 
 @jit
@@ -69,8 +69,7 @@ def many_links(system, work, state, derivative, n):
     first = 12 * system.bodies.kind.shape[0]
     inner = state[first:first + system.internal.kind.shape[0]]
     for _ in range(n):
-        link_forces(system.links, system.curves, inner, work.drive, work.R, work.X, work.V, work.W,
-                    work.F, work.M)
+        link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
 
 
 @jit
@@ -79,8 +78,8 @@ def many_mounts(system, work, state, derivative, n):
     first = 12 * system.bodies.kind.shape[0]
     inner = state[first:first + system.internal.kind.shape[0]]
     for _ in range(n):
-        mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.R,
-                     work.X, work.V, work.W, work.F, work.M)
+        mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.laws,
+                     work.pose)
 
 
 @jit
@@ -130,8 +129,8 @@ def many_creep_forces(system, work, state, patches, n):
 def many_dynamics(system, work, state, derivative, n):
     """Accelerations of all bodies."""
     for _ in range(n):
-        dynamics(system.bodies, work.frames, state[-1], system.gravity, state, work.C, work.R,
-                 work.F, work.M, work.rail_force, work.acceleration, derivative)
+        dynamics(system.bodies, work.frames, state[-1], system.gravity, state, work.relative,
+                 work.pose, work.rail_force, work.acceleration, derivative)
 
 
 @jit

@@ -19,8 +19,8 @@ from railsim.time_step import empty_recorder
 
 Floats = NDArray[np.float64]
 GRIDS = (5, 10, 20, 50)
-REPETITIONS = 200
-CALLS = 50  # evaluations in one repetition: some 200 us
+REPETITIONS = 50
+CALLS = 1000  # evaluations in one repetition: taking a System apart for a call is 10 us
 PATCHES = 10
 
 # part, and the names of the loops that measure it

@@ -6,8 +6,23 @@ The laws are those of `elements`, evaluated again at the recorded state.
 from math import sqrt
 
 from railsim.kernels import jit, jit_internal
-from railsim.kernels.elements import axis_force
+from railsim.kernels.elements import axis_law, pad_load
 from railsim.kernels.internal import curve_value
+from railsim.kernels.system import (
+    ANGULAR,
+    DAMPING,
+    DAMPING_X,
+    LENGTH,
+    POSITION,
+    PRELOAD,
+    PRELOAD_X,
+    ROTATION_DAMPING_X,
+    ROTATION_X,
+    STIFFNESS,
+    STIFFNESS_X,
+    TRANSLATES,
+    VELOCITY,
+)
 
 LINK, MOUNT = range(2)
 
@@ -30,36 +45,32 @@ def element_outputs(system, work, inner, chosen, out):
 
 
 @jit
-def end_point(work, b, x, y, z):
-    """Position and velocity of a point of body `b`, global axes."""
-    R = work.R
-    px = R[b, 0] * x + R[b, 1] * y + R[b, 2] * z
-    py = R[b, 3] * x + R[b, 4] * y + R[b, 5] * z
-    pz = R[b, 6] * x + R[b, 7] * y + R[b, 8] * z
-    W = work.W
+def end_point(pose, b, row, e, point):
+    """Position and velocity of a point of body `b`, given in row `e` from `point` on; global."""
+    x, y, z = row[e, point], row[e, point + 1], row[e, point + 2]
+    px = pose[b, 0] * x + pose[b, 1] * y + pose[b, 2] * z
+    py = pose[b, 3] * x + pose[b, 4] * y + pose[b, 5] * z
+    pz = pose[b, 6] * x + pose[b, 7] * y + pose[b, 8] * z
+    w1, w2, w3 = pose[b, ANGULAR], pose[b, ANGULAR + 1], pose[b, ANGULAR + 2]
     return (
-        work.X[b, 0] + px, work.X[b, 1] + py, work.X[b, 2] + pz,
-        work.V[b, 0] + W[b, 1] * pz - W[b, 2] * py,
-        work.V[b, 1] + W[b, 2] * px - W[b, 0] * pz,
-        work.V[b, 2] + W[b, 0] * py - W[b, 1] * px,
+        pose[b, POSITION] + px, pose[b, POSITION + 1] + py, pose[b, POSITION + 2] + pz,
+        pose[b, VELOCITY] + w2 * pz - w3 * py,
+        pose[b, VELOCITY + 1] + w3 * px - w1 * pz,
+        pose[b, VELOCITY + 2] + w1 * py - w2 * px,
     )
 
 
 @jit_internal
 def link_output(system, work, inner, index, e, out):
     """Elongation, force (tension positive) and power of a link."""
-    links, curves = system.links, system.curves
-    p, q = links.point, links.body
-    x1, y1, z1, u1, v1, w1 = end_point(work, q[index, 0], p[index, 0, 0], p[index, 0, 1],
-                                       p[index, 0, 2])
-    x2, y2, z2, u2, v2, w2 = end_point(work, q[index, 1], p[index, 1, 0], p[index, 1, 1],
-                                       p[index, 1, 2])
+    links, curves, row = system.links, system.curves, system.links.row
+    x1, y1, z1, u1, v1, w1 = end_point(work.pose, links.body[index, 0], row, index, 0)
+    x2, y2, z2, u2, v2, w2 = end_point(work.pose, links.body[index, 1], row, index, 3)
     dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
     length = sqrt(dx * dx + dy * dy + dz * dz)
     rate = (dx * (u2 - u1) + dy * (v2 - v1) + dz * (w2 - w1)) / length
-    elongation = length - links.length[index]
-    spring = links.spring
-    force = spring[index, 2] + spring[index, 0] * elongation + spring[index, 1] * rate
+    elongation = length - row[index, LENGTH]
+    force = row[index, PRELOAD] + row[index, STIFFNESS] * elongation + row[index, DAMPING] * rate
     if links.internal[index] >= 0:
         force += inner[links.internal[index]]
     if links.curve[index, 0] >= 0:
@@ -76,44 +87,45 @@ def mount_output(system, work, inner, index, e, out):
     """Deflections, angles, forces, moments (on body 1, its axes) and power of a mount."""
     mounts, curves, internal = system.mounts, system.curves, system.internal
     i, j = mounts.body[index, 0], mounts.body[index, 1]
-    R, W = work.R, work.W
-    p = mounts.point
-    x1, y1, z1, _, _, _ = end_point(work, i, p[index, 0, 0], p[index, 0, 1], p[index, 0, 2])
-    x2, y2, z2, u2, v2, w2 = end_point(work, j, p[index, 1, 0], p[index, 1, 1], p[index, 1, 2])
+    pose, row = work.pose, mounts.row
+    x1, y1, z1, u1, v1, w1 = end_point(pose, i, row, index, 0)
+    x2, y2, z2, u2, v2, w2 = end_point(pose, j, row, index, 3)
     gx, gy, gz = x2 - x1, y2 - y1, z2 - z1
-    lx, ly, lz = x2 - work.X[i, 0], y2 - work.X[i, 1], z2 - work.X[i, 2]
-    vx = u2 - work.V[i, 0] - W[i, 1] * lz + W[i, 2] * ly
-    vy = v2 - work.V[i, 1] - W[i, 2] * lx + W[i, 0] * lz
-    vz = w2 - work.V[i, 2] - W[i, 0] * ly + W[i, 1] * lx
-    if mounts.flags[index, 0]:
-        normal = 0.0
-        if mounts.flags[index, 3]:
-            d = R[i, 2] * gx + R[i, 5] * gy + R[i, 8] * gz
-            normal = mounts.preload[index, 2] + mounts.stiffness[index, 2] * d
+    a1, a2, a3 = pose[i, ANGULAR], pose[i, ANGULAR + 1], pose[i, ANGULAR + 2]
+    vx = u2 - u1 - a2 * gz + a3 * gy
+    vy = v2 - v1 - a3 * gx + a1 * gz
+    vz = w2 - w1 - a1 * gy + a2 * gx
+    if mounts.flags[index, TRANSLATES]:
+        normal = pad_load(mounts, index, pose[i, 2] * gx + pose[i, 5] * gy + pose[i, 8] * gz)
         for k in range(3):
-            d = R[i, k] * gx + R[i, 3 + k] * gy + R[i, 6 + k] * gz
-            rate = R[i, k] * vx + R[i, 3 + k] * vy + R[i, 6 + k] * vz
-            force = axis_force(mounts, internal, curves, index, k, d, rate, normal, inner,
-                               work.drive)
+            d = pose[i, k] * gx + pose[i, 3 + k] * gy + pose[i, 6 + k] * gz
+            rate = pose[i, k] * vx + pose[i, 3 + k] * vy + pose[i, 6 + k] * vz
+            force = (row[index, PRELOAD_X + k] + row[index, STIFFNESS_X + k] * d
+                     + row[index, DAMPING_X + k] * rate
+                     + axis_law(mounts, internal, curves, index, k, d, rate, normal, inner,
+                                work.drive))
             out[e, DEFLECTION + k] = d
             out[e, FORCE + k] = force
             out[e, POWER] += force * rate
-    rotation_output(mounts, index, i, j, R, W, e, out)
+    rotation_output(row, index, i, j, pose, e, out)
 
 
 @jit_internal
-def rotation_output(mounts, index, i, j, R, W, e, out):
+def rotation_output(row, index, i, j, pose, e, out):
     """Angles (antisymmetric part of R_1^T R_2), moments and their power."""
-    k = mounts.rotation
-    wx, wy, wz = W[j, 0] - W[i, 0], W[j, 1] - W[i, 1], W[j, 2] - W[i, 2]
+    wx = pose[j, ANGULAR] - pose[i, ANGULAR]
+    wy = pose[j, ANGULAR + 1] - pose[i, ANGULAR + 1]
+    wz = pose[j, ANGULAR + 2] - pose[i, ANGULAR + 2]
     for axis in range(3):
         a, b = (axis + 1) % 3, (axis + 2) % 3
-        r_ba = R[i, b] * R[j, a] + R[i, 3 + b] * R[j, 3 + a] + R[i, 6 + b] * R[j, 6 + a]
-        r_ab = R[i, a] * R[j, b] + R[i, 3 + a] * R[j, 3 + b] + R[i, 6 + a] * R[j, 6 + b]
+        r_ba, r_ab = 0.0, 0.0
+        for k in range(0, 9, 3):
+            r_ba += pose[i, k + b] * pose[j, k + a]
+            r_ab += pose[i, k + a] * pose[j, k + b]
         # m_axis = K_a R_ba - K_b R_ab in the order of `elements.rotation_moment`
-        rate = R[i, axis] * wx + R[i, 3 + axis] * wy + R[i, 6 + axis] * wz
-        moment = (k[index, a] * r_ba - k[index, b] * r_ab
-                  + mounts.rotation_damping[index, axis] * rate)
+        rate = pose[i, axis] * wx + pose[i, 3 + axis] * wy + pose[i, 6 + axis] * wz
+        moment = (row[index, ROTATION_X + a] * r_ba - row[index, ROTATION_X + b] * r_ab
+                  + row[index, ROTATION_DAMPING_X + axis] * rate)
         out[e, ANGLE + axis] = 0.5 * (r_ba - r_ab)
         out[e, MOMENT + axis] = moment
         out[e, POWER] += moment * rate

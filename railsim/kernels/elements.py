@@ -16,70 +16,121 @@ force times rate.  Dampers with a series stiffness, friction pads and air spring
 states (see `internal`).
 """
 
-from math import sqrt
-
-from railsim.kernels import jit_inline, jit_internal
+from railsim.kernels import jit_inline, jit_internal, jit_merged
 from railsim.kernels.internal import AIR, PAD, curve_value
+from railsim.kernels.lanes import (
+    LANES,
+    add_to_pairs,
+    eight_from,
+    load_lanes,
+    load_rows,
+    spread,
+    square_root,
+    starts,
+    store_lanes,
+)
+from railsim.kernels.rotation import cross, turned, turned_back
+from railsim.kernels.system import (
+    BOTH_ENDS,
+    FORCE,
+    FRICTION,
+    LINK_SIZE,
+    MOUNT_SIZE,
+    POSE_SIZE,
+    PRELOAD_Z,
+    PUSH,
+    ROTATES,
+    SPECIAL,
+    STIFFNESS_Z,
+)
 
 
 @jit_inline
-def push_pair(F, M, i, j, ax, ay, az, bx, by, bz, fx, fy, fz):
-    """Put a force on body `i` at the arm a from its centre, the opposite on body `j` at b."""
-    F[i, 0] += fx
-    F[i, 1] += fy
-    F[i, 2] += fz
-    M[i, 0] += ay * fz - az * fy
-    M[i, 1] += az * fx - ax * fz
-    M[i, 2] += ax * fy - ay * fx
-    F[j, 0] -= fx
-    F[j, 1] -= fy
-    F[j, 2] -= fz
-    M[j, 0] -= by * fz - bz * fy
-    M[j, 1] -= bz * fx - bx * fz
-    M[j, 2] -= bx * fy - by * fx
+def end_of(body, end, which):
+    """Where the rows in `Work.pose` of one end's bodies start, for eight elements."""
+    return (body[which[0], end] * POSE_SIZE, body[which[1], end] * POSE_SIZE,
+            body[which[2], end] * POSE_SIZE, body[which[3], end] * POSE_SIZE,
+            body[which[4], end] * POSE_SIZE, body[which[5], end] * POSE_SIZE,
+            body[which[6], end] * POSE_SIZE, body[which[7], end] * POSE_SIZE)
 
 
-@jit_internal
-def link_forces(links, curves, inner, drive, R, X, V, W, F, M):
-    """Add the forces of all point-to-point elements to `F`, `M`."""
-    for e in range(links.body.shape[0]):
-        i, j = links.body[e, 0], links.body[e, 1]
-        px, py, pz = links.point[e, 0, 0], links.point[e, 0, 1], links.point[e, 0, 2]
-        ax = R[i, 0] * px + R[i, 1] * py + R[i, 2] * pz
-        ay = R[i, 3] * px + R[i, 4] * py + R[i, 5] * pz
-        az = R[i, 6] * px + R[i, 7] * py + R[i, 8] * pz
-        px, py, pz = links.point[e, 1, 0], links.point[e, 1, 1], links.point[e, 1, 2]
-        bx = R[j, 0] * px + R[j, 1] * py + R[j, 2] * pz
-        by = R[j, 3] * px + R[j, 4] * py + R[j, 5] * pz
-        bz = R[j, 6] * px + R[j, 7] * py + R[j, 8] * pz
-        dx = X[j, 0] + bx - X[i, 0] - ax
-        dy = X[j, 1] + by - X[i, 1] - ay
-        dz = X[j, 2] + bz - X[i, 2] - az
-        length = sqrt(dx * dx + dy * dy + dz * dz)
-        nx, ny, nz = dx / length, dy / length, dz / length
-        rate = (
-            nx * (V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * az + W[i, 2] * ay)
-            + ny * (V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * ax + W[i, 0] * az)
-            + nz * (V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ay + W[i, 1] * ax)
-        )
-        elongation = length - links.length[e]
-        force = (links.spring[e, 2] + links.spring[e, 0] * elongation + links.spring[e, 1] * rate)
+@jit_inline
+def motion_of(pose, rows):
+    """Attitude, position, velocity and angular velocity of eight bodies."""
+    r0, r1, r2, r3, r4, r5, r6, r7 = load_rows(pose, rows, 0, 8)
+    r8, x, y, z, vx, vy, vz, w1 = load_rows(pose, rows, 8, 8)
+    w2, w3 = load_rows(pose, rows, 16, 2)
+    return (r0, r1, r2, r3, r4, r5, r6, r7, r8), (x, y, z), (vx, vy, vz), (w1, w2, w3)
+
+
+@jit_inline
+def gap(pose, one, two, x1, y1, z1, x2, y2, z2):
+    """Attitudes and angular velocities of both bodies, arms, distance of the points and its rate.
+
+    Arms a, b from the centres to the points, the vector g between the points and its rate w, all in
+    global axes.
+    """
+    R1, X1, V1, W1 = motion_of(pose, one)
+    R2, X2, V2, W2 = motion_of(pose, two)
+    ax, ay, az = turned(R1, x1, y1, z1)
+    bx, by, bz = turned(R2, x2, y2, z2)
+    ux, uy, uz = cross(W1[0], W1[1], W1[2], ax, ay, az)
+    vx, vy, vz = cross(W2[0], W2[1], W2[2], bx, by, bz)
+    g = (X2[0] - X1[0] + bx - ax, X2[1] - X1[1] + by - ay, X2[2] - X1[2] + bz - az)
+    w = (V2[0] + vx - V1[0] - ux, V2[1] + vy - V1[1] - uy, V2[2] + vz - V1[2] - uz)
+    return R1, R2, W1, W2, (ax, ay, az), (bx, by, bz), g, w
+
+
+@jit_inline
+def link_laws(links, curves, first, n, inner, drive, laws):
+    """Forces of internal states and tables of `n` links; `laws`: elongations, rates, forces."""
+    for k in range(n):
+        e = first + k
+        rate = laws[LANES + k]
+        force = 0.0
         m = links.internal[e]
         if m >= 0:
             force += inner[m]
             drive[m, 0] = rate
         if links.curve[e, 0] >= 0:
-            force += curve_value(curves, links.curve[e, 0], elongation)
+            force += curve_value(curves, links.curve[e, 0], laws[k])
         if links.curve[e, 1] >= 0:
             force += curve_value(curves, links.curve[e, 1], rate)
+        laws[2 * LANES + k] = force
+
+
+@jit_merged
+def link_forces(links, curves, inner, drive, laws, pose):
+    """Add the forces of all point-to-point elements to the bodies' rows in `pose`."""
+    count = links.body.shape[0]
+    zero = spread(0.0)
+    for first in range(0, count, LANES):
+        n = min(count - first, LANES)
+        which = eight_from(first, count)
+        one, two = end_of(links.body, 0, which), end_of(links.body, 1, which)
+        row = starts(which, LINK_SIZE)
+        x1, y1, z1, x2, y2, z2, nominal, stiffness = load_rows(links.row, row, 0, 8)
+        damping, preload = load_rows(links.row, row, 8, 2)
+        _, _, _, _, a, b, g, w = gap(pose, one, two, x1, y1, z1, x2, y2, z2)
+        length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+        nx, ny, nz = g[0] / length, g[1] / length, g[2] / length
+        rate = nx * w[0] + ny * w[1] + nz * w[2]
+        elongation = length - nominal
+        store_lanes(laws, 0, elongation)
+        store_lanes(laws, LANES, rate)
+        link_laws(links, curves, first, n, inner, drive, laws)
+        force = preload + stiffness * elongation + damping * rate + load_lanes(laws, 2 * LANES)
         fx, fy, fz = force * nx, force * ny, force * nz
-        push_pair(F, M, i, j, ax, ay, az, bx, by, bz, fx, fy, fz)
+        m1, m2, m3 = cross(a[0], a[1], a[2], fx, fy, fz)
+        n1, n2, n3 = cross(b[0], b[1], b[2], fx, fy, fz)
+        add_to_pairs(pose, one, two, PUSH, (zero, zero, fx, fy, fz, m1, m2, m3),
+                     (zero, zero, -fx, -fy, -fz, -n1, -n2, -n3), n)
 
 
 @jit_inline
-def axis_force(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
-    """Force along axis `k` of mount `e` at deflection `d` and its rate; `normal` loads a pad."""
-    force = mounts.preload[e, k] + mounts.stiffness[e, k] * d + mounts.damping[e, k] * rate
+def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
+    """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
+    force = 0.0
     if mounts.curve[e, k] >= 0:
         force += curve_value(curves, mounts.curve[e, k], d)
     m = mounts.internal[e, k]
@@ -98,103 +149,102 @@ def axis_force(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
 
 
 @jit_inline
-def translation_force(mounts, internal, curves, e, i, j, inner, drive, R, X, V, W, F, M):
-    """Force of a mount in the axes of body `i`, of a shear spring half of it in those of `j`.
-
-    With the gap g = P_j - P_i and its global rate w, the deflection in a body's axes is R^T g, its
-    rate R^T (w - omega x g), and the gradient of the potential puts the moment g x f on the body
-    whose axes they are, besides the forces +-f at the points.
-    """
-    px, py, pz = mounts.point[e, 0, 0], mounts.point[e, 0, 1], mounts.point[e, 0, 2]
-    ax = R[i, 0] * px + R[i, 1] * py + R[i, 2] * pz
-    ay = R[i, 3] * px + R[i, 4] * py + R[i, 5] * pz
-    az = R[i, 6] * px + R[i, 7] * py + R[i, 8] * pz
-    px, py, pz = mounts.point[e, 1, 0], mounts.point[e, 1, 1], mounts.point[e, 1, 2]
-    bx = R[j, 0] * px + R[j, 1] * py + R[j, 2] * pz
-    by = R[j, 3] * px + R[j, 4] * py + R[j, 5] * pz
-    bz = R[j, 6] * px + R[j, 7] * py + R[j, 8] * pz
-    gx = X[j, 0] - X[i, 0] + bx - ax
-    gy = X[j, 1] - X[i, 1] + by - ay
-    gz = X[j, 2] - X[i, 2] + bz - az
-    wx = V[j, 0] + W[j, 1] * bz - W[j, 2] * by - V[i, 0] - W[i, 1] * az + W[i, 2] * ay
-    wy = V[j, 1] + W[j, 2] * bx - W[j, 0] * bz - V[i, 1] - W[i, 2] * ax + W[i, 0] * az
-    wz = V[j, 2] + W[j, 0] * by - W[j, 1] * bx - V[i, 2] - W[i, 0] * ay + W[i, 1] * ax
-    sx, sy, sz = 0.0, 0.0, 0.0
-    ends = 1 + mounts.flags[e, 1]
-    share = 1.0 / ends
-    for end in range(ends):
-        c = j if end else i
-        vx = wx - W[c, 1] * gz + W[c, 2] * gy
-        vy = wy - W[c, 2] * gx + W[c, 0] * gz
-        vz = wz - W[c, 0] * gy + W[c, 1] * gx
-        dx = R[c, 0] * gx + R[c, 3] * gy + R[c, 6] * gz
-        dy = R[c, 1] * gx + R[c, 4] * gy + R[c, 7] * gz
-        dz = R[c, 2] * gx + R[c, 5] * gy + R[c, 8] * gz
-        rx = R[c, 0] * vx + R[c, 3] * vy + R[c, 6] * vz
-        ry = R[c, 1] * vx + R[c, 4] * vy + R[c, 7] * vz
-        rz = R[c, 2] * vx + R[c, 5] * vy + R[c, 8] * vz
-        if mounts.flags[e, 4]:
-            normal = 0.0
-            if mounts.flags[e, 3]:
-                normal = mounts.preload[e, 2] + mounts.stiffness[e, 2] * dz
-            tx = axis_force(mounts, internal, curves, e, 0, dx, rx, normal, inner, drive)
-            ty = axis_force(mounts, internal, curves, e, 1, dy, ry, normal, inner, drive)
-            tz = axis_force(mounts, internal, curves, e, 2, dz, rz, normal, inner, drive)
-        else:
-            tx = mounts.preload[e, 0] + mounts.stiffness[e, 0] * dx + mounts.damping[e, 0] * rx
-            ty = mounts.preload[e, 1] + mounts.stiffness[e, 1] * dy + mounts.damping[e, 1] * ry
-            tz = mounts.preload[e, 2] + mounts.stiffness[e, 2] * dz + mounts.damping[e, 2] * rz
-        fx = share * (R[c, 0] * tx + R[c, 1] * ty + R[c, 2] * tz)
-        fy = share * (R[c, 3] * tx + R[c, 4] * ty + R[c, 5] * tz)
-        fz = share * (R[c, 6] * tx + R[c, 7] * ty + R[c, 8] * tz)
-        M[c, 0] += gy * fz - gz * fy
-        M[c, 1] += gz * fx - gx * fz
-        M[c, 2] += gx * fy - gy * fx
-        sx += fx
-        sy += fy
-        sz += fz
-    push_pair(F, M, i, j, ax, ay, az, bx, by, bz, sx, sy, sz)
+def pad_load(mounts, e, z):
+    """Vertical spring force that loads the friction pads of mount `e` at its deflection `z`."""
+    if mounts.flags[e, FRICTION]:
+        return mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
+    return 0.0
 
 
 @jit_inline
-def rotation_moment(mounts, e, i, j, R, W, M):
-    """Add the moment of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
-    k1, k2, k3 = mounts.rotation[e, 0], mounts.rotation[e, 1], mounts.rotation[e, 2]
-    c1 = mounts.rotation_damping[e, 0]
-    c2 = mounts.rotation_damping[e, 1]
-    c3 = mounts.rotation_damping[e, 2]
+def mount_laws(mounts, internal, curves, first, n, inner, drive, laws):
+    """Forces of internal states and tables of `n` mounts; `laws`: deflections, rates, forces."""
+    for lane in range(n):
+        e = first + lane
+        normal = pad_load(mounts, e, laws[2 * LANES + lane])
+        for k in range(3):
+            d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
+            laws[(6 + k) * LANES + lane] = axis_law(mounts, internal, curves, e, k, d, rate, normal,
+                                                    inner, drive)
+
+
+@jit_inline
+def in_axes_of(R, W, g, w):
+    """Deflection R^T g in a body's axes, and its rate R^T (w - omega x g)."""
+    x, y, z = cross(W[0], W[1], W[2], g[0], g[1], g[2])
+    return turned_back(R, g[0], g[1], g[2]), turned_back(R, w[0] - x, w[1] - y, w[2] - z)
+
+
+@jit_inline
+def rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3):
+    """Moment on body 1 of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
     # off-diagonal terms of R_1^T R_2
-    r12 = R[i, 0] * R[j, 1] + R[i, 3] * R[j, 4] + R[i, 6] * R[j, 7]
-    r13 = R[i, 0] * R[j, 2] + R[i, 3] * R[j, 5] + R[i, 6] * R[j, 8]
-    r21 = R[i, 1] * R[j, 0] + R[i, 4] * R[j, 3] + R[i, 7] * R[j, 6]
-    r23 = R[i, 1] * R[j, 2] + R[i, 4] * R[j, 5] + R[i, 7] * R[j, 8]
-    r31 = R[i, 2] * R[j, 0] + R[i, 5] * R[j, 3] + R[i, 8] * R[j, 6]
-    r32 = R[i, 2] * R[j, 1] + R[i, 5] * R[j, 4] + R[i, 8] * R[j, 7]
-    wx, wy, wz = W[j, 0] - W[i, 0], W[j, 1] - W[i, 1], W[j, 2] - W[i, 2]
-    # moment on body 1, in its axes
-    m1 = k2 * r32 - k3 * r23 + c1 * (R[i, 0] * wx + R[i, 3] * wy + R[i, 6] * wz)
-    m2 = k3 * r13 - k1 * r31 + c2 * (R[i, 1] * wx + R[i, 4] * wy + R[i, 7] * wz)
-    m3 = k1 * r21 - k2 * r12 + c3 * (R[i, 2] * wx + R[i, 5] * wy + R[i, 8] * wz)
-    mx = R[i, 0] * m1 + R[i, 1] * m2 + R[i, 2] * m3
-    my = R[i, 3] * m1 + R[i, 4] * m2 + R[i, 5] * m3
-    mz = R[i, 6] * m1 + R[i, 7] * m2 + R[i, 8] * m3
-    M[i, 0] += mx
-    M[i, 1] += my
-    M[i, 2] += mz
-    M[j, 0] -= mx
-    M[j, 1] -= my
-    M[j, 2] -= mz
+    r12 = R1[0] * R2[1] + R1[3] * R2[4] + R1[6] * R2[7]
+    r13 = R1[0] * R2[2] + R1[3] * R2[5] + R1[6] * R2[8]
+    r21 = R1[1] * R2[0] + R1[4] * R2[3] + R1[7] * R2[6]
+    r23 = R1[1] * R2[2] + R1[4] * R2[5] + R1[7] * R2[8]
+    r31 = R1[2] * R2[0] + R1[5] * R2[3] + R1[8] * R2[6]
+    r32 = R1[2] * R2[1] + R1[5] * R2[4] + R1[8] * R2[7]
+    wx, wy, wz = turned_back(R1, W2[0] - W1[0], W2[1] - W1[1], W2[2] - W1[2])
+    return turned(R1, k2 * r32 - k3 * r23 + c1 * wx, k3 * r13 - k1 * r31 + c2 * wy,
+                  k1 * r21 - k2 * r12 + c3 * wz)
 
 
-@jit_internal
-def mount_forces(mounts, internal, curves, inner, drive, R, X, V, W, F, M):
-    """Add the forces of all three-axis elements to `F`, `M`."""
-    for e in range(mounts.body.shape[0]):
-        i, j = mounts.body[e, 0], mounts.body[e, 1]
-        if mounts.flags[e, 0]:
-            translation_force(mounts, internal, curves, e, i, j, inner, drive, R, X, V, W, F, M)
-        if mounts.flags[e, 2]:
-            rotation_moment(mounts, e, i, j, R, W, M)
+@jit_merged
+def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
+    """Add the forces of all three-axis elements to the bodies' rows in `pose`.
+
+    The force acts in the axes of body 1, of a shear spring half of it in those of body 2.  The
+    gradient of the potential puts the moment g x f on the body whose axes they are, besides the
+    forces +-f at the points.
+    """
+    count = mounts.body.shape[0]
+    zero = spread(0.0)
+    for first in range(0, count, LANES):
+        n = min(count - first, LANES)
+        which = eight_from(first, count)
+        both_ends, rotates, special = 0, 0, 0
+        for e in range(first, first + n):
+            both_ends |= mounts.flags[e, BOTH_ENDS]
+            rotates |= mounts.flags[e, ROTATES]
+            special |= mounts.flags[e, SPECIAL]
+        one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
+        row = starts(which, MOUNT_SIZE)
+        x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(mounts.row, row, 0, 8)
+        kx, ky, kz, cx, cy, cz, fx_0, fy_0 = load_rows(mounts.row, row, 8, 8)
+        fz_0, k1, k2, k3, c1, c2, c3 = load_rows(mounts.row, row, 16, 7)
+        R1, R2, W1, W2, a, b, g, w = gap(pose, one, two, x1, y1, z1, x2, y2, z2)
+        d, rate = in_axes_of(R1, W1, g, w)
+        tx = fx_0 + kx * d[0] + cx * rate[0]
+        ty = fy_0 + ky * d[1] + cy * rate[1]
+        tz = fz_0 + kz * d[2] + cz * rate[2]
+        if special:
+            for k in range(3):
+                store_lanes(laws, k * LANES, d[k])
+                store_lanes(laws, (3 + k) * LANES, rate[k])
+            mount_laws(mounts, internal, curves, first, n, inner, drive, laws)
+            tx = tx + load_lanes(laws, 6 * LANES)
+            ty = ty + load_lanes(laws, 7 * LANES)
+            tz = tz + load_lanes(laws, 8 * LANES)
+        fx, fy, fz = turned(R1, share_1 * tx, share_1 * ty, share_1 * tz)
+        m1, m2, m3 = cross(g[0], g[1], g[2], fx, fy, fz)
+        n1, n2, n3 = spread(0.0), spread(0.0), spread(0.0)
+        if both_ends:
+            d, rate = in_axes_of(R2, W2, g, w)
+            sx, sy, sz = turned(R2, share_2 * (fx_0 + kx * d[0] + cx * rate[0]),
+                                share_2 * (fy_0 + ky * d[1] + cy * rate[1]),
+                                share_2 * (fz_0 + kz * d[2] + cz * rate[2]))
+            n1, n2, n3 = cross(g[0], g[1], g[2], sx, sy, sz)
+            fx, fy, fz = fx + sx, fy + sy, fz + sz
+        if rotates:
+            x, y, z = rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3)
+            m1, m2, m3 = m1 + x, m2 + y, m3 + z
+            n1, n2, n3 = n1 - x, n2 - y, n3 - z
+        x, y, z = cross(a[0], a[1], a[2], fx, fy, fz)
+        m1, m2, m3 = m1 + x, m2 + y, m3 + z
+        x, y, z = cross(b[0], b[1], b[2], fx, fy, fz)
+        add_to_pairs(pose, one, two, PUSH, (zero, zero, fx, fy, fz, m1, m2, m3),
+                     (zero, zero, -fx, -fy, -fz, n1 - x, n2 - y, n3 - z), n)
 
 
 @jit_internal
@@ -211,9 +261,9 @@ def load_component(table, first, last, time, k):
     return table[i, k] + share * (table[i + 1, k] - table[i, k])
 
 
-@jit_internal
-def load_forces(loads, time, bodies, frames, R, F, M):
-    """Add the given forces and torques at `time` to `F`, `M`."""
+@jit_merged
+def load_forces(loads, time, bodies, frames, pose):
+    """Add the given forces and torques at `time` to the bodies' rows in `pose`."""
     for e in range(loads.body.shape[0]):
         b = loads.body[e]
         first, last = loads.start[e], loads.start[e + 1]
@@ -224,9 +274,9 @@ def load_forces(loads, time, bodies, frames, R, F, M):
         f = bodies.frame[b]
         x, y, z = 0.0, 0.0, 0.0
         for k in range(3):
-            a1 = frames[f, 3 + k * 3] if in_track else R[b, 3 * k]
-            a2 = frames[f, 4 + k * 3] if in_track else R[b, 3 * k + 1]
-            a3 = frames[f, 5 + k * 3] if in_track else R[b, 3 * k + 2]
+            a1 = frames[f, 3 + k * 3] if in_track else pose[b, 3 * k]
+            a2 = frames[f, 4 + k * 3] if in_track else pose[b, 3 * k + 1]
+            a3 = frames[f, 5 + k * 3] if in_track else pose[b, 3 * k + 2]
             value = a1 * c1 + a2 * c2 + a3 * c3
             if k == 0:
                 x = value
@@ -235,17 +285,17 @@ def load_forces(loads, time, bodies, frames, R, F, M):
             else:
                 z = value
         if loads.flags[e, 0]:
-            M[b, 0] += x
-            M[b, 1] += y
-            M[b, 2] += z
+            pose[b, FORCE + 3] += x
+            pose[b, FORCE + 4] += y
+            pose[b, FORCE + 5] += z
             continue
         p1, p2, p3 = loads.point[e, 0], loads.point[e, 1], loads.point[e, 2]
-        lx = R[b, 0] * p1 + R[b, 1] * p2 + R[b, 2] * p3
-        ly = R[b, 3] * p1 + R[b, 4] * p2 + R[b, 5] * p3
-        lz = R[b, 6] * p1 + R[b, 7] * p2 + R[b, 8] * p3
-        F[b, 0] += x
-        F[b, 1] += y
-        F[b, 2] += z
-        M[b, 0] += ly * z - lz * y
-        M[b, 1] += lz * x - lx * z
-        M[b, 2] += lx * y - ly * x
+        lx = pose[b, 0] * p1 + pose[b, 1] * p2 + pose[b, 2] * p3
+        ly = pose[b, 3] * p1 + pose[b, 4] * p2 + pose[b, 5] * p3
+        lz = pose[b, 6] * p1 + pose[b, 7] * p2 + pose[b, 8] * p3
+        pose[b, FORCE] += x
+        pose[b, FORCE + 1] += y
+        pose[b, FORCE + 2] += z
+        pose[b, FORCE + 3] += ly * z - lz * y
+        pose[b, FORCE + 4] += lz * x - lx * z
+        pose[b, FORCE + 5] += lx * y - ly * x

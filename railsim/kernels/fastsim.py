@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import fastsim_simd, jit, jit_ordered
+from .aligned import aligned_zeros
 from .fastsim_simd import (
     BOUNDS,
     PER_L,
@@ -54,13 +55,10 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
     Returns
     -------
     work : ndarray, shape (WORK_ROWS, n_columns)
-        Starts on a cache line: the SIMD loads of an unaligned array cost a third more.
     """
     # eight more: the last block of patches runs over the last strip
     columns = max((n_patch * ny + 7) // 8 * 8 + 8, (max(nx, ny) + 7) // 8 * 8, 128)
-    block = np.zeros(WORK_ROWS * columns + 8)
-    first = -(block.ctypes.data // 8) % 8
-    work = block[first : first + WORK_ROWS * columns].reshape(WORK_ROWS, columns)
+    work = aligned_zeros((WORK_ROWS, columns))
     work[BOUNDS, :nx] = 1.0 - (1.0 - (2.0 * np.arange(nx) + 1.0) / nx) ** 2
     y = (2.0 * np.arange(ny) + 1.0 - ny) / ny
     l2 = 1.0 - y * y

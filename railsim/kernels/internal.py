@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_internal
+from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
 
 MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
 
@@ -144,7 +144,7 @@ def steady_value(internal, i, drive):
     return p[i, 0] * drive / (p[i, 0] + p[i, 1])
 
 
-@jit
+@jit_merged
 def internal_rate(internal, curves, i, x, drive, limit):
     """Time derivative of state `i`."""
     if internal.kind[i] == PAD:
@@ -170,7 +170,7 @@ def constant_decays(internal, h, decay):
             decay[i] = 0.0
 
 
-@jit
+@jit_inline
 def advanced(internal, curves, i, x, drive, limit, h, decay):
     """State `i` after a step `h` at constant drive."""
     if internal.kind[i] == PAD:

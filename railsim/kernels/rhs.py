@@ -21,21 +21,42 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from math import cos, sin
-
-from railsim.kernels import jit, jit_internal
+from railsim.kernels import jit, jit_inline, jit_merged
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
-from railsim.kernels.rotation import sine_cosine
+from railsim.kernels.lanes import (
+    LANES,
+    add_rows,
+    eight,
+    eight_of,
+    load_rows,
+    spread,
+    starts,
+    store_rows,
+)
+from railsim.kernels.rotation import product, sine_cosine_lanes, turned, turned_back
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
-from railsim.kernels.system import AXLEBOX, FREE, TABLE, WHEELSET
-from railsim.kernels.track_frame import GRAVITY, OMEGA, OMEGA_S, heading, track_frame
+from railsim.kernels.system import (
+    AXLEBOX,
+    BODY_SIZE,
+    FORCE,
+    FREE,
+    I_2,
+    POSE_SIZE,
+    PUSH,
+    RATES_SIZE,
+    RELATIVE_SIZE,
+    TABLE,
+    Y_0,
+    Z_0,
+)
+from railsim.kernels.track_frame import FRAME_SIZE, OMEGA, cell_of, track_frames
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@jit
+@jit_inline
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -43,209 +64,166 @@ def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     round-off of coordinates counted from the start of the track would be forces of micronewtons;
     and the angles between the frames are small, which makes their sines cheap.
     """
-    turn = heading(track, s + offset[origin])
     for f in range(offset.shape[0]):
-        cell[f], cell_u[f] = track_frame(track, s + offset[f], turn, frames, f)
+        cell[f], cell_u[f] = cell_of(track, s + offset[f])
         if cell[f] < 0:
             return END_OF_TRACK
-    x, y, z = frames[origin, 0], frames[origin, 1], frames[origin, 2]
-    sine, cosine = sin(turn), cos(turn)
-    for f in range(offset.shape[0]):
-        east, north = frames[f, 0] - x, frames[f, 1] - y
-        frames[f, 0] = cosine * east + sine * north
-        frames[f, 1] = cosine * north - sine * east
-        frames[f, 2] -= z
+    track_frames(track, cell, cell_u, origin, frames)
     return RUNNING
 
 
-@jit
-def euler_rates(kind, sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
+@jit_inline
+def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     """Rates of roll, pitch, yaw from the angular velocity relative to the frame, body axes.
 
-    A wheelset's axes do not turn with its pitch.
+    A wheelset's axes do not turn with its pitch: 0 and 1 stand for its sine and cosine.
     """
-    if kind != WHEELSET:
-        w1, w3 = cos_pitch * w1 + sin_pitch * w3, cos_pitch * w3 - sin_pitch * w1
-    yaw_rate = w3 / cos_roll
-    return w1, w2 - yaw_rate * sin_roll, yaw_rate
+    about_x = cos_pitch * w1 + sin_pitch * w3
+    yaw_rate = (cos_pitch * w3 - sin_pitch * w1) / cos_roll
+    return about_x, w2 - yaw_rate * sin_roll, yaw_rate
 
 
-@jit_internal
-def attitudes(bodies, state, S, C):
-    """C = Rz(yaw) Rx(roll) Ry(pitch) of all bodies but axleboxes; a wheelset's without Ry."""
-    for b in range(bodies.kind.shape[0]):
-        roll, pitch, yaw = state[6 * b + 3], state[6 * b + 4], state[6 * b + 5]
-        if bodies.kind[b] == WHEELSET:
-            pitch = 0.0
-        sr, cr = sine_cosine(roll)
-        sp, cp = sine_cosine(pitch)
-        sy, cy = sine_cosine(yaw)
-        S[b, 0], S[b, 1], S[b, 2], S[b, 3] = sr, cr, sp, cp
-        C[b, 0] = cy * cp - sy * sr * sp
-        C[b, 1] = -sy * cr
-        C[b, 2] = cy * sp + sy * sr * cp
-        C[b, 3] = sy * cp + cy * sr * sp
-        C[b, 4] = cy * cr
-        C[b, 5] = sy * sp - cy * sr * cp
-        C[b, 6] = -cr * sp
-        C[b, 7] = sr
-        C[b, 8] = cr * cp
-
-
-@jit
-def kinematics(bodies, frames, speed, state, S, C, R, X, V, W, rates):
+@jit_merged
+def kinematics(bodies, frames, speed, state, relative, pose, rates):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
     `rates` (columns 3 to 5: roll, pitch, yaw) is the array `Work.acceleration`, which keeps them
-    until the accelerations are known.
+    until the accelerations are known.  Forces and moments in `pose` are set to zero.
     """
     n = bodies.kind.shape[0]
-    attitudes(bodies, state, S, C)
-    for b in range(n):
-        if bodies.kind[b] == AXLEBOX:
-            axlebox_kinematics(b, bodies.parent[b], n, state, R, X, V, W, rates)
-            continue
-        f = bodies.frame[b]
-        for i in range(3):
-            a1, a2, a3 = frames[f, 3 + 3 * i], frames[f, 4 + 3 * i], frames[f, 5 + 3 * i]
-            R[b, 3 * i] = a1 * C[b, 0] + a2 * C[b, 3] + a3 * C[b, 6]
-            R[b, 3 * i + 1] = a1 * C[b, 1] + a2 * C[b, 4] + a3 * C[b, 7]
-            R[b, 3 * i + 2] = a1 * C[b, 2] + a2 * C[b, 5] + a3 * C[b, 8]
-        f1 = speed * frames[f, OMEGA]
-        f2 = speed * frames[f, OMEGA + 1]
-        f3 = speed * frames[f, OMEGA + 2]
-        v = 6 * n + 6 * b
-        u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
-        g1 = C[b, 0] * f1 + C[b, 3] * f2 + C[b, 6] * f3
-        g2 = C[b, 1] * f1 + C[b, 4] * f2 + C[b, 7] * f3
-        g3 = C[b, 2] * f1 + C[b, 5] * f2 + C[b, 8] * f3
-        r1, r2, r3 = euler_rates(bodies.kind[b], S[b, 0], S[b, 1], S[b, 2], S[b, 3],
-                                 u1 - g1, u2 - g2, u3 - g3)
-        if bodies.kind[b] == WHEELSET:
-            # elements sit on the axleboxes, which do not spin
-            u2 = g2 + r3 * S[b, 0]
-            r2 += speed / bodies.radius[b]
-        rates[b, 3], rates[b, 4], rates[b, 5] = r1, r2, r3
-        W[b, 0] = R[b, 0] * u1 + R[b, 1] * u2 + R[b, 2] * u3
-        W[b, 1] = R[b, 3] * u1 + R[b, 4] * u2 + R[b, 5] * u3
-        W[b, 2] = R[b, 6] * u1 + R[b, 7] * u2 + R[b, 8] * u3
-        x = state[6 * b]
-        y = state[6 * b + 1] + bodies.nominal[b, 0]
-        z = state[6 * b + 2] + bodies.nominal[b, 1]
-        v1 = speed + f2 * z - f3 * y + state[v]
-        v2 = f3 * x - f1 * z + state[v + 1]
-        v3 = f1 * y - f2 * x + state[v + 2]
-        for i in range(3):
-            a1, a2, a3 = frames[f, 3 + 3 * i], frames[f, 4 + 3 * i], frames[f, 5 + 3 * i]
-            X[b, i] = frames[f, i] + a1 * x + a2 * y + a3 * z
-            V[b, i] = a1 * v1 + a2 * v2 + a3 * v3
+    zero = spread(0.0)
+    for first in range(0, bodies.whole.shape[0], LANES):
+        own = eight(bodies.whole, first)
+        frame = starts(eight_of(bodies.frame, own), FRAME_SIZE)
+        x, y, z, roll, pitch, yaw = load_rows(state, starts(own, 6), 0, 6)
+        _, _, _, _, y_0, z_0, radius, spins = load_rows(bodies.row, starts(own, BODY_SIZE), 0, 8)
+        sr, cr = sine_cosine_lanes(roll)
+        sp, cp = sine_cosine_lanes(pitch * (1.0 - spins))
+        sy, cy = sine_cosine_lanes(yaw)
+        # C = Rz(yaw) Rx(roll) Ry(pitch)
+        C = (cy * cp - sy * sr * sp, -sy * cr, cy * sp + sy * sr * cp,
+             sy * cp + cy * sr * sp, cy * cr, sy * sp - cy * sr * cp,
+             -cr * sp, sr, cr * cp)
+        store_rows(relative, starts(own, RELATIVE_SIZE), 0, C[:8])
+        store_rows(relative, starts(own, RELATIVE_SIZE), 8, (C[8], sr, cr, sp, cp))
+        x_f, y_f, z_f, a0, a1, a2, a3, a4 = load_rows(frames, frame, 0, 8)
+        a5, a6, a7, a8, f1, f2, f3 = load_rows(frames, frame, 8, 7)
+        A = (a0, a1, a2, a3, a4, a5, a6, a7, a8)
+        R = product(A, C)
+        f1, f2, f3 = speed * f1, speed * f2, speed * f3
+        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
+        g1, g2, g3 = turned_back(C, f1, f2, f3)
+        r1, r2, r3 = euler_rates(sr, cr, sp, cp, u1 - g1, u2 - g2, u3 - g3)
+        # elements sit on the axleboxes, which do not spin
+        u2 = u2 + spins * (g2 + r3 * sr - u2)
+        store_rows(rates, starts(own, RATES_SIZE), 3, (r1, r2 + spins * (speed / radius), r3))
+        w1, w2, w3 = turned(R, u1, u2, u3)
+        y, z = y + y_0, z + z_0
+        px, py, pz = turned(A, x, y, z)
+        vx, vy, vz = turned(A, speed + f2 * z - f3 * y + vx, f3 * x - f1 * z + vy,
+                            f1 * y - f2 * x + vz)
+        place = starts(own, POSE_SIZE)
+        store_rows(pose, place, 0, R[:8])
+        store_rows(pose, place, 8, (R[8], x_f + px, y_f + py, z_f + pz, vx, vy, vz, w1))
+        store_rows(pose, place, 16, (w2, w3, zero, zero, zero, zero, zero, zero))
+    axlebox_kinematics(bodies, state, pose, rates)
 
 
-@jit_internal
-def axlebox_kinematics(b, p, n, state, R, X, V, W, rates):
-    """Pose of axlebox `b`: that of its wheelset `p`, turned by its own pitch about the axle."""
-    s, c = sine_cosine(state[6 * b + 4])
-    rate = state[6 * n + 6 * b + 4]
-    rates[b, 4] = rate
-    for i in range(3):
-        k = 3 * i
-        R[b, k] = c * R[p, k] - s * R[p, k + 2]
-        R[b, k + 1] = R[p, k + 1]
-        R[b, k + 2] = s * R[p, k] + c * R[p, k + 2]
-        X[b, i] = X[p, i]
-        V[b, i] = V[p, i]
-        W[b, i] = W[p, i] + R[p, k + 1] * rate
+@jit_inline
+def axlebox_kinematics(bodies, state, pose, rates):
+    """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
+    n = bodies.kind.shape[0]
+    zero = spread(0.0)
+    for first in range(0, bodies.axleboxes.shape[0], LANES):
+        own = eight(bodies.axleboxes, first)
+        carrier = starts(eight_of(bodies.parent, own), POSE_SIZE)
+        s, c = sine_cosine_lanes(load_rows(state, starts(own, 6), 4, 1)[0])
+        rate = load_rows(state, starts(own, 6), 6 * n + 4, 1)[0]
+        store_rows(rates, starts(own, RATES_SIZE), 4, (rate,))
+        r0, r1, r2, r3, r4, r5, r6, r7 = load_rows(pose, carrier, 0, 8)
+        r8, x, y, z, vx, vy, vz, w1 = load_rows(pose, carrier, 8, 8)
+        w2, w3 = load_rows(pose, carrier, 16, 2)
+        place = starts(own, POSE_SIZE)
+        store_rows(pose, place, 0, (c * r0 - s * r2, r1, s * r0 + c * r2, c * r3 - s * r5, r4,
+                                    s * r3 + c * r5, c * r6 - s * r8, r7))
+        store_rows(pose, place, 8, (s * r6 + c * r8, x, y, z, vx, vy, vz, w1 + r1 * rate))
+        store_rows(pose, place, 16, (w2 + r4 * rate, w3 + r7 * rate, zero, zero, zero, zero, zero,
+                                     zero))
 
 
-@jit_internal
-def axlebox_dynamics(b, p, n, inertia, R, F, M, rates, derivative):
-    """Pitch acceleration of axlebox `b`; everything else it hands to its wheelset `p`."""
-    moment = 0.0
-    for i in range(3):
-        moment += M[b, i] * R[p, 3 * i + 1]
-    for i in range(3):
-        F[p, i] += F[b, i]
-        M[p, i] += M[b, i] - moment * R[p, 3 * i + 1]
-    for k in range(6):
-        derivative[6 * b + k] = 0.0
-        derivative[6 * n + 6 * b + k] = 0.0
-    derivative[6 * b + 4] = rates[b, 4]
-    derivative[6 * n + 6 * b + 4] = moment / inertia
-    for k in range(6):
-        rates[b, k] = 0.0
-    rates[b, 4] = moment / inertia
+@jit_inline
+def axlebox_dynamics(bodies, pose, rates, derivative):
+    """Pitch accelerations of the axleboxes; everything else they hand to their wheelsets."""
+    n = bodies.kind.shape[0]
+    zero = spread(0.0)
+    count = bodies.axleboxes.shape[0]
+    for first in range(0, count, LANES):
+        own = eight(bodies.axleboxes, first)
+        carrier = starts(eight_of(bodies.parent, own), POSE_SIZE)
+        inertia = load_rows(bodies.row, starts(own, BODY_SIZE), I_2, 1)[0]
+        f1, f2, f3, m1, m2, m3 = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
+        _, r1, _, _, r4, _, _, r7 = load_rows(pose, carrier, 0, 8)
+        moment = m1 * r1 + m2 * r4 + m3 * r7
+        add_rows(pose, carrier, PUSH, (zero, zero, f1, f2, f3, m1 - moment * r1, m2 - moment * r4,
+                                       m3 - moment * r7), count - first)
+        rate = load_rows(rates, starts(own, RATES_SIZE), 4, 1)[0]
+        acceleration = moment / inertia
+        store_rows(derivative, starts(own, 6), 0, (zero, zero, zero, zero, rate, zero))
+        store_rows(derivative, starts(own, 6), 6 * n, (zero, zero, zero, zero, acceleration, zero))
+        store_rows(rates, starts(own, RATES_SIZE), 0, (zero, zero, zero, zero, acceleration, zero))
 
 
-@jit_internal
-def dynamics(bodies, frames, speed, gravity, state, C, R, F, M, rail_force, rates, derivative):
+@jit_merged
+def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, rates, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
     Leaves the absolute accelerations in body axes in `rates` (`Work.acceleration`).
     """
+    axlebox_dynamics(bodies, pose, rates, derivative)
     n = bodies.kind.shape[0]
-    for k in range(n):
-        b = n - 1 - k  # axleboxes are last in order: they hand their forces down first
-        if bodies.kind[b] == AXLEBOX:
-            axlebox_dynamics(b, bodies.parent[b], n, bodies.inertia[b, 1], R, F, M, rates,
-                             derivative)
-            continue
-        f = bodies.frame[b]
-        v = 6 * n + 6 * b
-        for i in range(3):
-            derivative[6 * b + i] = state[v + i]
-            derivative[6 * b + 3 + i] = rates[b, 3 + i]
-        u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
-        # force in track axes, moment in body axes
-        f1 = frames[f, 3] * F[b, 0] + frames[f, 6] * F[b, 1] + frames[f, 9] * F[b, 2]
-        f2 = frames[f, 4] * F[b, 0] + frames[f, 7] * F[b, 1] + frames[f, 10] * F[b, 2]
-        f3 = frames[f, 5] * F[b, 0] + frames[f, 8] * F[b, 1] + frames[f, 11] * F[b, 2]
-        m1 = R[b, 0] * M[b, 0] + R[b, 3] * M[b, 1] + R[b, 6] * M[b, 2]
-        m2 = R[b, 1] * M[b, 0] + R[b, 4] * M[b, 1] + R[b, 7] * M[b, 2]
-        m3 = R[b, 2] * M[b, 0] + R[b, 5] * M[b, 1] + R[b, 8] * M[b, 2]
-        o2 = u2
-        if bodies.kind[b] == WHEELSET:
-            f1 += rail_force[b, 0]
-            f2 += rail_force[b, 1]
-            f3 += rail_force[b, 2]
-            q1, q2, q3 = rail_force[b, 3], rail_force[b, 4], rail_force[b, 5]
-            m1 += C[b, 0] * q1 + C[b, 3] * q2 + C[b, 6] * q3
-            m2 += C[b, 1] * q1 + C[b, 4] * q2 + C[b, 7] * q3
-            m3 += C[b, 2] * q1 + C[b, 5] * q2 + C[b, 8] * q3
-            # the axes do not spin: take the wheelset's own rotation out again
-            o2 = u2 - rates[b, 4] + speed / bodies.radius[b]
-        mass = bodies.mass[b]
-        a1 = f1 / mass + gravity * frames[f, GRAVITY]
-        a2 = f2 / mass + gravity * frames[f, GRAVITY + 1]
-        a3 = f3 / mass + gravity * frames[f, GRAVITY + 2]
-        i1, i2, i3 = bodies.inertia[b, 0], bodies.inertia[b, 1], bodies.inertia[b, 2]
+    square, twice = speed * speed, 2.0 * speed
+    for first in range(0, bodies.whole.shape[0], LANES):
+        own = eight(bodies.whole, first)
+        frame = starts(eight_of(bodies.frame, own), FRAME_SIZE)
+        mass, i1, i2, i3, y_0, z_0, radius, spins = load_rows(
+            bodies.row, starts(own, BODY_SIZE), 0, 8)
+        vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
+        roll_rate, pitch_rate, yaw_rate = load_rows(rates, starts(own, RATES_SIZE), 3, 3)
+        store_rows(derivative, starts(own, 6), 0, (vx, vy, vz, roll_rate, pitch_rate, yaw_rate))
+        _, _, _, a0, a1, a2, a3, a4 = load_rows(frames, frame, 0, 8)
+        a5, a6, a7, a8, w1, w2, w3, e1 = load_rows(frames, frame, 8, 8)
+        e2, e3 = load_rows(frames, frame, 16, 2)
+        c0, c1, c2, c3, c4, c5, c6, c7 = load_rows(relative, starts(own, RELATIVE_SIZE), 0, 8)
+        c8 = load_rows(relative, starts(own, RELATIVE_SIZE), 8, 1)[0]
+        C = (c0, c1, c2, c3, c4, c5, c6, c7, c8)
+        fx, fy, fz, mx, my, mz = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
+        px, py, pz, qx, qy, qz = load_rows(rail_force, starts(own, RATES_SIZE), 0, 6)
+        # force and moment in track axes, moment in body axes
+        A = (a0, a1, a2, a3, a4, a5, a6, a7, a8)
+        fx, fy, fz = turned_back(A, fx, fy, fz)
+        mx, my, mz = turned_back(A, mx, my, mz)
+        m1, m2, m3 = turned_back(C, mx + qx, my + qy, mz + qz)
+        # gravity points along global z: the third row of A
+        ax = (fx + px) / mass + gravity * a6
+        ay = (fy + py) / mass + gravity * a7
+        az = (fz + pz) / mass + gravity * a8
+        # a wheelset's axes do not spin: take its own rotation out again
+        o2 = u2 - spins * (pitch_rate - speed / radius)
         h1, h2, h3 = i1 * u1, i2 * u2, i3 * u3
         d1 = (m1 - o2 * h3 + u3 * h2) / i1
         d2 = (m2 - u3 * h1 + u1 * h3) / i2
         d3 = (m3 - u1 * h2 + o2 * h1) / i3
-        rates[b, 0] = C[b, 0] * a1 + C[b, 3] * a2 + C[b, 6] * a3
-        rates[b, 1] = C[b, 1] * a1 + C[b, 4] * a2 + C[b, 7] * a3
-        rates[b, 2] = C[b, 2] * a1 + C[b, 5] * a2 + C[b, 8] * a3
-        rates[b, 3], rates[b, 4], rates[b, 5] = d1, d2, d3
-
+        b1, b2, b3 = turned_back(C, ax, ay, az)
+        store_rows(rates, starts(own, RATES_SIZE), 0, (b1, b2, b3, d1, d2, d3))
         # relative acceleration in the moving frame
-        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
-        e1, e2, e3 = frames[f, OMEGA_S], frames[f, OMEGA_S + 1], frames[f, OMEGA_S + 2]
-        x = state[6 * b]
-        y = state[6 * b + 1] + bodies.nominal[b, 0]
-        z = state[6 * b + 2] + bodies.nominal[b, 1]
+        x, y, z = load_rows(state, starts(own, 6), 0, 3)
+        y, z = y + y_0, z + z_0
         wr = w1 * x + w2 * y + w3 * z
         ww = w1 * w1 + w2 * w2 + w3 * w3
-        v1, v2, v3 = state[v], state[v + 1], state[v + 2]
-        square, twice = speed * speed, 2.0 * speed
-        derivative[v] = (a1 - square * (w1 * wr - ww * x + e2 * z - e3 * y)
-                         - twice * (w2 * v3 - w3 * v2))
-        derivative[v + 1] = (a2 - square * (w3 + w2 * wr - ww * y + e3 * x - e1 * z)
-                             - twice * (w3 * v1 - w1 * v3))
-        derivative[v + 2] = (a3 - square * (-w2 + w3 * wr - ww * z + e1 * y - e2 * x)
-                             - twice * (w1 * v2 - w2 * v1))
-        derivative[v + 3] = d1
-        derivative[v + 4] = d2
-        derivative[v + 5] = d3
+        ax = ax - square * (w1 * wr - ww * x + e2 * z - e3 * y) - twice * (w2 * vz - w3 * vy)
+        ay = ay - square * (w3 + w2 * wr - ww * y + e3 * x - e1 * z) - twice * (w3 * vx - w1 * vz)
+        az = az - square * (w3 * wr - w2 - ww * z + e1 * y - e2 * x) - twice * (w1 * vy - w2 * vx)
+        store_rows(derivative, starts(own, 6), 6 * n, (ax, ay, az, d1, d2, d3))
 
 
 @jit
@@ -263,18 +241,18 @@ def table_value_slope(table, x):
     return table[i, 1] + slope * (x - table[i, 0]), slope
 
 
-@jit_internal
-def add_traction(drive, bodies, frames, speed, F):
+@jit_merged
+def add_traction(drive, bodies, frames, speed, pose):
     """Traction less running resistance of a free-running vehicle, on the reference body."""
     force, _ = table_value_slope(drive.table, speed)
     force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
     b = bodies.references[0]
     f = bodies.frame[b]
     for k in range(3):
-        F[b, k] += force * frames[f, 3 + 3 * k]
+        pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
 
 
-@jit_internal
+@jit_merged
 def speed_change(drive, bodies, frames, state, derivative):
     """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
     if drive.mode == TABLE:
@@ -284,14 +262,14 @@ def speed_change(drive, bodies, frames, state, derivative):
     if drive.mode == FREE:
         b = bodies.references[0]
         f = bodies.frame[b]
-        y = state[6 * b + 1] + bodies.nominal[b, 0]
-        z = state[6 * b + 2] + bodies.nominal[b, 1]
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
         return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
             1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y)
     return 0.0
 
 
-@jit_internal
+@jit_merged
 def apply_speed_change(bodies, frames, state, rate, derivative):
     """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
     n = bodies.kind.shape[0]
@@ -301,23 +279,23 @@ def apply_speed_change(bodies, frames, state, rate, derivative):
         f = bodies.frame[b]
         w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
         x = state[6 * b]
-        y = state[6 * b + 1] + bodies.nominal[b, 0]
-        z = state[6 * b + 2] + bodies.nominal[b, 1]
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
         v = 6 * n + 6 * b
         derivative[v] -= rate * (1.0 + w2 * z - w3 * y)
         derivative[v + 1] -= rate * (w3 * x - w1 * z)
         derivative[v + 2] -= rate * (w1 * y - w2 * x)
 
 
-@jit_internal
-def hold_reference(bodies, C, acceleration, derivative):
+@jit_merged
+def hold_reference(bodies, relative, acceleration, derivative):
     """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
     n = bodies.kind.shape[0]
     for k in range(bodies.references.shape[0]):
         b = bodies.references[k]
         held = 6 * n + 6 * b
         for i in range(3):
-            acceleration[b, i] -= derivative[held] * C[b, i]
+            acceleration[b, i] -= derivative[held] * relative[b, i]
         derivative[6 * b] = 0.0
         derivative[held] = 0.0
 
@@ -329,16 +307,20 @@ def right_hand_side(system, work, state, derivative):
     See `mechanics`, which leaves out the internal states of elements.
     """
     status, where, n_patches = mechanics(system, work, state, derivative)
-    if status == RUNNING:
-        first = 12 * system.bodies.kind.shape[0]
-        for i in range(system.internal.kind.shape[0]):
-            derivative[first + i] = internal_rate(system.internal, system.curves, i,
-                                                  state[first + i], work.drive[i, 0],
-                                                  work.drive[i, 1])
+    internal_rates(system, work, state, derivative)
     return status, where, n_patches
 
 
-@jit
+@jit_merged
+def internal_rates(system, work, state, derivative):
+    """Derivative of the internal states of elements."""
+    first = 12 * system.bodies.kind.shape[0]
+    for i in range(system.internal.kind.shape[0]):
+        derivative[first + i] = internal_rate(system.internal, system.curves, i, state[first + i],
+                                              work.drive[i, 0], work.drive[i, 1])
+
+
+@jit_merged
 def mechanics(system, work, state, derivative):
     """Derivative of coordinates, velocities, place and speed; drives of the internal states.
 
@@ -361,31 +343,25 @@ def mechanics(system, work, state, derivative):
                            s, work.frames, work.cell, work.cell_u)
     if status != RUNNING:
         return status, 0, 0
-    kinematics(bodies, work.frames, speed, state, work.S, work.C, work.R, work.X, work.V, work.W,
-               work.acceleration)
-    for b in range(n):
-        for i in range(3):
-            work.F[b, i] = 0.0
-            work.M[b, i] = 0.0
+    kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     m = system.internal.kind.shape[0]
     inner = state[12 * n:12 * n + m]
-    link_forces(system.links, system.curves, inner, work.drive, work.R, work.X, work.V, work.W,
-                work.F, work.M)
-    mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.R, work.X,
-                 work.V, work.W, work.F, work.M)
+    link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
+    mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.laws,
+                 work.pose)
     if system.loads.body.shape[0] > 0:
-        load_forces(system.loads, time, bodies, work.frames, work.R, work.F, work.M)
+        load_forces(system.loads, time, bodies, work.frames, work.pose)
     if system.drive.mode == FREE:
-        add_traction(system.drive, bodies, work.frames, speed, work.F)
+        add_traction(system.drive, bodies, work.frames, speed, work.pose)
     status, where, n_patches = wheel_rail(system, work, speed, state)
     if status != RUNNING:
         return status, where, n_patches
-    dynamics(bodies, work.frames, speed, system.gravity, state, work.C, work.R, work.F, work.M,
+    dynamics(bodies, work.frames, speed, system.gravity, state, work.relative, work.pose,
              work.rail_force, work.acceleration, derivative)
     rate = speed_change(system.drive, bodies, work.frames, state, derivative)
     if rate != 0.0:
         apply_speed_change(bodies, work.frames, state, rate, derivative)
-    hold_reference(bodies, work.C, work.acceleration, derivative)
+    hold_reference(bodies, work.relative, work.acceleration, derivative)
     derivative[-3] = 1.0
     derivative[-2] = speed
     derivative[-1] = rate

@@ -29,6 +29,34 @@ CONSTANT, TABLE, FREE = range(3)
 N_SCALARS = 3  # t, s, V at the end of the state
 
 
+# columns of Bodies.row
+MASS, I_1, I_2, I_3, Y_0, Z_0, RADIUS, SPINS = range(8)
+BODY_SIZE = 8
+
+# columns of Links.row, see there
+LENGTH, STIFFNESS, DAMPING, PRELOAD = range(6, 10)
+LINK_SIZE = 16  # whole cache lines
+
+# columns of Mounts.row, see there
+SHARE_1, SHARE_2, STIFFNESS_X, DAMPING_X, PRELOAD_X, ROTATION_X, ROTATION_DAMPING_X = (
+    6, 7, 8, 11, 14, 17, 20)
+STIFFNESS_Z, PRELOAD_Z = STIFFNESS_X + 2, PRELOAD_X + 2
+MOUNT_SIZE = 24
+# columns of Mounts.flags
+TRANSLATES, BOTH_ENDS, ROTATES, FRICTION, SPECIAL = range(5)
+
+# columns of Work.pose: attitude R (0 to 8), position, velocity, angular velocity, force, moment
+POSITION, VELOCITY, ANGULAR, FORCE, MOMENT = 9, 12, 15, 18, 21
+# Forces are added by whole cache lines, the last two columns of the angular velocity with them: a
+# part of a line that was just written is read again only after a delay.
+PUSH = 16
+POSE_SIZE = 24
+# columns of Work.relative: attitude C (0 to 8), sines and cosines
+SIN_ROLL, COS_ROLL, SIN_PITCH, COS_PITCH = range(9, 13)
+RELATIVE_SIZE = 16
+RATES_SIZE = 8  # of Work.acceleration and Work.rail_force
+
+
 class Bodies(NamedTuple):
     """Bodies, vehicle by vehicle; within one: rigid bodies, wheelsets from the front, axleboxes.
 
@@ -37,21 +65,40 @@ class Bodies(NamedTuple):
     kind : int64[n]          RIGID, WHEELSET or AXLEBOX
     frame : int64[n]         index of the body's track frame
     parent : int64[n]        the wheelset that carries an axlebox, else -1
-    mass : float64[n]        [kg]
-    inertia : float64[n, 3]  principal moments [kg m2]; an axlebox uses the second only
-    nominal : float64[n, 2]  y and z of the centre of gravity in the track frame [m]
-    radius : float64[n]      nominal rolling radius of a wheelset [m], else 1
+    row : float64[n, BODY_SIZE]   mass [kg], principal moments of inertia [kg m2] (an axlebox uses
+                             the second only), y and z of the centre of gravity in the track frame
+                             [m], nominal rolling radius [m] and 1 for a wheelset, else 1 and 0
+    whole, axleboxes : int64[...]   bodies with six coordinates, and with one
     references : int64[v]    one body of each vehicle, whose frame is `s`; its x is held
     """
 
     kind: np.ndarray
     frame: np.ndarray
     parent: np.ndarray
-    mass: np.ndarray
-    inertia: np.ndarray
-    nominal: np.ndarray
-    radius: np.ndarray
+    row: np.ndarray
+    whole: np.ndarray
+    axleboxes: np.ndarray
     references: np.ndarray
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Masses [kg]."""
+        return self.row[:, MASS]
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Principal moments of inertia [kg m2]."""
+        return self.row[:, I_1:I_1 + 3]
+
+    @property
+    def nominal(self) -> np.ndarray:
+        """Nominal y and z of the centres of gravity [m]."""
+        return self.row[:, Y_0:Y_0 + 2]
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Nominal rolling radii [m]."""
+        return self.row[:, RADIUS]
 
 
 class Contact(NamedTuple):
@@ -104,19 +151,32 @@ class Links(NamedTuple):
     Attributes
     ----------
     body : int64[e, 2]        the two bodies
-    point : float64[e, 2, 3]  attachment points in body axes from the centre of gravity [m]
-    length : float64[e]       nominal length [m]
-    spring : float64[e, 3]    stiffness [N/m], parallel damping [N s/m], preload [N]
+    row : float64[e, LINK_SIZE]   attachment points in body axes from the centres of gravity [m],
+                              nominal length [m], stiffness [N/m], parallel damping [N s/m],
+                              preload [N]
     internal : int64[e]       internal state, else -1
     curve : int64[e, 2]       tables of force over elongation and over its rate, else -1
     """
 
     body: np.ndarray
-    point: np.ndarray
-    length: np.ndarray
-    spring: np.ndarray
+    row: np.ndarray
     internal: np.ndarray
     curve: np.ndarray
+
+    @property
+    def point(self) -> np.ndarray:
+        """Attachment points, shape (e, 2, 3) [m]."""
+        return self.row[:, :6].reshape(-1, 2, 3)
+
+    @property
+    def length(self) -> np.ndarray:
+        """Nominal lengths [m]."""
+        return self.row[:, LENGTH]
+
+    @property
+    def spring(self) -> np.ndarray:
+        """Stiffness [N/m], parallel damping [N s/m], preload [N], shape (e, 3)."""
+        return self.row[:, STIFFNESS:PRELOAD + 1]
 
 
 class Mounts(NamedTuple):
@@ -125,29 +185,54 @@ class Mounts(NamedTuple):
     Attributes
     ----------
     body : int64[e, 2]
-    point : float64[e, 2, 3]     points in body axes; coincident in the nominal position [m]
-    stiffness, damping, preload : float64[e, 3]   [N/m], [N s/m], [N]
-    rotation : float64[e, 3]     K_d of the rotational potential tr(K_d (1 - R)) [N m]
-    rotation_damping : float64[e, 3]   [N m s]
+    row : float64[e, MOUNT_SIZE]   points in body axes, coincident in the nominal position [m];
+                                 share of the force in the axes of body 1 and 2; stiffness [N/m],
+                                 damping [N s/m], preload [N] along three axes; K_d of the
+                                 rotational potential tr(K_d (1 - R)) [N m], its damping [N m s]
     friction : float64[e, 3, 2]  limit of a friction pad: constant [N], share of the vertical
                                  spring force [1]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
-    flags : int64[e, 5]          1 if: translational part, both-ended axes (shear), rotational part,
-                                 friction pads, tables or internal states
+    flags : int64[e, 5]          1 if: translational part, axes of both bodies (shear), rotational
+                                 part, friction pads, tables or internal states
     """
 
     body: np.ndarray
-    point: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    preload: np.ndarray
-    rotation: np.ndarray
-    rotation_damping: np.ndarray
+    row: np.ndarray
     friction: np.ndarray
     internal: np.ndarray
     curve: np.ndarray
     flags: np.ndarray
+
+    @property
+    def point(self) -> np.ndarray:
+        """Points in body axes, shape (e, 2, 3) [m]."""
+        return self.row[:, :6].reshape(-1, 2, 3)
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Stiffnesses, shape (e, 3) [N/m]."""
+        return self.row[:, STIFFNESS_X:STIFFNESS_X + 3]
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Dampings, shape (e, 3) [N s/m]."""
+        return self.row[:, DAMPING_X:DAMPING_X + 3]
+
+    @property
+    def preload(self) -> np.ndarray:
+        """Preloads, shape (e, 3) [N]."""
+        return self.row[:, PRELOAD_X:PRELOAD_X + 3]
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """K_d of the rotational potential, shape (e, 3) [N m]."""
+        return self.row[:, ROTATION_X:ROTATION_X + 3]
+
+    @property
+    def rotation_damping(self) -> np.ndarray:
+        """Dampings about the axes, shape (e, 3) [N m s]."""
+        return self.row[:, ROTATION_DAMPING_X:ROTATION_DAMPING_X + 3]
 
 
 class Curves(NamedTuple):
@@ -226,14 +311,14 @@ class Work(NamedTuple):
     Attributes
     ----------
     frames : float64[f, FRAME_SIZE];  cell : int64[f];  cell_u : float64[f]
-    R : float64[n, 9]       attitude of each body in global axes, row by row
-    X, V, W : float64[n, 3] position, velocity, angular velocity in global axes
-    F, M : float64[n, 3]    force and moment about the centre of gravity, global axes
-    S : float64[n, 4]       sin, cos of roll and of pitch
-    C : float64[n, 9]       attitude relative to the track frame
+    pose : float64[n, POSE_SIZE]   attitude of each body row by row, position, velocity, angular
+                            velocity, force and moment about the centre of gravity, global axes
+    relative : float64[n, RELATIVE_SIZE]   attitude relative to the track frame row by row; sine and
+                            cosine of roll and of pitch (0 and 1 for a wheelset)
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
+    laws : float64[9 * LANES]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, 8]  see `wheel_rail`
     look_up, weights, stiffness, approach, rail : of the wheel at hand, see `contact_table`
@@ -248,17 +333,12 @@ class Work(NamedTuple):
     frames: np.ndarray
     cell: np.ndarray
     cell_u: np.ndarray
-    R: np.ndarray
-    X: np.ndarray
-    V: np.ndarray
-    W: np.ndarray
-    F: np.ndarray
-    M: np.ndarray
-    S: np.ndarray
-    C: np.ndarray
+    pose: np.ndarray
+    relative: np.ndarray
     rail_force: np.ndarray
     acceleration: np.ndarray
     drive: np.ndarray
+    laws: np.ndarray
     decay: np.ndarray
     contact_jacobian: np.ndarray
     look_up: np.ndarray

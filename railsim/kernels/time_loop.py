@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_internal
+from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.internal import (
     MAXWELL_CURVE,
@@ -21,9 +21,21 @@ from railsim.kernels.internal import (
     constant_decays,
     within_table,
 )
-from railsim.kernels.rhs import euler_rates, mechanics, right_hand_side, table_value_slope
+from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING
-from railsim.kernels.system import AXLEBOX, TABLE, WHEELSET
+from railsim.kernels.system import (
+    AXLEBOX,
+    COS_PITCH,
+    COS_ROLL,
+    I_1,
+    I_2,
+    I_3,
+    MASS,
+    SIN_PITCH,
+    SIN_ROLL,
+    TABLE,
+    WHEELSET,
+)
 from railsim.kernels.wheel_rail import (
     J_ACROSS,
     J_ACROSS_LEVER,
@@ -140,15 +152,15 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     track, of x and spin; slip across, of y and roll; yaw; contact damping in z, y, roll.
     """
     v = 6 * b
-    mass, roll = 1.0 / bodies.mass[b], 1.0 / bodies.inertia[b, 0]
+    mass, roll = 1.0 / bodies.row[b, MASS], 1.0 / bodies.row[b, I_1]
     along, across = jacobian[b, J_ALONG], jacobian[b, J_ACROSS]
     if along > 0.0:
         soften_slip(rate, before, v, v + 4, jacobian[b, J_ALONG_LEVER] / along, along, mass,
-                    1.0 / bodies.inertia[b, 1], h)
+                    1.0 / bodies.row[b, I_2], h)
     if across > 0.0:
         soften_slip(rate, before, v + 1, v + 3, -jacobian[b, J_ACROSS_LEVER] / across, across, mass,
                     roll, h)
-    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.inertia[b, 2], h)
+    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
     soften(rate, before, v + 1, jacobian[b, J_Y], mass, h)
     soften(rate, before, v + 2, jacobian[b, J_Z], mass, h)
     soften(rate, before, v + 3, jacobian[b, J_ROLL], roll, h)
@@ -178,7 +190,7 @@ def step_fast(system, work, state, derivative, decay, h):
     With the acceleration a of this step and b, the smoothed one of the steps before:
     u = v + h (a - b/2), q <- q + h u, b <- b + SMOOTHING (a - b), v <- u + h/2 b.
     """
-    bodies, S = system.bodies, work.S
+    bodies, C = system.bodies, work.relative
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
     rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
@@ -192,7 +204,8 @@ def step_fast(system, work, state, derivative, decay, h):
         d2 = h * (rate[q + 4] - 0.5 * before[q + 4])
         d3 = h * (rate[q + 5] - 0.5 * before[q + 5])
         if kind != AXLEBOX:
-            d1, d2, d3 = euler_rates(kind, S[b, 0], S[b, 1], S[b, 2], S[b, 3], d1, d2, d3)
+            d1, d2, d3 = euler_rates(C[b, SIN_ROLL], C[b, COS_ROLL], C[b, SIN_PITCH],
+                                     C[b, COS_PITCH], d1, d2, d3)
         for k in range(3):
             state[q + k] += h * (state[v + k] + h * (rate[q + k] - 0.5 * before[q + k]))
         state[q + 3] += h * (derivative[q + 3] + d1)
@@ -244,9 +257,10 @@ def step_rk4(system, work, state, derivative, stages, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = right_hand_side(system, work, trial, rate)
+        status, where, _ = mechanics(system, work, trial, rate)
         if status != RUNNING:
             return status, where
+        internal_rates(system, work, trial, rate)
         weight = 2.0 if stage < 3 else 1.0
         for k in range(state.shape[0]):
             total[k] += weight * rate[k]
@@ -257,7 +271,7 @@ def step_rk4(system, work, state, derivative, stages, h):
     return RUNNING, 0
 
 
-@jit_internal
+@jit_merged
 def all_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
     for k in range(state.shape[0]):
@@ -295,11 +309,10 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     rows = np.int64(0)
     end = first_step + n_steps
     for step in range(first_step, end + closing):
-        if scheme == FAST:
-            status, where, patches = mechanics(system, work, state, derivative)
-        else:
-            status, where, patches = right_hand_side(system, work, state, derivative)
+        status, where, patches = mechanics(system, work, state, derivative)
         if status == RUNNING:
+            if scheme == RK4:
+                internal_rates(system, work, state, derivative)
             if step % every == 0:
                 record(recorder, rows, system, state, derivative, work, patches)
                 rows += 1

@@ -8,12 +8,14 @@ Tables hold one cubic polynomial per cell and quantity, so that the position is 
 where the plan is a straight, a circle or a clothoid, whatever the table's spacing.
 """
 
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit
-from railsim.kernels.rotation import sine_cosine
+from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels.lanes import LANES, eight_from, eight_of, load_rows, starts, store_rows
+from railsim.kernels.rotation import sine_cosine_lanes
 
 # rows of TrackTables.coefficients
 X, Y, Z, PSI, THETA, PHI = range(6)
@@ -25,8 +27,8 @@ ORIGIN = 0  # 0:3   origin in global axes (m)
 ATTITUDE = 3  # 3:12  A, row by row
 OMEGA = 12  # 12:15 rate of turn per metre, frame axes (1/m)
 OMEGA_S = 15  # 15:18 its derivative along the track (1/m2)
-GRAVITY = 18  # 18:21 direction of gravity in frame axes (1)
-FRAME_SIZE = 21
+GRAVITY = 9  # 9:12 direction of gravity in frame axes (1): the third row of A
+FRAME_SIZE = 24  # whole cache lines
 
 
 class TrackTables(NamedTuple):
@@ -62,75 +64,72 @@ def cell_of(track, s):
     return i, s - track.s_start - i * track.ds
 
 
-@jit
-def heading(track, s):
-    """Heading of the track at arc length `s` [rad], 0 outside the table."""
-    i, u = cell_of(track, s)
-    c = track.coefficients
-    if i < 0:
-        return 0.0
-    return c[i, PSI, 0] + u * (c[i, PSI, 1] + u * (c[i, PSI, 2] + u * c[i, PSI, 3]))
+@jit_inline
+def polynomial(c0, c1, c2, c3, u):
+    """Cubic polynomial and its first two derivatives."""
+    return (c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + u * 3.0 * c3),
+            2.0 * c2 + 6.0 * u * c3)
 
 
-@jit
-def track_frame(track, s, turn, frames, f):
-    """Evaluate the track frame at arc length `s` [m] into ``frames[f, FRAME_SIZE]``.
+@jit_merged
+def track_frames(track, cell, cell_u, origin, frames):
+    """Evaluate track frames into ``frames[:, FRAME_SIZE]``.
 
-    Its attitude is given in axes that are turned by the heading `turn` [rad] about the vertical.
+    Origins and attitudes are given in those of frame `origin` on the level (its heading, not its
+    grade and cant), or in global ones where `origin` is negative.
 
-    With s the arc length, the frame turns by omega = vee(A^T dA/ds) per metre; for the Euler angles
+    With s the arc length, a frame turns by omega = vee(A^T dA/ds) per metre; for the Euler angles
     psi, theta, phi (z, y, x) omega_1 = phi' - psi' sin theta, omega_2 = theta' cos phi
     + psi' cos theta sin phi, omega_3 = psi' cos theta cos phi - theta' sin phi.
 
-    Returns
-    -------
-    cell : int
-        -1 if `s` lies outside the table (then `frames` is unchanged).
-    u : float
-        Distance into the cell [m].
+    Parameters
+    ----------
+    cell, cell_u : int64[f], float64[f]
+        Where the frames are, see `cell_of`.
     """
-    i, u = cell_of(track, s)
-    if i < 0:
-        return i, 0.0
     c = track.coefficients
-    for k in range(3):
-        frames[f, ORIGIN + k] = c[i, k, 0] + u * (c[i, k, 1] + u * (c[i, k, 2] + u * c[i, k, 3]))
-    psi = c[i, PSI, 0] - turn + u * (c[i, PSI, 1] + u * (c[i, PSI, 2] + u * c[i, PSI, 3]))
-    psi_1 = c[i, PSI, 1] + u * (2.0 * c[i, PSI, 2] + u * 3.0 * c[i, PSI, 3])
-    psi_2 = 2.0 * c[i, PSI, 2] + 6.0 * u * c[i, PSI, 3]
-    theta = c[i, THETA, 0] + u * (c[i, THETA, 1] + u * (c[i, THETA, 2] + u * c[i, THETA, 3]))
-    theta_1 = c[i, THETA, 1] + u * (2.0 * c[i, THETA, 2] + u * 3.0 * c[i, THETA, 3])
-    theta_2 = 2.0 * c[i, THETA, 2] + 6.0 * u * c[i, THETA, 3]
-    phi = c[i, PHI, 0] + u * (c[i, PHI, 1] + u * (c[i, PHI, 2] + u * c[i, PHI, 3]))
-    phi_1 = c[i, PHI, 1] + u * (2.0 * c[i, PHI, 2] + u * 3.0 * c[i, PHI, 3])
-    phi_2 = 2.0 * c[i, PHI, 2] + 6.0 * u * c[i, PHI, 3]
-
-    sp, cp = sine_cosine(psi)
-    st, ct = sine_cosine(theta)
-    sf, cf = sine_cosine(phi)
-    frames[f, 3] = cp * ct
-    frames[f, 4] = cp * st * sf - sp * cf
-    frames[f, 5] = cp * st * cf + sp * sf
-    frames[f, 6] = sp * ct
-    frames[f, 7] = sp * st * sf + cp * cf
-    frames[f, 8] = sp * st * cf - cp * sf
-    frames[f, 9] = -st
-    frames[f, 10] = ct * sf
-    frames[f, 11] = ct * cf
-
-    frames[f, 12] = phi_1 - psi_1 * st
-    frames[f, 13] = theta_1 * cf + psi_1 * ct * sf
-    frames[f, 14] = psi_1 * ct * cf - theta_1 * sf
-    frames[f, 15] = phi_2 - psi_2 * st - psi_1 * theta_1 * ct
-    frames[f, 16] = (theta_2 * cf - theta_1 * phi_1 * sf + psi_2 * ct * sf
-                 - psi_1 * theta_1 * st * sf + psi_1 * phi_1 * ct * cf)
-    frames[f, 17] = (psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
-                 - theta_2 * sf - theta_1 * phi_1 * cf)
-    # gravity points along global z: the third row of A
-    frames[f, 18] = frames[f, 9]
-    frames[f, 19] = frames[f, 10]
-    frames[f, 20] = frames[f, 11]
-    return i, u
+    x_0, y_0, z_0, turn = 0.0, 0.0, 0.0, 0.0
+    if origin >= 0:
+        i, t = cell[origin], cell_u[origin]
+        x_0, _, _ = polynomial(c[i, X, 0], c[i, X, 1], c[i, X, 2], c[i, X, 3], t)
+        y_0, _, _ = polynomial(c[i, Y, 0], c[i, Y, 1], c[i, Y, 2], c[i, Y, 3], t)
+        z_0, _, _ = polynomial(c[i, Z, 0], c[i, Z, 1], c[i, Z, 2], c[i, Z, 3], t)
+        turn, _, _ = polynomial(c[i, PSI, 0], c[i, PSI, 1], c[i, PSI, 2], c[i, PSI, 3], t)
+    sine, cosine = sin(turn), cos(turn)
+    for first in range(0, cell.shape[0], LANES):
+        which = eight_from(first, cell.shape[0])
+        place = starts(eight_of(cell, which), 24)
+        u = load_rows(cell_u, which, 0, 1)[0]
+        x0, x1, x2, x3, y0, y1, y2, y3 = load_rows(c, place, 0, 8)
+        z0, z1, z2, z3, p0, p1, p2, p3 = load_rows(c, place, 8, 8)
+        t0, t1, t2, t3, f0, f1, f2, f3 = load_rows(c, place, 16, 8)
+        x, _, _ = polynomial(x0, x1, x2, x3, u)
+        y, _, _ = polynomial(y0, y1, y2, y3, u)
+        z, _, _ = polynomial(z0, z1, z2, z3, u)
+        # the difference first: headings grow, their differences are small
+        psi, psi_1, psi_2 = polynomial(p0 - turn, p1, p2, p3, u)
+        theta, theta_1, theta_2 = polynomial(t0, t1, t2, t3, u)
+        phi, phi_1, phi_2 = polynomial(f0, f1, f2, f3, u)
+        sp, cp = sine_cosine_lanes(psi)
+        st, ct = sine_cosine_lanes(theta)
+        sf, cf = sine_cosine_lanes(phi)
+        east, north = x - x_0, y - y_0
+        row = starts(which, FRAME_SIZE)
+        store_rows(frames, row, 0, (
+            cosine * east + sine * north, cosine * north - sine * east, z - z_0,
+            cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf,
+            sp * ct, sp * st * sf + cp * cf))
+        store_rows(frames, row, 8, (
+            sp * st * cf - cp * sf, -st, ct * sf, ct * cf,
+            phi_1 - psi_1 * st,
+            theta_1 * cf + psi_1 * ct * sf,
+            psi_1 * ct * cf - theta_1 * sf,
+            phi_2 - psi_2 * st - psi_1 * theta_1 * ct))
+        store_rows(frames, row, 16, (
+            theta_2 * cf - theta_1 * phi_1 * sf + psi_2 * ct * sf
+            - psi_1 * theta_1 * st * sf + psi_1 * phi_1 * ct * cf,
+            psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
+            - theta_2 * sf - theta_1 * phi_1 * cf))
 
 
 @jit

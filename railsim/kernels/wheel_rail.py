@@ -19,7 +19,7 @@ from math import sqrt
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_internal
+from railsim.kernels import jit, jit_inline, jit_merged
 from railsim.kernels.contact_table import (
     ABOVE_Y,
     BELOW_Y,
@@ -51,6 +51,7 @@ from railsim.kernels.status import (
     WHEEL_LIFT,
     YAW_RANGE,
 )
+from railsim.kernels.system import COS_ROLL, Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA, rail_state
 
 # rows of Work.patch: one column per active patch
@@ -216,7 +217,7 @@ def outside(where):
 @jit_inline
 def creepages(system, work, n, speed, state):
     """Creepages of the active patches, see the module's equations."""
-    patch, C, frames = work.patch, work.C, work.frames
+    patch, C, frames = work.patch, work.relative, work.frames
     n_bodies = system.bodies.kind.shape[0]
     for k in range(n):
         w = work.patch_index[k, 0]
@@ -225,8 +226,8 @@ def creepages(system, work, n, speed, state):
         w1 = speed * frames[f, OMEGA]
         w2 = speed * frames[f, OMEGA + 1]
         w3 = speed * frames[f, OMEGA + 2]
-        y = state[6 * b + 1] + system.bodies.nominal[b, 0]
-        z = state[6 * b + 2] + system.bodies.nominal[b, 1]
+        y = state[6 * b + 1] + system.bodies.row[b, Y_0]
+        z = state[6 * b + 2] + system.bodies.row[b, Z_0]
         v = 6 * n_bodies + 6 * b
         u1, u2, u3 = state[v + 3], state[v + 4], state[v + 5]
         a1 = C[b, 0] * u1 + C[b, 1] * u2 + C[b, 2] * u3
@@ -332,7 +333,8 @@ def wheel_rail(system, work, speed, state):
         return status, w, n
     for k in range(system.contact.body.shape[0]):
         b = system.contact.body[k]
-        complete_normal_force(b, system.bodies, work.frames, work.C, work.S, state, work.rail_force)
+        complete_normal_force(b, system.bodies, work.frames, work.relative, state,
+                              work.rail_force)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
         third = cube_root(patch[NORMAL, k])
@@ -356,8 +358,8 @@ def wheel_rail(system, work, speed, state):
     return RUNNING, 0, n
 
 
-@jit_internal
-def complete_normal_force(b, bodies, frames, C, S, state, force):
+@jit_merged
+def complete_normal_force(b, bodies, frames, C, state, force):
     """Moment vector from the generalised moments, and the force along the track.
 
     The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
@@ -370,15 +372,15 @@ def complete_normal_force(b, bodies, frames, C, S, state, force):
     twisted track the wheels climb the rails.  `force[b, 0]` brings the share of irregular rails.
     """
     m1 = force[b, 3]
-    m3 = force[b, 5] / S[b, 1]
+    m3 = force[b, 5] / C[b, COS_ROLL]
     mx = C[b, 0] * m1 + C[b, 2] * m3
     my = C[b, 3] * m1 + C[b, 5] * m3
     mz = C[b, 6] * m1 + C[b, 8] * m3
     f = bodies.frame[b]
     w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
     x = state[6 * b]
-    y = state[6 * b + 1] + bodies.nominal[b, 0]
-    z = state[6 * b + 2] + bodies.nominal[b, 1]
+    y = state[6 * b + 1] + bodies.row[b, Y_0]
+    z = state[6 * b + 2] + bodies.row[b, Z_0]
     along = (force[b, 1] * (w3 * x - w1 * z) + force[b, 2] * (w1 * y - w2 * x)
              + mx * w1 + my * w2 + mz * w3)
     force[b, 0] = (force[b, 0] - along) / (1.0 + w2 * z - w3 * y)

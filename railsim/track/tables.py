@@ -9,6 +9,7 @@ elements continue.
 import numpy as np
 
 from railsim.definitions.track import Track
+from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
 from railsim.track.alignment import Alignment, Array
 from railsim.track.irregularity import Displacement, displacement, shortest_length
@@ -55,7 +56,7 @@ def track_tables(
     cells_before = int(np.ceil(before / ds))
     n_cells = cells_before + int(np.ceil((track.length + after) / ds))
     s: Array = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)
-    coefficients = np.empty((n_cells, 6, 4))
+    coefficients = aligned_zeros((n_cells, 6, 4))
     for row, (value, rate) in enumerate(_centre_line(alignment, s, cells_before)):
         coefficients[:, row] = hermite(value, rate, ds)
     for row, (value, rate) in enumerate(_angles(alignment, s)):

@@ -8,10 +8,10 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_WEIGHT, cell_weights, locate, look_up
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import locate_frames, right_hand_side
 from railsim.kernels.system import AXLEBOX, WHEELSET
 from railsim.kernels.time_loop import time_loop
-from railsim.kernels.track_frame import FRAME_SIZE, track_frame
+from railsim.kernels.track_frame import FRAME_SIZE
 from railsim.time_step import SCHEMES, empty_recorder
 
 NEVER = 1 << 40
@@ -72,7 +72,8 @@ def evaluate(system, state):
 def absolute_frame(system, s):
     """Track frame with its origin in global axes."""
     frames = np.zeros((1, FRAME_SIZE))
-    track_frame(system.track, s, 0.0, frames, 0)
+    cell, u = np.zeros(1, dtype=np.int64), np.zeros(1)
+    assert locate_frames(system.track, np.zeros(1), -1, s, frames, cell, u) == 0
     return frames[0]
 
 

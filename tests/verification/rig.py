@@ -18,7 +18,7 @@ from railsim.kernels.internal import (
     constant_decays,
     curve_value,
 )
-from railsim.kernels.system import AXLEBOX, WHEELSET
+from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, time_loop
 from railsim.time_step import empty_recorder
 
@@ -60,7 +60,7 @@ class Rig:
         self.state[self.probe + axis] = deflection
         self.state[6 * self.n + self.probe + axis] = rate
         self.work, self.derivative = evaluate(self.system, self.state)
-        return -self.work.F[self.body, axis]
+        return -self.work.pose[self.body, FORCE + axis]
 
     def history(self, axis, time, deflection, rate):
         """Forces along a prescribed motion, internal states advanced as the fast scheme does."""

@@ -1,0 +1,346 @@
+"""Eight numbers side by side in one vector register, with the arithmetic of one number.
+
+Why this exists: bodies and force elements are some forty scalar formulas an evaluation, each with
+hundreds of operations that wait for each other; the compiler does not put two of them side by side.
+With `Lanes` a formula is written once, as for one body, and is worked out for eight.  Gain:
+docs/performance.md.  Any processor will do: the instructions are generic vectors that LLVM cuts to
+what it has.
+
+`load_rows` reads eight rows of a table and turns them, so that each result holds one column of all
+eight; `store_rows` and `add_rows` go back.  Rows are given by where they start in the flat array;
+beyond the last body or element the last one is taken again, so that nothing outside is touched and
+a repeated store writes what is there.
+
+Where compilation is switched off, `lanes_plain` does the same with arrays of eight.
+"""
+
+import operator
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+from railsim.kernels import jit_inline
+from railsim.kernels import lanes_plain as plain
+
+LANES = 8
+_DOUBLE = ir.DoubleType()
+_VECTOR = ir.VectorType(_DOUBLE, LANES)
+_INT = ir.IntType(64)
+_INDEX = ir.IntType(32)
+
+
+class LanesType(types.Type):  # type: ignore[misc]
+    """Type of eight float64 in one register."""
+
+    def __init__(self):
+        super().__init__(name="Lanes")
+
+
+lanes = LanesType()
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _VECTOR)
+
+
+def _splat(builder, value):
+    undefined = ir.Constant(_VECTOR, ir.Undefined)
+    single = builder.insert_element(undefined, value, ir.Constant(_INDEX, 0))
+    zeros = ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES)
+    return builder.shuffle_vector(single, undefined, zeros)
+
+
+def _as_lanes(context, builder, kind, value):
+    if isinstance(kind, LanesType):
+        return value
+    return _splat(builder, context.cast(builder, value, kind, types.float64))
+
+
+def _define(operation, instruction):
+    """Let an operator take Lanes, and a number beside Lanes."""
+
+    @infer_global(operation)
+    class _Template(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, args, kws):
+            if lanes in args and all(a == lanes or isinstance(a, types.Number) for a in args):
+                return signature(lanes, *args)
+            return None
+
+    def lower(context, builder, sig, args):
+        values = [_as_lanes(context, builder, *pair) for pair in zip(sig.args, args, strict=True)]
+        return getattr(builder, instruction)(*values)
+
+    if instruction == "fneg":
+        lower_builtin(operation, LanesType)(lower)
+        return
+    for kinds in ((LanesType, LanesType), (LanesType, types.Number), (types.Number, LanesType)):
+        lower_builtin(operation, *kinds)(lower)
+
+
+_define(operator.add, "fadd")
+_define(operator.sub, "fsub")
+_define(operator.mul, "fmul")
+_define(operator.truediv, "fdiv")
+_define(operator.neg, "fneg")
+
+
+def _of_one(name):
+    """Make the intrinsic of an LLVM function of one number, lane by lane."""
+
+    @intrinsic
+    def function(typingctx, x):
+        def codegen(context, builder, sig, args):
+            kind = ir.FunctionType(_VECTOR, [_VECTOR])
+            return builder.call(cgutils.get_or_insert_function(
+                builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
+
+        return lanes(lanes), codegen
+
+    return function
+
+
+square_root, sine, cosine = _of_one("sqrt"), _of_one("sin"), _of_one("cos")
+
+
+@intrinsic
+def spread(typingctx, x):
+    """One number in all lanes."""
+
+    def codegen(context, builder, sig, args):
+        return _splat(builder, args[0])
+
+    return lanes(types.float64), codegen
+
+
+def _is_beyond(builder, x, limit):
+    kind = ir.FunctionType(_VECTOR, [_VECTOR])
+    name = f"llvm.fabs.v{LANES}f64"
+    size = builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [x])
+    return builder.fcmp_unordered(">", size, _splat(builder, limit))
+
+
+@intrinsic
+def any_beyond(typingctx, x, limit):
+    """Whether |x| is more than `limit`, or not a number, in any lane."""
+
+    def codegen(context, builder, sig, args):
+        bits = builder.bitcast(_is_beyond(builder, *args), ir.IntType(LANES))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
+
+    return types.boolean(lanes, types.float64), codegen
+
+
+@intrinsic
+def where_beyond(typingctx, x, limit, beyond, within):
+    """Lane by lane: `beyond` where |x| is more than `limit`, or not a number; else `within`."""
+
+    def codegen(context, builder, sig, args):
+        return builder.select(_is_beyond(builder, *args[:2]), args[2], args[3])
+
+    return lanes(lanes, types.float64, lanes, lanes), codegen
+
+
+def _pointer(context, builder, kind, array, place):
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [place]), ir.PointerType(_VECTOR))
+
+
+def _mask(count):
+    return ir.Constant(ir.VectorType(ir.IntType(1), LANES), [k < count for k in range(LANES)])
+
+
+def _load(builder, pointer, count):
+    """Load the first `count` of eight numbers, which need not be aligned."""
+    if count == LANES:
+        return builder.load(pointer, align=8)
+    bits = ir.VectorType(ir.IntType(1), LANES)
+    kind = ir.FunctionType(_VECTOR, [ir.PointerType(_VECTOR), _INDEX, bits, _VECTOR])
+    load = cgutils.get_or_insert_function(builder.module, kind, "llvm.masked.load.v8f64.p0")
+    zero = ir.Constant(_VECTOR, [0.0] * LANES)
+    return builder.call(load, [pointer, ir.Constant(_INDEX, 8), _mask(count), zero])
+
+
+def _store(builder, value, pointer, count):
+    if count == LANES:
+        builder.store(value, pointer, align=8)
+        return
+    bits = ir.VectorType(ir.IntType(1), LANES)
+    kind = ir.FunctionType(ir.VoidType(), [_VECTOR, ir.PointerType(_VECTOR), _INDEX, bits])
+    store = cgutils.get_or_insert_function(builder.module, kind, "llvm.masked.store.v8f64.p0")
+    builder.call(store, [value, pointer, ir.Constant(_INDEX, 8), _mask(count)])
+
+
+def _turned(builder, rows):
+    """Turn eight registers: the k-th of the result holds the k-th number of each."""
+
+    def pairs(these, distance, first, second):
+        mixed = list(these)
+        for k in range(LANES):
+            if not k & distance:
+                a, b = these[k], these[k + distance]
+                for place, mask in ((k, first), (k + distance, second)):
+                    mixed[place] = builder.shuffle_vector(a, b, ir.Constant(
+                        ir.VectorType(_INDEX, LANES), mask))
+        return mixed
+
+    rows = pairs(rows, 1, [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15])
+    rows = pairs(rows, 2, [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15])
+    return pairs(rows, 4, [0, 1, 2, 3, 8, 9, 10, 11], [4, 5, 6, 7, 12, 13, 14, 15])
+
+
+def _places(builder, rows, column):
+    return [builder.add(start, column) for start in cgutils.unpack_tuple(builder, rows)]
+
+
+@intrinsic(prefer_literal=True)
+def load_rows(typingctx, array, rows, column, count):
+    """Columns of eight rows of an array of float64 in C order, as a tuple of `count` <= 8 Lanes.
+
+    rows : UniTuple(int64, 8), where each row starts in the flat array; column : the first of the
+    columns; count : a literal number.
+    """
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+    number = count.literal_value
+    result = types.UniTuple(lanes, number)
+
+    def codegen(context, builder, sig, args):
+        column = context.cast(builder, args[2], sig.args[2], types.intp)
+        loaded = [
+            _load(builder, _pointer(context, builder, sig.args[0], args[0], place), number)
+            for place in _places(builder, args[1], column)
+        ]
+        return context.make_tuple(builder, result, _turned(builder, loaded)[:number])
+
+    return result(array, rows, column, count), codegen
+
+
+def _back(builder, values):
+    columns = cgutils.unpack_tuple(builder, values)
+    zero = ir.Constant(_VECTOR, [0.0] * LANES)
+    return len(columns), _turned(builder, columns + [zero] * (LANES - len(columns)))
+
+
+@intrinsic
+def store_rows(typingctx, array, rows, column, values):
+    """Store a tuple of up to eight Lanes into columns of eight rows, see `load_rows`."""
+
+    def codegen(context, builder, sig, args):
+        column = context.cast(builder, args[2], sig.args[2], types.intp)
+        count, turned = _back(builder, args[3])
+        for place, row in zip(_places(builder, args[1], column), turned, strict=True):
+            _store(builder, row, _pointer(context, builder, sig.args[0], args[0], place), count)
+        return context.get_dummy_value()
+
+    return types.void(array, rows, column, values), codegen
+
+
+@intrinsic
+def add_rows(typingctx, array, rows, column, values, n):
+    """Add a tuple of up to eight Lanes to columns of the first `n` of eight rows."""
+
+    def codegen(context, builder, sig, args):
+        column = context.cast(builder, args[2], sig.args[2], types.intp)
+        count, turned = _back(builder, args[3])
+        for k, (place, row) in enumerate(
+                zip(_places(builder, args[1], column), turned, strict=True)):
+            there = builder.icmp_signed(">", args[4], ir.Constant(_INT, k))
+            with builder.if_then(there, likely=True):
+                pointer = _pointer(context, builder, sig.args[0], args[0], place)
+                total = builder.fadd(_load(builder, pointer, count), row)
+                _store(builder, total, pointer, count)
+        return context.get_dummy_value()
+
+    return types.void(array, rows, column, values, types.intp), codegen
+
+
+@intrinsic
+def add_to_pairs(typingctx, array, one, two, column, to_one, to_two, n):
+    """Add tuples of eight Lanes to columns of the first `n` rows `one` and rows `two`.
+
+    Pair after pair: what several pairs add to one row is summed in their order, whichever of them
+    share a register.
+    """
+
+    def codegen(context, builder, sig, args):
+        column = context.cast(builder, args[3], sig.args[3], types.intp)
+        ends = [
+            zip(_places(builder, rows, column), _back(builder, values)[1], strict=True)
+            for rows, values in ((args[1], args[4]), (args[2], args[5]))
+        ]
+        for k, pair in enumerate(zip(*ends, strict=True)):
+            there = builder.icmp_signed(">", args[6], ir.Constant(_INT, k))
+            with builder.if_then(there, likely=True):
+                for place, row in pair:
+                    pointer = _pointer(context, builder, sig.args[0], args[0], place)
+                    total = builder.fadd(_load(builder, pointer, LANES), row)
+                    _store(builder, total, pointer, LANES)
+        return context.get_dummy_value()
+
+    return types.void(array, one, two, column, to_one, to_two, types.intp), codegen
+
+
+@intrinsic
+def load_lanes(typingctx, array, place):
+    """Eight numbers that follow each other in the flat array."""
+
+    def codegen(context, builder, sig, args):
+        return _load(builder, _pointer(context, builder, sig.args[0], *args), LANES)
+
+    return lanes(array, types.intp), codegen
+
+
+@intrinsic
+def store_lanes(typingctx, array, place, x):
+    """Store eight numbers one after the other in the flat array."""
+
+    def codegen(context, builder, sig, args):
+        pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
+        _store(builder, args[2], pointer, LANES)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, lanes), codegen
+
+
+@jit_inline
+def eight(index, first):
+    """Eight entries of `index` from `first` on; beyond its end the last one again."""
+    last = index.shape[0] - 1
+    return (index[min(first, last)], index[min(first + 1, last)], index[min(first + 2, last)],
+            index[min(first + 3, last)], index[min(first + 4, last)], index[min(first + 5, last)],
+            index[min(first + 6, last)], index[min(first + 7, last)])
+
+
+@jit_inline
+def eight_from(first, count):
+    """The numbers from `first` on; beyond `count` the last one again."""
+    last = count - 1
+    return (min(first, last), min(first + 1, last), min(first + 2, last), min(first + 3, last),
+            min(first + 4, last), min(first + 5, last), min(first + 6, last), min(first + 7, last))
+
+
+@jit_inline
+def eight_of(index, numbers):
+    """Entries of `index` at eight places."""
+    return (index[numbers[0]], index[numbers[1]], index[numbers[2]], index[numbers[3]],
+            index[numbers[4]], index[numbers[5]], index[numbers[6]], index[numbers[7]])
+
+
+@jit_inline
+def starts(numbers, size):
+    """Where eight rows of a table with rows of `size` start."""
+    return (numbers[0] * size, numbers[1] * size, numbers[2] * size, numbers[3] * size,
+            numbers[4] * size, numbers[5] * size, numbers[6] * size, numbers[7] * size)
+
+
+if numba.config.DISABLE_JIT:
+    spread, where_beyond, any_beyond = plain.spread, plain.where_beyond, plain.any_beyond
+    square_root, sine, cosine = plain.square_root, plain.sine, plain.cosine
+    load_rows, store_rows, add_rows = plain.load_rows, plain.store_rows, plain.add_rows
+    load_lanes, store_lanes, add_to_pairs = plain.load_lanes, plain.store_lanes, plain.add_to_pairs

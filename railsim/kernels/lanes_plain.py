@@ -1,0 +1,55 @@
+"""What `lanes` does, with arrays of eight in plain Python: for kernels that are not compiled."""
+
+import numpy as np
+
+LANES = 8
+square_root, sine, cosine = np.sqrt, np.sin, np.cos
+
+
+def spread(x):
+    """One number in all lanes."""
+    return np.full(LANES, x)
+
+
+def any_beyond(x, limit):
+    """Whether |x| is more than `limit`, or not a number, in any lane."""
+    return not np.all(np.abs(x) <= limit)
+
+
+def where_beyond(x, limit, beyond, within):
+    """Lane by lane: `beyond` where |x| is more than `limit`, or not a number; else `within`."""
+    return np.where(np.abs(x) <= limit, within, beyond)
+
+
+def load_rows(array, rows, column, count):
+    """Columns of eight rows."""
+    flat = array.reshape(-1)
+    return tuple(flat[np.array(rows) + column + k] for k in range(count))
+
+
+def store_rows(array, rows, column, values):
+    """Store into columns of eight rows."""
+    for k, value in enumerate(values):
+        array.reshape(-1)[np.array(rows) + column + k] = value
+
+
+def add_rows(array, rows, column, values, n):
+    """Add to columns of the first `n` of eight rows."""
+    for k, value in enumerate(values):
+        np.add.at(array.reshape(-1), np.array(rows)[:n] + column + k, value[:n])
+
+
+def add_to_pairs(array, one, two, column, to_one, to_two, n):
+    """Add to columns of the first `n` of eight pairs of rows."""
+    add_rows(array, one, column, to_one, n)
+    add_rows(array, two, column, to_two, n)
+
+
+def load_lanes(array, place):
+    """Eight numbers that follow each other."""
+    return array.reshape(-1)[place:place + LANES].copy()
+
+
+def store_lanes(array, place, x):
+    """Store eight numbers one after the other."""
+    array.reshape(-1)[place:place + LANES] = x
