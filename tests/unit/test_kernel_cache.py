@@ -103,4 +103,4 @@ def test_no_other_code_is_bound_to_the_callees_of_a_function(copied_kernels):
     """Else results depend on which function was compiled or called first, see `railsim.kernels`."""
     _, names = output(PROGRAM + VISIBLE, copied_kernels.parent.parent)
     assert "locate_frames" in names
-    assert len(names.split()) == 1
+    assert all("locate_frames" in name for name in names.split())
