@@ -16,18 +16,10 @@ from railsim.bench.report import tables
 RESULTS = Path(__file__).parent / "results"
 DOCS = Path(__file__).parents[1] / "docs"
 sys.path.insert(0, str(DOCS))
-from generate import filled  # noqa: E402
+from generate import filled, table  # noqa: E402
 
 BENCH = ("loop", "parts", "fastsim_grids", "cores", "commands")
 GROWTH = ("wheelsets", "cells", "output", "length")
-
-
-def markdown(header: list[str], rows: list[list[str]]) -> str:
-    line = "| " + " | ".join(header) + " |"
-    rule = "| --- |" + " ---: |" * (len(header) - 1)
-    return "".join(f"{row}\n" for row in [
-        line, rule, *("| " + " | ".join(row) + " |" for row in rows)
-    ])
 
 
 def peer_row(name: str, setting: str, record: dict[str, Any], ours: dict[str, Any]) -> list[str]:
@@ -62,7 +54,7 @@ def peers(found: dict[str, Any]) -> str:
         peer_row(f"Exudyn {record['method']}", f"{1e3 * record['step']:g} ms", record, ours)
         for record in part["candidates"]
     ]
-    return markdown(header, rows)
+    return table(header, rows)
 
 
 def fastsim(found: dict[str, Any]) -> str:
@@ -72,24 +64,24 @@ def fastsim(found: dict[str, Any]) -> str:
         for name, time in times.items()
         if not name.startswith("march")
     ]
-    return markdown(["FASTSIM 10 x 10", "us per patch", "ratio"], rows)
+    return table(["FASTSIM 10 x 10", "us per patch", "ratio"], rows)
 
 
 def growth(found: dict[str, Any]) -> list[str]:
     return [
-        markdown(["wheelsets", "patches", "states", "us per evaluation", "us per wheelset"], [
+        table(["wheelsets", "patches", "states", "us per evaluation", "us per wheelset"], [
             [str(r["wheelsets"]), str(r["patches"]), str(r["states"]), f"{1e6 * r['time']:.2f}",
              f"{1e6 * r['time'] / r['wheelsets']:.2f}"]
             for r in found["wheelsets"]
         ]),
-        markdown(["FASTSIM's grid", "us per evaluation"], [
+        table(["FASTSIM's grid", "us per evaluation"], [
             [f"{r['grid']} x {r['grid']}", f"{1e6 * r['time']:.2f}"] for r in found["cells"]
         ]),
-        markdown(["outputs per s", "step (ms)", "x real time"], [
+        table(["outputs per s", "step (ms)", "x real time"], [
             [f"{r['rate']:g}", f"{1e3 * r['step']:.3f}", f"{r['real_time']:.0f}"]
             for r in found["output"]
         ]),
-        markdown(["track (km)", "CPU (s)", "peak memory (MB)", "file (MB)"], [
+        table(["track (km)", "CPU (s)", "peak memory (MB)", "file (MB)"], [
             [f"{r['kilometres']:g}", f"{r['cpu']:.1f}", f"{r['memory'] / 1e6:.0f}",
              f"{r['file'] / 1e6:.1f}"]
             for r in found["length"]
@@ -102,7 +94,7 @@ def main() -> None:
         return dict(json.loads((RESULTS / f"{name}.json").read_text()))
 
     bench, found = load("bench"), load("peers")
-    known = dict(zip(BENCH, (markdown(*table) for table in tables(bench)), strict=True))
+    known = dict(zip(BENCH, (table(*made) for made in tables(bench)), strict=True))
     known |= {"peers": peers(found), "fastsim": fastsim(found["fastsim"])}
     known |= dict(zip(GROWTH, growth(load("growth")), strict=True))
     page = DOCS / "performance.md"

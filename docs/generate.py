@@ -7,6 +7,7 @@ they are up to date.
 
 import re
 import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from railsim import load_track, load_vehicle, simulate
@@ -28,7 +29,7 @@ def tables() -> dict[str, str]:
 def quantity_table() -> str:
     """Table of the quantities of a result."""
     head = ("name", "symbol", "meaning", "sign", "unit", "shown", "dimensions")
-    return _lines(head, "---", [_quantity_row(quantity) for quantity in QUANTITIES.values()])
+    return table(head, map(_quantity_row, QUANTITIES.values()), "---")
 
 
 def _quantity_row(quantity: Quantity) -> tuple[str, ...]:
@@ -53,14 +54,15 @@ def curving_table(coach: str) -> str:
         difference = f"{100.0 * (found / expected - 1.0):+.1f} %"
         numbers = (_digits(quantity.scale * value) for value in (expected, found))
         rows.append((f"{quantity.words}, {where}", *numbers, difference))
-    return _lines(("leading wheelset", "published", "railsim", "difference"), "---:", rows)
+    return table(("leading wheelset", "published", "railsim", "difference"), rows)
 
 
 def _digits(value: float) -> str:
     return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.3f}"
 
 
-def _lines(head: tuple[str, ...], rule: str, rows: list[tuple[str, ...]]) -> str:
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---:") -> str:
+    """Return a table of the manual; `rule` aligns all columns but the first."""
     rules = ("---", *[rule] * (len(head) - 1))
     return "".join(f"| {' | '.join(row)} |\n" for row in (head, rules, *rows))
 
@@ -68,6 +70,17 @@ def _lines(head: tuple[str, ...], rule: str, rows: list[tuple[str, ...]]) -> str
 def filled(text: str, known: dict[str, str]) -> str:
     """Return a page with its tables filled."""
     return TABLE.sub(lambda match: f"{match[1]}\n{known[match[2]]}\n{match[3]}", text)
+
+
+def fill_page(page: Path, makers: Mapping[str, Callable[[], str]]) -> None:
+    """Make the tables of a page that the command line asks for, all by default."""
+    wanted = sys.argv[1:] or list(makers)
+    text = page.read_text("utf-8")
+    known = {name: make() for name, make in makers.items() if name in wanted}
+    for match in TABLE.finditer(text):  # tables that were not asked for stay
+        present = match[0].split("-->\n", 1)[1].rsplit("<!-- end", 1)[0]
+        known.setdefault(match[2], present.strip() + "\n")
+    page.write_text(filled(text, known), encoding="utf-8")
 
 
 if __name__ == "__main__":

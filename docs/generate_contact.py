@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from generate import TABLE, filled
+from generate import fill_page, table
 from scipy.optimize import brentq
 
 from railsim import assembly, load_track, load_vehicle, simulate
@@ -36,12 +36,6 @@ PAIRS = {
     "60E1, 1:20": ("60E1", 0.05, (10.228, 26.0265)),
     "benchmark rail, 1:40": ("benchmark", 0.025, (10.49979, 25.98803)),
 }
-
-
-def rows(header: tuple[str, ...], body: list[tuple[str, ...]]) -> str:
-    """A table of the manual."""
-    rule = ("---", *["---:"] * (len(header) - 1))
-    return "".join(f"| {' | '.join(row)} |\n" for row in (header, rule, *body))
 
 
 def rigid_table() -> str:
@@ -105,7 +99,7 @@ def rigid_table() -> str:
             )
         )
     header = ("S1002 on", "radius, mm", "angle, mrad", "jumps at, mm", "conicity at 1/3/5 mm")
-    return rows(header, body)
+    return table(header, body)
 
 
 def exact_table() -> str:
@@ -162,7 +156,7 @@ def exact_table() -> str:
         "p_max, MPa",
         "table/exact",
     )
-    return rows(header, body)
+    return table(header, body)
 
 
 COARSE = {"ds": 1e-4, "droll": 6e-3, "n_w": 9}
@@ -198,11 +192,11 @@ def curving_table() -> str:
     for name, (changes, rail, inclination) in VARIANTS.items():
         grid = dataclasses.replace(TableGrid(), **changes)
 
-        def table(wheel, rail, *, grid=grid, **geometry):
+        def changed(wheel, rail, *, grid=grid, **geometry):
             del geometry["normal"]  # the grid says it
             return build_contact_table(wheel, rail, grid=grid, **geometry)
 
-        assembly.cached_contact_table = table
+        assembly.cached_contact_table = changed
         track = load_track("curve_r250", [f'rail="{rail}"', f"inclination={inclination}"])
         vehicle = load_vehicle("coach_manchester")
         result = simulate(vehicle, track, speed=20.0, settings=Settings(step=STEP))
@@ -226,7 +220,7 @@ def curving_table() -> str:
         "yaw, mrad",
         "lateral, mm",
     )
-    return rows(header, body)
+    return table(header, body)
 
 
 def time_table() -> str:
@@ -238,7 +232,7 @@ def time_table() -> str:
         cpu = time.process_time()
         build_contact_table(*pair, grid=TableGrid(normal=normal))
         body.append((normal, f"{time.process_time() - cpu:.1f}"))
-    return rows(("normal contact", "processor time of both cores, s"), body)
+    return table(("normal contact", "processor time of both cores, s"), body)
 
 
 if __name__ == "__main__":
@@ -248,10 +242,4 @@ if __name__ == "__main__":
         "tables": curving_table,
         "building": time_table,
     }
-    wanted = sys.argv[1:] or list(makers)
-    text = PAGE.read_text("utf-8")
-    known = {name: makers[name]() for name in wanted}
-    for match in TABLE.finditer(text):  # tables that were not asked for stay
-        present = match[0].split("-->\n", 1)[1].rsplit("<!-- end", 1)[0]
-        known.setdefault(match[2], present.strip() + "\n")
-    PAGE.write_text(filled(text, known), encoding="utf-8")
+    fill_page(PAGE, makers)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from generate import TABLE, filled
+from generate import fill_page, table
 
 from railsim import load_settings, load_track, load_vehicle, simulate
 from railsim.contact.creep import LAWS, CreepForce, creep_force
@@ -30,12 +30,6 @@ from curving_study import COACHES, measured, published  # noqa: E402
 
 CURVES = creep_curves(REFERENCE)
 RATIOS = (0.3, 1.0, 3.0)
-
-
-def rows(header, body):
-    """A table of the manual."""
-    rule = ("---", *["---:"] * (len(header) - 1))
-    return "".join(f"| {' | '.join(row)} |\n" for row in (header, rule, *body))
 
 
 def law(name, n=10):
@@ -64,7 +58,7 @@ HEADER = ("", "a/b = 0.3", "1", "3", "rms", "moment")
 
 def fastsim_table():
     """FASTSIM against its own limit."""
-    return rows(
+    return table(
         HEADER,
         [
             error_row(f"{n} × {n}", law("fastsim", n), "fastsim3_continuum")
@@ -94,7 +88,7 @@ def laws_table():
         cells = [f"{error[ratio == CURVES.ratio].max():.4f}" for ratio in RATIOS]
         rms = np.sqrt(np.mean(error**2))
         body.append((name, *cells, f"{rms:.4f}", f"{np.abs(difference[2]).max():.4f}"))
-    return rows(HEADER, body)
+    return table(HEADER, body)
 
 
 def curves_table():
@@ -118,7 +112,7 @@ def curves_table():
             )
         )
     header = ("curve", "`table`", "`fastsim`", "listed", "`fastrip`", "listed")
-    return rows(header, body)
+    return table(header, body)
 
 
 def solver_table():
@@ -128,7 +122,7 @@ def solver_table():
     weight = 1.0 / (np.sqrt(8.0) - 1.0)
     both = CreepForce(*(f + weight * (f - c) for f, c in zip(found[28], found[14], strict=True)))
     body.append(error_row("28 × 28 and 14 × 14, extrapolated", both))
-    return rows(HEADER, body)
+    return table(HEADER, body)
 
 
 def coefficients_table():
@@ -147,7 +141,7 @@ def coefficients_table():
             for o, k, t in zip(own, other, printed, strict=True)
         ]
         body.append((f"{ratio:g}", *cells))
-    return rows(("a/b", "c11", "c22", "c23", "c33"), body)
+    return table(("a/b", "c11", "c22", "c23", "c33"), body)
 
 
 RUNS = (("fastsim", 10), ("fastsim", 50), *((name, 10) for name in LAWS if name != "fastsim"))
@@ -179,7 +173,7 @@ def curving_table():
             grid = f", {n} × {n}" if law_name in ("fastsim", "fastrip") else ""
             body.append((f"`{law_name}`{grid}", *cells))
             print(body[-1], flush=True)
-    return rows(("", *(quantity.words for quantity in quantities)), body)
+    return table(("", *(quantity.words for quantity in quantities)), body)
 
 
 def shown(quantity, value):
@@ -209,12 +203,6 @@ if __name__ == "__main__":
         "coefficients": coefficients_table,
         "law_curving": curving_table,
     }
-    wanted = sys.argv[1:] or [*makers, "pictures"]
-    if "pictures" in wanted:
+    if "pictures" in sys.argv or not sys.argv[1:]:
         pictures()
-    text = PAGE.read_text("utf-8")
-    known = {name: makers[name]() for name in wanted if name in makers}
-    for match in TABLE.finditer(text):  # tables that were not asked for stay
-        present = match[0].split("-->\n", 1)[1].rsplit("<!-- end", 1)[0]
-        known.setdefault(match[2], present.strip() + "\n")
-    PAGE.write_text(filled(text, known), encoding="utf-8")
+    fill_page(PAGE, makers)

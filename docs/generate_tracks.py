@@ -8,7 +8,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from generate import TABLE, filled
+from generate import fill_page, table
 from scipy.signal import welch
 
 from railsim.definitions.track import Track
@@ -26,12 +26,6 @@ CHANNELS = {"lateral": "alignment", "vertical": "longitudinal level", "cross_lev
             "gauge": "gauge"}
 BAND = (3.0, 70.0)  # m
 LENGTH, SPACING, SEEDS = 1000.0, 0.25, 50  # m, m, -; a part of the period of 1400 m
-
-
-def rows(header, body):
-    """A table of the manual."""
-    rule = ("---", *["---:"] * (len(header) - 1))
-    return "".join(f"| {' | '.join(row)} |\n" for row in (header, rule, *body))
 
 
 def signed(value):
@@ -56,7 +50,7 @@ def convergence():
         words = "acceleration of the car body" if name == "body_acceleration" else words
         cells = [", ".join(signed(100.0 * value) for value in case[name]) for case in found]
         body.append((words, *cells))
-    return rows(("", *heads), [*body, ("simulated per CPU second", *times)])
+    return table(("", *heads), [*body, ("simulated per CPU second", *times)])
 
 
 def channels(seed):
@@ -94,7 +88,7 @@ def variance_table(variance):
                      signed(100.0 * (variance[name] / exact**2 - 1.0))))
     head = ("standard deviation", "from the spectrum's integral", f"mean of {SEEDS} seeds",
             "difference of the variance (%)")
-    return rows(head, body)
+    return table(head, body)
 
 
 def picture(omega, density):
@@ -122,7 +116,4 @@ def picture(omega, density):
 if __name__ == "__main__":
     omega, density, variance = spectra()
     picture(omega, density)
-    known = {"convergence": convergence(), "variance": variance_table(variance)}
-    text = PAGE.read_text("utf-8")
-    assert {match[2] for match in TABLE.finditer(text)} == set(known)
-    PAGE.write_text(filled(text, known), encoding="utf-8")
+    fill_page(PAGE, {"convergence": convergence, "variance": lambda: variance_table(variance)})

@@ -306,7 +306,7 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     )
 
 
-def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float) -> list[tuple[str, str]]:
+def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float, pair: str) -> list[Fault]:
     """Why a wheelset of this wheel cannot run in this track, on both sides the same.
 
     Parameters
@@ -315,14 +315,21 @@ def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float) -> list[tuple[str,
     rail : RailCurve
     gauge : float
         For the message [m].
+    pair : str
+        What the message calls them.
 
     Returns
     -------
-    list of (found, remedy)
+    list of Fault
         Empty if it can: in the middle of the track the tread stands on the rail, and pushed to one
         side until the flange touches, the other wheel still has the rail under it.
     """
+    found = _misfit(wheel, rail, gauge)
     remedy = "check gauge, back-to-back distance and both profiles"
+    return [Fault(f"gauge {1e3 * gauge:.1f} mm", pair, found, remedy)] if found else []
+
+
+def _misfit(wheel: WheelCurve, rail: RailCurve, gauge: float) -> str:
     steepest = float(wheel.t.min())
     # a wheel without flange has none to be in the way
     flank = int(np.flatnonzero(wheel.t < 0.9 * steepest)[-1]) if steepest < -0.5 else 0
@@ -330,19 +337,17 @@ def misfits(wheel: WheelCurve, rail: RailCurve, gauge: float) -> list[tuple[str,
     corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
     slack = 0.5 * gauge - flank_place
     if corner - flank_place < 0.0:
-        found = (
+        return (
             f"the flange stands on the rail, {1e3 * (flank_place - corner):.1f} mm beyond the "
             "gauge corner, when the wheelset is central"
         )
-        return [(found, remedy)]
     if wheel.u[-1] - slack < corner:
         short = 1e3 * (corner + slack - wheel.u[-1])
-        found = (
+        return (
             "the wheelset falls between the rails: with one flange at its rail, the outer end of "
             f"the other wheel is {short:.1f} mm short of the rail"
         )
-        return [(found, remedy)]
     height = np.interp(wheel.u, rail.Y, rail.z, left=1.0, right=1.0) - (wheel.r - wheel.r.min())
     if int(np.argmin(height)) <= flank:
-        return [("the flange touches the rail when the wheelset is central", remedy)]
-    return []
+        return "the flange touches the rail when the wheelset is central"
+    return ""

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from railsim.contact.curves import misfits, rail_curve, tape_circle_place, wheel_curve
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError
 from railsim.kernels import normal_contact as kernel
 from railsim.profiles.profile import Profile
 
@@ -162,11 +162,7 @@ class _Geometry:
     ) -> None:
         points = wheel_curve(wheel, radius, tape_circle_place(back_to_back), CANDIDATE_SPACING)
         nodes = rail_curve(rail, gauge, inclination)
-        faults = [
-            Fault(f"gauge {1e3 * gauge:.1f} mm", f"{wheel.name} on {rail.name}", found, remedy)
-            for found, remedy in misfits(points, nodes, gauge)
-        ]
-        if faults:
+        if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
             raise InputError(faults)
         cosine, sine = np.cos(roll), np.sin(roll)
         place = y + points.u * cosine - points.r * sine

@@ -22,7 +22,7 @@ from railsim.contact.curves import (
     tape_circle_place,
     wheel_curve,
 )
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile
 
@@ -151,9 +151,9 @@ def contact_geometry(
         else np.atleast_1d(np.asarray(lateral, dtype=np.float64))
     )
     faults = [
-        Fault(f"gauge {1e3 * gauge:.1f} mm", f"{side} wheel", found, remedy)
+        fault
         for side, w, r in zip(("left", "right"), wheels, rails, strict=True)
-        for found, remedy in misfits(w, r, gauge)
+        for fault in misfits(w, r, gauge, f"{side} wheel")
     ]
     if faults:
         raise InputError(faults)

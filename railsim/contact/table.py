@@ -65,7 +65,7 @@ from railsim.contact.curves import (
     tape_circle_place,
     wheel_curve,
 )
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
@@ -306,11 +306,7 @@ def build_contact_table(
     height = radius if centre_height is None else centre_height
     wheel_points = wheel_curve(wheel, radius, tape_circle_place(back_to_back))
     rail_nodes = rail_curve(rail, gauge, inclination)
-    faults = [
-        Fault(f"gauge {1e3 * gauge:.1f} mm", f"{wheel.name} on {rail.name}", found, remedy)
-        for found, remedy in misfits(wheel_points, rail_nodes, gauge)
-    ]
-    if faults:
+    if faults := misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
         raise InputError(faults)
     window = zone_windows(wheel_points)
     present = window > 1e-6

@@ -10,6 +10,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+from started import started
 
 import railsim
 from railsim.cli import main
@@ -247,17 +248,7 @@ def test_interrupt_leaves_nothing(tmp_path, delay):
     # RK4 at small steps runs for a minute: the interrupt comes early, while loading, or within it
     arguments = [*COACH, "--speed", "2", "--set", "settings.scheme=rk4"]
     arguments += ["--set", "settings.step=1e-4", "--out", str(tmp_path / "run.h5")]
-    # a background job of a shell is started with the interrupt ignored: here it counts
-    call = (
-        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
-        "from railsim.cli import main; sys.exit(main())"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", call, *arguments],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = started(arguments)
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)

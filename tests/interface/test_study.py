@@ -15,6 +15,7 @@ import time
 import numpy as np
 import pytest
 from example_result import ROOT, feed
+from started import started
 
 import railsim
 import railsim.studies.run
@@ -378,18 +379,7 @@ def begun(folder):
     """A study of four runs of a minute each on two workers, each of which has begun a run."""
     given = arguments(folder, 2, 3, 4, 5)[:-2]
     given += ["--set", "settings.scheme=rk4", "--set", "settings.step=1e-4", "--workers", "2"]
-    # a background job of a shell is started with the interrupt ignored: here it counts
-    call = (
-        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
-        "from railsim.cli import main; sys.exit(main())"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", call, *given],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    process = started(given)
     while len(list(folder.glob(".*.partial"))) < 2:
         time.sleep(0.2)
     time.sleep(1.0)

@@ -1,0 +1,19 @@
+"""A command in a process of its own, to be interrupted."""
+
+import subprocess
+import sys
+
+
+def started(arguments):
+    """Start railsim; Ctrl-C counts even where a shell started the tests without it."""
+    call = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "from railsim.cli import main; sys.exit(main())"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", call, *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
