@@ -80,12 +80,14 @@ def choose_step(
     ModelError
         No step longer than `SHORTEST_STEP` is stable.
     """
-    growth = max(0.0, _vehicle_growth(model, system, state)) + GROWTH
+    allowed: float | None = None
     longest = min(LONGEST_STEP[scheme], LONGEST_TRAVEL / float(state[-1]))
     n = max(1, int(np.ceil(interval / longest * (1.0 - 1e-9))))
     while interval / n >= SHORTEST_STEP:
-        h = MARGIN * interval / n
-        if _step_growth(model, system, state, scheme, h) <= growth:
+        growth = _step_growth(model, system, state, scheme, MARGIN * interval / n)
+        if growth > GROWTH and allowed is None:  # for most vehicles the question does not arise
+            allowed = max(0.0, _vehicle_growth(model, system, state)) + GROWTH
+        if growth <= (allowed or GROWTH):
             return interval / n
         n = max(n + 1, int(n * 1.1))
     raise ModelError(
@@ -109,7 +111,7 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
 
 
 def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: float) -> float:
-    """Largest growth rate of the modes of one step of length `h` [1/s]."""
+    """Largest growth rate of the modes of one step of length `h` [1/s]; inf where it fails."""
     work = work_arrays(system)
     derivative = np.zeros_like(state)
     stages = np.zeros((3, len(state)))
@@ -117,12 +119,14 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
 
     def step(trial: Floats) -> Floats:
         after = trial.copy()
-        time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme], h, 1, 1,
-                  _NEVER, 0, 0)
-        return after
+        status, *_ = time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme],
+                               h, 1, 1, _NEVER, 0, 0)
+        return after if status == RUNNING else np.full_like(after, np.nan)
 
-    radius = np.max(np.abs(np.linalg.eigvals(_jacobian(step, state))))
-    return float(np.log(radius) / h) if np.isfinite(radius) else np.inf
+    columns = _jacobian(step, state)
+    if not np.isfinite(columns).all():
+        return np.inf
+    return float(np.log(np.max(np.abs(np.linalg.eigvals(columns)))) / h)
 
 
 def _jacobian(function, state: Floats) -> Floats:  # type: ignore[no-untyped-def]
