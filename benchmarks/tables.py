@@ -18,7 +18,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 sys.path.insert(0, str(DOCS))
 from generate import filled, table  # noqa: E402
 
-BENCH = ("loop", "parts", "fastsim_grids", "cores", "commands")
+BENCH = ("loop", "parts", "fastsim_grids", "ensembles", "cores", "commands")
 GROWTH = ("wheelsets", "cells", "output", "length")
 
 

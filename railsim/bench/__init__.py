@@ -3,6 +3,7 @@
 machine.py    hardware, versions, and whether the machine is quiet enough for what is measured
 scenarios.py  the runs that are timed
 runs.py       speed of the time loop, each with its error against RK4 at 0.125 ms; two cores
+ensembles.py  many runs per call
 loops.py      compiled loops over parts of the right-hand side
 parts.py      time per right-hand side and per part, FASTSIM over its grid, table look-up
 commands.py   start-up cold and warm, whole commands, peak memory

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from railsim.bench.commands import commands
+from railsim.bench.ensembles import COACH_IN_CURVE, SIZES, ensembles
 from railsim.bench.machine import SPIN, hardware, vector_instructions, versions
 from railsim.bench.parts import (
     GRIDS,
@@ -40,6 +41,10 @@ class Plan:
         How often a part is measured.
     grids : tuple of int
         Grids of FASTSIM.
+    ensembles : tuple of int
+        Numbers of runs in one call.
+    ensemble_run : Scenario
+        What these runs are, with changed springs and dampers.
     command_repetitions : int
         How often whole commands run; 0: not at all.
     cold : bool
@@ -56,6 +61,8 @@ class Plan:
     place: float = 396.0
     part_repetitions: int = REPETITIONS
     grids: tuple[int, ...] = GRIDS
+    ensembles: tuple[int, ...] = SIZES
+    ensemble_run: Scenario = COACH_IN_CURVE
     command_repetitions: int = 3
     cold: bool = True
     spins: int = SPIN
@@ -63,7 +70,8 @@ class Plan:
 
 FULL = Plan()
 QUICK = Plan(
-    runs=(STUDY[0], STUDY[2]), repetitions=3, batches=2, command_repetitions=1, cold=False
+    runs=(STUDY[0], STUDY[2]), repetitions=3, batches=2, ensembles=(1, 8), command_repetitions=1,
+    cold=False,
 )
 
 
@@ -73,6 +81,7 @@ def shortened(plan: Plan, until: float) -> Plan:
         plan,
         runs=tuple(replace(run, until=until) for run in plan.runs),
         batch=tuple(replace(run, until=until) for run in plan.batch),
+        ensemble_run=replace(plan.ensemble_run, until=until),
         place=min(plan.place, until),
     )
 
@@ -83,7 +92,8 @@ def benchmark(plan: Plan, progress: Callable[[float], None] = lambda _: None) ->
     Returns
     -------
     dict
-        Plain numbers and strings, SI; `runs`, `two_cores`, `parts`, `fastsim`, `commands`.
+        Plain numbers and strings, SI; `runs`, `two_cores`, `parts`, `fastsim`, `ensembles`,
+        `commands`.
     """
     found: dict[str, Any] = {
         "hardware": hardware() | {"vectors": vector_instructions()},
@@ -104,6 +114,8 @@ def benchmark(plan: Plan, progress: Callable[[float], None] = lambda _: None) ->
     found["parts"] = right_hand_side_parts(place=plan.place, repetitions=plan.part_repetitions)
     found["fastsim"] = fastsim_grids(plan.grids, repetitions=plan.part_repetitions)
     progress(0.6)
+    found["ensembles"] = ensembles(plan.ensembles, plan.repetitions, plan.ensemble_run)
+    progress(0.7)
     if plan.batch:
         found["two_cores"] = two_cores(plan.batches, plan.batch, plan.spins)
     progress(0.8)
@@ -118,7 +130,8 @@ Table = tuple[list[str], list[list[str]]]
 
 def tables(found: dict[str, Any]) -> list[Table]:
     """Return what was found as tables: titles of the columns, rows."""
-    made = [_runs(found["runs"]), _parts(found["parts"]), _fastsim(found["fastsim"])]
+    made = [_runs(found["runs"]), _parts(found["parts"]), _fastsim(found["fastsim"]),
+            _ensembles(found["ensembles"])]
     if "two_cores" in found:
         made.append(_two_cores(found["two_cores"]))
     if "commands" in found:
@@ -178,6 +191,21 @@ def _fastsim(records: Sequence[dict[str, float]]) -> Table:
         for record in records
     ]
     return ["FASTSIM", "us per patch, all at once", "us, one alone", "ns per cell"], rows
+
+
+def _ensembles(records: Sequence[dict[str, Any]]) -> Table:
+    alone = records[0]
+    rows = [
+        [
+            str(record["members"]),
+            f"{record['real_time']:.0f}",
+            f"{record['real_time_best']:.0f}",
+            f"{1e6 * record['cpu_per_step']:.2f}",
+            f"{record['real_time'] / alone['real_time']:.2f}",
+        ]
+        for record in records
+    ]
+    return ["runs in one call", "x real time, all", "best", "us per step and run", "gain"], rows
 
 
 def _two_cores(found: dict[str, Any]) -> Table:

@@ -16,8 +16,9 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
     """Measure how fast railsim is on this machine, and how right at that speed.
 
     The study's runs in multiples of real time with their errors against RK4 at 0.125 ms; the parts
-    of the right-hand side; FASTSIM over its grid; one core and two; start-up, whole commands and
-    memory.  Takes a few minutes.  Other programs that run meanwhile spoil wall times.
+    of the right-hand side; FASTSIM over its grid; many runs per call; one core and two; start-up,
+    whole commands and memory.  Takes a few minutes.  Other programs that run meanwhile spoil wall
+    times.
 
     \b
     Example:

@@ -15,7 +15,7 @@ from railsim.cli import main
 
 TINY = replace(
     shortened(QUICK, 10.0), runs=shortened(QUICK, 10.0).runs[:1], batch=(), repetitions=2,
-    part_repetitions=3, grids=(5, 10), command_repetitions=0, spins=1000,
+    part_repetitions=3, grids=(5, 10), ensembles=(1, 3), command_repetitions=0, spins=1000,
 )
 
 
@@ -48,14 +48,22 @@ def test_parts_of_the_right_hand_side_are_positive_and_below_the_whole(found):
     assert [row["grid"] for row in found["fastsim"]] == [5, 10]
 
 
+def test_several_runs_in_one_call_are_timed_together(found):
+    one, three = found["ensembles"]
+    assert (one["members"], three["members"]) == (1, 3)
+    for record in (one, three):
+        assert len(record["real_time_all"]) == 2
+        assert record["real_time_best"] >= record["real_time"] > 0.0
+
+
 def test_json_and_tables_hold_what_was_found(monkeypatch, capsys):
     monkeypatch.setattr(report, "QUICK", TINY)
     assert main(["bench", "--quick", "--json", "--quiet"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert {"hardware", "versions", "runs", "parts", "fastsim"} <= set(data)
+    assert {"hardware", "versions", "runs", "parts", "fastsim", "ensembles"} <= set(data)
     assert data["versions"]["numba"] != "not installed"
     headers = [header[0] for header, _ in tables(data)]
-    assert headers == ["time loop", "right-hand side, 8 patches", "FASTSIM"]
+    assert headers == ["time loop", "right-hand side, 8 patches", "FASTSIM", "runs in one call"]
     for header, rows in tables(data):
         assert all(len(row) == len(header) for row in rows)
 
