@@ -39,7 +39,7 @@ from railsim.result.sinks import (
 )
 
 CHUNK_BYTES = 2**18
-ROWS_AT_ONCE = 512
+ROWS_AT_ONCE = 2048  # of the coach 4 MB
 
 
 class Hdf5Sink(SinkContext):
@@ -77,10 +77,14 @@ class Hdf5Sink(SinkContext):
         self._attributes = dict(attributes)
         self._partial = partial_path(self.path, os.getpid())
         self._quantities: dict[str, Quantity] = {}
-        self._waiting: list[dict[str, Array]] = []
+        self._datasets: dict[str, h5py.Dataset] = {}
+        self._blocks: dict[str, Array] = {}  # what waits to be written, by quantity
+        self._waiting = 0
         self._length = 0
         try:
-            self._file = h5py.File(self._partial, "w", track_order=True)
+            # what is written is not read again: HDF5 need not keep chunks, by itself 8 MB of each
+            # quantity
+            self._file = h5py.File(self._partial, "w", track_order=True, rdcc_nbytes=0)
         except OSError as error:
             fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another place")
             raise InputError([fault]) from None
@@ -99,24 +103,27 @@ class Hdf5Sink(SinkContext):
         for quantity in sorted(self._quantities.values(), key=lambda q: q.name != "time"):
             if "time" in quantity.dims:
                 inner = tuple(len(names[dim]) for dim in quantity.dims[1:])
-                _create(self._file, quantity, inner)
+                self._datasets[quantity.name] = _create(self._file, quantity, inner)
+                self._blocks[quantity.name] = np.empty((ROWS_AT_ONCE, *inner))
 
     def append(self, chunk: Mapping[str, Array]) -> None:
-        """See `Sink.append`; small chunks wait until they are worth writing."""
-        self._waiting.append({name: np.array(chunk[name]) for name in timed(self._quantities)})
-        if sum(len(waiting["time"]) for waiting in self._waiting) >= ROWS_AT_ONCE:
-            self._write_waiting()
+        """See `Sink.append`; rows wait until they are worth writing."""
+        rows, done = len(chunk["time"]), 0
+        while done < rows:
+            count = min(rows - done, ROWS_AT_ONCE - self._waiting)
+            for name, block in self._blocks.items():
+                block[self._waiting : self._waiting + count] = chunk[name][done : done + count]
+            done += count
+            self._waiting += count
+            if self._waiting == ROWS_AT_ONCE:
+                self._write_waiting()
 
     def _write_waiting(self) -> None:
-        if not self._waiting:
-            return
-        length = self._length + sum(len(waiting["time"]) for waiting in self._waiting)
-        for name in timed(self._quantities):
-            dataset = self._file[name]
+        length = self._length + self._waiting
+        for name, dataset in self._datasets.items():
             dataset.resize(length, axis=0)
-            dataset[self._length :] = np.concatenate([waiting[name] for waiting in self._waiting])
-        self._length = length
-        self._waiting = []
+            dataset[self._length : length] = self._blocks[name][: self._waiting]
+        self._length, self._waiting = length, 0
 
     def close(
         self,
@@ -251,7 +258,7 @@ def _write_names(file: h5py.File, dim: str, labels: Sequence[str]) -> None:
     dataset.make_scale(dim)
 
 
-def _create(file: h5py.File, quantity: Quantity, inner: tuple[int, ...]) -> None:
+def _create(file: h5py.File, quantity: Quantity, inner: tuple[int, ...]) -> h5py.Dataset:
     rows = max(1, CHUNK_BYTES // (8 * max(1, int(np.prod(inner)))))
     dataset = file.create_dataset(
         quantity.name,
@@ -263,6 +270,7 @@ def _create(file: h5py.File, quantity: Quantity, inner: tuple[int, ...]) -> None
     if quantity.name == "time":
         dataset.make_scale("time")
     _describe(dataset, quantity)
+    return dataset
 
 
 def _describe(dataset: h5py.Dataset, quantity: Quantity) -> None:

@@ -108,7 +108,8 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         raise
     except Exception as error:
         found = [error] * len(batch)
-    return [_record(job, outcome) for job, outcome in zip(batch, found, strict=True)]
+    found.reverse()  # each result is let go of with its record: it holds what was read of its file
+    return [_record(job, found.pop()) for job in batch]
 
 
 def _record(job: Job, outcome: Result | Exception) -> Record:
