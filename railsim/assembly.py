@@ -152,6 +152,7 @@ def assemble(
     elements = ElementArrays({body.name: body for body in flat.bodies})
     for element in flat.elements:
         elements.add(element)
+    elements.sort()
     bodies, offsets = _bodies(flat)
     system = System(
         bodies=bodies,

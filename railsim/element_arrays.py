@@ -247,6 +247,10 @@ class ElementArrays:
         self.curve_rows.append(np.array(two_sided(table)))
         return len(self.curve_rows) - 1
 
+    def sort(self) -> None:
+        """Bring mounts of one kind together: what none of a block of eight has is skipped."""
+        self.mount_rows.sort(key=_kind_of_mount)
+
     def links(self) -> Links:
         """Arrays of all point-to-point elements."""
         rows = self.link_rows
@@ -264,14 +268,14 @@ class ElementArrays:
                   "rotation_damping")
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
-        special = ((internal >= 0) | (curve >= 0)).any(axis=1).astype(np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
             row=_table(rows, floats, MOUNT_SIZE),
             friction=_column(rows, "friction", (3, 2)),
             internal=internal,
             curve=curve,
-            flags=np.column_stack([_column(rows, "flags", (4,), np.int64), special]),
+            flags=_column(rows, "flags", (4,), np.int64),
+            law=np.flatnonzero((internal >= 0) | (curve >= 0)),
         )
 
     def loads(self) -> Loads:
@@ -303,6 +307,11 @@ class ElementArrays:
             parameter=np.array([row[1] for row in rows], dtype=float).reshape(-1, 3),
             curve=np.array([row[2] for row in rows], dtype=np.int64),
         )
+
+
+def _kind_of_mount(row: dict[str, Any]) -> tuple[bool, ...]:
+    has_law = max(*row["internal"], *row["curve"]) >= 0
+    return (not has_law, *(bool(flag) for flag in row["flags"][1:3]))
 
 
 def _given(preload: Any) -> Triple:

@@ -149,6 +149,7 @@ def joined_system(models: Sequence[Model]) -> System:
     bodies = _starts(len(system.bodies.kind) for system in systems)
     internal = _starts(len(system.internal.kind) for system in systems)
     curves = _starts(len(system.curves.start) - 1 for system in systems)
+    mounts = _starts(len(system.mounts.body) for system in systems)
     offset = np.unique(np.concatenate([system.frame_offset for system in systems]))
     first = systems[0]
     return System(
@@ -159,7 +160,7 @@ def joined_system(models: Sequence[Model]) -> System:
         links=_joined([system.links for system in systems], body=bodies, internal=internal,
                       curve=curves),
         mounts=_joined([system.mounts for system in systems], body=bodies, internal=internal,
-                       curve=curves),
+                       curve=curves, law=3 * mounts),
         curves=Curves(
             start=_joined_starts([system.curves.start for system in systems]),
             x=np.concatenate([system.curves.x for system in systems]),

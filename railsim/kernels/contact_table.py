@@ -50,7 +50,8 @@ FAR = 4.0e-4
 LEVER = 0.75
 
 MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
-SETTLED = 1e-14  # relative change of the approaches below which they have converged
+# Relative change of the approaches below which they have converged: Newton squares it once more.
+SETTLED = 1e-8
 
 
 @jit

@@ -40,7 +40,6 @@ from railsim.kernels.system import (
     PRELOAD_Z,
     PUSH,
     ROTATES,
-    SPECIAL,
     STIFFNESS_Z,
 )
 
@@ -157,15 +156,15 @@ def pad_load(mounts, e, z):
 
 
 @jit_inline
-def mount_laws(mounts, internal, curves, first, n, inner, drive, laws):
-    """Forces of internal states and tables of `n` mounts; `laws`: deflections, rates, forces."""
-    for lane in range(n):
-        e = first + lane
+def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
+    """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
+    for i in range(law, end):
+        e, k = mounts.law[i] // 3, mounts.law[i] % 3
+        lane = e - first
+        d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
         normal = pad_load(mounts, e, laws[2 * LANES + lane])
-        for k in range(3):
-            d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
-            laws[(6 + k) * LANES + lane] = axis_law(mounts, internal, curves, e, k, d, rate, normal,
-                                                    inner, drive)
+        laws[(6 + k) * LANES + lane] = axis_law(mounts, internal, curves, e, k, d, rate, normal,
+                                                inner, drive)
 
 
 @jit_inline
@@ -200,14 +199,17 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
     """
     count = mounts.body.shape[0]
     zero = spread(0.0)
+    law = 0
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
         which = eight_from(first, count)
-        both_ends, rotates, special = 0, 0, 0
+        both_ends, rotates = 0, 0
         for e in range(first, first + n):
             both_ends |= mounts.flags[e, BOTH_ENDS]
             rotates |= mounts.flags[e, ROTATES]
-            special |= mounts.flags[e, SPECIAL]
+        end = law
+        while end < mounts.law.shape[0] and mounts.law[end] < 3 * (first + n):
+            end += 1
         one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
         row = starts(which, MOUNT_SIZE)
         x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(mounts.row, row, 0, 8)
@@ -218,11 +220,13 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         tx = fx_0 + kx * d[0] + cx * rate[0]
         ty = fy_0 + ky * d[1] + cy * rate[1]
         tz = fz_0 + kz * d[2] + cz * rate[2]
-        if special:
+        if law < end:
             for k in range(3):
                 store_lanes(laws, k * LANES, d[k])
                 store_lanes(laws, (3 + k) * LANES, rate[k])
-            mount_laws(mounts, internal, curves, first, n, inner, drive, laws)
+                store_lanes(laws, (6 + k) * LANES, zero)
+            mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws)
+            law = end
             tx = tx + load_lanes(laws, 6 * LANES)
             ty = ty + load_lanes(laws, 7 * LANES)
             tz = tz + load_lanes(laws, 8 * LANES)

@@ -43,7 +43,7 @@ SHARE_1, SHARE_2, STIFFNESS_X, DAMPING_X, PRELOAD_X, ROTATION_X, ROTATION_DAMPIN
 STIFFNESS_Z, PRELOAD_Z = STIFFNESS_X + 2, PRELOAD_X + 2
 MOUNT_SIZE = 24
 # columns of Mounts.flags
-TRANSLATES, BOTH_ENDS, ROTATES, FRICTION, SPECIAL = range(5)
+TRANSLATES, BOTH_ENDS, ROTATES, FRICTION = range(4)
 
 # columns of Work.pose: attitude R (0 to 8), position, velocity, angular velocity, force, moment
 POSITION, VELOCITY, ANGULAR, FORCE, MOMENT = 9, 12, 15, 18, 21
@@ -193,8 +193,10 @@ class Mounts(NamedTuple):
                                  spring force [1]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
-    flags : int64[e, 5]          1 if: translational part, axes of both bodies (shear), rotational
-                                 part, friction pads, tables or internal states
+    flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
+                                 part, friction pads
+    law : int64[l]               3 times the mount plus the axis, rising, of all tables and internal
+                                 states
     """
 
     body: np.ndarray
@@ -203,6 +205,7 @@ class Mounts(NamedTuple):
     internal: np.ndarray
     curve: np.ndarray
     flags: np.ndarray
+    law: np.ndarray
 
     @property
     def point(self) -> np.ndarray:
