@@ -32,7 +32,9 @@ from railsim.time_step import SCHEMES
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
-ROWS = 500  # outputs per chunk: some hundredths of a second of computing
+# Longest chunk in outputs, and in steps of all its vehicles: some hundredths of a second of
+# computing by the fast scheme, and below a second by the other one
+ROWS, STEPS = 500, 64_000
 
 
 @dataclass
@@ -211,7 +213,8 @@ class _Convoy:
 
     def _chunk(self, step: float, every: int) -> tuple[int, int, int]:
         """Advance by one chunk: status, where, number of records."""
-        intervals = 1 if self._varies else ROWS
+        at_most = max(1, STEPS // (every * len(self._runs)))
+        intervals = 1 if self._varies else min(ROWS, at_most)
         n_steps = min(intervals * every, math.ceil(self._left() / step * (1.0 - 1e-9)))
         last = int(self._spacing is not None and n_steps == every)
         goal = self._state[-2] + (self._spacing or 0.0)
