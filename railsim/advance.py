@@ -36,6 +36,9 @@ Progress = Callable[[float], None]
 # computing by the fast scheme, and below a second by the other one
 ROWS, STEPS = 500, 64_000
 
+# state, whether nothing was before it, whether it is to be recorded, counts of patches
+_Before = tuple[Floats, bool, bool, NDArray[np.int64]]
+
 
 @dataclass
 class Preparation:
@@ -180,36 +183,47 @@ class _Convoy:
         """Advance to the end, or to where runs part; return in which groups they go on."""
         while self._left() > 1e-9 or self._due:
             begin = time.perf_counter()
-            at_end = self._left() <= 1e-9
-            paces = [] if at_end else self._paces()
-            if len(set(paces)) > 1:
-                return self._parted(paces)
             before = self._state.copy(), self._fresh, self._due, self._work.events.copy()
-            status, where, rows = self._last_record() if at_end else self._chunk(*paces[0])
+            paces = self._paces()
+            if len(set(paces)) > 1 or self._errors():
+                return self._parted(paces, before)
+            status, where, rows = self._chunk(*paces[0]) if paces else self._last_record()
             if status != RUNNING and len(self._runs) > 1:
-                self._state, self._fresh, self._due, self._work.events[:] = before
-                return self._parted(self._ensemble.concerned(status, where))
+                return self._parted(self._ensemble.concerned(status, where), before)
             self._write(rows)
+            spent = time.perf_counter() - begin
             for run, share in zip(self._runs, self._shares, strict=True):
                 run.status, run.where = status, where
-                run.wall_time += share * (time.perf_counter() - begin)
+                run.wall_time += share * spent
             moved(self._runs, self._state)
             if status != RUNNING:
                 break
-            if any(run.error for run in self._runs):
-                return self._parted([run.error is None for run in self._runs])
+            if self._errors():
+                return self._parted([0] * len(self._runs))
         self._give_back()
         return []
 
     def _left(self) -> float:
         return self._runs[0].prepared.left(self._state)
 
+    def _errors(self) -> bool:
+        return any(run.error is not None for run in self._runs)
+
     def _paces(self) -> list[tuple[float, int]]:
-        """Step and number of steps to the next output of every run."""
+        """Step and number of steps to the next output of every run; none at the end."""
+        if self._left() <= 1e-9:
+            return []
         if self._spacing is not None:
             right_hand_side(self._system, self._work, self._state, self._derivative)
         speed, rate = self._state[-1], self._derivative[-1]
-        return [run.prepared.pace.at(speed, rate) for run in self._runs]
+        paces = []
+        for run in self._runs:
+            try:
+                paces.append(run.prepared.pace.at(speed, rate))
+            except Exception as error:  # no equilibrium at this speed, or no stable step
+                run.error = error
+                paces.append((math.nan, 0))
+        return paces
 
     def _chunk(self, step: float, every: int) -> tuple[int, int, int]:
         """Advance by one chunk: status, where, number of records."""
@@ -260,8 +274,12 @@ class _Convoy:
             except Exception as error:
                 run.error = error
 
-    def _parted(self, keys: Sequence[object]) -> list[list[Run]]:
-        """Runs with their states, grouped by equal keys; those with an error are at their end."""
+    def _parted(
+        self, keys: Sequence[object], before: _Before | None = None
+    ) -> list[list[Run]]:
+        """Runs grouped by equal keys, as they were before; those with an error are at their end."""
+        if before is not None:
+            self._state, self._fresh, self._due, self._work.events[:] = before
         self._give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rig import test_vehicle
 
-from railsim import load_track, load_vehicle, simulate, simulate_together
+from railsim import load_track, load_vehicle, pace, simulate, simulate_together
 from railsim.assembly import SharedTables, assemble
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
@@ -111,6 +111,32 @@ def test_one_speed_table_and_outputs_in_equal_steps_of_distance():
         [coach(), with_mass(35e3)], load_track("straight"), until=150.0, settings=settings
     )
     np.testing.assert_allclose(np.diff(results[0].distance), 0.5, atol=1e-3)
+
+
+def test_the_one_that_overturns_while_speeds_and_intervals_change():
+    """What the others counted and recorded before is counted and recorded once."""
+    drive = {"mode": "table", "speed_table": [[0.0, 20.0], [20.0, 20.0], [60.0, 17.0]]}
+    settings = Settings(drive=drive, output_spacing=0.5)
+    vehicles = [coach(), overturned(), with_mass(35e3)]
+    results = assert_each_is_alone(vehicles, load_track("straight"), until=70.0, settings=settings)
+    assert [result.status == "complete" for result in results] == [True, False, True]
+
+
+def test_the_one_that_finds_no_step_on_the_way_fails_by_itself(monkeypatch):
+    """Preparation goes well; at a lower speed one vehicle has no stable step."""
+    drive = {"mode": "table", "speed_table": [[0.0, 20.0], [5.0, 20.0], [15.0, 15.0]]}
+    vehicles, chosen = [coach(), with_mass(35e3)], pace.choose_step
+
+    def no_step_for_the_second(model, system, state, *how):
+        if state[-1] < 17.0 and model.system.bodies.mass[0] == 35e3:
+            raise ModelError("no stable step")
+        return chosen(model, system, state, *how)
+
+    monkeypatch.setattr(pace, "choose_step", no_step_for_the_second)
+    fine, failure = outcomes(vehicles, load_track("straight"), until=20.0,
+                             settings=Settings(drive=drive))  # fmt: skip
+    assert fine.status == "complete"
+    assert isinstance(failure, ModelError)
 
 
 def test_the_one_that_overturns_ends_as_alone_and_the_others_go_on():
