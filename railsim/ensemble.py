@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from railsim.assembly import Model, side_by_side
 from railsim.kernels.aligned import aligned
-from railsim.kernels.element_outputs import LINK, MOUNT
+from railsim.kernels.element_outputs import LINK
 from railsim.kernels.status import (
     DERAILED,
     FELL_BETWEEN_RAILS,
@@ -28,7 +28,16 @@ from railsim.kernels.status import (
     WHEEL_LIFT,
     YAW_RANGE,
 )
-from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, System
+from railsim.kernels.system import (
+    BOTH_ENDS,
+    N_SCALARS,
+    ROTATES,
+    Bodies,
+    Contact,
+    Curves,
+    Mounts,
+    System,
+)
 from railsim.kernels.time_loop import Recorder
 
 Floats = NDArray[np.float64]
@@ -149,7 +158,6 @@ def joined_system(models: Sequence[Model]) -> System:
     bodies = _starts(len(system.bodies.kind) for system in systems)
     internal = _starts(len(system.internal.kind) for system in systems)
     curves = _starts(len(system.curves.start) - 1 for system in systems)
-    mounts = _starts(len(system.mounts.body) for system in systems)
     offset = np.unique(np.concatenate([system.frame_offset for system in systems]))
     first = systems[0]
     return System(
@@ -159,8 +167,7 @@ def joined_system(models: Sequence[Model]) -> System:
         contact=_joined_contact(models, bodies),
         links=_joined([system.links for system in systems], body=bodies, internal=internal,
                       curve=curves),
-        mounts=_joined([system.mounts for system in systems], body=bodies, internal=internal,
-                       curve=curves, law=3 * mounts),
+        mounts=_joined_mounts(systems, body=bodies, internal=internal, curve=curves),
         curves=Curves(
             start=_joined_starts([system.curves.start for system in systems]),
             x=np.concatenate([system.curves.x for system in systems]),
@@ -181,6 +188,31 @@ def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bo
         np.searchsorted(offset, system.frame_offset)[system.bodies.frame] for system in systems
     ]
     return joint._replace(frame=np.concatenate(frames))
+
+
+def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
+    """Mounts of all vehicles, those of one kind together: what a block of eight lacks is skipped.
+
+    Those of one vehicle keep their order, and so do the forces on each body.
+    """
+    joint = _joined([system.mounts for system in systems], **shifts)
+    order = _order_of_mounts(systems)
+    joint = joint._replace(**{
+        name: aligned(getattr(joint, name)[order]) for name in joint._fields if name != "law"
+    })
+    return joint._replace(law=np.flatnonzero((joint.internal >= 0) | (joint.curve >= 0)))
+
+
+def _order_of_mounts(systems: Sequence[System]) -> Ints:
+    """Numbers of the mounts, counted vehicle after vehicle, in the order of the joint system."""
+    kinds = [
+        np.column_stack([
+            ((mounts.internal < 0) & (mounts.curve < 0)).all(axis=1),
+            mounts.flags[:, (BOTH_ENDS, ROTATES)] != 0,
+        ])
+        for mounts in (system.mounts for system in systems)
+    ]
+    return np.lexsort(np.concatenate(kinds).T[::-1])
 
 
 def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
@@ -213,12 +245,11 @@ def _joined_recorder(
     def along(name: str) -> Floats:
         return np.concatenate([getattr(recorder, name) for recorder in recorders], axis=1)
 
-    first = {
-        LINK: _starts(len(system.links.length) for system in systems),
-        MOUNT: _starts(len(system.mounts.body) for system in systems),
-    }
+    links = _starts(len(system.links.length) for system in systems)
+    mounts = _starts(len(system.mounts.body) for system in systems)
+    place = np.argsort(_order_of_mounts(systems))
     chosen = [
-        (group, index + first[group][k])
+        (group, index + links[k] if group == LINK else place[index + mounts[k]])
         for k, recorder in enumerate(recorders)
         for group, index in recorder.chosen.tolist()
     ]
