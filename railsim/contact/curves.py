@@ -7,10 +7,13 @@ track's centre line, z down from the plane through the rail tops.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 from railsim.errors import Fault, InputError
 from railsim.profiles.profile import FLANGE_BACK, Profile
@@ -140,12 +143,15 @@ def single_valued_part(y: Array, z: Array, start: int, limit: float) -> slice:
     return slice(first, last + 1)
 
 
-def contour_spline(y: Array, z: Array) -> CubicSpline:
+def contour_spline(y: Array, z: Array) -> "CubicSpline":
     """Cubic spline of a contour whose end slopes are those of its last pieces.
 
     Where the usable part ends at a kink, a free end would swing to the wrong side.
     """
     ends = (z[1] - z[0]) / (y[1] - y[0]), (z[-1] - z[-2]) / (y[-1] - y[-2])
+    # here and below: a run with cached tables does without this import of a quarter of a second
+    from scipy.interpolate import CubicSpline
+
     return CubicSpline(y, z, bc_type=((1, ends[0]), (1, ends[1])))
 
 
@@ -221,6 +227,8 @@ def inclined(profile: Profile, inclination: float) -> tuple[Array, Array]:
     angle = np.arctan(inclination) - np.arctan(profile.inclination)
     y = profile.y * np.cos(angle) + profile.z * np.sin(angle)
     z = -profile.y * np.sin(angle) + profile.z * np.cos(angle)
+    from scipy.interpolate import CubicSpline
+
     crown = CubicSpline(y[top_slice(z)], z[top_slice(z)])
     roots = crown.derivative().roots(extrapolate=False)
     top = float(np.min(crown(roots))) if roots.size else float(z.min())

@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PPoly
 
 from railsim.definitions.layout import (
     Section,
@@ -37,6 +36,11 @@ def _array(s: ArrayLike) -> Array:
     return np.asarray(s, dtype=np.float64)
 
 
+def _running(parts: Array) -> Array:
+    """Sum of all parts before each."""
+    return np.concatenate([[0.0], np.cumsum(parts)[:-1]])
+
+
 class RoundedProfile:
     """A piecewise linear function, constant beyond its ends, averaged over a window.
 
@@ -56,41 +60,59 @@ class RoundedProfile:
         first = sections[0].start_value if sections else 0.0
         last = sections[-1].end_value if sections else 0.0
         values = [first, *(section.start_value for section in sections), last]
-        self._plain = PPoly(
-            np.array([slopes, values]), origin + np.array([*knots, knots[-1] + 1.0])
+        slope, value, width = np.array(slopes), np.array(values), np.diff([*knots, knots[-1] + 1.0])
+        once = _running(value * width + slope * width**2 / 2.0)
+        twice = _running(once * width + value * width**2 / 2.0 + slope * width**3 / 6.0)
+        self._knots = origin + np.array(knots)
+        # coefficients of each piece, highest power first: of derivative, value and two integrals
+        self._pieces = (
+            (slope,),
+            (slope, value),
+            (slope / 2.0, value, once),
+            (slope / 6.0, value / 2.0, once, twice),
         )
-        self._integral = self._plain.antiderivative()
-        self._double_integral = self._integral.antiderivative()
         self._half_window = 0.5 * rounding
 
-    def _mean(self, integral: PPoly, s: ArrayLike) -> Array:
+    def _plain(self, times: int, s: ArrayLike) -> Array:
+        """Derivative (-1), value (0), integral (1) or double integral (2) before rounding."""
+        # scipy's PPoly does this too, but its package takes a quarter of a second to import
+        at = _array(s)
+        piece = np.clip(np.searchsorted(self._knots, at, side="right") - 1, 0, None)
+        u = at - self._knots[piece]
+        highest, *others = self._pieces[times + 1]
+        total: Array = highest[piece]
+        for coefficient in others:
+            total = total * u + coefficient[piece]
+        return total
+
+    def _mean(self, times: int, s: ArrayLike) -> Array:
         at, h = _array(s), self._half_window
-        mean: Array = (integral(at + h) - integral(at - h)) / (2.0 * h)
+        mean: Array = (self._plain(times, at + h) - self._plain(times, at - h)) / (2.0 * h)
         return mean
 
     def __call__(self, s: ArrayLike) -> Array:
         """Value at the arc length `s` [m]."""
         if self._half_window == 0.0:
-            return np.asarray(self._plain(_array(s)))
-        return self._mean(self._integral, s)
+            return self._plain(0, s)
+        return self._mean(1, s)
 
     def rate(self, s: ArrayLike) -> Array:
         """Derivative along the track at `s`."""
         if self._half_window == 0.0:
-            return np.asarray(self._plain.derivative()(_array(s)))
-        return self._mean(self._plain, s)
+            return self._plain(-1, s)
+        return self._mean(0, s)
 
     def second_rate(self, s: ArrayLike) -> Array:
         """Second derivative along the track."""
         if self._half_window == 0.0:
             return np.zeros_like(_array(s))
-        return self._mean(self._plain.derivative(), s)
+        return self._mean(-1, s)
 
     def integral(self, s: ArrayLike) -> Array:
         """Integral from 0 to `s`."""
         if self._half_window == 0.0:
-            return np.asarray(self._integral(_array(s)) - self._integral(0.0))
-        return self._mean(self._double_integral, s) - self._mean(self._double_integral, 0.0)
+            return self._plain(1, s) - self._plain(1, 0.0)
+        return self._mean(2, s) - self._mean(2, 0.0)
 
 
 class Alignment:

@@ -16,8 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len
-from scipy.interpolate import CubicSpline
 
 from railsim.definitions.irregularity import (
     Coefficients,
@@ -185,6 +183,8 @@ def _triangle(middle: float, length: float) -> Displacement:
 def _measured(part: Measured) -> Displacement:
     rows = np.array(part.rows)
     places = rows[:, 0] + part.shift
+    from scipy.interpolate import CubicSpline  # a quarter of a second, and most tracks need none
+
     spline = CubicSpline(places, part.scale * rows[:, 1:].T, axis=1)
     slope = spline.derivative()
     window = _window(places[0], places[-1], part.fade)
@@ -225,6 +225,8 @@ def _profile(points: Sequence[tuple[float, float]], rounding: float) -> RoundedP
 
 
 def _random(part: Random, track: Track) -> Displacement:
+    from scipy.fft import next_fast_len
+
     coefficients = part.coefficients or ERRI_B176[part.spectrum]
     end = track.length if part.end is None else part.end
     longest, shortest = part.wavelengths[1], part.wavelengths[0]
@@ -276,7 +278,7 @@ def _waves(amplitudes: Array, phases: Array, period: float, n_points: int) -> Ar
     harmonics = np.zeros(n_points // 2 + 1, dtype=complex)
     harmonics[: amplitudes.size] = 0.5 * n_points * amplitudes * np.exp(1j * phases)
     omega = 2.0 * np.pi / period * np.arange(harmonics.size)
-    return np.stack((irfft(harmonics, n_points), irfft(1j * omega * harmonics, n_points)))
+    return np.fft.irfft(np.stack((harmonics, 1j * omega * harmonics)), n_points)
 
 
 def _periodic(lattice: Array, period: float, u: Array) -> tuple[Array, Array]:
