@@ -251,17 +251,25 @@ class _Convoy:
         self, step: float, first: int, n_steps: int, every: int, closing: int = 0
     ) -> tuple[int, int, int, int]:
         begin = time.thread_time()  # a library's idle threads may still be spinning
-        status, where, steps, rows = time_loop(
-            self._system, self._work, self._state, self._derivative, self._stages,
-            self._ensemble.recorder, self._scheme, step, first, n_steps, every, int(self._fresh),
-            closing,
-        )
+        most = max(1, STEPS // len(self._runs))
+        at, end, rows = first, first + n_steps, 0
+        while True:
+            # more than one call only within one output interval, which records at its begin:
+            # Ctrl-C is heard between calls
+            status, where, steps, new = time_loop(
+                self._system, self._work, self._state, self._derivative, self._stages,
+                self._ensemble.recorder, self._scheme, step, at, min(most, end - at), every,
+                int(self._fresh), closing,
+            )
+            at, rows = at + steps, rows + new
+            self._fresh = self._fresh and steps == 0
+            if status != RUNNING or at >= end:
+                break
         spent = time.thread_time() - begin
         for run, share in zip(self._runs, self._shares, strict=True):
             run.cpu_time += share * spent
             run.together = max(run.together, len(self._runs))
-        self._fresh = self._fresh and steps == 0
-        return status, where, steps, rows
+        return status, where, at - first, rows
 
     def _write(self, rows: int) -> None:
         """Hand the records of a chunk to the runs' sinks."""

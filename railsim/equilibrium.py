@@ -98,7 +98,7 @@ def with_preloads(model: Model) -> Model:
     # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
     scale = np.sqrt(np.array([support[unknown] for unknown in unknowns]))
     right_side = -(loads + fixed)
-    scaled, *_ = np.linalg.lstsq(matrix * scale, right_side, rcond=1e-10)
+    scaled = _least_squares(matrix * scale, right_side, 1e-10)
     values = scaled * scale
     _check_balance(model, conditions, matrix @ values - right_side)
     links = system.links._replace(row=aligned(system.links.row))
@@ -107,6 +107,16 @@ def with_preloads(model: Model) -> Model:
         _set_preload(links, mounts, group, element, value)
     filled = system._replace(links=links, mounts=mounts)
     return Model(filled, model.index, model.flat, model.tables, model.profiles)
+
+
+def _least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:
+    try:
+        solution, *_ = np.linalg.lstsq(matrix, right_side, rcond=rcond)
+    except np.linalg.LinAlgError:
+        raise ModelError(
+            "no static equilibrium: masses, forces or stiffnesses are out of all proportion"
+        ) from None
+    return np.asarray(solution, dtype=float)
 
 
 def _auto_preloads(model: Model) -> dict[tuple[str, int], float]:
@@ -266,14 +276,12 @@ class _Balance:
             self.residual = float(np.max(np.abs(rest)))
             if self.residual < RESIDUAL:
                 break
-            change: Floats = np.asarray(
-                np.linalg.lstsq(self._jacobian(state, rest), -rest, rcond=1e-13)[0], dtype=float
-            )
+            change = _least_squares(self._jacobian(state, rest), -rest, 1e-13)
             state, rest, shorter = self._line_search(state, rest, change)
             if not shorter:
                 break
         self.residual = float(np.max(np.abs(rest)))
-        if self.residual > 1e3 * RESIDUAL:
+        if not self.residual < 1e3 * RESIDUAL:  # so that NaN counts too
             raise ModelError(self._message(rest))
         return state
 

@@ -5,7 +5,6 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from railsim.definitions.base import (
-    Count,
     Definition,
     FileDefinition,
     Finite,
@@ -28,6 +27,10 @@ def _forward(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
 SpeedRows = Annotated[
     tuple[tuple[Finite, Positive], ...], Field(min_length=1), AfterValidator(_forward)
 ]
+Step = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-6, le=0.1)]
+Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-3, le=1e5)]
+Spacing = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-3, le=1e5)]
+Cells = Annotated[int, Field(strict=True, ge=1, le=500)]
 TractionRows = Annotated[
     tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), AfterValidator(_forward)
 ]
@@ -102,13 +105,13 @@ class Settings(FileDefinition):
     """Kind and version of the file"""
     scheme: Literal["fast", "rk4"] = "fast"
     """Integration scheme: `fast`, or `rk4` as the reference"""
-    step: Positive | None = None
+    step: Step | None = None
     """Time step [s]; by default chosen from vehicle and speed"""
-    output_rate: Positive = 200.0
+    output_rate: Rate = 200.0
     """Output points per second [1/s]"""
-    output_spacing: Positive | None = None
+    output_spacing: Spacing | None = None
     """Distance between output points [m] instead of `output_rate`"""
-    fastsim_grid: tuple[Count, Count] = (10, 10)
+    fastsim_grid: tuple[Cells, Cells] = (10, 10)
     """Cells of a contact patch along and across"""
     creep_law: Literal["fastsim", "table", "fastrip", "polach", "linear"] = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""

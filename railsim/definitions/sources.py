@@ -132,7 +132,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     InputError : it cannot be read, is no text or no TOML (with the line).
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors put a mark at its beginning
     except OSError as error:
         raise InputError([Fault(str(path), "", f"cannot be read ({error.strerror})", "")]) from None
     except UnicodeDecodeError:

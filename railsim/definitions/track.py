@@ -15,7 +15,6 @@ from railsim.definitions.base import (
     Finite,
     NonNegative,
     NonNegativePair,
-    Positive,
     Text,
     TextPair,
     one_or_two,
@@ -93,6 +92,7 @@ WideningRows = Annotated[
     _ROWS,
 ]
 Radius = Annotated[float, Field(strict=True), AfterValidator(_curved)]
+Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e7)]
 Cant = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
 Gradient = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.3, le=0.3)]
 
@@ -101,7 +101,7 @@ class Straight(Definition):
     """A straight."""
 
     type: Literal["STR"]
-    length: Positive
+    length: Length
     """Length [m]"""
 
 
@@ -109,7 +109,7 @@ class Circle(Definition):
     """A circular curve."""
 
     type: Literal["CIR"]
-    length: Positive
+    length: Length
     """Length along the centre line [m]"""
     radius: Radius
     """Radius, positive to the right [m]"""
@@ -119,7 +119,7 @@ class Clothoid(Definition):
     """A transition with curvature linear in the arc length."""
 
     type: Literal["CLO"]
-    length: Positive
+    length: Length
     """Length [m]"""
     radius_start: Radius | None = None
     """Radius at its beginning, `inf` if straight [m]; by default that of the element before"""
@@ -131,7 +131,7 @@ class ConstantCant(Definition):
     """Constant cant."""
 
     type: Literal["CST"]
-    length: Positive
+    length: Length
     """Length [m]"""
     cant: Cant
     """Height of the left rail over the right one, on the cant base of 1.5 m [m]"""
@@ -141,7 +141,7 @@ class CantRamp(Definition):
     """A ramp with cant linear in the arc length."""
 
     type: Literal["LIR"]
-    length: Positive
+    length: Length
     """Length [m]"""
     cant_start: Cant | None = None
     """Cant at its beginning [m]; by default that of the element before"""
@@ -153,7 +153,7 @@ class ConstantGradient(Definition):
     """Constant gradient."""
 
     type: Literal["CST"]
-    length: Positive
+    length: Length
     """Length [m]"""
     gradient: Gradient
     """Rise over horizontal distance, positive uphill [1]"""
@@ -163,7 +163,7 @@ class GradientRamp(Definition):
     """A vertical curve: gradient linear in the arc length, radius = length / change of gradient."""
 
     type: Literal["LIR"]
-    length: Positive
+    length: Length
     """Length [m]"""
     gradient_start: Gradient | None = None
     """Gradient at its beginning [1]; by default that of the element before"""

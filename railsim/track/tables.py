@@ -9,6 +9,7 @@ elements continue.
 import numpy as np
 
 from railsim.definitions.track import Track
+from railsim.errors import Fault, InputError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
 from railsim.track.alignment import Alignment, Array
@@ -49,10 +50,13 @@ def track_tables(
 
     Raises
     ------
-    InputError : elements that do not fit together.
+    InputError : elements that do not fit together; a track too long for its details.
     """
     alignment = Alignment(track)
     ds = cell_length or usual_cell_length(track, before + after)
+    if (track.length + before + after) / ds > 10 * MOST_CELLS:
+        found = f"{track.length:g} m of track with details of {ds:g} m"
+        raise InputError([Fault(track.name, "plan", found, "a shorter track, or coarser details")])
     cells_before = int(np.ceil(before / ds))
     n_cells = cells_before + int(np.ceil((track.length + after) / ds))
     s: Array = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)

@@ -82,7 +82,7 @@ ELEMENTS = [
 ]
 SETTINGS = [
     ('scheme = "euler"', "scheme", "'euler'; must be 'fast' or 'rk4'"),
-    ("output_spacing = -1.0", "output_spacing", "-1.0; must be greater than 0"),
+    ("output_spacing = -1.0", "output_spacing", "-1.0; must be greater than or equal"),
     ('drive = {mode = "slow"}', "drive.mode", "'slow'; must be 'constant', 'table' or 'free'"),
     ('drive = {mode = "table"}', "drive", "'speed_table' belongs to mode"),
     ("drive = {speed_table = [[0.0, 20.0]]}", "drive", "'speed_table' belongs to mode"),
@@ -182,6 +182,14 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
         (["--set", "settings.drive.mode=fast"], "drive.mode: 'fast'; must be 'constant'"),
         (["--set", "settings.step=0.0007"], "step: found 0.0007 s; a whole part of the output"),
         (["--set", "track.irregularities.0.seed=2"], "no member '0' in irregularities"),
+        (["--set", "settings.step=1e-12"], "settings.step: 1e-12; must be greater than or equal"),
+        (["--set", "settings.step=5"], "settings.step: 5; must be less than or equal to 0.1"),
+        (["--set", "settings.output_rate=1e9"], "output_rate: 1000000000.0; must be less than"),
+        (["--set", "settings.output_rate=1e-9"], "output_rate: 1e-09; must be greater than"),
+        (["--set", "settings.fastsim_grid.1=100000"], "fastsim_grid.1: 100000; must be less than"),
+        (["--set", "track.plan.0.length=1e300"], "plan.0.length: 1e+300; must be less than"),
+        (["--set", "track.plan.0.length=1e7"], "1e+07 m of track with details of 2.5 m; a shorter"),
+        (["--set", "vehicle.bodies.carbody.mass=1e300"], "out of all proportion"),
     ],
 )
 def test_wrong_option_is_told(tmp_path, capsys, monkeypatch, options, words):

@@ -3,11 +3,28 @@
 import pytest
 
 import railsim
+import railsim.advance
 
 
 def run():
     vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     return railsim.simulate(vehicle, track, speed=20.0, until=5.0)
+
+
+def test_calls_within_an_output_interval_change_nothing(monkeypatch):
+    """Long intervals are cut, so that Ctrl-C is heard."""
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    settings = railsim.load_settings(None, ["output_rate=10"])
+    runs = []
+    for most in (railsim.advance.STEPS, 7):  # of 80 steps from one output to the next
+        monkeypatch.setattr(railsim.advance, "STEPS", most)
+        runs.append(
+            railsim.simulate(vehicle, track, speed=20.0, until=20.0, settings=settings)
+        )
+    whole, cut = runs
+    assert len(whole.time) == 11
+    for name in whole:
+        assert cut[name].tobytes() == whole[name].tobytes(), name
 
 
 @pytest.mark.slow

@@ -266,6 +266,12 @@ def test_name_that_is_no_name_is_refused(write):
     assert any("letters, digits" in fault.allowed for fault in faults(load_vehicle, path))
 
 
+def test_mark_at_the_beginning_of_a_file_is_passed_over(write):
+    """Some editors put one there (byte order mark)."""
+    text = 'format = "railsim-settings/1"\nstep = 1e-3\n'
+    assert load_settings(write("s.toml", "\ufeff" + text)).step == 1e-3
+
+
 # overrides ----------------------------------------------------------------------------------------
 
 
