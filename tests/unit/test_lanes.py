@@ -1,0 +1,136 @@
+"""Eight numbers side by side: each lane has what the same formula gives for one number."""
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from railsim.kernels import jit, lanes_plain
+from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
+from railsim.kernels.lanes import (
+    LANES,
+    add_rows,
+    add_to_pairs,
+    eight,
+    eight_from,
+    load_rows,
+    square_root,
+    starts,
+    store_rows,
+    where_beyond,
+)
+from railsim.kernels.rotation import sine_cosine_lanes
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="what is compiled is tested")
+WIDTH = 11
+
+
+@jit
+def turn(table, out, n):
+    """Store the columns of rows in another order, and a sum of two."""
+    for first in range(0, n, LANES):
+        rows = starts(eight_from(first, n), WIDTH)
+        a, b, c, d, e = load_rows(table, rows, 1, 5)
+        store_rows(out, rows, 2, (e, d, c, b, a, a + 2.0 * b))
+
+
+@jit
+def collect(table, one, two, total):
+    """Add rows of `table` to the rows `one` of `total`, and what is left of 1 to the rows `two`."""
+    n = one.shape[0]
+    for first in range(0, n, LANES):
+        count = min(n - first, LANES)
+        values = load_rows(table, starts(eight_from(first, n), 8), 0, 8)
+        a, b, c, d, e, f, g, h = values
+        rest = (1.0 - a, 1.0 - b, 1.0 - c, 1.0 - d, 1.0 - e, 1.0 - f, 1.0 - g, 1.0 - h)
+        add_to_pairs(total, starts(eight(one, first), 8), starts(eight(two, first), 8), 0, values,
+                     rest, count)
+
+
+@jit
+def collect_three(table, where, total):
+    """Add the first three columns of `table` to the rows `where` of `total`."""
+    n = where.shape[0]
+    for first in range(0, n, LANES):
+        values = load_rows(table, starts(eight_from(first, n), 8), 0, 3)
+        add_rows(total, starts(eight(where, first), 8), 5, values, min(n - first, LANES))
+
+
+@jit
+def elementary(x, out):
+    """Functions of eight numbers."""
+    rows = starts(eight_from(0, LANES), 1)
+    (v,) = load_rows(x, rows, 0, 1)
+    s, c = sine_cosine_lanes(v)
+    store_rows(out, starts(eight_from(0, LANES), 4), 0, (
+        s, c, square_root(v * v), where_beyond(v, 1.0, -v, v / 4.0)))
+
+
+@pytest.mark.parametrize("n", [1, 7, 8, 9, 23])
+def test_columns_of_rows_are_turned_and_turned_back(n):
+    table = np.random.default_rng(n).normal(size=(n, WIDTH))
+    out = np.zeros((n, WIDTH))
+    turn(table, out, n)
+    np.testing.assert_array_equal(out[:, 2:7], table[:, 5:0:-1])
+    np.testing.assert_array_equal(out[:, 7], table[:, 1] + 2.0 * table[:, 2])
+    assert not out[:, :2].any()
+    assert not out[:, 8:].any()
+
+
+@pytest.mark.parametrize("n", [1, 8, 21])
+def test_rows_that_meet_in_one_row_are_all_added(n):
+    generator = np.random.default_rng(n)
+    table = generator.normal(size=(n, 8))
+    one, two = generator.integers(0, 4, size=(2, n))
+    total = np.ones((4, 8))
+    collect(table, one, two, total)
+    expected = np.ones((4, 8))
+    for row, i, j in zip(table, one, two, strict=True):
+        expected[i] += row
+        expected[j] += 1.0 - row
+    # one after the other, as here: to the last bit
+    np.testing.assert_array_equal(total, expected)
+
+
+def test_only_the_given_columns_are_added_to():
+    table, where = np.arange(80.0).reshape(10, 8), np.zeros(10, dtype=np.int64)
+    total = np.zeros((2, 8))
+    collect_three(table, where, total)
+    np.testing.assert_array_equal(total, [[0.0] * 5 + list(table[:, :3].sum(axis=0)), [0.0] * 8])
+
+
+@settings(deadline=None)  # the first call compiles
+@given(st.lists(st.floats(-3.0, 3.0), min_size=LANES, max_size=LANES))
+def test_functions_are_those_of_numpy_in_every_lane(numbers):
+    x, out = np.array(numbers), np.zeros((LANES, 4))
+    elementary(x, out)
+    expected = [np.sin(x), np.cos(x), np.abs(x), np.where(np.abs(x) > 1.0, -x, x / 4.0)]
+    np.testing.assert_allclose(out.T, expected, rtol=1e-15, atol=1e-15)
+
+
+def test_not_a_number_is_beyond_every_limit():
+    x, out = np.zeros(LANES), np.zeros((LANES, 4))
+    x[3] = np.nan
+    elementary(x, out)
+    assert np.flatnonzero(np.isnan(out[:, 0])) == [3]
+    assert np.flatnonzero(np.isnan(out[:, 3])) == [3]
+
+
+def test_plain_functions_have_the_names_of_the_compiled_ones():
+    from railsim.kernels import lanes
+
+    names = [name for name, thing in vars(lanes_plain).items() if callable(thing)]
+    assert [name for name in names if not hasattr(lanes, name)] == []
+
+
+def test_aligned_arrays_start_on_a_cache_line():
+    array = np.random.default_rng(0).normal(size=(5, 3))
+    copies = [aligned(array[k:]) for k in range(5)] + [aligned(array.T)]
+    for copy, original in zip(copies, [*(array[k:] for k in range(5)), array.T], strict=True):
+        np.testing.assert_array_equal(copy, original)
+        assert copy.flags.c_contiguous
+        assert copy.ctypes.data % CACHE_LINE == 0
+    empty = aligned_zeros((0, 3), np.int64)
+    assert empty.shape == (0, 3)
+    assert empty.dtype == np.int64
