@@ -110,12 +110,11 @@ def with_preloads(model: Model) -> Model:
 
 
 def _least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:
-    try:
-        solution, *_ = np.linalg.lstsq(matrix, right_side, rcond=rcond)
-    except np.linalg.LinAlgError:
+    if not (np.isfinite(matrix).all() and np.isfinite(right_side).all()):
         raise ModelError(
             "no static equilibrium: masses, forces or stiffnesses are out of all proportion"
-        ) from None
+        )
+    solution, *_ = np.linalg.lstsq(matrix, right_side, rcond=rcond)
     return np.asarray(solution, dtype=float)
 
 

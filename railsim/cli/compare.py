@@ -67,7 +67,7 @@ def command(
 def _opened(files: tuple[str, ...]) -> "dict[str, Result]":
     """Open all results under the shortest names that tell them apart."""
     from railsim.errors import Fault, InputError
-    from railsim.result import open_result
+    from railsim.result import open_run
 
     faults: list[Fault] = []
     if len(files) < 2:
@@ -80,7 +80,7 @@ def _opened(files: tuple[str, ...]) -> "dict[str, Result]":
             faults.append(Fault(file, "", "given twice", "give each result once"))
             continue
         try:
-            results[label] = open_result(file)
+            results[label] = open_run(file)
         except InputError as error:
             faults.extend(error.faults)
     if faults:

@@ -59,7 +59,9 @@ def command(
       railsim plot run.h5 Y Q:1 --over time --by wheelset --out forces.pdf
       railsim plot curve_r250 --out curve.png
     """  # noqa: D301 - click reads the escape
-    path = Path(out) if out else Path(file).with_suffix(".png")
+    path = Path(out or file)
+    if not out and path.name:
+        path = path.with_suffix(".png")
     check_file(path, overwrite=overwrite, endings=PICTURES)
     if Path(file).suffix.lower() in RESULTS:
         figure = _result_figure(file, selections, over, by, between)
@@ -82,9 +84,9 @@ def _result_figure(
     between: tuple[float, float] | None,
 ) -> "Figure":
     from railsim.plot.histories import STUDY, histories
-    from railsim.result import open_result
+    from railsim.result import open_run
 
-    return histories(open_result(file), selections or STUDY, over=over, by=by, between=between)
+    return histories(open_run(file), selections or STUDY, over=over, by=by, between=between)
 
 
 def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":

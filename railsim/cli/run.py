@@ -116,7 +116,7 @@ def command(
 def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
     """Open a result to go on from, which says speed and place itself."""
     from railsim.errors import Fault, InputError
-    from railsim.result import open_result
+    from railsim.result import open_run
 
     faults = [
         Fault(option, "", "given together with --continue", "one of the two")
@@ -125,7 +125,7 @@ def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
     ]
     result = None
     try:
-        result = open_result(before)
+        result = open_run(before)
         if "end" not in result.groups.get("state", {}):
             faults.append(Fault("--continue", "", f"{before} holds no state", "run it again first"))
     except InputError as error:

@@ -79,9 +79,9 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
             {"key": "points", "text": note} for note in profile.notes
         ]
     if suffix in RESULTS:
-        from railsim.result import open_result
+        from railsim.result import open_run
 
-        return f"result, {open_result(file).status}", []
+        return f"result, {open_run(file).status}", []
     if suffix == ".json":
         from railsim.studies.summary import check_index
 

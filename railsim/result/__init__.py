@@ -4,7 +4,7 @@
 `data.py`       `Result`: arrays by name, coordinates, attributes, the embedded inputs
 `extremes.py`   largest values with wheelset, side, time and distance; values at mid-curve
 `sinks.py`      `Sink`, what a simulation writes to; `MemorySink`
-`hdf5.py`       layout of the result file, `Hdf5Sink`, `open_result`
+`hdf5.py`       layout of the result file, `Hdf5Sink`, `open_result`, `open_run`
 ==============  ===========================================================================
 
 Begin reading in `data.py`.
@@ -12,7 +12,7 @@ Begin reading in `data.py`.
 
 from railsim.result.data import Result
 from railsim.result.extremes import MidCurve, Peak, mid_curves, peak, peaks
-from railsim.result.hdf5 import Hdf5Sink, open_result
+from railsim.result.hdf5 import Hdf5Sink, open_result, open_run
 from railsim.result.sinks import MemorySink, Sink
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Sink",
     "mid_curves",
     "open_result",
+    "open_run",
     "peak",
     "peaks",
 ]

@@ -39,6 +39,10 @@ from railsim.result.sinks import (
 )
 
 CHUNK_BYTES = 2**18
+# what the result of every run holds
+ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
+ARRAYS = ("time", "distance")
+DIMENSIONS = ("wheelset", "side", "body")
 ROWS_AT_ONCE = 2048  # of the coach 4 MB
 
 
@@ -182,9 +186,8 @@ def open_result(path: str | Path) -> Result:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(
-            [Fault(str(path), "", "there is no such file", "give a result file (.h5)")]
-        )
+        found = "a folder" if path.is_dir() else "there is no such file"
+        raise InputError([Fault(str(path), "", found, "give a result file (.h5)")])
     try:
         with h5py.File(path, "r") as file:
             return _read(file, path)
@@ -193,9 +196,26 @@ def open_result(path: str | Path) -> Result:
         raise InputError([fault]) from None
 
 
+def open_run(path: str | Path) -> Result:
+    """Open the result of a run, as `open_result`, and see that nothing is missing.
+
+    Raises
+    ------
+    InputError : as `open_result`; the file lacks what the result of every run holds.
+    """
+    result = open_result(path)
+    missing = [name for name in ATTRIBUTES if name not in result.attributes]
+    missing += [name for name in ARRAYS if name not in result.quantities]
+    missing += [name for name in DIMENSIONS if name not in result.coordinates]
+    if missing:
+        allowed = "a result as railsim wrote it"
+        raise InputError([Fault(str(path), name, "missing", allowed) for name in missing])
+    return result
+
+
 def _read(file: h5py.File, path: Path) -> Result:
     found = file.attrs.get("format", "nothing")
-    if found != FORMAT:
+    if not (isinstance(found, str) and found == FORMAT):
         fault = Fault(str(path), "format", f"found {found}", f"a result says '{FORMAT}'")
         raise InputError([fault])
     quantities: dict[str, Quantity] = {}

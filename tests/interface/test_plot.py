@@ -144,6 +144,12 @@ def test_what_a_result_does_not_have_is_refused(file, tmp_path, selection, words
     assert not out.exists()
 
 
+@pytest.mark.parametrize("name", [".", "..", "/", ""])
+def test_folder_is_not_drawn(name, capsys):
+    assert main(["plot", name]) == 2
+    assert "is a folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_picture_has_the_format_of_its_ending(file, tmp_path, ending, capsys):
     out = tmp_path / f"run.{ending}"

@@ -10,7 +10,7 @@ from example_result import BODIES, COORDINATES, PROFILES, WHEELSETS, arrays, exa
 
 from railsim.errors import InputError
 from railsim.notation import COMPONENTS, QUANTITIES, Quantity
-from railsim.result import Hdf5Sink, MemorySink, open_result
+from railsim.result import Hdf5Sink, MemorySink, open_result, open_run
 
 
 @pytest.fixture
@@ -195,6 +195,26 @@ def test_output_that_cannot_be_written_is_refused_at_the_door(written, path, wor
         Hdf5Sink(written.parent / path)
     assert caught.value.faults[0].file == "--out"
     assert os.listdir(written.parent) == ["run.h5"]
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        (lambda file: file.attrs.pop("track_toml"), "track_toml: missing"),
+        (lambda file: file.attrs.pop("status"), "status: missing"),
+        (lambda file: file.pop("distance"), "distance: missing"),
+        (lambda file: file.pop("wheelset"), "wheelset: missing"),
+        (lambda file: file.attrs.__setitem__("format", [1, 2]), "format: found [1 2]"),
+    ],
+)
+def test_result_that_lacks_something_is_refused(written, tmp_path, change, found):
+    path = tmp_path / "run.h5"
+    path.write_bytes(written.read_bytes())
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with pytest.raises(InputError) as caught:
+        open_run(path)
+    assert f"{path}: {found}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
