@@ -4,9 +4,9 @@ The vehicles share time, place and speed and do not feel each other; each has it
 elements and wheels.  In the time loop FASTSIM then marches the strips of all their wheels side by
 side, and what a call or an evaluation costs by itself is spent once.
 
-Arrays hold vehicle after vehicle, indices are moved on accordingly; a track frame serves all
-vehicles that have a body at its place.  Nothing large is copied: equal contact tables are one, and
-so is the track's table.
+Arrays hold vehicle after vehicle, indices are moved on accordingly; but mounts of one kind are
+together, and a track frame serves all vehicles that have a body at its place.  Nothing large is
+copied: equal contact tables are one, and so is the track's table.
 """
 
 from collections.abc import Iterable, Sequence

@@ -24,8 +24,8 @@ from numba.core.registry import CPUDispatcher
 
 # The subset of fastmath that keeps NaN and infinity visible to the blow-up checks.
 FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
-# What of it is left where sums and products keep their order.
-ORDERED = {"contract", "nsz"}
+# What of it is left where every sum and product is rounded as it is written.
+ORDERED = {"nsz"}
 
 
 def source_hash(folder: Path) -> str:

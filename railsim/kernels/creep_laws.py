@@ -7,7 +7,7 @@ without contact or friction give zero.  docs/theory/creep.md derives and compare
 
 import math
 
-from . import jit
+from . import jit, jit_ordered
 
 # FaStrip: flexibilities go over to a single one around this much creepage ...
 _BLEND_CREEPAGE = 2.1
@@ -22,7 +22,7 @@ _NO_LOAD = 1e-200  # a bound below this is none: its inverse would overflow [N]
 _EXCESS_POINTS = 16
 
 
-@jit
+@jit_ordered
 def linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, G, xi_x, xi_y, phi, T_x, T_y, M_z):
     """Kalker's linear theory, saturated after Shen, Hedrick and Elkins (1983), spin included.
 
@@ -62,7 +62,7 @@ def linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, G, xi_x, xi_y, phi, T_x,
         M_z[i] = factor * m
 
 
-@jit
+@jit_ordered
 def polach(
     n, a, b, mu_N, c11, c22, c23, G, k_adhesion, k_slip, xi_x, xi_y, phi, T_x, T_y, M_z
 ):  # fmt: skip

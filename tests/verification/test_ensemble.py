@@ -90,7 +90,7 @@ def test_vehicles_with_memory_on_irregular_rails():
     assert_each_is_alone(vehicles, track, speed=25.0, start=100.0, duration=2.0, settings=settings)
 
 
-@pytest.mark.parametrize("law", ["table", "polach"])
+@pytest.mark.parametrize("law", ["table", "fastrip", "polach", "linear"])
 def test_every_patch_has_its_own_creep_force(law):
     settings = Settings(creep_law=law)
     assert_each_is_alone(
