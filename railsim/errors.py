@@ -5,6 +5,7 @@ and ends with exit status 2.  `ModelError` says that a model was asked for somet
 range of validity.
 """
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -35,6 +36,22 @@ class Fault:
         place = f"{self.file}: {self.key}" if self.key else self.file
         remedy = f"; {self.allowed}" if self.allowed else ""
         return f"{place}: {self.found}{remedy}"
+
+
+def words_of(error: OSError | MemoryError) -> str:
+    """Return what the system refused, in a line: no space on the device, no memory.
+
+    Examples
+    --------
+    >>> words_of(OSError(28, "no space left on device", "run.h5"))
+    'No space left on device: run.h5'
+    """
+    if isinstance(error, MemoryError):
+        return "not enough memory"
+    if error.errno is None:
+        return str(error).partition("\n")[0]
+    # HDF5 tells the cause in several lines
+    return os.strerror(error.errno) + (f": {error.filename}" if error.filename else "")
 
 
 class RailsimError(Exception):

@@ -15,7 +15,7 @@ from pathlib import Path
 import click
 
 from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
-from railsim.errors import InputError, ModelError
+from railsim.errors import InputError, ModelError, words_of
 from railsim.version import __version__
 
 # Matrices here have at most some hundred rows: threads of the linear algebra library gain nothing,
@@ -104,8 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted by Ctrl-C (143
-        by SIGTERM), 1 anything else.  Unforeseen exceptions pass: Python prints their traceback
-        and ends with 1.
+        by SIGTERM), 1 anything else, such as a full disk.  Unforeseen exceptions pass: Python
+        prints their traceback and ends with 1.
     """
     # the commands print themselves what the library logs
     logging.getLogger("railsim").addHandler(logging.NullHandler())
@@ -129,6 +129,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # the reader of a pipe has seen enough; keep the interpreter from flushing into it again
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return DONE
+        except (OSError, MemoryError) as error:
+            click.echo(f"railsim: {words_of(error)}", err=True)
+            return FAILED
 
 
 def _called(arguments: list[str]) -> int:

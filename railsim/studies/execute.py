@@ -23,7 +23,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, RailsimError
+from railsim.errors import Fault, InputError, RailsimError, words_of
 from railsim.files import partial_path
 from railsim.kernels.time_loop import time_loop
 from railsim.result import Result
@@ -125,6 +125,8 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
         return finished_record(job.case, outcome)
     except RailsimError as error:
         return failed_record(job.case, str(error))
+    except (OSError, MemoryError) as error:
+        return failed_record(job.case, words_of(error))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         return failed_record(job.case, reason, traceback.format_exc())

@@ -1,6 +1,8 @@
 """Ctrl-C and SIGTERM end a command, also where Python loses the exception that they raise."""
 
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -87,3 +89,14 @@ def test_handlers_of_the_caller_come_back():
     with remembered_interrupts(), pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGTERM)
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+@pytest.mark.slow
+def test_full_disk_leaves_nothing_and_is_told_in_a_line(tmp_path):
+    """A limit of the file size stands for the disk."""
+    run = [sys.executable, "-m", "railsim", *RUN[:-3], "--quiet", "--out", str(tmp_path / "run.h5")]
+    limited = ["sh", "-c", 'ulimit -f 2000; exec "$@"', "sh", *run]
+    done = subprocess.run(limited, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "railsim: File too large\n"
+    assert list(tmp_path.iterdir()) == []

@@ -141,7 +141,13 @@ def test_wrong_command_gets_the_nearest_one(capsys):
 
 @pytest.mark.parametrize(
     ("error", "status"),
-    [(KeyboardInterrupt(), 130), (click.Abort(), 130), (ModelError("too much"), 2)],
+    [
+        (KeyboardInterrupt(), 130),
+        (click.Abort(), 130),
+        (ModelError("too much"), 2),
+        (OSError(28, "No space left on device"), 1),
+        (MemoryError(), 1),
+    ],
 )
 def test_exception_becomes_an_exit_status(error, status, monkeypatch, capsys):
     def failing(*_):
