@@ -215,11 +215,12 @@ def outcomes(
     shared = SharedTables()
     found: list[Result | Exception | None] = [None] * len(vehicles)
     runs: dict[Run, int] = {}
-    for number, sink in enumerate(sinks or [MemorySink() for _ in vehicles]):
+    sinks = [MemorySink() for _ in vehicles] if sinks is None else sinks
+    for number, (vehicle, sink) in enumerate(zip(vehicles, sinks, strict=True)):
         if progress is not None:
             progress(0.0)
         try:
-            run = _begun(vehicles[number], inputs, sink, profiles, before, shared)
+            run = _begun(vehicle, inputs, sink, profiles, before, shared)
         except Exception as error:
             found[number] = error
         else:
