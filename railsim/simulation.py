@@ -101,6 +101,7 @@ def simulate(
     >>> result.status
     'complete'
     """
+    _check_types([vehicle], track)
     settings = settings or Settings()
     before = None if resume is None else state_before(vehicle, track, settings, resume)
     if before is not None:
@@ -208,6 +209,7 @@ def outcomes(
     before : float64[n_state], optional
         State in which the run of a single vehicle begins.
     """
+    _check_types(vehicles, track)
     settings = settings or Settings()
     speed = initial_speed(settings, speed, start)
     check_range(track, speed, start, duration, until)
@@ -292,6 +294,17 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
     for remark in result.remarks:
         _LOG.warning(remark)
     return result
+
+
+def _check_types(vehicles: Sequence[object], track: object) -> None:
+    """Raise TypeError where a name or a file is given in place of what it stands for."""
+    for kind, wanted, given in [
+        *(("vehicle", Vehicle, vehicle) for vehicle in vehicles),
+        ("track", Track, track),
+    ]:
+        if not isinstance(given, wanted):
+            found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
+            raise TypeError(f"the {kind} is {found}; give what railsim.load_{kind} returns")
 
 
 def initial_speed(settings: Settings, speed: float | None, start: float) -> float:

@@ -91,13 +91,13 @@ def command(
         click.echo("\n".join(_assumption_lines(case)))
     with progress_bar(case.name, quiet=quiet) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
+    record = {"file": str(path), **result_record(result)}
+    lines = _report_lines(result, path)
     if plots:
         from railsim.plot.histories import histories
         from railsim.plot.style import save
 
-        save(histories(result), path.with_suffix(".png"), overwrite=overwrite)
-    record = {"file": str(path), **result_record(result)}
-    lines = _report_lines(result, path)
+        lines.append(str(save(histories(result), path.with_suffix(".png"), overwrite=overwrite)))
     if check_step:
         from railsim.check_step import difference_record, half_step, step_differences
 

@@ -214,7 +214,8 @@ def _print_record(record: "Record") -> None:
 def _print_end(outcome: "Outcome") -> None:
     there = len(outcome.records) - outcome.computed
     kept = f", {there} were there" if there else ""
-    click.echo(f"{outcome.computed} of {len(outcome.records)} runs computed{kept}")
+    done = outcome.computed - len(outcome.failed)
+    click.echo(f"{done} of {len(outcome.records)} runs computed{kept}")
     if outcome.failed:
         click.echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
     click.echo(str(outcome.folder / "summary.csv"))

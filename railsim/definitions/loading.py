@@ -89,7 +89,7 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def load_vehicle(path: str | Path, overrides: Iterable[str] = ()) -> Vehicle:
+def load_vehicle(path: str | Path, overrides: Iterable[str] | str = ()) -> Vehicle:
     """Load a vehicle from a file, or a shipped one by its name.
 
     Parameters
@@ -111,19 +111,21 @@ def load_vehicle(path: str | Path, overrides: Iterable[str] = ()) -> Vehicle:
     return _loaded(Vehicle, _file_source(path, "vehicle"), overrides)
 
 
-def load_track(path: str | Path, overrides: Iterable[str] = ()) -> Track:
+def load_track(path: str | Path, overrides: Iterable[str] | str = ()) -> Track:
     """Load a track from a file, or a shipped one by its name; as `load_vehicle`."""
     return _loaded(Track, _file_source(path, "track"), overrides)
 
 
-def load_settings(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Settings:
+def load_settings(
+    path: str | Path | None = None, overrides: Iterable[str] | str = ()
+) -> Settings:
     """Load settings from a file, or the default ones; as `load_vehicle`."""
     if path is None:
         return _loaded(Settings, Source("settings", {"format": SETTINGS_FORMAT}), overrides)
     return _loaded(Settings, _file_source(path, "settings"), overrides)
 
 
-def load_spring(path: str | Path, overrides: Iterable[str] = ()) -> TrailingArmSuspension:
+def load_spring(path: str | Path, overrides: Iterable[str] | str = ()) -> TrailingArmSuspension:
     """Load a spring file, or a shipped one by its name; as `load_vehicle`."""
     return _loaded(TrailingArmSuspension, _file_source(path, "spring"), overrides)
 

@@ -29,7 +29,7 @@ def apply_overrides(
     ----------
     source : Source
         What to change; it stays as it is.
-    overrides : iterable of str
+    overrides : iterable of str, or str
         Assignments with TOML values; members of lists are named by their `name`, else by index.
     free : sequence of str
         Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
@@ -40,6 +40,8 @@ def apply_overrides(
     ------
     InputError : an assignment that means nothing; all of them at once.
     """
+    if isinstance(overrides, str):
+        overrides = [overrides]
     changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
     faults = []
     for text in overrides:

@@ -73,12 +73,12 @@ class Outcome:
 
 
 def study(
-    vehicles: Sequence[str | Path],
-    tracks: Sequence[str | Path],
-    speeds: Sequence[float],
+    vehicles: Sequence[str | Path] | str | Path,
+    tracks: Sequence[str | Path] | str | Path,
+    speeds: Sequence[float] | float,
     *,
     out: str | Path,
-    grid: Mapping[str, Iterable[object]] | None = None,
+    grid: Mapping[str, Iterable[object] | float] | None = None,
     settings: str | Path | None = None,
     start: float = 0.0,
     duration: float | None = None,
@@ -97,9 +97,9 @@ def study(
 
     Parameters
     ----------
-    vehicles, tracks : sequence of str or Path
+    vehicles, tracks : sequence of str or Path, or a single one
         Files, or names of shipped ones.
-    speeds : sequence of float
+    speeds : sequence of float, or a single one
         Speeds [m/s].
     out : str or Path
         Folder of the study; made if need be.
@@ -152,7 +152,8 @@ def study(
     """
     folder = Path(out)
     check_folder(folder)
-    written = {key: [str(value) for value in values] for key, values in (grid or {}).items()}
+    vehicles, tracks, speeds = _several(vehicles), _several(tracks), _several(speeds)
+    written = {key: [str(v) for v in _several(values)] for key, values in (grid or {}).items()}
     cases = combinations(
         vehicles,
         tracks,
@@ -204,6 +205,11 @@ def study(
 
         draw(outcome)
     return outcome
+
+
+def _several(values: Any) -> list[Any]:
+    """Return values as a list, also where a single one is given."""
+    return [values] if isinstance(values, str | Path | float | int) else list(values)
 
 
 def _job(case: Case, folder: Path, plots: bool) -> Job:

@@ -236,10 +236,19 @@ def test_run_that_ends_early_keeps_its_file(tmp_path, capsys):
     assert np.isfinite(result.Q).all()
 
 
-def test_pictures_are_drawn_beside_the_result(tmp_path):
+def test_pictures_are_drawn_beside_the_result(tmp_path, capsys):
     path = tmp_path / "run.h5"
     assert main([*SHORT, "--out", str(path), "--plots"]) == 0
     assert sorted(os.listdir(tmp_path)) == ["run.h5", "run.png"]
+    assert capsys.readouterr().out.splitlines()[-2:] == [str(path), str(tmp_path / "run.png")]
+
+
+def test_names_in_place_of_what_they_stand_for_are_told():
+    coach, curve = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    with pytest.raises(TypeError, match=r"'coach_manchester'; give what railsim.load_vehicle"):
+        railsim.simulate("coach_manchester", curve, speed=20.0)
+    with pytest.raises(TypeError, match=r"the track is a Vehicle; give what railsim.load_track"):
+        railsim.simulate(coach, coach, speed=20.0)
 
 
 @pytest.mark.slow

@@ -161,7 +161,9 @@ def test_failed_run_is_recorded_and_the_others_go_on(tmp_path, simulated, capsys
     assert "trouble" in trouble["traceback"]
     assert fine["status"] == "complete"
     assert [path.name for path in tmp_path.glob("*.h5")] == [f"{COACH}_{CURVE}_20.h5"]
-    assert "2 failed" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "2 failed" in printed.err
+    assert "1 of 3 runs computed" in printed.out
 
 
 def test_failed_runs_are_tried_again(tmp_path, simulated):
@@ -405,6 +407,15 @@ def test_processes_end_after_a_study_that_was_killed(tmp_path):
     process.kill()
     process.communicate(timeout=60)  # the standard error stays open as long as one of them lives
     assert sorted(os.listdir(tmp_path)) == ["study.json", "summary.csv"]
+
+
+def test_python_takes_single_values_too(tmp_path, simulated):
+    outcome = railsim.study(
+        COACH, CURVE, 20.0, grid={"track.rail": "54E1", "track.friction": 0.3}, out=tmp_path,
+        workers=1,
+    )
+    (record,) = outcome.records
+    assert record["name"] == f"{COACH}_{CURVE}_20_rail=54E1_friction=0.3"
 
 
 def test_python_raises_what_the_command_prints(tmp_path):

@@ -339,6 +339,10 @@ def test_override_of_the_initial_state_takes_dotted_body_names():
         assert settings.initial["front.frame"].y == 0.003
 
 
+def test_single_override_needs_no_list():
+    assert load_track("straight", "friction=0.3").friction == (0.3, 0.3)
+
+
 def test_later_override_wins():
     assert load_settings(None, ["scheme=rk4", "scheme=fast"]).scheme == "fast"
 
