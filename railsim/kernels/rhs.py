@@ -60,9 +60,9 @@ STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
-    Origins and axes are those of frame `origin`, on the level: elements are stiff, and the
-    round-off of coordinates counted from the start of the track would be forces of micronewtons;
-    and the angles between the frames are small, which makes their sines cheap.
+    Origins and axes are those of frame `origin`, on the level (see `track_frames`): elements are
+    stiff, and the round-off of coordinates counted from the start of the track would be forces of
+    micronewtons; and the angles between the frames are small, which makes their sines cheap.
     """
     for f in range(offset.shape[0]):
         cell[f], cell_u[f] = cell_of(track, s + offset[f])

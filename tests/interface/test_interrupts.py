@@ -37,6 +37,17 @@ def turned_into_another(number):
         raise ImportError("initialization failed") from None
 
 
+@pytest.fixture(autouse=True)
+def nothing_ignored():
+    """A shell that starts the tests in the background has them ignore Ctrl-C."""
+    numbers = signal.SIGINT, signal.SIGTERM
+    defaults = signal.default_int_handler, signal.SIG_DFL
+    before = [signal.signal(*pair) for pair in zip(numbers, defaults, strict=True)]
+    yield
+    for pair in zip(numbers, before, strict=True):
+        signal.signal(*pair)
+
+
 @pytest.fixture
 def comes(monkeypatch):
     """Let a signal come, in one of the ways above, while a run is prepared."""
