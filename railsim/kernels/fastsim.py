@@ -58,6 +58,8 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
     """
     # eight more: the last block of patches runs over the last strip
     columns = max((n_patch * ny + 7) // 8 * 8 + 8, (max(nx, ny) + 7) // 8 * 8, 128)
+    # an odd number of cache lines: rows 4 kB apart would all want the same places of the cache
+    columns = (columns // 8 | 1) * 8
     work = aligned_zeros((WORK_ROWS, columns))
     work[BOUNDS, :nx] = 1.0 - (1.0 - (2.0 * np.arange(nx) + 1.0) / nx) ** 2
     y = (2.0 * np.arange(ny) + 1.0 - ny) / ny
