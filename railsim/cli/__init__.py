@@ -16,12 +16,10 @@ import click
 
 from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
 from railsim.errors import InputError, ModelError, words_of
+from railsim.threads import use_one_thread
 from railsim.version import __version__
 
-# Matrices here have at most some hundred rows: threads of the linear algebra library gain nothing,
-# and after each call they spin for a while on the core that another run could have.  It reads this
-# when numpy is imported, which no command has done yet.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+use_one_thread()
 
 DONE, FAILED, WRONG_INPUT, ENDED_EARLY = 0, 1, 2, 3
 

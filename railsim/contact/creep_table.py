@@ -24,10 +24,8 @@ Begin with `creep_table` (use) or `build_nodes` (generator: half an hour, restar
 
 import math
 import multiprocessing
-import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -40,6 +38,7 @@ from railsim.contact.exact_creep import RollingGrid, rolling_grid
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, RATIO_MAX, T_HALF
 from railsim.kernels.halfspace import CONVERGED, rolling_traction
+from railsim.threads import one_thread_each
 
 Array = NDArray[np.float64]
 
@@ -51,7 +50,6 @@ _EXTRAPOLATION = 1.0 / (math.sqrt(8.0) - 1.0)
 _NO_SLIP = 1e9  # bound for linear theory
 _TOLERANCE = 1e-6
 _ITERATIONS = 60
-_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 class CreepNodes(NamedTuple):
@@ -260,28 +258,13 @@ def build_nodes(folder: Path, workers: int = 2) -> Iterator[tuple[int, int]]:
         return
     # "spawn": a fork of a process that has run compiled code with threads may hang
     with (
-        _one_thread_each(),
+        one_thread_each(),
         ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool,
     ):
         for future in as_completed(pool.submit(_stored_row, folder, i, j) for i, j in missing):
             future.result()
             done += 1
             yield done, len(rows)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Let processes that begin meanwhile use one thread for linear algebra."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def gather_nodes(folder: Path) -> CreepNodes:

@@ -30,6 +30,7 @@ from railsim.result import Result
 from railsim.studies.case import Case
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import Record, failed_record, finished_record
+from railsim.threads import one_thread_each
 
 GRACE = 3.0  # seconds that running jobs have to stop by themselves
 POLL = 0.2  # seconds between looks at the progress
@@ -160,7 +161,7 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
     batch_of: dict[Future[list[Record]], Batch] = {}
 
     def submitted(some: range) -> set[Future[list[Record]]]:
-        with _interrupts_later():  # the processes inherit it
+        with _interrupts_later(), one_thread_each():  # the processes inherit it
             new = {
                 pool.submit(_work, index, batches[index]): batches[index] for index in some
             }
