@@ -117,7 +117,7 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
     for c in range(system.contact.body.shape[0]):
         b = system.contact.body[c]
         put_on(forces, b, work.frames[bodies.frame[b]], G, vector, work.rail_force[b])
-    b = bodies.reference
+    b = bodies.references[0]
     vector[0, :] = 0.0
     hold = np.zeros(6)
     hold[0] = -HOLD_STIFFNESS * state[6 * b] - HOLD_DAMPING * state[6 * n + 6 * b]
