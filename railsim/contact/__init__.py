@@ -14,15 +14,35 @@ module        job
 `creep_table` its table for the time loop: generator and data
 ============= ==================================================================
 
-Read `table` first: it says what the simulation takes from this package.
+Read `table` first: it says what the simulation takes from this package.  The public names are
+loaded when they are first used: a run with cached tables needs no generator.
 """
 
-from railsim.contact.conicity import equivalent_conicity
-from railsim.contact.creep import CreepForce, creep_force
-from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
-from railsim.contact.geometry import ContactGeometry, contact_geometry
-from railsim.contact.hertzian import HertzContact, hertz
-from railsim.contact.table import ContactTable, build_contact_table, cached_contact_table
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from railsim.contact.conicity import equivalent_conicity
+    from railsim.contact.creep import CreepForce, creep_force
+    from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
+    from railsim.contact.geometry import ContactGeometry, contact_geometry
+    from railsim.contact.hertzian import HertzContact, hertz
+    from railsim.contact.table import ContactTable, build_contact_table, cached_contact_table
+
+_HOMES = {
+    "ContactGeometry": "geometry",
+    "ContactTable": "table",
+    "CreepForce": "creep",
+    "ExactCreepForce": "exact_creep",
+    "HertzContact": "hertzian",
+    "build_contact_table": "table",
+    "cached_contact_table": "table",
+    "contact_geometry": "geometry",
+    "creep_force": "creep",
+    "equivalent_conicity": "conicity",
+    "exact_creep_force": "exact_creep",
+    "hertz": "hertzian",
+}
 
 __all__ = [
     "ContactGeometry",
@@ -38,3 +58,9 @@ __all__ = [
     "exact_creep_force",
     "hertz",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'railsim.contact' has no attribute '{name}'")
+    return getattr(import_module(f"railsim.contact.{_HOMES[name]}"), name)

@@ -29,16 +29,18 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from railsim.contact.exact_creep import RollingGrid, rolling_grid
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, RATIO_MAX, T_HALF
-from railsim.kernels.halfspace import CONVERGED, rolling_traction
 from railsim.threads import one_thread_each
+
+# the generator's solver; a run reads the finished table only
+if TYPE_CHECKING:
+    from railsim.contact.exact_creep import RollingGrid
 
 Array = NDArray[np.float64]
 
@@ -117,7 +119,7 @@ def grid_size(ratio: float) -> tuple[int, int]:
 class _Path:
     """Solutions along increasing t in one direction, each started from the one before."""
 
-    def __init__(self, grid: RollingGrid, bound: Array | None = None) -> None:
+    def __init__(self, grid: "RollingGrid", bound: Array | None = None) -> None:
         self.grid = grid
         self.bound = grid.bound.ravel() if bound is None else bound
         self.traction = np.zeros((2, grid.x.size))
@@ -126,6 +128,8 @@ class _Path:
 
     def force(self, xi_x: float, xi_y: float, phi: float) -> tuple[Array, bool]:
         """(T_x, T_y, M_z) of normalised creepages, and whether the solver converged."""
+        from railsim.kernels.halfspace import CONVERGED, rolling_traction
+
         grid = self.grid
         across = (xi_x - phi * grid.y).ravel()
         status, _ = rolling_traction(
@@ -143,14 +147,16 @@ class _Path:
         return _resultant(grid, self.traction), bool(status == CONVERGED)
 
 
-def _resultant(grid: RollingGrid, traction: Array) -> Array:
+def _resultant(grid: "RollingGrid", traction: Array) -> Array:
     area, x, y = grid.area.ravel(), grid.x.ravel(), grid.y.ravel()
     t_x, t_y = traction
     return np.array([area @ t_x, area @ t_y, area @ (x * t_y - y * t_x)])
 
 
 @lru_cache(maxsize=2)
-def _grids(ratio: float) -> tuple[RollingGrid, RollingGrid]:
+def _grids(ratio: float) -> tuple["RollingGrid", "RollingGrid"]:
+    from railsim.contact.exact_creep import rolling_grid
+
     nx, ny = grid_size(ratio)
     fine = rolling_grid(ratio, POISSON, nx, ny)
     return fine, rolling_grid(ratio, POISSON, nx // 2, ny // 2)

@@ -71,7 +71,10 @@ AutoOrVector = Annotated[_Auto | Annotated[Vector, Tag("value")], Discriminator(
 class Definition(BaseModel):
     """Base of everything that a user may write."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    # built when first used: a part of a vehicle is built as part of it, not once more by itself
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True
+    )
 
 
 class FileDefinition(Definition):
