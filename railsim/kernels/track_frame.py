@@ -22,7 +22,7 @@ X, Y, Z, PSI, THETA, PHI = range(6)
 # rows of TrackTables.rail
 Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
 
-# columns of a frame row, see `track_frame`
+# columns of a frame row, see `track_frames`
 ORIGIN = 0  # 0:3   origin in global axes (m)
 ATTITUDE = 3  # 3:12  A, row by row
 OMEGA = 12  # 12:15 rate of turn per metre, frame axes (1/m)
