@@ -96,6 +96,8 @@ class Run:
         Most runs that have shared a call with it, itself included.
     error : Exception or None
         What went wrong with its output.
+    remarks : list of str
+        What a reader of its result must know, see `railsim.remarks`.
     """
 
     prepared: Preparation
@@ -111,6 +113,7 @@ class Run:
     wall_time: float = 0.0
     together: int = 1
     error: Exception | None = None
+    remarks: list[str] = field(default_factory=list)
 
 
 def advance(

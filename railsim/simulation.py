@@ -26,6 +26,7 @@ from railsim.kernels.status import NOT_FINITE, STATUS
 from railsim.outputs import OutputPlan
 from railsim.pace import Pace
 from railsim.profiles import Profile
+from railsim.remarks import run_remarks
 from railsim.result import MemorySink, Result, Sink
 from railsim.run_in import start_state
 from railsim.time_step import SCHEMES
@@ -265,6 +266,7 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
     attributes: dict[str, str | float | int] = {
         "status": STATUS[run.status][0],
         "status_reason": _sentence(prepared.model, run.status, run.where),
+        "remarks": "\n".join(run_remarks(run)),
         "vehicle_toml": vehicle.to_toml(),
         "track_toml": inputs.track.to_toml(),
         "settings_json": json.dumps(settings.model_dump(mode="json")),

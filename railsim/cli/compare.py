@@ -1,7 +1,7 @@
 """``railsim compare``: results side by side."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -57,7 +57,7 @@ def command(
     rows = compare(results)
     written = _write(folder, rows, results, over) if folder else []
     if as_json:
-        print_json({"results": list(results), "rows": [row.record() for row in rows]})
+        print_json(_record(rows, results))
         return
     click.echo("\n".join(_lines(rows, results)))
     for path in written:
@@ -88,6 +88,15 @@ def _opened(files: tuple[str, ...]) -> "dict[str, Result]":
     return results
 
 
+def _record(rows: "Sequence[Comparison]", results: "dict[str, Result]") -> dict[str, Any]:
+    """Return a comparison as plain numbers and strings, SI."""
+    return {
+        "results": list(results),
+        "remarks": {label: list(result.remarks) for label, result in results.items()},
+        "rows": [row.record() for row in rows],
+    }
+
+
 def _write(
     folder: Path, rows: "Sequence[Comparison]", results: "dict[str, Result]", over: str
 ) -> list[Path]:
@@ -99,7 +108,7 @@ def _write(
 
     make_folder(folder)
     table_file, record_file, picture = (folder / name for name in FILES)
-    record = {"results": list(results), "rows": [row.record() for row in rows]}
+    record = _record(rows, results)
     with whole_file(table_file) as partial:
         partial.write_text(comparison_csv(rows), encoding="utf-8")
     with whole_file(record_file) as partial:
@@ -136,7 +145,12 @@ def _lines(rows: "Sequence[Comparison]", results: "dict[str, Result]") -> list[s
     for where, block in blocks.items():
         header = [where, "", "result", "wheelset", "side", "value", "t (s)", "s (m)", "difference"]
         lines += ["", *table(header, block, numbers=5)]
-    return lines[1:]
+    remarks = [
+        f"{label}: remark: {remark}"
+        for label, result in results.items()
+        for remark in result.remarks
+    ]
+    return [*lines[1:], *([""] if remarks else []), *remarks]
 
 
 def _percent(share: float) -> str:

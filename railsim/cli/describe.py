@@ -367,7 +367,7 @@ def _range(values: Sequence[float], scale: float) -> str:
 def result_data(result: "Result") -> dict[str, Any]:
     """Return what a result holds, without its arrays."""
     inputs = ("vehicle_toml", "track_toml", "settings_json")
-    attributes = {k: v for k, v in result.attributes.items() if k not in inputs}
+    attributes = {k: v for k, v in result.attributes.items() if k not in (*inputs, "remarks")}
     quantities = {
         name: {"dims": quantity.dims, "shape": result[name].shape, "unit": quantity.unit}
         for name, quantity in result.quantities.items()
@@ -376,6 +376,7 @@ def result_data(result: "Result") -> dict[str, Any]:
     return {
         "kind": "result",
         "attributes": attributes,
+        "remarks": list(result.remarks),
         "coordinates": coordinates,
         "quantities": quantities,
     }
@@ -385,6 +386,7 @@ def result_lines(result: "Result") -> list[str]:
     """Return a result in a screenful: facts about the run, dimensions, quantities."""
     data = result_data(result)
     lines = [f"{name:18} {value}" for name, value in data["attributes"].items()]
+    lines += [f"{'remark':18} {remark}" for remark in data["remarks"]]
     lines += ["", *(f"{k:18} {', '.join(names)}" for k, names in data["coordinates"].items())]
     rows = [
         [name, ", ".join(q["dims"]), " x ".join(str(n) for n in q["shape"]), q["unit"]]

@@ -176,6 +176,7 @@ def result_record(result: "Result") -> dict[str, Any]:
 
     return {
         **{name: result.attributes[name] for name in FACTS if name in result.attributes},
+        "remarks": list(result.remarks),
         "peaks": [peak.record() for peak in peaks(result)],
         "mid_curves": [curve.record() for curve in mid_curves(result)],
     }
@@ -259,7 +260,7 @@ def _report_lines(result: "Result", path: Path) -> list[str]:
         f"  {end}; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m",
         f"  step {1e3 * float(facts['step']):g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
-        *(f"  {remark}" for remark in result.remarks),
+        *(f"  remark: {remark}" for remark in result.remarks),
         "",
         *peak_lines(result, peaks(result)),
     ]

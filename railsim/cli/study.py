@@ -209,6 +209,8 @@ def _print_record(record: "Record") -> None:
         status += f" ({record['status_reason']})"
     with tqdm.external_write_mode():
         click.echo("  ".join([record["name"], status, *values]))
+        for remark in record.get("remarks", ()):
+            click.echo(f"  remark: {remark}")
 
 
 def _print_end(outcome: "Outcome") -> None:

@@ -197,15 +197,8 @@ class Result:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on where the run left the range of a law; empty if nowhere."""
-        count = int(self._attributes.get("patches_out_of_range", 0))
-        if not count:
-            return ()
-        total = int(self._attributes["patches_evaluated"])
-        return (
-            f"{count} of {total} contact patches in the time loop ({count / total:.1e}) were "
-            "narrower or wider than the creep law's range of a/b; they got the force of its end",
-        )
+        """What a reader of the result must know, one sentence each; see `railsim.remarks`."""
+        return tuple(str(self._attributes.get("remarks", "")).splitlines())
 
     def vehicle(self) -> "Vehicle":
         """Rebuild the vehicle's definition from the text that the result carries."""

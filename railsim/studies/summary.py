@@ -42,6 +42,7 @@ def finished_record(case: Case, result: Result) -> Record:
     return {
         **waiting_record(case),
         **{name: result.attributes[name] for name in FACTS if name in result.attributes},
+        "remarks": list(result.remarks),
         "peaks": [peak.record() for peak in peaks(result)],
         "mid_curves": [curve.record() for curve in mid_curves(result)],
     }
@@ -112,7 +113,8 @@ def summary_csv(records: Sequence[Record]) -> str:
 
     The columns of a quantity are ``Q_peak`` (or ``dQ_over_Q0_max`` and ``_min``), the same with
     ``_wheelset``, ``_side``, ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at
-    the middle of the first curve (``Q_mid2`` of the second).
+    the middle of the first curve (``Q_mid2`` of the second).  The column ``remarks`` holds all
+    remarks on the run.
     """
     rows = [_row(record) for record in records]
     columns = list(dict.fromkeys(column for row in rows for column in row))
@@ -126,6 +128,7 @@ def summary_csv(records: Sequence[Record]) -> str:
 def _row(record: Record) -> dict[str, Any]:
     row = {"name": record["name"], **record["labels"], "file": record["file"]}
     row |= {name: record.get(name, "") for name in FACTS}
+    row["remarks"] = " ".join(record.get("remarks", ()))
     endings = {"abs": "peak", "max": "max", "min": "min"}
     for peak in record.get("peaks", ()):
         column = f"{peak['quantity']}_{endings[peak['kind']]}"

@@ -1,0 +1,75 @@
+"""Remarks on a run stand wherever its numbers are shown."""
+
+import csv
+import json
+
+import pytest
+import xarray
+from example_result import COORDINATES, PROFILES, arrays, attributes
+
+from railsim.cli import main
+from railsim.result import Hdf5Sink, MemorySink, open_result
+from railsim.studies import summary
+from railsim.studies.combine import load_case
+
+REMARKS = ("The first remark of two.", "The second one, on another matter.")
+
+
+def fed(sink, remarks=REMARKS):
+    given = arrays(duration=10.0)
+    static = {"Q0": given.pop("Q0")}
+    sink.begin(COORDINATES)
+    sink.append(given)
+    return sink.close({**attributes(), "remarks": "\n".join(remarks)}, static, PROFILES)
+
+
+@pytest.fixture
+def files(tmp_path):
+    paths = [tmp_path / "remarked.h5", tmp_path / "plain.h5"]
+    for path, remarks in zip(paths, (REMARKS, ()), strict=True):
+        with Hdf5Sink(path) as sink:
+            fed(sink, remarks)
+    return [str(path) for path in paths]
+
+
+def test_root_attribute_is_text_with_one_sentence_a_line(files):
+    with xarray.open_dataset(files[0], engine="h5netcdf") as data:
+        assert data.attrs["remarks"].splitlines() == list(REMARKS)
+    assert open_result(files[0]).remarks == REMARKS
+    assert open_result(files[1]).remarks == ()
+
+
+def test_result_without_the_attribute_opens():
+    assert MemorySink().close({}, {}).remarks == ()
+
+
+def test_index_and_table_of_a_study_repeat_them():
+    case = load_case("coach_manchester", "curve_r250", 20.0)
+    records = [
+        summary.finished_record(case, fed(MemorySink())),
+        summary.finished_record(case, fed(MemorySink(), ())),
+        summary.failed_record(case, "a reason"),
+    ]
+    assert [record.get("remarks") for record in records] == [list(REMARKS), [], None]
+    rows = list(csv.DictReader(summary.summary_csv(records).splitlines()))
+    assert [row["remarks"] for row in rows] == [" ".join(REMARKS), "", ""]
+
+
+def test_comparison_names_the_result_that_they_belong_to(files, tmp_path, capsys):
+    assert main(["compare", *files, "--out", str(tmp_path / "both")]) == 0
+    printed = capsys.readouterr().out
+    for remark in REMARKS:
+        assert f"remarked: remark: {remark}" in printed
+    assert "plain: remark" not in printed
+    expected = {"remarked": list(REMARKS), "plain": []}
+    assert json.loads((tmp_path / "both" / "compare.json").read_text())["remarks"] == expected
+    assert main(["compare", *files, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["remarks"] == expected
+
+
+def test_info_shows_them(files, capsys):
+    assert main(["info", files[0]]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(maxsplit=1)[1] for line in lines if line.startswith("remark")] == [*REMARKS]
+    assert main(["info", files[0], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["remarks"] == list(REMARKS)
