@@ -14,7 +14,8 @@ from scipy.signal import welch
 from railsim.definitions.track import Track
 from railsim.notation import QUANTITIES
 from railsim.plot.style import DISTINCT, save, styled
-from railsim.track.irregularity import ERRI_B176, band_variance, displacement, spectral_density
+from railsim.track.irregularity import displacement
+from railsim.track.spectra import SPECTRA
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "validation" / "vehicles_and_tracks.md"
@@ -82,7 +83,7 @@ def variance_table(variance):
     body = []
     for name, words in CHANNELS.items():
         unit = (1e3, "mrad") if name == "cross_level" else (1e3, "mm")
-        exact = np.sqrt(band_variance(ERRI_B176["erri_b176_low"], name, BAND))
+        exact = np.sqrt(SPECTRA["erri_b176_low"].band_variance(name, BAND))
         found = np.sqrt(variance[name])
         body.append((f"{words} ({unit[1]})", f"{unit[0] * exact:.4f}", f"{unit[0] * found:.4f}",
                      signed(100.0 * (variance[name] / exact**2 - 1.0))))
@@ -99,7 +100,7 @@ def picture(omega, density):
         band = (exact >= 2.0 * np.pi / BAND[1]) & (exact <= 2.0 * np.pi / BAND[0])
         for k, (name, words) in enumerate(CHANNELS.items()):
             ax = axes[int(name == "cross_level")]
-            wanted = spectral_density(ERRI_B176["erri_b176_low"], name, exact)
+            wanted = SPECTRA["erri_b176_low"].density(name, exact)
             shown = (omega > exact[0]) & (omega < exact[-1])
             ax.plot(omega[shown], density[name][shown], color=DISTINCT[k], lw=1.6, label=words)
             ax.plot(exact[band], wanted[band], color="black", lw=0.9, ls=(0, (4, 2)))

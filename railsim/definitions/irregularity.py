@@ -21,6 +21,10 @@ from railsim.definitions.base import (
 
 # Names of the columns of a measured irregularity, beside the arc length.
 COLUMNS = ("y_left", "z_left", "y_right", "z_right")
+# The four irregularities of a track.
+CHANNELS = ("lateral", "vertical", "cross_level", "gauge")
+# Keys that say how the file of a measured irregularity is read; its rows are what came of it.
+READING = ("columns", "units", "reverse", "falling_mileage", "chord", "band")
 Amplitude = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
 Rails = Literal["left", "right", "both"]
 Row = tuple[Finite, Amplitude, Amplitude, Amplitude, Amplitude]
@@ -48,12 +52,31 @@ Wavelengths = Annotated[
 
 
 class Measured(Definition):
-    """Displacements measured or computed elsewhere, smoothly interpolated (cubic spline)."""
+    """Displacements measured or computed elsewhere.
+
+    Between the rows a cubic spline where they resolve the waves, shape-preserving elsewhere.
+    """
 
     type: Literal["measured"]
     file: Text | None = None
     """CSV with a header: `s` and any of `y_left`, `z_left`, `y_right`, `z_right` in m (`s_m`) or
     mm (`y_left_mm`), or `y`, `z`, `cross_level`, `gauge`; read when the track is loaded"""
+    columns: dict[Text, Text] | None = None
+    """Names of the file's columns by ours, where they differ: `{ s = "Mileage", z_left = "LL" }`;
+    columns that are not named are not read"""
+    units: dict[Text, Literal["m", "mm", "km"]] | None = None
+    """Units by our names of the columns, `{ s = "km", z_left = "mm" }`; by default as the names
+    say"""
+    reverse: tuple[Text, ...] = ()
+    """Our names of the columns whose sign is the opposite of ours"""
+    falling_mileage: Flag = False
+    """The file's mileage falls in the direction of travel; s then counts from its first row"""
+    chord: tuple[Positive, Positive] | None = None
+    """Displacements are offsets at a chord of these parts behind and ahead [m]: the space curve is
+    recovered from them"""
+    band: Literal["D1", "D2", "D3"] | Wavelengths | None = None
+    """Band of wavelengths that is kept: D1 (3 to 25 m), D2 (25 to 70 m), D3 (70 to 150 m), or
+    [shortest, longest] [m]"""
     rows: Annotated[tuple[Row, ...], AfterValidator(_measured_rows)] | None = None
     """What was read: rows [s, y_left, z_left, y_right, z_right] [m]"""
     shift: Finite = 0.0
@@ -69,6 +92,10 @@ class Measured(Definition):
             raise ValueError("either 'file' or 'rows' is needed")
         if self.rows is not None and len(self.rows) < 4:
             raise ValueError("four rows at least are needed")
+        if self.rows is not None:
+            given = [key for key in READING if getattr(self, key) not in (None, (), False)]
+            if given:
+                raise ValueError(f"'{given[0]}' belongs to 'file' and does not go with 'rows'")
         return self
 
 
@@ -139,22 +166,46 @@ class Coefficients(Definition):
     """Half the distance of the rails that the cross level refers to [m]"""
 
 
+SpectrumName = Literal[
+    "erri_b176_low",
+    "erri_b176_high",
+    "fra_1",
+    "fra_2",
+    "fra_3",
+    "fra_4",
+    "fra_5",
+    "fra_6",
+    "fra_1983_1",
+    "fra_1983_2",
+    "fra_1983_3",
+    "fra_1983_4",
+    "fra_1983_5",
+    "fra_1983_6",
+    "china_high_speed",
+    "china_trunk",
+    "own",
+]
+
+
 class Random(Definition):
     """Stationary random irregularities from power spectral densities."""
 
     type: Literal["random"]
-    spectrum: Literal["erri_b176_low", "erri_b176_high", "own"]
-    """Which spectra; `own` needs `coefficients`"""
+    spectrum: SpectrumName
+    """Which spectra, by name; `own` needs `coefficients`"""
     coefficients: Coefficients | None = None
     """Own coefficients"""
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     """Seed of the random phases: the same seed gives the same track"""
     wavelengths: Wavelengths = (3.0, 70.0)
     """Shortest and longest wavelength [m]; the variance is the integral of the spectrum between"""
-    channels: Annotated[
-        tuple[Literal["lateral", "vertical", "cross_level", "gauge"], ...], Field(min_length=1)
-    ] = ("lateral", "vertical", "cross_level", "gauge")
-    """Which of the four irregularities are generated"""
+    channels: (
+        Annotated[
+            tuple[Literal["lateral", "vertical", "cross_level", "gauge"], ...], Field(min_length=1)
+        ]
+        | None
+    ) = None
+    """Which of the four irregularities are generated; by default all that the spectra describe"""
     begin: Finite = 0.0
     """Arc length where it begins [m]"""
     end: Finite | None = None
@@ -172,8 +223,11 @@ class Random(Definition):
             raise ValueError("'coefficients' belong to spectrum = \"own\" and only to it")
         if self.end is not None and self.end <= self.begin:
             raise ValueError("'end' must lie behind 'begin'")
-        if len(set(self.channels)) < len(self.channels):
+        channels = self.channels or ()
+        if len(set(channels)) < len(channels):
             raise ValueError("'channels' names one irregularity twice")
+        if self.spectrum == "china_trunk" and "gauge" in channels:
+            raise ValueError("the spectra 'china_trunk' do not describe the gauge")
         return self
 
 

@@ -6,13 +6,18 @@ The rows become part of the track, so that a result carries its irregularities w
 import csv
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.irregularity import COLUMNS
+import numpy as np
+from pydantic import ValidationError
+
+from railsim.definitions.irregularity import COLUMNS, READING, Measured
+from railsim.definitions.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, nearest
 
-UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3}
+UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
 # what a column adds to y_left, z_left, y_right, z_right
 SHARES = {
     "y_left": (1.0, 0.0, 0.0, 0.0),
@@ -26,6 +31,9 @@ SHARES = {
 }
 MOST_FAULTS = 20
 LARGEST = 0.5  # m
+# Change of a displacement over distance between two rows beyond which no wheel could follow: a step
+# in the record, or a wrong unit.
+STEEPEST = 0.2
 
 Rows = list[tuple[float, ...]]
 
@@ -55,15 +63,45 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
             key = f"irregularities.{index}.file"
             faults.append(Fault("", key, f"no file '{path}'", "a CSV beside the track file"))
             continue
-        rows, wrong = read_measured(path)
+        how = Reading.of(table)
+        if how is None:
+            continue  # refused by the definition
+        rows, wrong = read_measured(path, how)
         faults += wrong
         if not wrong:
-            del table["file"]
+            for key in ("file", *READING):
+                table.pop(key, None)
             table["rows"] = [list(row) for row in rows]
     return faults
 
 
-def read_measured(path: Path) -> tuple[Rows, list[Fault]]:
+@dataclass(frozen=True)
+class Reading:
+    """How the file of a measured irregularity is read; see `definitions.irregularity.Measured`."""
+
+    columns: dict[str, str] | None = None
+    units: dict[str, str] | None = None
+    reverse: tuple[str, ...] = ()
+    falling_mileage: bool = False
+    chord: tuple[float, float] | None = None
+    band: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, table: dict[str, Any]) -> "Reading | None":
+        """Return what a plain table says; None where it is not well formed."""
+        try:
+            # the definition itself checks the keys, with a file that need not be there
+            part = Measured.model_validate({**table, "file": "-"})
+        except ValidationError:
+            return None
+        band = BANDS[part.band] if isinstance(part.band, str) else part.band
+        return cls(
+            part.columns, dict(part.units or {}), part.reverse, part.falling_mileage, part.chord,
+            band,
+        )
+
+
+def read_measured(path: Path, how: Reading = Reading()) -> tuple[Rows, list[Fault]]:
     """Read rows [s, y_left, z_left, y_right, z_right] in m, and the faults of the file."""
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -76,36 +114,90 @@ def read_measured(path: Path) -> tuple[Rows, list[Fault]]:
     ]
     if not numbered:
         return [], [Fault(str(path), "", "empty", "a header and rows of numbers")]
-    delimiter = ";" if ";" in numbered[0][1] else ","
-    header, faults = _header(path, next(csv.reader([numbered[0][1]], delimiter=delimiter)))
+    delimiter = next((d for d in (";", "\t") if d in numbered[0][1]), ",")
+    head = [cell.strip() for cell in next(csv.reader([numbered[0][1]], delimiter=delimiter))]
+    header, faults = _mapped(path, head, how) if how.columns else _header(path, head)
     if faults:
         return [], faults
+    header = [column and _with_unit(column, how) for column in header]
     rows: Rows = []
+    begin = 0.0
     for number, line in numbered[1:]:
+        if delimiter != ",":
+            line = line.replace(",", ".")  # a decimal comma
         cells = next(csv.reader([line], delimiter=delimiter))
-        problem = _problem(cells, len(header))
+        problem = _problem(cells, header)
         if problem:
             faults.append(Fault(str(path), f"line {number}", *problem))
             continue
-        row = _row(header, [float(cell) for cell in cells])
+        row = _row(header, cells)
+        if how.falling_mileage:
+            begin = row[0] if not rows else begin
+            row = (begin - row[0], *row[1:])
         faults += _misplaced(path, number, row, rows)
         rows.append(row)
     if not faults and len(rows) < 4:
         faults.append(Fault(str(path), "", f"{len(rows)} rows", "four rows at least"))
+    if not faults and (how.chord or how.band):
+        rows, faults = _filtered(path, rows, how)
     return rows, faults[:MOST_FAULTS]
 
 
-def _header(path: Path, cells: list[str]) -> tuple[list[tuple[str, float]], list[Fault]]:
+def _filtered(path: Path, rows: Rows, how: Reading) -> tuple[Rows, list[Fault]]:
+    table = np.array(rows)
+    step = equal_step(table[:, 0])
+    if step is None:
+        key = "chord" if how.chord else "band"
+        found = "rows at unequal steps"
+        return rows, [Fault(str(path), "s", found, f"equal steps within 1 % (needed for '{key}')")]
+    values = table[:, 1:].T
+    if how.chord:
+        values = from_chord(values, step, how.chord)
+    if how.band:
+        values = band_passed(values, step, how.band)
+    return [(s, *row) for s, row in zip(table[:, 0].tolist(), values.T.tolist(), strict=True)], []
+
+
+Column = tuple[str, float]
+
+
+def _with_unit(column: Column, how: Reading) -> Column:
+    name, unit = column
+    if how.units and name in how.units:
+        unit = UNITS[f"_{how.units[name]}"]
+    return name, -unit if name in how.reverse else unit
+
+
+def _mapped(path: Path, head: list[str], how: Reading) -> tuple[list[Column | None], list[Fault]]:
+    """Name and unit of every column that is named; None for the others."""
+    assert how.columns is not None  # by the caller
+    columns: list[Column | None] = [None] * len(head)
+    faults = []
+    for name, theirs in how.columns.items():
+        if name not in ("s", *SHARES):
+            allowed = nearest(name, ["s", *SHARES])
+            faults.append(Fault("", f"columns.{name}", "unknown quantity", allowed))
+        elif theirs not in head:
+            found = f"no column '{theirs}'"
+            faults.append(Fault(str(path), "header", found, nearest(theirs, head)))
+        else:
+            columns[head.index(theirs)] = (name, 1.0)
+    if "s" not in how.columns:
+        faults.append(Fault("", "columns", "no column for s", "the arc length or mileage s"))
+    return columns, faults
+
+
+def _header(path: Path, cells: list[str]) -> tuple[list[Column | None], list[Fault]]:
     """Return name and unit of every column."""
-    columns: list[tuple[str, float]] = []
+    columns: list[Column | None] = []
     faults = []
     for cell in cells:
-        found = [(name, unit) for name, unit in _names(cell.strip()) if name in ("s", *SHARES)]
+        found = [(name, unit) for name, unit in _names(cell) if name in ("s", *SHARES)]
         if not found:
-            allowed = nearest(cell.strip(), ["s", *SHARES])
-            faults.append(Fault(str(path), "header", f"unknown column '{cell.strip()}'", allowed))
+            allowed = nearest(cell, ["s", *SHARES]) + "; or name it in 'columns'"
+            faults.append(Fault(str(path), "header", f"unknown column '{cell}'", allowed))
         columns += found[:1]
-    names = [name for name, _ in columns]
+    names = [column[0] for column in columns if column]
     if "s" not in names:
         faults.append(Fault(str(path), "header", "no column s", "the arc length s in m"))
     if len(set(names)) < len(names):
@@ -119,11 +211,11 @@ def _names(cell: str) -> Iterator[tuple[str, float]]:
             yield cell.removesuffix(ending), unit
 
 
-def _problem(cells: list[str], columns: int) -> tuple[str, str] | None:
-    if len(cells) != columns:
-        return f"{len(cells)} values", f"{columns} values as in the header"
+def _problem(cells: list[str], header: list[Column | None]) -> tuple[str, str] | None:
+    if len(cells) != len(header):
+        return f"{len(cells)} values", f"{len(header)} values as in the header"
     try:
-        values = [float(cell) for cell in cells]
+        values = [float(cell) for cell, column in zip(cells, header, strict=True) if column]
     except ValueError:
         return "not a number", "numbers only"
     if not all(math.isfinite(value) for value in values):
@@ -137,6 +229,12 @@ def _misplaced(path: Path, number: int, row: tuple[float, ...], before: Rows) ->
     if before and row[0] <= before[-1][0]:
         found = f"s = {row[0]:g} m does not increase"
         faults.append(Fault(str(path), place, found, "arc lengths that increase from row to row"))
+    elif before:
+        steepest = max(abs(new - old) for new, old in zip(row[1:], before[-1][1:], strict=True))
+        if steepest > STEEPEST * (row[0] - before[-1][0]):
+            found = f"{steepest * 1e3:.3g} mm within {row[0] - before[-1][0]:.3g} m"
+            allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
+            faults.append(Fault(str(path), place, found, allowed))
     largest = max(abs(value) for value in row[1:])
     if largest > LARGEST:
         allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
@@ -144,10 +242,13 @@ def _misplaced(path: Path, number: int, row: tuple[float, ...], before: Rows) ->
     return faults
 
 
-def _row(header: list[tuple[str, float]], values: list[float]) -> tuple[float, ...]:
+def _row(header: list[Column | None], cells: list[str]) -> tuple[float, ...]:
     place = 0.0
     rails = [0.0] * len(COLUMNS)
-    for (name, unit), value in zip(header, values, strict=True):
+    for column, cell in zip(header, cells, strict=True):
+        if column is None:
+            continue
+        (name, unit), value = column, float(cell)
         if name == "s":
             place = unit * value
             continue

@@ -1,9 +1,9 @@
 """Irregularities as displacements of the rails and their rates over arc length.
 
 A `Displacement` gives, for any arc lengths, the four displacements (y_left, z_left, y_right,
-z_right; y to the right, z down) [m] and their derivatives along the track [1].  The spectra are
-one-sided: the variance of a displacement is the integral of S over omega from 2 pi / longest to
-2 pi / shortest wavelength.
+z_right; y to the right, z down) [m] and their derivatives along the track [1].  The spectra (see
+`spectra`) are one-sided: the variance of a displacement is the integral of S over omega from
+2 pi / longest to 2 pi / shortest wavelength.
 
 Random irregularities are sums of cosines with random phases (Shinozuka and Deodatis 1991, Applied
 Mechanics Reviews 44): one cosine for each bin of a fine division of the band, with the amplitude
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.irregularity import (
-    Coefficients,
+    CHANNELS,
     Dip,
     Irregularity,
     Kink,
@@ -29,20 +29,11 @@ from railsim.definitions.irregularity import (
 from railsim.definitions.layout import Section
 from railsim.definitions.track import Track
 from railsim.track.alignment import RoundedProfile
+from railsim.track.spectra import SPECTRA, Spectrum, erri_b176
 
 Array = NDArray[np.float64]
 Displacement = Callable[[Array], tuple[Array, Array]]
 
-# ERRI B176 (1993), as given in three agreeing re-entries; the form of the gauge's spectrum is that
-# of the cross level without 1/b^2, as in the German spectra (assumed).
-ERRI_B176 = {
-    "erri_b176_low": Coefficients(
-        lateral=2.119e-7, vertical=4.032e-7, cross_level=4.032e-7, gauge=5.32e-8
-    ),
-    "erri_b176_high": Coefficients(
-        lateral=6.125e-7, vertical=1.080e-6, cross_level=1.080e-6, gauge=1.032e-7
-    ),
-}
 # rails moved by one unit of each irregularity: y_left, z_left, y_right, z_right; the cross level is
 # an angle here, positive = left rail higher, and its unit moves the rails by b
 SHARES = {
@@ -57,42 +48,8 @@ RAILS = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}
 # Points of the lattice in the shortest wavelength: interpolation error 4e-6 of the amplitude.
 POINTS_PER_WAVE = 32
 PERIOD_IN_WAVES = 20.0
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-
-
-def spectral_density(coefficients: Coefficients, channel: str, omega: Array) -> Array:
-    """One-sided power spectral density of one irregularity.
-
-    Parameters
-    ----------
-    coefficients : Coefficients
-        Coefficients of the spectra.
-    channel : {'lateral', 'vertical', 'cross_level', 'gauge'}
-        Which irregularity; the cross level is an angle.
-    omega : ndarray
-        Angular wave number [rad/m].
-
-    Returns
-    -------
-    ndarray
-        S(omega) = A omega_c^2 / ((omega^2 + omega_r^2)(omega^2 + omega_c^2)) for lateral and
-        vertical [m2/(rad/m)]; the same times omega^2 / (omega^2 + omega_s^2) for the gauge, and
-        divided by b^2 for the cross level [rad2/(rad/m)].
-    """
-    c = coefficients
-    density: Array = (
-        getattr(c, channel) * c.omega_c**2 / ((omega**2 + c.omega_r**2) * (omega**2 + c.omega_c**2))
-    )
-    if channel in ("cross_level", "gauge"):
-        density = density * omega**2 / (omega**2 + c.omega_s**2)
-    return density / c.b**2 if channel == "cross_level" else density
-
-
-def band_variance(coefficients: Coefficients, channel: str, wavelengths: Sequence[float]) -> float:
-    """Variance of one irregularity: the integral of its spectrum over the band [m2 or rad2]."""
-    low, high = 2.0 * np.pi / wavelengths[1], 2.0 * np.pi / wavelengths[0]
-    edges = np.geomspace(low, high, 201)
-    return float(np.sum(_bin_integrals(coefficients, channel, edges[:-1], edges[1:])))
+# Share of the range of the rows around by which a spline between measured rows may leave it.
+OVERSHOOT = 0.25
 
 
 def displacement(track: Track) -> Displacement | None:
@@ -183,9 +140,11 @@ def _triangle(middle: float, length: float) -> Displacement:
 def _measured(part: Measured) -> Displacement:
     rows = np.array(part.rows)
     places = rows[:, 0] + part.shift
-    from scipy.interpolate import CubicSpline  # a quarter of a second, and most tracks need none
+    values = part.scale * rows[:, 1:].T
+    from scipy.interpolate import CubicHermiteSpline  # a quarter of a second; most need none
 
-    spline = CubicSpline(places, part.scale * rows[:, 1:].T, axis=1)
+    slopes = np.stack([shape_preserving_slopes(places, row) for row in values])
+    spline = CubicHermiteSpline(places, values, slopes, axis=1)
     slope = spline.derivative()
     window = _window(places[0], places[-1], part.fade)
 
@@ -194,6 +153,47 @@ def _measured(part: Measured) -> Displacement:
         return _windowed(spline(at), slope(at), *window(s))
 
     return moved
+
+
+def shape_preserving_slopes(places: Array, values: Array) -> Array:
+    """Slopes at the rows for piecewise cubic interpolation without false waves.
+
+    Those of the cubic spline where the rows resolve the wave; where the spline leaves the range of
+    the four rows around an interval by more than a quarter of that range, the monotone ones of
+    Fritsch and Butland (1984, SIAM J. Sci. Stat. Comput. 5) at both its ends.  A sine of six rows a
+    wave leaves it by 0.15 at most.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n,)
+        Increasing arc lengths [m].
+    values : ndarray, shape (n,)
+        Displacements [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Slopes [1].
+    """
+    from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
+
+    slopes = CubicSpline(places, values)(places, 1)
+    monotone = PchipInterpolator(places, values)(places, 1)
+    padded = np.concatenate((values[:1], values, values[-1:]))
+    around = np.stack([padded[i : i + len(values) - 1] for i in range(4)])
+    low, high = around.min(axis=0), around.max(axis=0)
+    allowed = OVERSHOOT * (high - low)
+    inner = places[:-1, None] + np.diff(places)[:, None] * np.arange(1, 8) / 8.0
+    while True:
+        inside = CubicHermiteSpline(places, values, slopes)(inner)
+        lowest, highest = inside.min(axis=1), inside.max(axis=1)
+        wrong = (lowest < low - allowed) | (highest > high + allowed)
+        ends = np.zeros(len(places), dtype=bool)
+        ends[:-1] |= wrong
+        ends[1:] |= wrong
+        if not np.any(ends & (slopes != monotone)):
+            return np.asarray(slopes)
+        slopes = np.where(ends, monotone, slopes)
 
 
 def _widening(track: Track) -> Displacement:
@@ -227,17 +227,17 @@ def _profile(points: Sequence[tuple[float, float]], rounding: float) -> RoundedP
 def _random(part: Random, track: Track) -> Displacement:
     from scipy.fft import next_fast_len
 
-    coefficients = part.coefficients or ERRI_B176[part.spectrum]
+    spectrum = erri_b176(part.coefficients) if part.coefficients else SPECTRA[part.spectrum]
     end = track.length if part.end is None else part.end
     longest, shortest = part.wavelengths[1], part.wavelengths[0]
     period = max(end - part.begin, PERIOD_IN_WAVES * longest)
     n_points = next_fast_len(int(np.ceil(POINTS_PER_WAVE * period / shortest)), real=True)
     lattice = np.zeros((2, 4, n_points))
-    for channel in part.channels:
+    for channel in part.channels or spectrum.channels:
         shares = part.scale * np.array(SHARES[channel])
         shares *= MIRROR[channel] if part.mirror else 1.0
-        shares *= coefficients.b if channel == "cross_level" else 1.0
-        amplitudes = _amplitudes(coefficients, channel, part.wavelengths, period)
+        shares *= spectrum.half_base if channel == "cross_level" else 1.0
+        amplitudes = _amplitudes(spectrum, channel, part.wavelengths, period)
         waves = _waves(amplitudes, _phases(part.seed, channel, amplitudes.size), period, n_points)
         lattice += shares[:, None] * waves[:, None, :]
     window = _window(part.begin, end, part.fade)
@@ -250,26 +250,19 @@ def _random(part: Random, track: Track) -> Displacement:
 
 
 def _amplitudes(
-    coefficients: Coefficients, channel: str, wavelengths: Sequence[float], period: float
+    spectrum: Spectrum, channel: str, wavelengths: Sequence[float], period: float
 ) -> Array:
     """Amplitude of each harmonic of the period, from the one of index 0 on."""
     step = 2.0 * np.pi / period
     low, high = 2.0 * np.pi / wavelengths[1], 2.0 * np.pi / wavelengths[0]
     middle = step * np.arange(int(np.ceil(high / step)) + 1)
     begin, end = np.clip([middle - 0.5 * step, middle + 0.5 * step], low, high)
-    return np.sqrt(2.0 * _bin_integrals(coefficients, channel, begin, end))
-
-
-def _bin_integrals(coefficients: Coefficients, channel: str, begin: Array, end: Array) -> Array:
-    half = 0.5 * (end - begin)
-    omega = (begin + half)[:, None] + half[:, None] * _NODES
-    integrals: Array = half * (spectral_density(coefficients, channel, omega) @ _WEIGHTS)
-    return integrals
+    return np.sqrt(2.0 * spectrum.bin_variances(channel, begin, end))
 
 
 def _phases(seed: int, channel: str, number: int) -> Array:
     """Random phases of a channel: the same for a seed whatever the other channels [rad]."""
-    generator = np.random.default_rng([seed, list(SHARES).index(channel)])
+    generator = np.random.default_rng([seed, CHANNELS.index(channel)])
     return generator.uniform(0.0, 2.0 * np.pi, number)
 
 

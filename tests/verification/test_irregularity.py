@@ -8,12 +8,8 @@ from scipy.signal import welch
 from railsim.definitions.loading import load_track
 from railsim.definitions.track import Track
 from railsim.errors import InputError
-from railsim.track.irregularity import (
-    ERRI_B176,
-    band_variance,
-    displacement,
-    spectral_density,
-)
+from railsim.track.irregularity import displacement
+from railsim.track.spectra import ERRI_B176, SPECTRA
 from railsim.track.tables import track_tables
 
 Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
@@ -65,22 +61,23 @@ def test_coefficients_are_those_of_the_reference(reference_dir):
 
 @pytest.mark.parametrize("channel", CHANNELS)
 def test_band_variance_is_the_integral_of_the_spectrum(channel):
-    low = ERRI_B176["erri_b176_low"]
+    low = SPECTRA["erri_b176_low"]
     exact, _ = quad(
-        lambda omega: float(spectral_density(low, channel, np.array(omega))),
+        lambda omega: float(low.density(channel, np.array(omega))),
         2.0 * np.pi / 70.0,
         2.0 * np.pi / 3.0,
         epsabs=0.0,
         epsrel=1e-10,
     )
-    assert band_variance(low, channel, (3.0, 70.0)) == pytest.approx(exact, rel=1e-9)
+    assert low.band_variance(channel, (3.0, 70.0)) == pytest.approx(exact, rel=1e-9)
 
 
 def test_vertical_spectrum_has_the_closed_integral_of_two_poles():
     # over all wave numbers: pi A omega_c / (2 omega_r (omega_c + omega_r))
     c = ERRI_B176["erri_b176_high"]
     closed = np.pi * c.vertical * c.omega_c / (2.0 * c.omega_r * (c.omega_c + c.omega_r))
-    assert band_variance(c, "vertical", (1e-3, 1e9)) == pytest.approx(closed, rel=1e-6)
+    found = SPECTRA["erri_b176_high"].band_variance("vertical", (1e-3, 1e9))
+    assert found == pytest.approx(closed, rel=1e-6)
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
@@ -92,7 +89,7 @@ def test_variance_over_50_seeds_is_the_integral_of_the_band(channel, spectrum):
     for seed in range(50):
         part = random(spectrum=spectrum, seed=seed, wavelengths=wavelengths, channels=[channel])
         variances.append(np.mean(channels(track(part), s)[channel] ** 2))
-    expected = band_variance(ERRI_B176[spectrum], channel, wavelengths)
+    expected = SPECTRA[spectrum].band_variance(channel, wavelengths)
     assert np.mean(variances) == pytest.approx(expected, rel=0.02)
 
 
@@ -102,7 +99,7 @@ def test_variance_over_the_whole_period_is_exact_for_every_seed():
     for seed in range(3):
         found = channels(track(random(seed=seed, end=1400.0)), s)
         for channel in CHANNELS:
-            expected = band_variance(ERRI_B176["erri_b176_low"], channel, (3.0, 70.0))
+            expected = SPECTRA["erri_b176_low"].band_variance(channel, (3.0, 70.0))
             # interpolation of the shortest waves on their lattice
             assert np.mean(found[channel] ** 2) == pytest.approx(expected, rel=1e-4)
 
@@ -113,7 +110,7 @@ def test_spectrum_of_a_long_track_is_the_given_one():
     frequency, density = welch(z, fs=2.0, nperseg=2048)
     omega = 2.0 * np.pi * frequency
     band = (omega > 0.15) & (omega < 2.0)
-    given = spectral_density(ERRI_B176["erri_b176_low"], "vertical", omega[band])
+    given = SPECTRA["erri_b176_low"].density("vertical", omega[band])
     ratio = density[band] / (2.0 * np.pi) / given
     # each estimate averages 38 periodograms (16 %); their mean over 600 lines is close to one
     assert np.mean(ratio) == pytest.approx(1.0, abs=0.03)
@@ -318,3 +315,161 @@ def test_missing_measured_file_is_a_fault_of_its_key(measured):
         load_track(path)
     assert caught.value.faults[0].key == "irregularities.0.file"
     assert "other.csv" in caught.value.faults[0].found
+
+
+# spectra by name, standard deviations in mm between 3 and 70 m computed independently of railsim;
+# the cross level as a height over 1.5 m; tolerance half a unit of the last digit printed
+PRINTED = [
+    *((f"fra_{i}", "vertical", v) for i, v in
+      ((1, 16.82), (2, 15.42), (3, 12.62), (5, 7.00), (6, 2.81))),
+    ("fra_6", "lateral", 2.81),
+    ("fra_6", "cross_level", 2.51),
+    ("fra_1983_6", "vertical", 3.37),
+    ("china_trunk", "vertical", 2.43),
+    ("china_trunk", "lateral", 2.34),
+    ("china_trunk", "cross_level", 1.44),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "channel", "mm", "digit"),
+    [(*row, 0.01) for row in PRINTED]
+    + [("china_high_speed", c, v, 0.001) for c, v in
+       (("vertical", 0.462), ("cross_level", 0.379), ("gauge", 0.301))],
+)
+def test_standard_deviation_of_a_spectrum_is_the_published_one(name, channel, mm, digit):
+    height = 1.5 if channel == "cross_level" else 1.0
+    found = 1e3 * height * np.sqrt(SPECTRA[name].band_variance(channel, (3.0, 70.0)))
+    assert found == pytest.approx(mm, abs=0.5 * digit + 1e-3 * mm)
+
+
+def test_pieces_of_the_chinese_high_speed_spectra_join():
+    for channel, density in SPECTRA["china_high_speed"].densities.items():
+        f = np.geomspace(1e-2, 0.5, 20001)
+        steps = np.abs(np.diff(np.log(density(f)))) - 5.0 * np.diff(np.log(f))
+        assert np.max(steps) < 0.01, channel  # the source's pieces join within 0.3 %
+
+
+@pytest.mark.parametrize("name", [n for n in SPECTRA if not n.startswith("erri")])
+def test_realisation_of_every_spectrum_has_the_variance_of_its_band(name):
+    s = 0.35 * np.arange(4000)
+    found = channels(track(random(spectrum=name, end=1400.0)), s)
+    for channel in SPECTRA[name].channels:
+        expected = SPECTRA[name].band_variance(channel, (3.0, 70.0))
+        assert np.mean(found[channel] ** 2) == pytest.approx(expected, rel=1e-4)
+
+
+def test_names_of_the_definition_are_those_of_the_spectra():
+    from typing import get_args
+
+    from railsim.definitions.irregularity import SpectrumName
+
+    assert set(get_args(SpectrumName)) == {*SPECTRA, "own"}
+
+
+# measured rows ------------------------------------------------------------------------------------
+
+
+def track_of(rows, **more):
+    return track({"type": "measured", "rows": rows, "fade": 0.0, **more}, length=rows[-1][0])
+
+
+def test_a_step_between_few_rows_stays_a_step():
+    points = ((0.0, 0.0), (50.0, 0.0), (50.05, 5e-3), (100.0, 5e-3))
+    rows = [[s, 0, z, 0, z] for s, z in points]
+    z = rails(track_of(rows), np.linspace(0.0, 99.9, 5000))[0][Z_LEFT]
+    assert z.min() > -1e-12
+    assert z.max() < 5e-3 + 1e-12
+
+
+def test_a_joint_sampled_coarsely_does_not_swing():
+    s = np.arange(0.0, 60.0, 0.5)
+    z = np.where(np.abs(s - 30.0) < 0.3, 5e-3, 0.0)
+    found = rails(track_of([[x, 0, v, 0, v] for x, v in zip(s, z, strict=True)]),
+                  np.linspace(0.0, 59.0, 6000))[0][Z_LEFT]
+    assert found.min() > -1.3e-3  # a quarter of the rows' range; the spline swings to -0.27 of it
+    assert found.max() < 6.3e-3
+
+
+def test_a_wave_of_eight_rows_is_followed_as_by_a_spline():
+    s = np.arange(0.0, 100.0, 1.25)
+    fine = np.linspace(10.0, 90.0, 3001)
+    rows = [[x, 0, 4e-3 * np.sin(2 * np.pi * x / 10.0), 0, 0] for x in s]
+    found = rails(track_of(rows), fine)[0][Z_LEFT]
+    # error of a cubic spline at eight points a wave: (2 pi/8)^4/384 of the amplitude
+    np.testing.assert_allclose(found, 4e-3 * np.sin(2 * np.pi * fine / 10.0), atol=0.004 * 4e-3)
+
+
+# files of recording cars --------------------------------------------------------------------------
+
+
+def recorded(tmp_path, text, **more):
+    (tmp_path / "rec.csv").write_text(text)
+    (tmp_path / "t.toml").write_text(
+        'format = "railsim-track/1"\nname = "t"\nplan = [{ type = "STR", length = 100.0 }]\n'
+        "[[irregularities]]\n" 'type = "measured"\nfile = "rec.csv"\nfade = 0.0\n'
+        + "".join(f"{key} = {value}\n" for key, value in more.items())
+    )
+    return load_track(tmp_path / "t.toml")
+
+
+def test_columns_units_signs_decimal_comma_and_mileage_of_a_recording(tmp_path):
+    lines = ["Km;Other;LL;AL"]
+    for i in range(6):
+        lines.append(f"{12.3 - 0.001 * i:.4f};x;{i:.1f};{2 * i}.5".replace(".", ","))
+    found = recorded(
+        tmp_path, "\n".join(lines), columns='{ s = "Km", z_left = "LL", y_right = "AL" }',
+        units='{ s = "km", z_left = "mm", y_right = "mm" }', reverse='["z_left"]',
+        falling_mileage="true",
+    ).irregularities[0]
+    expected = [[i, 0.0, -1e-3 * i, 1e-3 * (2 * i + 0.5), 0.0] for i in range(6)]
+    np.testing.assert_allclose(found.rows, expected, atol=1e-9)
+    assert found.columns is None
+
+
+def wave(wavelength, n=4000, step=0.25):
+    s = step * np.arange(n)
+    return s, 1e-3 * np.sin(2.0 * np.pi * s / wavelength)
+
+
+def written(s, z):
+    return "s,z_left\n" + "\n".join(f"{a:.3f},{b:.9f}" for a, b in zip(s, z, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("wavelength", "gain"),
+    # 1/sqrt(1 + (l/f)^8) at the edges is 0.707; an octave outside 1/16
+    [(3.0, 0.7071), (8.0, 1.0), (25.0, 0.7071), (50.0, 0.0625)],
+)
+def test_band_D1_has_the_gains_of_a_butterworth_filter(tmp_path, wavelength, gain):
+    s, z = wave(wavelength)
+    rows = np.array(recorded(tmp_path, written(s, z), band='"D1"').irregularities[0].rows)
+    inner = (s > 300.0) & (s < 700.0)
+    found = np.sqrt(2.0) * np.std(rows[inner, 2])
+    assert found == pytest.approx(1e-3 * gain, rel=0.01)
+
+
+def test_space_curve_is_recovered_from_chord_offsets(tmp_path):
+    # the chord of 4 + 6 m sees all waves of this sum; the record holds whole waves
+    s = 0.25 * np.arange(4000)
+
+    def curve(x):
+        return 1e-3 * np.sin(2 * np.pi * x / 25.0) + 5e-4 * np.cos(2 * np.pi * x / 12.5)
+
+    offsets = curve(s) - (6.0 * curve(s - 4.0) + 4.0 * curve(s + 6.0)) / 10.0
+    found = recorded(tmp_path, written(s, offsets), chord="[4.0, 6.0]").irregularities[0].rows
+    np.testing.assert_allclose(np.array(found)[:, 2], curve(s), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "message"),
+    [
+        ("a;b\n0;0\n", {"columns": '{ s = "a", z_left = "c" }'}, "no column 'c'"),
+        ("a;b\n0;0\n", {"columns": '{ z_left = "b" }'}, "no column for s"),
+        ("s,z\n0,0\n1,0\n1.001,0.004\n2,0\n", {}, "mm within"),
+        ("s,z\n0,0\n1,0\n2.5,0\n3,0\n", {"band": '"D1"'}, "unequal steps"),
+    ],
+)
+def test_a_recording_that_cannot_be_read_is_refused(tmp_path, text, keys, message):
+    with pytest.raises(InputError, match=message):
+        recorded(tmp_path, text, **keys)
