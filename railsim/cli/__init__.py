@@ -37,6 +37,7 @@ COMMANDS = {
     "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
     "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
     "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),
+    "list": ("library", "What vehicles, tracks, profiles and design files there are."),
     "validate": ("validate", "Check files and list every fault."),
     "info": ("info", "What a vehicle, track or result file holds, in a screenful."),
     "bench": ("bench", "The runtime benchmark on this machine."),

@@ -4,6 +4,8 @@ The result is one nested table of plain values with its provenance: for each key
 came from, so that a fault can be reported where it was written.
 """
 
+import itertools
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Iterator
@@ -58,9 +60,38 @@ def shipped_folder(kind: str) -> Path:
     return installed if installed.is_dir() else PACKAGE.parent / FOLDERS[kind]
 
 
+def library_folders(kind: str) -> Iterator[Path]:
+    """Yield the folders in which a bare name is looked for, in their order.
+
+    Those of the environment variable `RAILSIM_PATH`, those that come with railsim, and those of
+    installed packages that declare an entry point of the group `railsim.library`.  Each library has
+    the layout of railsim's own: `vehicles/`, `vehicles/springs/`, `tracks/`.
+    """
+    for folder in filter(None, os.environ.get("RAILSIM_PATH", "").split(os.pathsep)):
+        yield Path(folder) / FOLDERS[kind]
+    yield shipped_folder(kind)
+    # last and imported here: reading the metadata of all installed packages takes some 50 ms
+    from importlib.metadata import entry_points
+
+    for entry in entry_points(group="railsim.library"):
+        library = entry.load()
+        # a module stands for the folder that holds it
+        root = Path(library.__file__).parent if hasattr(library, "__file__") else Path(library)
+        yield root / FOLDERS[kind]
+
+
+def library_files(kind: str) -> dict[str, Path]:
+    """Return the files of the libraries by their bare names; the first of a name counts."""
+    files: dict[str, Path] = {}
+    for folder in library_folders(kind):
+        for path in sorted(folder.glob("*.toml")):
+            files.setdefault(path.stem, path)
+    return dict(sorted(files.items()))
+
+
 def shipped_names(kind: str) -> list[str]:
-    """Return the bare names of the shipped vehicles or tracks."""
-    return sorted(path.stem for path in shipped_folder(kind).glob("*.toml"))
+    """Return the bare names of the vehicles or tracks in the libraries."""
+    return list(library_files(kind))
 
 
 def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
@@ -83,15 +114,19 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     candidates = [folder / name]
     if beside is not None:
         candidates.append(folder / f"{name}.toml")
+    in_libraries: Iterable[Path] = ()
     if kind in FOLDERS:
-        candidates.append(shipped_folder(kind) / f"{name}.toml")
-    found = [candidate for candidate in candidates if candidate.is_file()]
-    for candidate in found:
+        in_libraries = (folder / f"{name}.toml" for folder in library_folders(kind))
+    own = None
+    for candidate in itertools.chain(candidates, in_libraries):
+        if not candidate.is_file():
+            continue
         # a file that extends its own name means the shipped one
         if beside is None or candidate.resolve() != beside.resolve():
             return candidate
-    if found:
-        return found[0]
+        own = candidate
+    if own is not None:
+        return own
     raise InputError([_no_file(name, kind, candidates[0], beside)])
 
 

@@ -1,0 +1,133 @@
+"""``railsim list``: what vehicles, tracks, profiles and design files there are."""
+
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import click
+
+from railsim.cli.common import json_option, overwrite_option, print_json, table
+
+PROFILES = "profiles"
+# Marks of trust beside a number, as the shipped files explain them: read, re-entered, computed,
+# recalled, assumed.
+MARK = re.compile(r"\[(D|R|C|M|A|assumed)\]")
+MEANING = {
+    "D": "data sheet or printed table, read",
+    "R": "re-entered in public code that names its source",
+    "C": "computed",
+    "M": "recalled",
+    "A": "assumed",
+}
+
+
+def _kinds() -> dict[str, str]:
+    """Words of the command line and the kinds of files they stand for."""
+    from railsim.definitions.sources import FOLDERS
+
+    return {Path(folder).name: kind for kind, folder in FOLDERS.items()}
+
+
+@click.command()
+@click.argument("kinds", nargs=-1, metavar="[KIND]...")
+@click.option("--draw", metavar="DIR", help="Draw every listed vehicle and track into this folder.")
+@overwrite_option
+@json_option
+def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: bool) -> None:
+    """List what can be called by its bare name: vehicles, tracks, profiles, springs ...
+
+    Beside railsim's own files those of the folders in the environment variable RAILSIM_PATH and of
+    installed packages with an entry point `railsim.library`.
+
+    \b
+    Example:
+      railsim list vehicles
+    """  # noqa: D301 - click reads the escape
+    from railsim.errors import Fault, InputError, nearest
+
+    known = [*_kinds(), PROFILES]
+    wrong = [kind for kind in kinds if kind not in known]
+    if wrong:
+        raise InputError(Fault("list", "", f"no kind '{k}'", nearest(k, known)) for k in wrong)
+    entries = [entry for kind in kinds or known for entry in _entries(kind)]
+    if draw is not None:
+        _draw(entries, Path(draw), overwrite)
+    if as_json:
+        print_json(entries)
+        return
+    for kind in kinds or known:
+        rows = [
+            [entry["name"], entry["trust"], entry["title"]]
+            for entry in entries
+            if entry["kind"] == kind
+        ]
+        click.echo("\n".join([f"{kind}", *table(["name", "trust", ""], rows, numbers=3), ""]))
+    if any(entry["trust"] for entry in entries):
+        meanings = ", ".join(f"{letter} {meaning}" for letter, meaning in MEANING.items())
+        click.echo(f"trust of the numbers, the most frequent first: {meanings}")
+
+
+def _entries(kind: str) -> list[dict[str, Any]]:
+    if kind == PROFILES:
+        from railsim.profiles.builtin import DEFINITIONS, builtin_profile
+
+        profiles = {name: builtin_profile(name) for name in DEFINITIONS}
+        return [
+            {
+                "kind": kind,
+                "name": name,
+                "title": f"{p.kind}: {p.source}",
+                "trust": "",
+                "file": None,
+            }
+            for name, p in profiles.items()
+        ]
+    from railsim.definitions.sources import library_files, read_toml
+
+    return [
+        {
+            "kind": kind,
+            "name": name,
+            "title": str(read_toml(path).get("name", "")),
+            "trust": trust(path.read_text("utf-8")),
+            "file": str(path),
+        }
+        for name, path in library_files(_kinds()[kind]).items()
+    ]
+
+
+def trust(text: str) -> str:
+    """Return the letters of trust of a file's numbers, the most frequent first.
+
+    Examples
+    --------
+    >>> trust("mass = 3.0  # [R]\\nx = 1.0  # [A]\\ny = 2.0  # [R]; z [A]\\n radius = 4  # [R]")
+    'RA'
+    """
+    lines = (line.partition("#") for line in text.splitlines())
+    comments = [comment for value, _, comment in lines if value.strip()]
+    letters = Counter(mark[0].upper() for line in comments for mark in MARK.findall(line))
+    return "".join(letter for letter, _ in letters.most_common())
+
+
+def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:
+    from railsim.definitions.loading import load_any
+    from railsim.definitions.track import Track
+    from railsim.definitions.vehicle import Vehicle
+    from railsim.files import check_folder
+    from railsim.plot.style import save
+    from railsim.plot.track import track_figure
+    from railsim.plot.vehicle import vehicle_figure
+
+    drawn = [entry for entry in entries if entry["kind"] in ("vehicles", "tracks")]
+    pictures = [f"{entry['name']}.png" for entry in drawn]
+    check_folder(folder, pictures, overwrite=overwrite)
+    folder.mkdir(parents=True, exist_ok=True)
+    for entry, picture in zip(drawn, pictures, strict=True):
+        definition, _ = load_any(entry["file"])
+        if isinstance(definition, Vehicle):
+            save(vehicle_figure(definition), folder / picture, overwrite=overwrite)
+        elif isinstance(definition, Track):
+            save(track_figure(definition), folder / picture, overwrite=overwrite)
+        entry["picture"] = str(folder / picture)
