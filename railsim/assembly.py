@@ -18,6 +18,7 @@ from railsim.contact.table import ContactTable, cached_contact_table
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.settings import Drive as DriveDefinition
 from railsim.definitions.settings import Settings
+from railsim.definitions.support import Support as SupportDefinition
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.element_arrays import ElementArrays
@@ -27,6 +28,13 @@ from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.creep import LAW_NUMBERS
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.lanes import LANES
+from railsim.kernels.support import (
+    SUPPORT_COLUMNS,
+    SUPPORT_ROW,
+    SUPPORT_SIZE,
+    SUPPORT_STEP,
+    Support,
+)
 from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
@@ -48,6 +56,7 @@ from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTabl
 from railsim.kernels.wheel_rail import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
+from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -110,7 +119,9 @@ class Model:
     @property
     def n_state(self) -> int:
         """Length of the state vector."""
-        return 18 * self.index.n_bodies + 2 * len(self.system.internal.kind) + N_SCALARS
+        system = self.system
+        track = SUPPORT_SIZE * system.support.elastic * len(system.contact.body)
+        return 18 * self.index.n_bodies + 2 * len(system.internal.kind) + track + N_SCALARS
 
 
 def assemble(
@@ -158,6 +169,7 @@ def assemble(
         bodies=bodies,
         frame_offset=offsets,
         track=shared.track,
+        support=support_arrays(track.support),
         contact=contact,
         links=elements.links(),
         mounts=elements.mounts(),
@@ -182,6 +194,7 @@ def work_arrays(system: System) -> Work:
     n_wheelsets = len(system.contact.body)
     n_patches = 2 * N_PATCH * n_wheelsets
     n_frames = len(system.frame_offset)
+    n_tracks = n_wheelsets * system.support.elastic
     return Work(
         frames=aligned_zeros((n_frames, FRAME_SIZE)),
         cell=aligned_zeros(n_frames, np.int64),
@@ -203,6 +216,9 @@ def work_arrays(system: System) -> Work:
         patch=aligned_zeros((PATCH_ROWS, n_patches)),
         fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
         offsets=aligned_zeros(16, np.int64),
+        support=aligned_zeros((n_tracks, 2, SUPPORT_COLUMNS)),
+        support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
+        compliance=aligned_zeros(2),
         events=aligned_zeros((n_wheelsets, 2), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
     )
@@ -222,7 +238,8 @@ def level_track(system: System) -> System:
     nothing = system.loads._replace(
         body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
     )
-    return system._replace(track=track, drive=CONSTANT_SPEED, loads=nothing)
+    even = system.support._replace(variation=system.support.variation[:0])
+    return system._replace(track=track, support=even, drive=CONSTANT_SPEED, loads=nothing)
 
 
 def level_track_with_friction(system: System) -> System:
@@ -232,6 +249,24 @@ def level_track_with_friction(system: System) -> System:
     for row in (MU_LEFT, MU_RIGHT):
         rail[:, row, 0] = np.max(system.track.rail[:, row, 0])
     return level._replace(track=level.track._replace(rail=rail))
+
+
+def support_arrays(definition: SupportDefinition) -> Support:
+    """Arrays of the moving track model; the track's elastic parts as they follow from the file."""
+    values = definition.values
+    variation = np.array(definition.variation or (), dtype=float).reshape(-1, 3)
+    if values is None:
+        return Support(0, 0, 0, np.zeros(SUPPORT_ROW), variation)
+    (k_y, c_y), (k_z, c_z) = values.pad_lateral, values.pad_vertical
+    ballast_y, ballast_z = values.ballast_lateral or (0.0, 0.0), values.ballast_vertical
+    k_side, c_side = ballast_z or (0.0, 0.0)
+    square = values.ballast_base**2
+    row = np.array([
+        values.rail_mass, values.sleeper_mass, values.sleeper_inertia, k_y, c_y, k_z, c_z,
+        *ballast_y, 2.0 * k_side, 2.0 * c_side, 2.0 * square * k_side, 2.0 * square * c_side,
+        0.5 * CANT_BASE,
+    ])
+    return Support(1, int(values.has_sleeper), int(values.massless), row, variation)
 
 
 def drive_arrays(drive: DriveDefinition) -> Drive:

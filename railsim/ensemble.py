@@ -28,6 +28,7 @@ from railsim.kernels.status import (
     WHEEL_LIFT,
     YAW_RANGE,
 )
+from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import (
     BOTH_ENDS,
     N_SCALARS,
@@ -102,15 +103,17 @@ class Ensemble:
         wheelsets = _slices(len(system.contact.body) for system in systems)
         elements = _slices(len(recorder.chosen) for recorder in recorders)
         n, m = bodies[-1].stop, internal[-1].stop
+        track = SUPPORT_SIZE * systems[0].support.elastic  # of each wheelset
         self.parts = tuple(
-            Part(_places(n, m, own, inner), own, axles, chosen)
+            Part(_places(n, m, track, own, inner, axles, wheelsets[-1].stop), own, axles, chosen)
             for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
         )
         if len(models) == 1:
             self.system, self.recorder = systems[0], recorders[0]
             return
         self.system = joined_system(models)
-        self.recorder = _joined_recorder(systems, recorders, 18 * n + 2 * m + N_SCALARS)
+        n_state = 18 * n + 2 * m + track * wheelsets[-1].stop + N_SCALARS
+        self.recorder = _joined_recorder(systems, recorders, n_state)
 
     def state(self, states: Sequence[Floats]) -> Floats:
         """State of the ensemble from those of its vehicles."""
@@ -164,6 +167,7 @@ def joined_system(models: Sequence[Model]) -> System:
         bodies=_joined_bodies(systems, bodies, offset),
         frame_offset=offset,
         track=first.track,
+        support=first.support,
         contact=_joined_contact(models, bodies),
         links=_joined([system.links for system in systems], body=bodies, internal=internal,
                       curve=curves),
@@ -292,12 +296,17 @@ def _slices(lengths: Iterable[int]) -> list[slice]:
     return [slice(start, end) for start, end in pairwise(ends)]
 
 
-def _places(n: int, m: int, bodies: slice, internal: slice) -> Ints:
-    """Places of one vehicle's state in that of n bodies and m internal states."""
+def _places(
+    n: int, m: int, track: int, bodies: slice, internal: slice, wheelsets: slice, w: int
+) -> Ints:
+    """Places of one vehicle's state in that of n bodies, m internal states, w wheelsets' tracks."""
     coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
     inner = np.arange(internal.start, internal.stop)
-    end = 18 * n + 2 * m
+    first = 18 * n + 2 * m
+    end = first + track * w
     return np.concatenate([
         coordinates, 6 * n + coordinates, 12 * n + inner,
-        12 * n + m + coordinates, 18 * n + m + inner, np.arange(end, end + N_SCALARS),
+        12 * n + m + coordinates, 18 * n + m + inner,
+        first + np.arange(track * wheelsets.start, track * wheelsets.stop),
+        np.arange(end, end + N_SCALARS),
     ])

@@ -23,7 +23,15 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
-from railsim.kernels.system import AXLEBOX, RIGID, WHEELSET, Links, Mounts, System
+from railsim.kernels.support import (
+    DOF,
+    K_BALLAST_Z,
+    K_PAD_Z,
+    RAIL_DOF,
+    RATE,
+    SUPPORT_SIZE,
+)
+from railsim.kernels.system import AXLEBOX, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.kernels.wheel_rail import W_Q
 from railsim.notation import COMPONENTS
@@ -233,7 +241,29 @@ def _first_guess(model: Model, level: System) -> Floats:
         gap = max(float(np.min(node[:, 0])) for node in nodes)
         stiffness = sum(float(node[np.argmin(node[:, 0]), 1]) for node in nodes)
         state[6 * body + 2] = gap + (weight / stiffness) ** (2.0 / 3.0)
+    _sink(level, state, weight)
     return state
+
+
+def _sink(level: System, state: Floats, weight: float) -> None:
+    """Let elastic rails give way under `weight` on each wheelset, and the vehicle with them."""
+    support = level.support
+    if not support.elastic:
+        return
+    sleeper = weight / support.row[K_BALLAST_Z] if support.sleeper else 0.0
+    rail = sleeper + 0.5 * weight / support.row[K_PAD_Z]
+    track = _tracks(level, state)
+    track[:, 1:RAIL_DOF:2] = rail
+    track[:, RAIL_DOF + 1] = sleeper
+    for body in level.bodies.whole:
+        state[6 * body + 2] += rail
+
+
+def _tracks(system: System, state: Floats) -> Floats:
+    """View of the states of the track under each wheelset."""
+    end = len(state) - N_SCALARS
+    wheelsets = len(system.contact.body)
+    return state[end - SUPPORT_SIZE * wheelsets : end].reshape(wheelsets, SUPPORT_SIZE)
 
 
 class _Balance:
@@ -260,6 +290,13 @@ class _Balance:
                 # the unknown of a wheelset's spin is its rate, of all others the position
                 self._unknowns.append((6 * n if spin else 0) + 6 * body + component)
                 self._equations.append(6 * n + 6 * body + component)
+        if system.support.elastic:
+            first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(system.contact.body)
+            moving = DOF if system.support.sleeper else RAIL_DOF
+            places = first + SUPPORT_SIZE * np.arange(len(system.contact.body))
+            degrees = (places[:, None] + np.arange(moving)).ravel().tolist()
+            self._unknowns += degrees
+            self._equations += [RATE + k for k in degrees]
         for i in np.flatnonzero(system.internal.kind == AIR):
             self._unknowns.append(12 * n + int(i))
             self._equations.append(12 * n + int(i))

@@ -179,7 +179,8 @@ QUANTITIES: dict[str, Quantity] = _table(
         _AXLE,
         "mm",
         1e3,
-        "of the wheelset relative to the track at its place, positive to the right",
+        "of the wheelset relative to the track at its place, positive to the right; on elastic "
+        "rails less the mean of their deflections",
     ),
     Quantity(
         "wheelset_roll",
@@ -189,7 +190,8 @@ QUANTITIES: dict[str, Quantity] = _table(
         _AXLE,
         "mrad",
         1e3,
-        "relative to the track plane, positive with the right wheel down",
+        "relative to the track plane, positive with the right wheel down; on elastic rails "
+        "relative to the deflected rails",
     ),
     Quantity(
         "wheelset_yaw",
@@ -330,4 +332,8 @@ REQUESTED: dict[str, Quantity] = _table(
              "irregularity at the wheelset's place, to the right"),
     Quantity("rail_vertical", "vertical displacement of the rail", "z_r", "m", _WHEEL, "mm", 1e3,
              "irregularity at the wheelset's place, down"),
+    Quantity("rail_deflection_lateral", "lateral deflection of the rail", "u_y", "m", _WHEEL, "mm",
+             1e3, "of the elastic rail under the wheel, to the right"),
+    Quantity("rail_deflection_vertical", "vertical deflection of the rail", "u_z", "m", _WHEEL,
+             "mm", 1e3, "of the elastic rail under the wheel, down"),
 )

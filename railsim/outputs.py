@@ -12,11 +12,13 @@ from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import element_outputs as element
 from railsim.kernels import wheel_rail as patch
+from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
+from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Recorder
 from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_XI_X, W_XI_Y, W_Y
 from railsim.notation import PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.time_step import empty_recorder
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import CANT_BASE, Alignment
 from railsim.track.irregularity import displacement
 
 Floats = NDArray[np.float64]
@@ -47,6 +49,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     # a wheel that carries nothing has no derailment quotient
     loaded = np.where(Q > 0.0, Q, np.nan)
     places = model.system.frame_offset[model.system.bodies.frame[axles]]
+    deflection = rail_deflection(model, state)
     return {
         "time": state[:, -3],
         "distance": state[:, -2],
@@ -56,8 +59,10 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "dQ_over_Q0": (Q - Q0) / Q0,
         "sum_Y": Y.sum(axis=-1),
         "sum_abs_Y": np.abs(Y).sum(axis=-1),
-        "wheelset_lateral": position[:, axles, LATERAL],
-        "wheelset_roll": position[:, axles, ROLL],
+        "wheelset_lateral": position[:, axles, LATERAL] - deflection[..., 0].mean(axis=-1),
+        "wheelset_roll": (
+            position[:, axles, ROLL] - np.diff(deflection[..., 1])[..., 0] / CANT_BASE
+        ),
         "wheelset_yaw": position[:, axles, YAW],
         "wheelset_distance": state[:, -2, None] + places + position[:, axles, 0],
         "xi_x": wheel[..., W_XI_X],
@@ -68,6 +73,22 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
     }
+
+
+def rail_deflection(model: Model, state: Floats) -> Floats:
+    """Displacement of the rail heads on their support, from recorded states.
+
+    Returns
+    -------
+    float64[time, wheelset, side, 2]
+        Lateral and vertical [m]; zero on rigid rails.
+    """
+    rows, wheelsets = len(state), len(model.index.wheelsets)
+    if not model.system.support.elastic:
+        return np.zeros((rows, wheelsets, 2, 2))
+    end = state.shape[1] - N_SCALARS
+    track = state[:, end - wheelsets * SUPPORT_SIZE : end].reshape(rows, wheelsets, SUPPORT_SIZE)
+    return track[..., :RAIL_DOF].reshape(rows, wheelsets, 2, 2)
 
 
 class OutputPlan:
@@ -132,6 +153,9 @@ class OutputPlan:
             values |= _patches(recorder.patch[:rows])
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
+            deflection = rail_deflection(self._model, recorder.state[:rows])
+            values |= {"rail_deflection_lateral": deflection[..., 0],
+                       "rail_deflection_vertical": deflection[..., 1]}
         return values
 
     def _track(self, place: Floats) -> dict[str, Floats]:

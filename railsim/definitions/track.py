@@ -22,6 +22,7 @@ from railsim.definitions.base import (
     rising,
 )
 from railsim.definitions.irregularity import Irregularity
+from railsim.definitions.support import Support
 
 TRACK_FORMAT = "railsim-track/1"
 
@@ -228,6 +229,8 @@ class Track(FileDefinition):
 
     irregularities: tuple[Irregularity, ...] = ()
     """Displacements of the rails from their ideal places; they add up"""
+    support: Support = Support()
+    """What carries the rails: rigid, or elastic as a moving track model"""
 
     @property
     def length(self) -> float:

@@ -36,6 +36,7 @@ from railsim.kernels.lanes import (
 )
 from railsim.kernels.rotation import product, sine_cosine_lanes, turned, turned_back
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
+from railsim.kernels.support import locate_support, support_rates
 from railsim.kernels.system import (
     AXLEBOX,
     BODY_SIZE,
@@ -308,6 +309,7 @@ def right_hand_side(system, work, state, derivative):
     """
     status, where, n_patches = mechanics(system, work, state, derivative)
     internal_rates(system, work, state, derivative)
+    support_rates(system, work, state, derivative)
     return status, where, n_patches
 
 
@@ -343,6 +345,8 @@ def mechanics(system, work, state, derivative):
                            s, work.frames, work.cell, work.cell_u)
     if status != RUNNING:
         return status, 0, 0
+    if system.support.elastic:
+        locate_support(system, work, s)
     kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     m = system.internal.kind.shape[0]
     inner = state[12 * n:12 * n + m]

@@ -8,6 +8,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
+    then 28w      of each wheelset on elastic rails: track under it, see `support`
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
@@ -19,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels.internal import Internal
+from railsim.kernels.support import Support
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
@@ -298,6 +300,7 @@ class System(NamedTuple):
     bodies: Bodies
     frame_offset: np.ndarray
     track: TrackTables
+    support: Support
     contact: Contact
     links: Links
     mounts: Mounts
@@ -329,6 +332,10 @@ class Work(NamedTuple):
     patch : float64[PATCH_ROWS, p]  see `wheel_rail`
     fastsim : float64[WORK_ROWS, ...];  offsets : int64[16]   scratch of the creep laws
     wheel : float64[w, 2, WHEEL_COLUMNS]  see `wheel_rail`
+    support : float64[w, 2, SUPPORT_COLUMNS];  support_step : float64[w, SUPPORT_STEP]
+                                of each wheelset's track, see `support`; w = 0 on rigid rails
+    compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
+                                [m/(N s)]
     events : int64[w, 2]        of each wheelset: loaded patches so far, and how many of them were
                                 outside the range of the creep law
     """
@@ -353,5 +360,8 @@ class Work(NamedTuple):
     patch: np.ndarray
     fastsim: np.ndarray
     offsets: np.ndarray
+    support: np.ndarray
+    support_step: np.ndarray
+    compliance: np.ndarray
     events: np.ndarray
     wheel: np.ndarray

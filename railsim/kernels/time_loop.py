@@ -23,6 +23,14 @@ from railsim.kernels.internal import (
 )
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING
+from railsim.kernels.support import (
+    note_wheelsets,
+    remember_track,
+    settle_rates,
+    step_compliance,
+    step_support,
+    support_rates,
+)
 from railsim.kernels.system import (
     AXLEBOX,
     COS_PITCH,
@@ -52,6 +60,8 @@ FAST, RK4 = range(2)
 # to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
+# forces of a massless track in the reference scheme (N, N m), and evaluations allowed for them
+BALANCED, MOST_CORRECTIONS = 1e-2, 50
 
 
 class Recorder(NamedTuple):
@@ -181,6 +191,8 @@ def remember(system, work, state, derivative, h):
         before[k] = rate[k]
     for i in range(m):
         state[first + 6 * n + i] = work.drive[i, 0]
+    if system.support.elastic:
+        remember_track(system, work, state)
 
 
 @jit_inline
@@ -194,6 +206,8 @@ def step_fast(system, work, state, derivative, decay, h):
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
     rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
+    if system.support.elastic:
+        note_wheelsets(system, work, state)
     for b in range(n):
         q = 6 * b
         v = 6 * n + q
@@ -223,6 +237,8 @@ def step_fast(system, work, state, derivative, decay, h):
         state[k] = advanced(system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h,
                             decay[i])
     advance_place(system.drive, state, derivative, h)
+    if system.support.elastic:
+        step_support(system, work, state, h)
 
 
 @jit_inline
@@ -246,6 +262,18 @@ def settle_limits(internal, curves, first, drive, state):
             state[k] = within_table(curves, internal.curve[i], state[k])
 
 
+@jit_internal
+def balanced_mechanics(system, work, state, derivative):
+    """As `mechanics`; a massless track first takes the rates with which its forces balance."""
+    status, where, patches = mechanics(system, work, state, derivative)
+    if system.support.elastic and system.support.massless:
+        for _ in range(MOST_CORRECTIONS):
+            if status != RUNNING or settle_rates(system, work, state) < BALANCED:
+                break
+            status, where, patches = mechanics(system, work, state, derivative)
+    return status, where, patches
+
+
 @jit_inline
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
@@ -257,10 +285,11 @@ def step_rk4(system, work, state, derivative, stages, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = mechanics(system, work, trial, rate)
+        status, where, _ = balanced_mechanics(system, work, trial, rate)
         if status != RUNNING:
             return status, where
         internal_rates(system, work, trial, rate)
+        support_rates(system, work, trial, rate)
         weight = 2.0 if stage < 3 else 1.0
         for k in range(state.shape[0]):
             total[k] += weight * rate[k]
@@ -306,13 +335,19 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     """
     decay = work.decay
     constant_decays(system.internal, h, decay)
+    if system.support.elastic:
+        step_compliance(system.support, h, work.compliance)
     rows = np.int64(0)
     end = first_step + n_steps
     for step in range(first_step, end + closing):
-        status, where, patches = mechanics(system, work, state, derivative)
+        if scheme == RK4:
+            status, where, patches = balanced_mechanics(system, work, state, derivative)
+        else:
+            status, where, patches = mechanics(system, work, state, derivative)
         if status == RUNNING:
             if scheme == RK4:
                 internal_rates(system, work, state, derivative)
+                support_rates(system, work, state, derivative)
             if step % every == 0:
                 record(recorder, rows, system, state, derivative, work, patches)
                 rows += 1

@@ -51,15 +51,38 @@ from railsim.kernels.status import (
     WHEEL_LIFT,
     YAW_RANGE,
 )
+from railsim.kernels.support import (
+    D_Y_ROLL,
+    D_Y_Y,
+    D_Y_Z,
+    D_Z_ROLL,
+    D_Z_Y,
+    D_Z_Z,
+    F_Y,
+    F_Z,
+    K_Y_ROLL,
+    K_Y_Y,
+    K_Y_Z,
+    K_Z_ROLL,
+    K_Z_Y,
+    K_Z_Z,
+    PLACE_Y,
+    PLACE_Z,
+    RATE,
+    SLOPE_Z,
+    SUPPORT_COLUMNS,
+    SUPPORT_SIZE,
+    support_begin,
+)
 from railsim.kernels.system import COS_ROLL, Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA, rail_state
 
 # rows of Work.patch: one column per active patch
 (
     A, B, NORMAL, MU_N, ANGLE_SIN, ANGLE_COS, C_X, C_Y, C_Z, XI_X, XI_Y, PHI,
-    C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION, BEYOND,
-) = range(21)
-PATCH_ROWS = 21
+    C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION, BEYOND, NORMAL_STIFFNESS, NORMAL_DAMPING,
+) = range(23)
+PATCH_ROWS = 23
 
 # columns of Work.wheel[w, side]
 W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL = range(8)
@@ -111,6 +134,13 @@ def normal_contact(system, work, speed, state):
             z = state[6 * b + 2] - work.rail[1]
             y_dot = sign * (y_rate - speed * work.rail[2])
             z_dot = z_rate - speed * work.rail[3]
+            if system.support.elastic:
+                begin_support(work.support, w, side, work.rail)
+                i = support_begin(system) + SUPPORT_SIZE * w + 2 * side
+                y -= sign * state[i]
+                z -= state[i + 1]
+                y_dot -= sign * state[i + RATE]
+                z_dot -= state[i + RATE + 1]
             roll = sign * state[6 * b + 3]
             table = contact.table[w, side]
             where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, yaw * yaw)
@@ -176,6 +206,8 @@ def normal_contact(system, work, speed, state):
                 column[C_Y, n] = sign * t[k + 2]
                 column[C_Z, n] = t[k + 3]
                 column[PENETRATION, n] = p
+                column[NORMAL_STIFFNESS, n] = 1.5 * t[k + 1] * root / cos_2
+                column[NORMAL_DAMPING, n] = contact.damping * fade
                 work.patch_index[n, 0] = w
                 work.patch_index[n, 1] = side
                 work.patch_index[n, 2] = patch
@@ -244,6 +276,10 @@ def creepages(system, work, n, speed, state):
                        work.rail)
             vy -= speed * work.rail[2]
             vz -= speed * work.rail[3]
+        if system.support.elastic:  # here the rail's material moves
+            i = support_begin(system) + SUPPORT_SIZE * w + 2 * work.patch_index[k, 1] + RATE
+            vy -= state[i]
+            vz -= state[i + 1]
         s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
         patch[XI_X, k] = vx / speed
         patch[XI_Y, k] = (vy * c - vz * s) / speed
@@ -271,6 +307,45 @@ def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
     along = share * tangent + (1.0 - share) * secant
     across = share * secant + (1.0 - share) * tangent
     return G * ab * c11 * along, G * ab * c22 * across
+
+
+@jit_inline
+def begin_support(support, w, side, rail):
+    """Nothing yet acts on a rail; where its irregularity has it."""
+    for k in range(SUPPORT_COLUMNS):
+        support[w, side, k] = 0.0
+    support[w, side, PLACE_Y] = rail[0]
+    support[w, side, PLACE_Z] = rail[1]
+    support[w, side, SLOPE_Z] = rail[3]
+
+
+@jit_inline
+def add_slopes(support, w, side, patch, k, across):
+    """Add to the derivatives of the forces on a rail what patch `k` contributes.
+
+    By a motion d of the wheel at the patch, N changes by k_N n d and c_N n d', and the creep force
+    with it, being nearly proportional to N; T_y by the slope of the creep law, `across`, times
+    t d'.
+    """
+    s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
+    cy, cz = patch[C_Y, k], patch[C_Z, k]
+    share = patch[T_Y, k] / patch[NORMAL, k]
+    f_y, f_z = s + share * c, c - share * s
+    stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
+    lever = c * cy - s * cz  # of the normal about the wheelset's centre
+    support[w, side, K_Y_Y] += stiffness * f_y * s
+    support[w, side, K_Y_Z] += stiffness * f_y * c
+    support[w, side, K_Y_ROLL] += stiffness * f_y * lever
+    support[w, side, K_Z_Y] += stiffness * f_z * s
+    support[w, side, K_Z_Z] += stiffness * f_z * c
+    support[w, side, K_Z_ROLL] += stiffness * f_z * lever
+    arm = -c * cz - s * cy  # of the tangent
+    support[w, side, D_Y_Y] += damping * f_y * s + across * c * c
+    support[w, side, D_Y_Z] += damping * f_y * c - across * c * s
+    support[w, side, D_Y_ROLL] += damping * f_y * lever + across * c * arm
+    support[w, side, D_Z_Y] += damping * f_z * s - across * s * c
+    support[w, side, D_Z_Z] += damping * f_z * c + across * s * s
+    support[w, side, D_Z_ROLL] += damping * f_z * lever - across * s * arm
 
 
 @jit_inline
@@ -307,7 +382,12 @@ def add_creep_forces(system, work, n, speed):
                 patch[A, k] * patch[B, k], patch[C11, k], patch[C22, k], patch[C23, k],
                 contact.reduction * contact.shear_modulus, patch[MU_N, k], patch[XI_X, k],
                 patch[XI_Y, k], patch[PHI, k])
-            along, across = along / speed, across * c * c / speed
+            along, across = along / speed, across / speed
+            if system.support.elastic:
+                add_slopes(work.support, w, side, patch, k, across)
+                # a rail that gives way is in series with the creep force
+                across /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
+            across *= c * c
             work.contact_jacobian[b, J_ALONG] += along
             work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
             work.contact_jacobian[b, J_ACROSS] += across
@@ -315,6 +395,11 @@ def add_creep_forces(system, work, n, speed):
             work.contact_jacobian[b, J_YAW] += along * cy * cy
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
+    if system.support.elastic:
+        for w in range(contact.body.shape[0]):
+            for side in range(2):
+                work.support[w, side, F_Y] = wheel[w, side, W_Y]
+                work.support[w, side, F_Z] = wheel[w, side, W_Q]
 
 
 @jit_inline

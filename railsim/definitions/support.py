@@ -1,0 +1,186 @@
+"""Support of the rails: the moving track model under every wheelset.
+
+Two rails on pads and one sleeper on ballast move along with each wheelset (`railsim.kernels.
+support`).  A preset names a whole set of values; single keys replace its values.
+
+Sources of the presets:
+
+co-running   values that public code names "benchmark", taken to be those of Bezin and Pålsson
+             (2021), Multibody simulation benchmark for dynamic vehicle-track interaction in
+             switches and crossings; vertical ballast read as per side
+ballasted    the same stiffnesses and dampings, without masses
+p2           mass, stiffness and damping per wheel of the British P2 assessment (GM/TT0088); it has
+             no lateral part: that of the pads is taken from co-running (assumed)
+slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and 52 kN s/m every
+             0.63 m, as one degree of freedom in the static shape of a beam on an elastic
+             foundation u = k/d: L = (4 EI/u)^(1/4), stiffness 2 u L, and 3/2 L of damping and mass
+             per length; the lateral part as co-running (assumed)
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+
+from railsim.definitions.base import Definition, Finite, NonNegative, Positive, rising
+
+SpringDamper = Annotated[
+    tuple[Positive, NonNegative],
+    WithJsonSchema({
+        "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2,
+    }),
+]
+Preset = Literal["rigid", "ballasted", "co-running", "p2", "slab"]
+
+
+def _both_factors(value: Any) -> Any:
+    """Return rows [s, factor] as [s, pads, ballast]."""
+    if not isinstance(value, list | tuple):
+        return value
+    return [
+        (row[0], row[1], row[1]) if isinstance(row, list | tuple) and len(row) == 2 else row
+        for row in value
+    ]
+
+
+def _forward(rows: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not rising(rows):
+        raise ValueError("the arc length must increase from row to row")
+    return rows
+
+
+FactorRows = Annotated[
+    Annotated[tuple[tuple[Finite, Positive, Positive], ...], Field(min_length=1)],
+    AfterValidator(_forward),
+    BeforeValidator(_both_factors),
+    WithJsonSchema({
+        "type": "array", "minItems": 1,
+        "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
+    }),
+]
+
+
+@dataclass(frozen=True)
+class SupportValues:
+    """All values of a support, preset and single keys together.
+
+    Attributes
+    ----------
+    rail_mass : float
+        Mass of a rail [kg].
+    pad_vertical, pad_lateral : (float, float)
+        Stiffness [N/m] and damping [N s/m] between a rail and the sleeper.
+    sleeper_mass, sleeper_inertia : float
+        Mass [kg] and moment of inertia in roll [kg m2].
+    ballast_vertical : (float, float) or None
+        Stiffness and damping under each half of the sleeper; None where the pads stand on firm
+        ground.
+    ballast_lateral : (float, float) or None
+        Stiffness and damping of the whole sleeper.
+    ballast_base : float
+        Lateral distance of the ballast's vertical springs from the track's middle [m].
+    """
+
+    rail_mass: float
+    pad_vertical: tuple[float, float]
+    pad_lateral: tuple[float, float]
+    sleeper_mass: float = 0.0
+    sleeper_inertia: float = 0.0
+    ballast_vertical: tuple[float, float] | None = None
+    ballast_lateral: tuple[float, float] | None = None
+    ballast_base: float = 0.75
+
+    @property
+    def has_sleeper(self) -> bool:
+        """Whether the pads stand on sleepers that move."""
+        return self.ballast_vertical is not None
+
+    @property
+    def massless(self) -> bool:
+        """Whether nothing of the track has mass."""
+        return self.rail_mass == 0.0
+
+
+_CO_RUNNING = SupportValues(
+    60.0, (150e6, 100e3), (30e6, 150e3), 1400.0, 450.0, (140e6, 1400e3), (70e6, 350e3))
+PRESETS: dict[str, SupportValues | None] = {
+    "rigid": None,
+    "ballasted": SupportValues(
+        0.0, _CO_RUNNING.pad_vertical, _CO_RUNNING.pad_lateral, 0.0, 0.0,
+        _CO_RUNNING.ballast_vertical, _CO_RUNNING.ballast_lateral),
+    "co-running": _CO_RUNNING,
+    "p2": SupportValues(245.0, (62e6, 55.4e3), _CO_RUNNING.pad_lateral),
+    "slab": SupportValues(73.1, (102.1e6, 99.5e3), _CO_RUNNING.pad_lateral),
+}
+
+
+class Support(Definition):
+    """Support of the rails: rails on pads and sleepers on ballast, moving with each wheelset."""
+
+    preset: Preset = "rigid"
+    """Set of values that the other keys replace one by one: `rigid`, `ballasted` (without masses),
+    `co-running` (the same with masses), `p2`, `slab`"""
+    rail_mass: NonNegative | None = None
+    """Mass of each rail that moves with a wheel [kg]; 0 = without masses"""
+    pad_vertical: SpringDamper | None = None
+    """Vertical [stiffness N/m, damping N s/m] between each rail and the sleeper"""
+    pad_lateral: SpringDamper | None = None
+    """Lateral [stiffness N/m, damping N s/m] between each rail and the sleeper"""
+    sleeper_mass: NonNegative | None = None
+    """Mass of sleeper and ballast that moves with a wheelset [kg]"""
+    sleeper_inertia: NonNegative | None = None
+    """Its moment of inertia in roll [kg m2]"""
+    ballast_vertical: SpringDamper | None = None
+    """Vertical [stiffness N/m, damping N s/m] under each half of the sleeper"""
+    ballast_lateral: SpringDamper | None = None
+    """Lateral [stiffness N/m, damping N s/m] of the whole sleeper"""
+    ballast_base: Positive | None = None
+    """Lateral distance of the ballast's vertical springs from the track's middle [m]"""
+    variation: FactorRows | None = None
+    """Rows [s, factor] or [s, pads, ballast]: factors of stiffness and damping along the track,
+    linear in between, constant beyond [m, 1]"""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        given = [
+            name for name in SupportValues.__dataclass_fields__ if getattr(self, name) is not None
+        ]
+        base = PRESETS[self.preset]
+        if base is None:
+            if given or self.variation:
+                key = given[0] if given else "variation"
+                raise ValueError(f"'{key}' belongs to elastic rails, not to preset = \"rigid\"")
+            return self
+        values = self.values
+        assert values is not None
+        sleeper = [values.ballast_vertical, values.ballast_lateral]
+        if any(part is None for part in sleeper) != all(part is None for part in sleeper):
+            raise ValueError("'ballast_vertical' and 'ballast_lateral' belong together")
+        if values.has_sleeper:
+            masses = (values.rail_mass, values.sleeper_mass, values.sleeper_inertia)
+            if any(masses) != all(masses):
+                raise ValueError(
+                    "'rail_mass', 'sleeper_mass' and 'sleeper_inertia' are all 0 or all positive")
+        elif any(getattr(self, name) is not None
+                 for name in ("sleeper_mass", "sleeper_inertia", "ballast_base")):
+            raise ValueError("a sleeper needs 'ballast_vertical' and 'ballast_lateral'")
+        if values.massless and not self._damped(values):
+            raise ValueError("without masses every spring needs a damping above 0")
+        return self
+
+    @staticmethod
+    def _damped(values: SupportValues) -> bool:
+        parts = [values.pad_vertical, values.pad_lateral, values.ballast_vertical,
+                 values.ballast_lateral]
+        return all(part[1] > 0.0 for part in parts if part is not None)
+
+    @property
+    def values(self) -> SupportValues | None:
+        """Values of the preset with those given in their places; None for rigid rails."""
+        base = PRESETS[self.preset]
+        if base is None:
+            return None
+        return SupportValues(**{
+            name: getattr(base, name) if getattr(self, name) is None else getattr(self, name)
+            for name in SupportValues.__dataclass_fields__
+        })

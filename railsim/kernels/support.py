@@ -1,0 +1,381 @@
+"""Moving track model: two rails on pads and a sleeper on ballast under each wheelset.
+
+Degrees of freedom of the track under one wheelset, displacements from the unloaded place in track
+axes: y and z of the left and of the right rail head, y, z and roll of the sleeper.  They move along
+with the wheelset and feel no travel: no convective terms, no inertia from the track's curvature.
+With the forces F = (Y, Q) of the wheels on the rails, pads between rail and sleeper and ballast
+between sleeper and ground
+
+    M u'' + C u' + K u = F(q - u, q' - u')
+
+The contact sees wheel minus rail: displacement u beside the rail's irregularity, and the rate u' as
+a velocity of the rail's *material*, so that it counts in the creepage (an irregularity's slope does
+not).  Rail heads shift and do not turn.  Without masses M = 0, and the equation is one of order
+one for u, in which u' is also the slip: `settle_rates` solves for it.
+
+The contact makes the track stiff: a rail of 60 kg on a contact of 1.2 GN/m vibrates at 700 Hz, and
+creep forces damp it at 20 000 1/s.  `step_support` takes all of it implicitly by the two-step
+backward differentiation formula (Curtiss and Hirschfelder 1952; L-stable, order two), linearised
+once a step about the last evaluation, with the wheelset's motion over the step already known:
+
+    r = (u_1 - u_0)/h,  u_1' = 3/2 r - 1/2 r_0,  u_1'' = 3/2 (u_1' - u_0')/h - 1/2 s_0
+
+r_0 and s_0 are the mean rate and the mean acceleration of the step before; the state keeps them, so
+that the step may change.  The forces themselves are always those of the contact at (q, u): the
+linearisation is felt through a change of u within one step only.
+
+Source of the model: moving track models as of Iwnicki (2006), Handbook of Railway Vehicle Dynamics,
+chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels.track_frame import cell_of, rail_state
+
+# columns of a wheelset's track in the state: u, u', r_0, s_0
+RAIL_DOF, DOF = 4, 7
+RATE, MEAN_RATE, MEAN_CHANGE = DOF, 2 * DOF, 3 * DOF
+SUPPORT_SIZE = 4 * DOF
+
+# entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
+(
+    M_RAIL, M_SLEEPER, I_SLEEPER, K_PAD_Y, C_PAD_Y, K_PAD_Z, C_PAD_Z, K_BALLAST_Y, C_BALLAST_Y,
+    K_BALLAST_Z, C_BALLAST_Z, K_BALLAST_ROLL, C_BALLAST_ROLL, HALF_BASE,
+) = range(14)
+SUPPORT_ROW = 14
+
+# columns of Work.support[w, side]: forces on the rail, their derivatives by the wheel's y, z and
+# roll and by their rates, the rail's irregularity (y, z) and vertical slope
+F_Y, F_Z = 0, 1
+K_Y_Y, K_Y_Z, K_Y_ROLL, K_Z_Y, K_Z_Z, K_Z_ROLL = range(2, 8)
+D_Y_Y, D_Y_Z, D_Y_ROLL, D_Z_Y, D_Z_Z, D_Z_ROLL = range(8, 14)
+PLACE_Y, PLACE_Z, SLOPE_Z = 14, 15, 16
+SUPPORT_COLUMNS = 17
+# columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's y, z,
+# roll and their rates before the step, and the factors of pads and ballast
+MOTION, PADS, BALLAST = DOF, DOF + 6, DOF + 7
+SUPPORT_STEP = 16
+# mass that makes the imbalance of forces on a massless track an acceleration (kg)
+REFERENCE_MASS = 100.0
+
+
+class Support(NamedTuple):
+    """Moving track model, the same under each wheelset.
+
+    Attributes
+    ----------
+    elastic, sleeper, massless : int   1 if so
+    row : float64[SUPPORT_ROW]         see the constants [kg, kg m2, N/m, N s/m, N m, N m s, m]
+    variation : float64[k, 3]          arc length [m], factors of pads and ballast; empty if none
+    """
+
+    elastic: int
+    sleeper: int
+    massless: int
+    row: np.ndarray
+    variation: np.ndarray
+
+
+@jit
+def factors(variation, s, out):
+    """Factors of pads and ballast at arc length `s` into ``out[PADS]``, ``out[BALLAST]``."""
+    last = variation.shape[0] - 1
+    if s <= variation[0, 0] or last == 0:
+        out[PADS], out[BALLAST] = variation[0, 1], variation[0, 2]
+        return
+    i = 0
+    while i < last and s > variation[i + 1, 0]:
+        i += 1
+    if i == last:
+        out[PADS], out[BALLAST] = variation[last, 1], variation[last, 2]
+        return
+    u = (s - variation[i, 0]) / (variation[i + 1, 0] - variation[i, 0])
+    out[PADS] = variation[i, 1] + u * (variation[i + 1, 1] - variation[i, 1])
+    out[BALLAST] = variation[i, 2] + u * (variation[i + 1, 2] - variation[i, 2])
+
+
+@jit_inline
+def locate_support(system, work, s):
+    """Factors of stiffness and damping under each wheelset, the reference body being at `s`."""
+    for w in range(work.support_step.shape[0]):
+        work.support_step[w, PADS] = 1.0
+        work.support_step[w, BALLAST] = 1.0
+        if system.support.variation.shape[0] > 0:
+            f = system.bodies.frame[system.contact.body[w]]
+            factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
+
+
+@jit_inline
+def track_forces(support, track, u, first, k, c, out, sign):
+    """Add `sign` times the forces of pads and ballast, k K x + c C x with x at ``u[first:]``.
+
+    Parameters
+    ----------
+    track : float64[SUPPORT_STEP]
+        For the factors of pads and ballast.
+    out : float64[...]
+        Its first 7 entries take the forces on the degrees of freedom, resistance positive.
+    """
+    row = support.row
+    base = row[HALF_BASE]
+    y, z, roll = 0.0, 0.0, 0.0
+    for side in range(2):
+        arm = (2.0 * side - 1.0) * base
+        i = first + 2 * side
+        f_y = (u[i] - u[first + 4]) * sign * track[PADS] * (k * row[K_PAD_Y] + c * row[C_PAD_Y])
+        f_z = ((u[i + 1] - u[first + 5] - arm * u[first + 6]) * sign * track[PADS]
+               * (k * row[K_PAD_Z] + c * row[C_PAD_Z]))
+        out[2 * side] += f_y
+        out[2 * side + 1] += f_z
+        y += f_y
+        z += f_z
+        roll += arm * f_z
+    if support.sleeper:
+        much = sign * track[BALLAST]
+        out[4] += much * (k * row[K_BALLAST_Y] + c * row[C_BALLAST_Y]) * u[first + 4] - y
+        out[5] += much * (k * row[K_BALLAST_Z] + c * row[C_BALLAST_Z]) * u[first + 5] - z
+        out[6] += much * (k * row[K_BALLAST_ROLL] + c * row[C_BALLAST_ROLL]) * u[first + 6] - roll
+
+
+@jit_inline
+def solve_track(support, track, side, m, c, k):
+    """Solve (m M + c (C + D) + k (K + K_c)) x = b for one wheelset's track.
+
+    The rails are eliminated side by side; what is left is 3 by 3.  D and K_c: damping and stiffness
+    of the contacts as seen by the rails.
+
+    Parameters
+    ----------
+    track : float64[SUPPORT_STEP]
+        b in its first 7 entries on entry, x on return.
+    side : float64[2, SUPPORT_COLUMNS]
+        See `Work.support`.
+    """
+    row = support.row
+    base, rail = row[HALF_BASE], m * row[M_RAIL]
+    a_y = track[PADS] * (c * row[C_PAD_Y] + k * row[K_PAD_Y])
+    a_z = track[PADS] * (c * row[C_PAD_Z] + k * row[K_PAD_Z])
+    much = track[BALLAST]
+    s_yy = m * row[M_SLEEPER] + much * (c * row[C_BALLAST_Y] + k * row[K_BALLAST_Y])
+    s_zz = m * row[M_SLEEPER] + much * (c * row[C_BALLAST_Z] + k * row[K_BALLAST_Z])
+    s_rr = m * row[I_SLEEPER] + much * (c * row[C_BALLAST_ROLL] + k * row[K_BALLAST_ROLL])
+    s_yz, s_yr, s_zy, s_zr, s_ry, s_rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    b_y, b_z, b_r = track[4], track[5], track[6]
+    for i in range(2):
+        arm = (2.0 * i - 1.0) * base
+        p = rail + a_y + c * side[i, D_Y_Y] + k * side[i, K_Y_Y]
+        q = c * side[i, D_Y_Z] + k * side[i, K_Y_Z]
+        r = c * side[i, D_Z_Y] + k * side[i, K_Z_Y]
+        t = rail + a_z + c * side[i, D_Z_Z] + k * side[i, K_Z_Z]
+        inverse = 1.0 / (p * t - q * r)
+        x_y = inverse * (t * track[2 * i] - q * track[2 * i + 1])
+        x_z = inverse * (p * track[2 * i + 1] - r * track[2 * i])
+        track[2 * i] = x_y
+        track[2 * i + 1] = x_z
+        if support.sleeper:
+            b_y += a_y * x_y
+            b_z += a_z * x_z
+            b_r += arm * a_z * x_z
+            # pad and contact in series
+            e_yy = a_y - a_y * a_y * t * inverse
+            e_zz = a_z - a_z * a_z * p * inverse
+            e_yz = a_y * a_z * q * inverse
+            e_zy = a_y * a_z * r * inverse
+            s_yy += e_yy
+            s_yz += e_yz
+            s_yr += arm * e_yz
+            s_zy += e_zy
+            s_zz += e_zz
+            s_zr += arm * e_zz
+            s_ry += arm * e_zy
+            s_rz += arm * e_zz
+            s_rr += base * base * e_zz
+    track[4], track[5], track[6] = 0.0, 0.0, 0.0
+    if not support.sleeper:
+        return
+    # the matrix is far from singular: ballast on its diagonal
+    f = s_zy / s_yy
+    s_zz -= f * s_yz
+    s_zr -= f * s_yr
+    b_z -= f * b_y
+    f = s_ry / s_yy
+    s_rz -= f * s_yz
+    s_rr -= f * s_yr
+    b_r -= f * b_y
+    f = s_rz / s_zz
+    roll = (b_r - f * b_z) / (s_rr - f * s_zr)
+    z = (b_z - s_zr * roll) / s_zz
+    y = (b_y - s_yz * z - s_yr * roll) / s_yy
+    track[4], track[5], track[6] = y, z, roll
+    for i in range(2):
+        arm = (2.0 * i - 1.0) * base
+        p = rail + a_y + c * side[i, D_Y_Y] + k * side[i, K_Y_Y]
+        q = c * side[i, D_Y_Z] + k * side[i, K_Y_Z]
+        r = c * side[i, D_Z_Y] + k * side[i, K_Z_Y]
+        t = rail + a_z + c * side[i, D_Z_Z] + k * side[i, K_Z_Z]
+        inverse = 1.0 / (p * t - q * r)
+        f_y, f_z = a_y * y, a_z * (z + arm * roll)
+        track[2 * i] += inverse * (t * f_y - q * f_z)
+        track[2 * i + 1] += inverse * (p * f_z - r * f_y)
+
+
+@jit_inline
+def mass_of(row, k):
+    """Mass or moment of inertia of degree of freedom `k`."""
+    if k < RAIL_DOF:
+        return row[M_RAIL]
+    return row[M_SLEEPER] if k < DOF - 1 else row[I_SLEEPER]
+
+
+@jit_inline
+def imbalance(system, work, state, w):
+    """F - C u' - K u of the track under wheelset `w` into ``work.support_step[w, :7]``."""
+    first = support_begin(system) + SUPPORT_SIZE * w
+    track = work.support_step[w]
+    for k in range(DOF):
+        track[k] = 0.0
+    for side in range(2):
+        track[2 * side] = work.support[w, side, F_Y]
+        track[2 * side + 1] = work.support[w, side, F_Z]
+    track_forces(system.support, track, state, first, 1.0, 0.0, track, -1.0)
+    track_forces(system.support, track, state, first + RATE, 0.0, 1.0, track, -1.0)
+
+
+@jit_inline
+def support_begin(system):
+    """Place of the first wheelset's track in the state."""
+    return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
+
+
+@jit_merged
+def support_rates(system, work, state, derivative):
+    """Rates of the track's displacements and of their rates.
+
+    Of a massless track the latter is the imbalance of forces over `REFERENCE_MASS`, zero once
+    `settle_rates` has found the rates.
+    """
+    support = system.support
+    if not support.elastic:
+        return
+    row = support.row
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        imbalance(system, work, state, w)
+        for k in range(DOF):
+            mass = REFERENCE_MASS if support.massless else mass_of(row, k)
+            moves = k < RAIL_DOF or support.sleeper
+            derivative[first + k] = state[first + RATE + k] if moves else 0.0
+            derivative[first + RATE + k] = work.support_step[w, k] / mass if moves else 0.0
+
+
+@jit_merged
+def settle_rates(system, work, state):
+    """One Newton step for the rates of a massless track, with the forces just evaluated.
+
+    The slopes are those of `Work.support`, an estimate for the creep forces.
+
+    Returns
+    -------
+    float : largest imbalance of forces before [N, N m].
+    """
+    worst = 0.0
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        imbalance(system, work, state, w)
+        track = work.support_step[w]
+        for k in range(DOF):
+            worst = max(worst, abs(track[k]))
+        solve_track(system.support, track, work.support[w], 0.0, 1.0, 0.0)
+        for k in range(DOF):
+            state[first + RATE + k] += track[k]
+    return worst
+
+
+@jit_inline
+def step_compliance(support, h, out):
+    """Velocity of a rail per force over a step `h`, lateral and vertical, the sleeper held."""
+    row = support.row
+    mass = 2.25 / h * row[M_RAIL]
+    out[0] = 1.0 / (mass + 1.5 * row[C_PAD_Y] + h * row[K_PAD_Y])
+    out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
+
+
+@jit_merged
+def remember_track(system, work, state):
+    """Let the memory of `step_support` begin at `state`."""
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        for k in range(DOF):
+            state[first + MEAN_RATE + k] = state[first + RATE + k]
+            state[first + MEAN_CHANGE + k] = 0.0
+
+
+@jit_merged
+def note_wheelsets(system, work, state):
+    """Keep lateral and vertical place, roll and their rates of the wheelsets before a step."""
+    n = system.bodies.kind.shape[0]
+    for w in range(work.support.shape[0]):
+        q = 6 * system.contact.body[w]
+        for k in range(3):
+            work.support_step[w, MOTION + k] = state[q + 1 + k]
+            work.support_step[w, MOTION + 3 + k] = state[6 * n + q + 1 + k]
+
+
+@jit_merged
+def step_support(system, work, state, h):
+    """Advance the track under all wheelsets by `h`; bodies, place and speed are those after it."""
+    support = system.support
+    n = system.bodies.kind.shape[0]
+    row = support.row
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        b = system.contact.body[w]
+        track = work.support_step[w]
+        y = state[6 * b + 1] - track[MOTION]
+        z = state[6 * b + 2] - track[MOTION + 1]
+        roll = state[6 * b + 3] - track[MOTION + 2]
+        y_rate = state[6 * n + 6 * b + 1] - track[MOTION + 3]
+        z_rate = state[6 * n + 6 * b + 2] - track[MOTION + 4]
+        roll_rate = state[6 * n + 6 * b + 3] - track[MOTION + 5]
+        for k in range(DOF):
+            track[k] = 0.0
+        # what is known of -(C u' + K u) after the step
+        track_forces(support, track, state, first, 1.0, 0.0, track, -1.0)
+        track_forces(support, track, state, first + MEAN_RATE, 0.0, 1.0, track, 0.5)
+        for k in range(DOF):
+            track[k] += mass_of(row, k) * (1.5 / h * (state[first + RATE + k]
+                                           + 0.5 * state[first + MEAN_RATE + k])
+                                + 0.5 * state[first + MEAN_CHANGE + k])
+        for side in range(2):
+            contact = work.support[w, side]
+            i = first + 2 * side
+            d_y, d_z = y, z
+            v_y = y_rate + state[i + RATE] + 0.5 * state[i + MEAN_RATE]
+            v_z = z_rate + state[i + RATE + 1] + 0.5 * state[i + MEAN_RATE + 1]
+            if system.track.has_irregularity:
+                f = system.bodies.frame[b]
+                cell, cell_u = cell_of(system.track, state[-2] + system.frame_offset[f])
+                if cell >= 0:
+                    rail_state(system.track, cell, cell_u, side, work.rail)
+                    d_y -= work.rail[0] - contact[PLACE_Y]
+                    d_z -= work.rail[1] - contact[PLACE_Z]
+                    v_z -= state[-1] * (work.rail[3] - contact[SLOPE_Z])
+            track[2 * side] += (
+                contact[F_Y] + contact[K_Y_Y] * d_y + contact[K_Y_Z] * d_z
+                + contact[K_Y_ROLL] * roll + contact[D_Y_Y] * v_y + contact[D_Y_Z] * v_z
+                + contact[D_Y_ROLL] * roll_rate)
+            track[2 * side + 1] += (
+                contact[F_Z] + contact[K_Z_Y] * d_y + contact[K_Z_Z] * d_z
+                + contact[K_Z_ROLL] * roll + contact[D_Z_Y] * v_y + contact[D_Z_Z] * v_z
+                + contact[D_Z_ROLL] * roll_rate)
+        solve_track(support, track, work.support[w], 2.25 / h, 1.5, h)
+        for k in range(DOF):
+            before = state[first + RATE + k]
+            rate = 1.5 * track[k] - 0.5 * state[first + MEAN_RATE + k]
+            state[first + k] += h * track[k]
+            state[first + RATE + k] = rate
+            state[first + MEAN_RATE + k] = track[k]
+            state[first + MEAN_CHANGE + k] = (rate - before) / h
