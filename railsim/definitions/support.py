@@ -101,6 +101,33 @@ class SupportValues:
         return self.rail_mass == 0.0
 
 
+def beam_on_foundation(bending_stiffness: float, foundation: float) -> tuple[float, float]:
+    """A long beam on an elastic foundation under a single force (Winkler 1867, Zimmermann 1888).
+
+    Parameters
+    ----------
+    bending_stiffness : float
+        E I of the rail [N m2].
+    foundation : float
+        u, stiffness of the support over the distance of the supports [N/m2].
+
+    Returns
+    -------
+    length, stiffness : float
+        L = (4 E I/u)^(1/4) [m]; force over deflection at the force, 2 u L [N/m].
+    """
+    length = (4.0 * bending_stiffness / foundation) ** 0.25
+    return length, 2.0 * foundation * length
+
+
+def _slab() -> SupportValues:
+    """Rail on fastenings in its static shape: 3/2 L of mass and damping per length."""
+    distance, rail = 0.63, 60.64
+    length, stiffness = beam_on_foundation(2.059e11 * 3.217e-5, 40e6 / distance)
+    return SupportValues(
+        1.5 * length * rail, (stiffness, 1.5 * length * 52e3 / distance), _CO_RUNNING.pad_lateral)
+
+
 _CO_RUNNING = SupportValues(
     60.0, (150e6, 100e3), (30e6, 150e3), 1400.0, 450.0, (140e6, 1400e3), (70e6, 350e3))
 PRESETS: dict[str, SupportValues | None] = {
@@ -110,7 +137,7 @@ PRESETS: dict[str, SupportValues | None] = {
         _CO_RUNNING.ballast_vertical, _CO_RUNNING.ballast_lateral),
     "co-running": _CO_RUNNING,
     "p2": SupportValues(245.0, (62e6, 55.4e3), _CO_RUNNING.pad_lateral),
-    "slab": SupportValues(73.1, (102.1e6, 99.5e3), _CO_RUNNING.pad_lateral),
+    "slab": _slab(),
 }
 
 
