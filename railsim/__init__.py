@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING, Any
 from railsim.version import __version__
 
 if TYPE_CHECKING:
-    from railsim.definitions.loading import load_settings, load_track, load_vehicle
+    from railsim.definitions.loading import (
+        load_mechanism,
+        load_settings,
+        load_track,
+        load_vehicle,
+    )
     from railsim.errors import InputError, ModelError
     from railsim.result import Result, mid_curves, open_result, peaks
     from railsim.simulation import simulate, simulate_together
@@ -24,6 +29,7 @@ _HOMES = {
     "InputError": "railsim.errors",
     "ModelError": "railsim.errors",
     "Result": "railsim.result",
+    "load_mechanism": "railsim.definitions.loading",
     "load_settings": "railsim.definitions.loading",
     "load_track": "railsim.definitions.loading",
     "load_vehicle": "railsim.definitions.loading",
@@ -40,6 +46,7 @@ __all__ = [
     "ModelError",
     "Result",
     "__version__",
+    "load_mechanism",
     "load_settings",
     "load_track",
     "load_vehicle",

@@ -10,6 +10,7 @@ from railsim.cli.common import table
 if TYPE_CHECKING:
     from railsim.definitions.elements import Element
     from railsim.definitions.layout import Section
+    from railsim.definitions.mechanism import Mechanism
     from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Assembly, Vehicle
@@ -190,6 +191,39 @@ def static_lines(static: dict[str, Any]) -> list[str]:
 
 
 # springs ------------------------------------------------------------------------------------------
+
+
+def mechanism_lines(mechanism: "Mechanism") -> list[str]:
+    """Return a mechanism file in a screenful: parts, driver, parameters with their provenance."""
+    from railsim.definitions.mechanism_faults import parameter_values
+
+    values = parameter_values(mechanism)
+    driver = mechanism.driver
+    moved = driver.angle or driver.coordinate or " to ".join(driver.length or ())
+    lines = [f"{mechanism.name}"]
+    lines += [f"  source: {mechanism.source}"] if mechanism.source else []
+    lines += [
+        f"  {len(mechanism.bodies)} bodies: {', '.join(mechanism.bodies)}",
+        f"  {len(mechanism.joints)} joints: {', '.join(mechanism.joints)}",
+        f"  driven by {moved}",
+    ]
+    for title, names in (
+        ("actuators", mechanism.actuators),
+        ("elements", mechanism.elements),
+        ("cases", mechanism.cases),
+        ("catalogues", mechanism.catalogues),
+    ):
+        lines += [f"  {title}: {', '.join(names)}"] if names else []
+    rows = [
+        [
+            name,
+            "auto" if name in mechanism.automatic else f"{float(values[name]):.8g}",
+            mechanism.unit_of(name),
+            mechanism.provenance_of(name),
+        ]
+        for name in mechanism.parameters
+    ]
+    return [*lines, "", *table(["parameter", "value", "unit", "provenance"], rows)]
 
 
 def spring_lines(suspension: "TrailingArmSuspension") -> list[str]:

@@ -80,6 +80,7 @@ def _description(
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a definition as data and as lines."""
     from railsim.cli import describe
+    from railsim.definitions.mechanism import Mechanism
     from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
@@ -91,6 +92,8 @@ def _description(
         data = {"kind": kind, **definition.model_dump()}
         if isinstance(definition, TrailingArmSuspension):
             return data, describe.spring_lines(definition)
+        if isinstance(definition, Mechanism):
+            return data, describe.mechanism_lines(definition)
         return data, definition.to_toml().splitlines()
     data, lines = describe.vehicle_data(definition), describe.vehicle_lines(definition)
     if static:

@@ -22,7 +22,7 @@ PROFILE_SUFFIXES = {".csv", ".prw", ".prr", ".ban", ".whl"}
 @json_option
 @quiet_option
 def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
-    """Check vehicle, track, settings, spring, study and profile files.
+    """Check vehicle, track, settings, spring, mechanism, study and profile files.
 
     Every fault is listed with file, key, what was found and what is allowed; remarks point to what
     is allowed but unusual.  Shipped files may be given by name.

@@ -17,6 +17,8 @@ from railsim.definitions.faults import validation_faults
 from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.measured import embed_measured
+from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
+from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
 from railsim.definitions.overrides import apply_overrides
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
@@ -86,6 +88,12 @@ FORMATS: dict[str, Format] = {
         remarks=spring_remarks,
         free=("loads",),
     ),
+    MECHANISM_FORMAT: Format(
+        "mechanism",
+        Mechanism,
+        faults=mechanism_faults,
+        remarks=mechanism_remarks,
+    ),
 }
 
 
@@ -128,6 +136,37 @@ def load_settings(
 def load_spring(path: str | Path, overrides: Iterable[str] | str = ()) -> TrailingArmSuspension:
     """Load a spring file, or a shipped one by its name; as `load_vehicle`."""
     return _loaded(TrailingArmSuspension, _file_source(path, "spring"), overrides)
+
+
+def load_mechanism(path: str | Path, overrides: Iterable[str] | str = ()) -> Mechanism:
+    """Load a mechanism file, or a shipped one by its name; as `load_vehicle`.
+
+    Parameters that the overrides set are listed in `provenance.set`.
+
+    Examples
+    --------
+    >>> load_mechanism("atr95_lift_5", "parameters.a1=0.16").parameters["a1"]
+    0.16
+    """
+    overrides = [overrides] if isinstance(overrides, str) else list(overrides)
+    source = _file_source(path, "mechanism")
+    _find_reference(source)
+    known = source.data.get("parameters", {})
+    keys = [text.partition("=")[0].strip().split(".") for text in overrides]
+    changed = [key[1] for key in keys if key[0] == "parameters" and len(key) == 2]
+    if changed := [name for name in dict.fromkeys(changed) if name in known]:
+        source.data["provenance"] = {**source.data.get("provenance", {}), "set": changed}
+    return _loaded(Mechanism, source, overrides)
+
+
+def _find_reference(source: Source) -> None:
+    """Make the path of a mechanism's reference count from the file that names it."""
+    optimise = source.data.get("optimise")
+    name = optimise.get("reference") if isinstance(optimise, dict) else None
+    if isinstance(optimise, dict) and isinstance(name, str):
+        beside = Path(source.file_of(("optimise", "reference"))).parent / name
+        if beside.is_file():
+            optimise["reference"] = str(beside.resolve())
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -17,7 +17,12 @@ from railsim.definitions.paths import descend, key_path
 from railsim.errors import Fault, InputError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
-FOLDERS = {"vehicle": "vehicles", "track": "tracks", "spring": "vehicles/springs"}
+FOLDERS = {
+    "vehicle": "vehicles",
+    "track": "tracks",
+    "spring": "vehicles/springs",
+    "mechanism": "vehicles/mechanisms",
+}
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
 

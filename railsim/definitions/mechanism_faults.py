@@ -1,0 +1,444 @@
+"""What the parts of a mechanism file say together: names, parameters, freedoms, sizes."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from railsim.definitions.base import Remark
+from railsim.definitions.expressions import Expression, evaluate
+from railsim.definitions.mechanism import (
+    AirSpring,
+    Cam,
+    Cylinder,
+    GasSpring,
+    Link,
+    Mechanism,
+    Piston,
+    Polar,
+    Prismatic,
+    Slot,
+)
+from railsim.errors import Fault, InputError, nearest
+
+LARGEST = 50.0  # m; no mechanism of a vehicle is larger
+OUT_OF_PROPORTION = 100.0
+ROWS = {"revolute": 2, "link": 1, "slot": 1, "prismatic": 2, "cam": 1}
+
+
+def mechanism_faults(mechanism: Mechanism) -> list[Fault]:
+    """Return every fault between the parts of a valid mechanism; the faults' file is left empty."""
+    faults = [*_parameter_faults(mechanism), *_reference_faults(mechanism)]
+    if faults:
+        return faults
+    for case in (None, *mechanism.cases):
+        faults += _value_faults(mechanism, case)
+    if faults:
+        return faults
+    return [*_freedom_faults(mechanism), *_size_faults(mechanism)]
+
+
+def mechanism_remarks(mechanism: Mechanism) -> list[Remark]:
+    """What a reader of a valid mechanism must be told."""
+    remarks = [Remark("remarks", text) for text in mechanism.remarks]
+    stated = {name for names in mechanism.provenance.values() for name in names}
+    if silent := [name for name in mechanism.parameters if name not in stated]:
+        remarks.append(Remark("provenance", f"not stated for {', '.join(silent)}"))
+    return remarks
+
+
+def expressions(node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Expression]]:
+    """Yield every expression in a definition with its dotted key."""
+    if isinstance(node, Expression):
+        yield ".".join(path), node
+    elif isinstance(node, BaseModel):
+        for name in type(node).model_fields:
+            yield from expressions(getattr(node, name), (*path, name))
+    elif isinstance(node, Mapping):
+        for key, value in node.items():
+            yield from expressions(value, (*path, str(key)))
+    elif isinstance(node, list | tuple):
+        for index, value in enumerate(node):
+            yield from expressions(value, (*path, str(index)))
+
+
+def parameter_values(
+    mechanism: Mechanism, changed: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Values of all parameters and intermediate results.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Whose parameters.
+    changed : mapping of str to float or complex ndarray, optional
+        Values instead of the file's, also for parameters that are expressions there.
+
+    Raises
+    ------
+    InputError : an expression without a value, or parameters that go round in a circle.
+    """
+    values: dict[str, Any] = dict(changed or {})
+    home = {n: f"derived.{n}" for n in mechanism.derived}
+    home |= {n: f"parameters.{n}" for n in mechanism.parameters}
+    written = {**mechanism.derived, **mechanism.parameters}
+    waiting = {n: v for n, v in written.items() if n not in values}
+    for name in mechanism.automatic & waiting.keys():
+        del waiting[name]
+        values[name] = np.nan
+    while waiting:
+        ready = [
+            name
+            for name, value in waiting.items()
+            if not (isinstance(value, Expression) and value.names & waiting.keys())
+        ]
+        if not ready:
+            names = ", ".join(sorted(waiting))
+            raise InputError([Fault("", "parameters", f"{names} refer to each other", "")])
+        for name in ready:
+            values[name] = number(waiting.pop(name), values, home[name])
+    return values
+
+
+def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> Any:
+    """Value of a number or an expression.
+
+    Raises
+    ------
+    InputError : it has none.
+    """
+    if not isinstance(quantity, Expression):
+        return quantity
+    try:
+        return evaluate(quantity, values)
+    except ValueError as error:
+        hint = ""
+        if "acos" in str(error) or "asin" in str(error) or "root" in str(error):
+            hint = "the links cannot be assembled with these parameters"
+        raise InputError([Fault("", key, str(error), hint)]) from None
+
+
+def place(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:
+    """Coordinates of a place in its body's axes."""
+    if isinstance(where, Polar):
+        radius, angle = number(where.radius, values, key), number(where.angle, values, key)
+        return radius * np.cos(angle), radius * np.sin(angle)
+    return number(where[0], values, key), number(where[1], values, key)
+
+
+def _parameter_faults(mechanism: Mechanism) -> list[Fault]:
+    known = {**mechanism.parameters, **mechanism.derived}
+    faults: list[Fault] = []
+    used: set[str] = set()
+    for name in sorted(mechanism.parameters.keys() & mechanism.derived.keys()):
+        faults.append(Fault("", f"derived.{name}", "is a parameter too", "another name"))
+    for key, expression in expressions(mechanism):
+        for name in sorted(expression.names - known.keys()):
+            hint = nearest(name, known) if known else "there are no parameters"
+            faults.append(Fault("", key, f"no parameter '{name}' in '{expression}'", hint))
+        if not key.startswith("cases."):
+            used |= expression.names
+    for name in known:
+        if name not in used:
+            key = f"parameters.{name}" if name in mechanism.parameters else f"derived.{name}"
+            faults.append(Fault("", key, "is used nowhere", "use it or take it out"))
+    known = dict(mechanism.parameters)
+    lists: list[tuple[str, Any]] = [
+        *((f"cases.{case}", names) for case, names in mechanism.cases.items()),
+        *((f"provenance.{home}", names) for home, names in mechanism.provenance.items()),
+        *((f"units.{unit}", names) for unit, names in mechanism.units.items()),
+        ("tolerances", mechanism.tolerances),
+    ]
+    if mechanism.optimise is not None:
+        lists.append(("optimise.bounds", mechanism.optimise.bounds))
+        lists.append(("optimise.assemblies", mechanism.optimise.assemblies))
+    for key, names in lists:
+        for name in names:
+            if name not in known:
+                faults.append(Fault("", key, f"no parameter '{name}'", nearest(name, known)))
+    return faults
+
+
+def _reference_faults(mechanism: Mechanism) -> list[Fault]:
+    points = point_names(mechanism)
+    bodies = ["ground", *mechanism.bodies]
+    faults = []
+    if "ground" in mechanism.bodies:
+        faults.append(Fault("", "bodies.ground", "the ground is no body", "it is [ground]"))
+    for key, found, kind in _references(mechanism):
+        allowed: Any = {
+            "point": points,
+            "body": bodies,
+            "actuator": mechanism.actuators,
+            "gas spring": [n for n, e in mechanism.elements.items() if isinstance(e, GasSpring)],
+            "catalogue": mechanism.catalogues,
+        }[kind]
+        if found not in allowed:
+            faults.append(Fault("", key, f"no {kind} '{found}'", nearest(found, allowed)))
+    for body, part in mechanism.bodies.items():
+        for name in part.outline:
+            if name not in part.points:
+                key = f"bodies.{body}.outline"
+                faults.append(Fault("", key, f"no point '{name}'", nearest(name, part.points)))
+    if not faults:
+        faults = [*_end_faults(mechanism), *_actuator_faults(mechanism)]
+    return faults
+
+
+def _references(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
+    """Every name of a point, body, actuator, ... in the file: key, name, kind."""
+    for table in ("joints", "actuators", "elements"):
+        for name, part in getattr(mechanism, table).items():
+            yield from _part_references(f"{table}.{name}", part)
+    for name in mechanism.start:
+        yield f"start.{name}", name, "body"
+    driver = mechanism.driver
+    if driver.angle is not None:
+        yield "driver.angle", driver.angle, "body"
+    for i, point in enumerate(driver.length or ()):
+        yield f"driver.length.{i}", point, "point"
+    if driver.coordinate is not None:
+        yield "driver.coordinate", driver.coordinate, "point"
+    for name, angle in mechanism.angles.items():
+        for i, line in enumerate(angle.between):
+            for j, point in enumerate(line):
+                yield f"angles.{name}.between.{i}.{j}", point, "point"
+    if mechanism.output is not None:
+        yield "output.point", mechanism.output.point, "point"
+    if mechanism.solve is not None:
+        yield "solve.unknown", mechanism.solve.unknown, "actuator"
+        if mechanism.solve.actuator is not None:
+            yield "solve.actuator", mechanism.solve.actuator, "actuator"
+    if mechanism.motion is not None:
+        yield "motion.actuator", mechanism.motion.actuator, "actuator"
+        if mechanism.motion.unknown is not None:
+            yield "motion.unknown", mechanism.motion.unknown, "actuator"
+    for i, selection in enumerate(mechanism.selection):
+        yield f"selection.{i}.element", selection.element, "gas spring"
+        yield f"selection.{i}.catalogue", selection.catalogue, "catalogue"
+    for i, box in enumerate(mechanism.optimise.envelope if mechanism.optimise else ()):
+        for j, point in enumerate(box.points):
+            yield f"optimise.envelope.{i}.points.{j}", point, "point"
+
+
+def _part_references(key: str, part: Any) -> Iterator[tuple[str, str, str]]:
+    for field in ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston",
+                  "spring", "damper", "stop", "gas_spring"):  # fmt: skip
+        for i, point in enumerate(getattr(part, field, ())):
+            yield f"{key}.{field}.{i}", point, "point"
+    for field in ("push", "force", "point_mass", "cam", "path"):
+        if (point := getattr(part, field, None)) is not None:
+            yield f"{key}.{field}", point, "point"
+    for field in ("turn", "torque", "body"):
+        if (body := getattr(part, field, None)) is not None:
+            yield f"{key}.{field}", body, "body"
+
+
+def point_names(mechanism: Mechanism) -> list[str]:
+    """Names of all points, those of the ground first."""
+    names = [f"ground.{name}" for name in mechanism.ground.points]
+    return [*names, *(f"{b}.{p}" for b, part in mechanism.bodies.items() for p in part.points)]
+
+
+def ends(part: Any) -> tuple[str, str] | None:
+    """The two points of a joint, actuator or element between points."""
+    for field in ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston",
+                  "spring", "damper", "stop", "gas_spring"):  # fmt: skip
+        if (pair := getattr(part, field, None)) is not None:
+            return pair  # type: ignore[no-any-return]
+    return None
+
+
+def _end_faults(mechanism: Mechanism) -> list[Fault]:
+    faults = []
+    for name, joint in mechanism.joints.items():
+        pair = ends(joint)
+        if pair is None:
+            assert isinstance(joint, Cam)
+            pair = (joint.cam, joint.path or f"{joint.body}.")
+        first, second = (point.partition(".")[0] for point in pair)
+        if first == second:
+            found = f"both points are on '{first}'"
+            faults.append(Fault("", f"joints.{name}", found, "points of two bodies"))
+    return faults
+
+
+def _actuator_faults(mechanism: Mechanism) -> list[Fault]:
+    """Actuators that do not suit what they are named for."""
+    faults = []
+    along = (Cylinder, AirSpring, Piston)
+    if mechanism.solve is not None:
+        actuator = mechanism.solve.actuator or mechanism.solve.unknown
+        if mechanism.solve.actuator and not isinstance(mechanism.actuators[actuator], along):
+            found = f"'{actuator}' has no length"
+            faults.append(Fault("", "solve.actuator", found, "an actuator between two points"))
+    if mechanism.motion is not None and not isinstance(
+        mechanism.actuators[mechanism.motion.actuator], along
+    ):
+        found = f"'{mechanism.motion.actuator}' has no length"
+        faults.append(Fault("", "motion.actuator", found, "an actuator between two points"))
+    needs = [
+        ("zone", mechanism.zone, "output", mechanism.output),
+        ("contact", mechanism.contact, "zone", mechanism.zone),
+        ("contact", mechanism.contact, "solve", mechanism.solve),
+        ("optimise", mechanism.optimise, "solve", mechanism.solve),
+    ]
+    for key, there, other, needed in needs:
+        if there is not None and needed is None:
+            faults.append(Fault("", key, f"no [{other}]", f"[{key}] needs it"))
+    if mechanism.contact is not None and mechanism.solve is not None:
+        held = mechanism.actuators[mechanism.solve.unknown]
+        if not isinstance(held, Cylinder | AirSpring):
+            found = f"'{mechanism.solve.unknown}' has no pressure"
+            faults.append(Fault("", "contact", found, "a cylinder or an air spring"))
+    if (optimise := mechanism.optimise) is not None:
+        kinds = optimise.objective
+        kinds = {kinds: 1.0} if isinstance(kinds, str) else kinds
+        if "follow" in kinds and optimise.reference is None:
+            faults.append(Fault("", "optimise.reference", "missing", "'follow' needs one"))
+        for kind in ("constant", "linear"):
+            if kind in kinds and optimise.target is None:
+                faults.append(Fault("", "optimise.target", "missing", f"'{kind}' needs one"))
+        if optimise.range == "zone" and mechanism.zone is None:
+            faults.append(Fault("", "optimise.range", "no [zone]", "'travel', or a [zone]"))
+    return faults
+
+
+def _value_faults(mechanism: Mechanism, case: str | None) -> list[Fault]:
+    """Faults of the values of parameters and expressions in a case."""
+    chosen = mechanism.in_case(case)
+    try:
+        values = parameter_values(chosen)
+    except InputError as error:
+        return list(error.faults)
+    faults = []
+    for key, expression in expressions(chosen):
+        if key.startswith(("parameters.", "derived.", "cases.")):
+            continue
+        if automatic := expression.names & chosen.automatic:
+            if key != "contact.pressure":
+                names = ", ".join(sorted(automatic))
+                faults.append(Fault("", key, f"{names} is 'auto'", "a number is needed here"))
+            continue
+        try:
+            number(expression, values, key)
+        except InputError as error:
+            faults += [
+                Fault("", f.key, f.found + (f" in case '{case}'" if case else ""), f.allowed)
+                for f in error.faults
+            ]
+    if faults:
+        return faults
+    return _positive_faults(chosen, values)
+
+
+POSITIVE: dict[Any, tuple[str, ...]] = {
+    Link: ("length",),
+    Cylinder: ("bore", "count", "supply_pressure"),
+    GasSpring: ("F1", "progression", "stroke", "extended"),
+}
+NOT_NEGATIVE = {"mass", "inertia", "stiffness", "damping", "friction", "rod", "end_damping"}
+
+
+def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fault]:
+    faults = []
+    for table in ("bodies", "joints", "actuators", "elements"):
+        for name, part in getattr(mechanism, table).items():
+            positive = POSITIVE.get(type(part), ())
+            for field in type(part).model_fields:
+                quantity = getattr(part, field)
+                if (field not in positive and field not in NOT_NEGATIVE) or quantity is None:
+                    continue
+                value = number(quantity, values)
+                if value < 0.0 or (field in positive and value == 0.0):
+                    allowed = "greater than 0" if field in positive else "0 or greater"
+                    faults.append(Fault("", f"{table}.{name}.{field}", f"{value:g}", allowed))
+            if isinstance(part, Cam):
+                faults += _arc_faults(f"joints.{name}", part, values)
+            if isinstance(part, AirSpring):
+                faults += _table_faults(f"{table}.{name}", part, values)
+    driver = mechanism.driver
+    begin, end = number(driver.start, values), number(driver.end, values)
+    if begin == end:
+        faults.append(Fault("", "driver.end", f"{end:g}", "another value than driver.start"))
+    if (zone := mechanism.zone) is not None:
+        low, work, high = (number(getattr(zone, k), values) for k in ("low", "work", "high"))
+        if not low <= work <= high or low == high:
+            faults.append(Fault("", "zone", f"{low:g}, {work:g}, {high:g}", "low <= work <= high"))
+    if (optimise := mechanism.optimise) is not None:
+        for name, (lower, upper) in optimise.bounds.items():
+            low, high = number(lower, values), number(upper, values)
+            if not low < high:
+                key = f"optimise.bounds.{name}"
+                faults.append(Fault("", key, f"{low:g}, {high:g}", "the second above the first"))
+    return faults
+
+
+def _arc_faults(key: str, cam: Cam, values: Mapping[str, Any]) -> list[Fault]:
+    faults = []
+    for i, arc in enumerate(cam.arcs):
+        for field in ("radius", "length"):
+            quantity = getattr(arc, field)
+            if quantity is not None and not number(quantity, values) > 0.0:
+                found = f"{number(quantity, values):g}"
+                faults.append(Fault("", f"{key}.arcs.{i}.{field}", found, "greater than 0"))
+    return faults
+
+
+def _table_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> list[Fault]:
+    for field in ("heights", "pressures"):
+        steps = np.diff([number(q, values) for q in getattr(table, field)])
+        if not np.all(steps > 0.0):
+            return [Fault("", f"{key}.{field}", "not rising", "rising from value to value")]
+    forces = np.array([[number(q, values) for q in row] for row in table.forces])
+    if not np.all(np.diff(forces, axis=1) > 0.0):
+        return [Fault("", f"{key}.forces", "not rising with pressure", "rising along each row")]
+    return []
+
+
+def _freedom_faults(mechanism: Mechanism) -> list[Fault]:
+    rows = sum(
+        ROWS[kind]
+        for joint in mechanism.joints.values()
+        for kind in ROWS
+        if hasattr(joint, kind)
+    )
+    freedoms = 3 * len(mechanism.bodies) - rows
+    if freedoms == 1:
+        return []
+    bodies = len(mechanism.bodies)
+    remedy = "a joint too many" if freedoms < 1 else "a joint too few"
+    found = f"{freedoms} degrees of freedom: {bodies} bodies with 3 each, {rows} held by joints"
+    return [Fault("", "joints", found, f"1 is needed: {remedy}")]
+
+
+def sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
+    """Lengths of the mechanism by the key that says them [m]; arcs of cams are left out."""
+    found = {}
+    parts: list[tuple[str, Any]] = [("ground", mechanism.ground)]
+    parts += [(f"bodies.{name}", body) for name, body in mechanism.bodies.items()]
+    for key, part in parts:
+        for name, where in part.points.items():
+            x, y = place(where, values)
+            found[f"{key}.points.{name}"] = float(np.hypot(x, y))
+    for name, joint in mechanism.joints.items():
+        if isinstance(joint, Link):
+            found[f"joints.{name}.length"] = float(number(joint.length, values))
+        if isinstance(joint, Slot | Prismatic):
+            found[f"joints.{name}.offset"] = abs(float(number(joint.offset, values)))
+    return {key: size for key, size in found.items() if size > 1e-9}
+
+
+def _size_faults(mechanism: Mechanism) -> list[Fault]:
+    values = parameter_values(mechanism)
+    found = sizes(mechanism, values)
+    if not found:
+        return [Fault("", "bodies", "no lengths", "points at different places")]
+    middle = float(np.median(list(found.values())))
+    return [
+        Fault("", key, f"{size:g} m, the others about {middle:.3g} m", "lengths in metres")
+        for key, size in found.items()
+        if size > LARGEST or size > OUT_OF_PROPORTION * middle
+    ]
+

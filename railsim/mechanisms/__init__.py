@@ -1,0 +1,20 @@
+"""Planar linkages with one degree of freedom: a design tool that stands alone, without a train.
+
+=================  ====================================================================
+module             job
+=================  ====================================================================
+`analysis`         everything that a file asks for: `analyse` returns an `Analysis`
+`optimisation`     search for parameters under constraints: `optimise`
+`tolerance`        what tolerances of the parameters do
+`model`            from the file to the arrays of `kernels.linkage`
+`kinematics`       positions along the driver, with exact derivatives by parameters
+`inversion`        the driver's value at a height, a length, without a force
+`forces`           virtual work, inertia, unknown forces, reactions of the joints
+`dynamics`         motion laws and free motion
+`components`       gas spring, air spring, cylinder
+`selection`        checks and catalogues
+`summary`          results as plain numbers, for ``--json``
+`tables`           results as texts, for the terminal and the page
+`quantities`       names and units of the results
+=================  ====================================================================
+"""

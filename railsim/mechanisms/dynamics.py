@@ -1,0 +1,231 @@
+"""Motion in time: inverse dynamics along a motion law, free motion under the elements' forces."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from railsim.definitions import mechanism as written
+from railsim.definitions.mechanism_faults import ends
+from railsim.errors import Fault, InputError
+from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia
+from railsim.mechanisms.inversion import driver_at
+from railsim.mechanisms.kinematics import Motion, solve
+from railsim.mechanisms.model import Model
+
+Floats = NDArray[np.float64]
+Law = Callable[[Floats], tuple[Floats, Floats, Floats]]
+"""Travel, speed and acceleration at given times."""
+
+ACCURACY = 1e-11
+"""Relative error of a step of the free motion."""
+
+
+def polynomial_345(duration: float, stroke: float) -> tuple[float, float, float]:
+    """Coefficients of t^3, t^4, t^5 of the motion from rest to rest with no jump of acceleration.
+
+    `h (10 u^3 - 15 u^4 + 6 u^5)`, u = t/T.
+
+    Examples
+    --------
+    >>> [round(c, 6) for c in polynomial_345(2.0, 0.434)]
+    [0.5425, -0.406875, 0.081375]
+    """
+    return 10 * stroke / duration**3, -15 * stroke / duration**4, 6 * stroke / duration**5
+
+
+@dataclass(frozen=True)
+class TimedMotion:
+    """A motion in time with the force that makes it.
+
+    Attributes
+    ----------
+    time : ndarray, shape (time,)
+        [s]
+    motion : Motion
+        Positions at these times.
+    speed, acceleration : ndarray, shape (time,)
+        Of the driver [rad/s or m/s], [rad/s2 or m/s2].
+    force : ndarray, shape (time,)
+        Of the actuator that drives [N].
+    """
+
+    time: Floats
+    motion: Motion
+    speed: Floats
+    acceleration: Floats
+    force: Floats
+
+    def point(self, name: str) -> tuple[Floats, Floats]:
+        """Velocity and acceleration of a named point, shape (time, 2) [m/s], [m/s2]."""
+        _, r1, r2 = self.motion.point(name)
+        v = r1 * self.speed[:, None]
+        return v, r2 * self.speed[:, None] ** 2 + r1 * self.acceleration[:, None]
+
+
+def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float]:
+    """Motion law of a length over its whole stroke, and its duration [s]."""
+    n = model.number
+    if law.law == "polynomial_345":
+        assert law.duration is not None
+        duration = n(law.duration)
+        c3, c4, c5 = polynomial_345(duration, stroke)
+
+        def smooth(t: Floats) -> tuple[Floats, Floats, Floats]:
+            return (
+                c3 * t**3 + c4 * t**4 + c5 * t**5,
+                3 * c3 * t**2 + 4 * c4 * t**3 + 5 * c5 * t**4,
+                6 * c3 * t + 12 * c4 * t**2 + 20 * c5 * t**3,
+            )
+
+        return smooth, duration
+    if law.law == "table":
+        assert law.table is not None
+        time, travel = np.array([[n(x) for x in row] for row in law.table]).T
+        if not np.all(np.diff(time) > 0.0):
+            fault = Fault(model.definition.name, "motion.table", "times not rising", "rising")
+            raise InputError([fault])
+        spline = CubicSpline(time, travel)
+
+        def tabulated(t: Floats) -> tuple[Floats, Floats, Floats]:
+            at = t + time[0]
+            return spline(at), spline(at, 1), spline(at, 2)
+
+        return tabulated, float(time[-1] - time[0])
+    speed = n(law.speed) if law.speed is not None else abs(stroke) / n(law.duration or 1.0)
+    speed = abs(speed) * np.sign(stroke)
+
+    def constant(t: Floats) -> tuple[Floats, Floats, Floats]:
+        return speed * t, np.full_like(t, speed), np.zeros_like(t)
+
+    return constant, stroke / speed
+
+
+def driven_motion(whole: Motion) -> TimedMotion:
+    """Inverse dynamics along the file's motion law.
+
+    Parameters
+    ----------
+    whole : Motion
+        Positions over the whole range, dense.
+
+    Raises
+    ------
+    InputError : the law leaves the range; a dead point of the driving actuator.
+    """
+    model = whole.model
+    law = model.definition.motion
+    assert law is not None
+    pair = ends(model.definition.actuators[law.actuator])
+    assert pair is not None
+    lengths = whole.length(pair)[0]
+    function, duration = law_of(model, law, float(lengths[-1] - lengths[0]))
+    time = np.linspace(0.0, duration, law.points)
+    travel, speed, acceleration = function(time)
+    wanted = np.clip(
+        lengths[0] + travel, *np.sort(lengths[[0, -1]])
+    ) if law.law != "table" else lengths[0] + travel  # fmt: skip
+    s = driver_at(whole, lambda motion: motion.length(pair)[:2], wanted)
+    if not np.all(np.isfinite(s)):
+        t = time[np.flatnonzero(~np.isfinite(s))[0]]
+        found = f"at {t:.4g} s the length would be {wanted[~np.isfinite(s)][0] * 1e3:.3f} mm"
+        low, high = np.sort(lengths[[0, -1]]) * 1e3
+        allowed = f"{low:.3f} to {high:.3f} mm"
+        raise InputError([Fault(model.definition.name, "motion", found, allowed)])
+    motion = solve(model, s)
+    _, slope, bend = motion.length(pair)
+    s1 = speed / slope
+    s2 = (acceleration - bend * s1**2) / slope
+    sense = int(np.sign(model.end - model.start))
+    unknown = law.unknown or law.actuator
+    force = actuator_force(motion, unknown, Rates(s1, s2, sense))
+    return TimedMotion(time, motion, s1, s2, force)
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """A mechanism let go.
+
+    Attributes
+    ----------
+    time, s, speed : ndarray, shape (time,)
+        [s], driver [rad or m], its rate.
+    reached : bool
+        Whether it came to where it was to end.
+    """
+
+    time: Floats
+    s: Floats
+    speed: Floats
+    reached: bool
+
+
+def free_motion(
+    model: Model,
+    start: float,
+    until: float,
+    duration: float,
+    *,
+    speed: float = 0.0,
+    force: Callable[[float, Motion], Any] | None = None,
+) -> FreeMotion:
+    """Motion from given position and speed under the elements' forces: `M s'' = Q - M' s'^2/2`.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism.
+    start, until : float
+        Values of the driver where it begins and ends [rad or m].
+    duration : float
+        Time after which it ends in any case [s].
+    speed : float
+        Rate of the driver at the start.
+    force : callable, optional
+        Further generalised force of time and position.
+
+    Raises
+    ------
+    InputError : the mechanism leaves the positions that it can take.
+
+    Notes
+    -----
+    Dormand and Prince's method of order 8 with a relative error of `ACCURACY` a step.  Friction
+    acts against the motion.
+    """
+    last = [solve(model, [start])]
+
+    def rate(t: float, state: Floats) -> list[float]:
+        motion = solve(model, [state[0]], last[0])
+        last[0] = motion
+        sense = int(np.sign(state[1])) if state[1] != 0.0 else int(np.sign(until - start))
+        mass, slope = inertia(motion)
+        if not mass[0] > 0.0:
+            fault = Fault(model.definition.name, "release", "no mass moves", "masses of bodies")
+            raise InputError([fault])
+        pull = generalised_force(motion, Rates(np.array([state[1]]), 0.0, sense, trial=True))
+        if force is not None:
+            pull = pull + force(t, motion)
+        return [state[1], float((pull[0] - 0.5 * slope[0] * state[1] ** 2) / mass[0])]
+
+    def there(_: float, state: Floats) -> float:
+        return float(state[0] - until)
+
+    there.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(
+        rate, (0.0, duration), [start, speed], "DOP853", events=[there], rtol=ACCURACY, atol=1e-13
+    )
+    if not found.success:
+        fault = Fault(model.definition.name, "release", "the motion has no solution", found.message)
+        raise InputError([fault])
+    generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is told here
+    return FreeMotion(found.t, found.y[0], found.y[1], found.status == 1)
+
+
+def energy(motion: Motion, speed: Any) -> Any:
+    """Kinetic energy at given rates of the driver, shape (position,) [J]."""
+    return 0.5 * inertia(motion)[0] * np.asarray(speed) ** 2

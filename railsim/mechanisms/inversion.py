@@ -1,0 +1,104 @@
+"""The driver's value at which something has a given value: a height, a length, no force."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from railsim.mechanisms.kinematics import Motion, solve
+from railsim.mechanisms.model import Model
+
+Floats = NDArray[np.float64]
+Quantity = Callable[[Motion], tuple[Any, Any]]
+"""A quantity and its derivative by the driver, of a motion."""
+
+ITERATIONS = 30
+
+
+def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
+    """Values of the driver at which a quantity has given values; NaN where it never has them.
+
+    The first crossing along the motion counts; Newton's method within its bracket.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions dense enough to bracket the values.
+    quantity : callable
+        The quantity and its derivative.
+    values : array_like, shape (value,)
+        What it shall be.
+    """
+    wanted = np.atleast_1d(np.asarray(values, dtype=float))
+    known, _ = quantity(motion)
+    size = float(np.ptp(known)) or 1.0
+    low, high = np.full(len(wanted), np.nan), np.full(len(wanted), np.nan)
+    guess = np.full(len(wanted), np.nan)
+    for i, value in enumerate(wanted):
+        gap = known - value
+        if abs(gap[0]) <= 1e-12 * size or abs(gap[-1]) <= 1e-12 * size:
+            end = 0 if abs(gap[0]) <= abs(gap[-1]) else -1
+            low[i] = high[i] = guess[i] = motion.s[end]
+            continue
+        crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
+        if len(crossed):
+            k = crossed[0]
+            low[i], high[i] = motion.s[k], motion.s[k + 1]
+            share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.5
+            guess[i] = low[i] + share * (high[i] - low[i])
+    there = np.isfinite(guess)
+    guess[there] = _refined(motion.model, quantity, wanted[there], guess[there], low[there],
+                            high[there], size)  # fmt: skip
+    return guess
+
+
+def _refined(
+    model: Model,
+    quantity: Quantity,
+    wanted: Floats,
+    s: Floats,
+    low: Floats,
+    high: Floats,
+    size: float,
+) -> Floats:
+    left, right = np.minimum(low, high), np.maximum(low, high)
+    span = max(abs(model.end - model.start), 1e-300)
+    for _ in range(ITERATIONS):
+        if not len(s):
+            break
+        value, slope = quantity(solve(model, s))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = (value - wanted) / slope
+        new = np.where(np.isfinite(step), np.clip(s - step, left, right), s)
+        done = np.all(np.abs(new - s) <= 1e-15 * span) or np.all(
+            np.abs(value - wanted) <= 1e-15 * size
+        )
+        s = new
+        if done:
+            break
+    return s
+
+
+def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
+    """All values of the driver at which a function of the motion goes through zero.
+
+    The function need not be smooth; where it is NaN there is nothing to find.
+    """
+    known = np.asarray(function(motion))
+    found = []
+
+    def at(s: float) -> float:
+        return float(np.ravel(function(solve(motion.model, [s])))[0])
+
+    for k in range(len(known) - 1):
+        a, b = known[k], known[k + 1]
+        if a == 0.0:
+            found.append(float(motion.s[k]))
+        elif a * b < 0.0:
+            span = abs(motion.model.end - motion.model.start)
+            found.append(float(brentq(at, motion.s[k], motion.s[k + 1], xtol=1e-12 * span)))
+    if len(known) and known[-1] == 0.0:
+        found.append(float(motion.s[-1]))
+    return found

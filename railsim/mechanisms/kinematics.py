@@ -1,0 +1,229 @@
+"""Positions of a mechanism along its driver, and what follows: points, lengths, angles.
+
+A prime is a derivative by the driver; `Motion` holds all bodies' coordinates with two of them.
+Complex models give complex results, whose imaginary parts are derivatives by parameters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from railsim.definitions.expressions import atan2
+from railsim.definitions.mechanism import Angle
+from railsim.errors import Fault, InputError
+from railsim.kernels import linkage as kernel
+from railsim.mechanisms.model import STEP, Model
+
+Floats = NDArray[np.float64]
+Triple = tuple[Any, Any, Any]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Positions of all bodies.
+
+    Attributes
+    ----------
+    model : Model
+        The mechanism.
+    s : ndarray, shape (..., position)
+        Driver [rad or m].
+    q, q1, q2 : ndarray, shape (..., position, body, 3)
+        x, y, theta and their derivatives by the driver; body 0 is the ground.
+    arcs : int64 ndarray, shape (position, joint)
+        Arc on which each cam's roller is.
+    """
+
+    model: Model
+    s: NDArray[Any]
+    q: NDArray[Any]
+    q1: NDArray[Any]
+    q2: NDArray[Any]
+    arcs: NDArray[np.int64]
+
+    def point(self, name: str) -> Triple:
+        """Place of a named point with two derivatives, shapes (..., position, 2)."""
+        k = self.model.points[name]
+        return self.at(self.model.linkage.point_body[k], *self._local(k))
+
+    def arc_centre(self, joint: int) -> Any:
+        """Place of the centre of the arc that a cam's roller is on, shape (position, 2)."""
+        linkage = self.model.linkage
+        found = np.zeros((self.s.shape[-1], 2))
+        for arc in np.unique(self.arcs[:, joint]):
+            k = linkage.arc_point[arc]
+            r, _, _ = self.at(linkage.point_body[k], *self._local(k))
+            found = np.where((self.arcs[:, joint] == arc)[:, None], r, found)
+        return found
+
+    def _local(self, k: int) -> tuple[Any, Any]:
+        u = self.model.linkage.point[:, k]
+        return (u[:, :1], u[:, 1:]) if np.iscomplexobj(u) else (u[0, 0], u[0, 1])
+
+    def at(self, body: int, u: Any, v: Any) -> Triple:
+        """As `point`, for a place (u, v) in the axes of a body."""
+        x, y, theta = (self.q[..., body, i] for i in range(3))
+        c, s = np.cos(theta), np.sin(theta)
+        ax, ay = c * u - s * v, s * u + c * v
+        w, w1 = self.q1[..., body, 2], self.q2[..., body, 2]
+        r = np.stack((x + ax, y + ay), axis=-1)
+        r1 = np.stack((self.q1[..., body, 0] - ay * w, self.q1[..., body, 1] + ax * w), axis=-1)
+        r2 = np.stack(
+            (
+                self.q2[..., body, 0] - ay * w1 - ax * w * w,
+                self.q2[..., body, 1] + ax * w1 - ay * w * w,
+            ),
+            axis=-1,
+        )
+        return r, r1, r2
+
+    def length(self, pair: Sequence[str]) -> Triple:
+        """Distance of two points with two derivatives, shape (..., position) [m]."""
+        first, second = self.point(pair[0]), self.point(pair[1])
+        d, d1, d2 = (b - a for a, b in zip(first, second, strict=True))
+        length = np.sqrt(_dot(d, d))
+        rate = _dot(d, d1) / length
+        return length, rate, (_dot(d1, d1) + _dot(d, d2) - rate * rate) / length
+
+    def angle(self, name: str) -> Any:
+        """Body's angle or a named angle, not folded, shape (..., position) [rad]."""
+        return angle_between(self, self.model.definition.angles[name])
+
+
+def _dot(a: Any, b: Any) -> Any:
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
+
+
+def angle_between(motion: Motion, angle: Angle) -> Any:
+    """Angle of the first line less that of the second, plus the offset [rad], from -pi to pi."""
+    lines = []
+    for first, second in angle.between:
+        d = motion.point(second)[0] - motion.point(first)[0]
+        lines.append((d[..., 0], d[..., 1]))
+    (a, b), (c, d) = lines
+    turned = atan2(b * c - a * d, a * c + b * d) + motion.model.number(angle.offset)
+    return turned - 2.0 * np.pi * np.round(np.real(turned) / (2.0 * np.pi))
+
+
+def folded(angle: Any) -> Any:
+    """Angle between lines without direction, from 0 to pi/2 [rad].
+
+    Examples
+    --------
+    >>> [round(float(np.degrees(folded(np.radians(x)))), 9) for x in (30.0, 140.0, -100.0, 200.0)]
+    [30.0, 40.0, 80.0, 20.0]
+    """
+    turned = angle - np.pi * np.round(np.real(angle) / np.pi)
+    return np.where(np.real(turned) < 0.0, -turned, turned)
+
+
+def solve(model: Model, s: ArrayLike, near: Motion | None = None) -> Motion:
+    """Positions for given values of the driver, continued from the start of the range.
+
+    Parameters
+    ----------
+    model : Model
+        A real model.
+    s : array_like, shape (position,)
+        Values of the driver [rad or m].
+    near : Motion, optional
+        Known positions of the same model, from the last of which to go on.
+
+    Raises
+    ------
+    InputError : lost assembly, dead point, jump of branch, roller off its cam: where, which joint.
+    """
+    wanted = np.atleast_1d(np.asarray(s, dtype=float))
+    linkage = model.linkage
+    start, pose, arc_start = model.start, model.pose, linkage.joint[:, 4].copy()
+    if near is not None:
+        start, pose, arc_start = near.s[-1], near.q[-1], near.arcs[-1].copy()
+    values = np.concatenate(([start], wanted))
+    shape = (len(values), linkage.n_bodies + 1, 3)
+    q, q1, q2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    arcs = np.zeros((len(values), len(linkage.joint)), dtype=np.int64)
+    failure = np.zeros(2)
+    status, _ = kernel.track(linkage, values, pose, arc_start, q, q1, q2, arcs, failure)
+    if status != kernel.OK:
+        raise InputError([_fault(model, status, *failure)])
+    return Motion(model, wanted, q[1:], q1[1:], q2[1:], arcs[1:])
+
+
+def _fault(model: Model, status: int, at: float, joint: float) -> Fault:
+    name = kernel_joint_names(model)[int(joint)]
+    sentence = kernel.STATUS[status].format(joint=f"'{name}'")
+    where = f"driver at {driver_words(model, at)}"
+    remedy = {
+        kernel.NO_ASSEMBLY: "other lengths, or a pose in [start] nearer to the assembly",
+        kernel.BEYOND_CAM: "a longer arc, or another driver.end",
+    }.get(status, "another driver.end or other lengths")
+    return Fault(model.definition.name, f"joints.{name}", f"{where}: {sentence}", remedy)
+
+
+def kernel_joint_names(model: Model) -> list[str]:
+    """Names of the joints by the kernel's rows of joints: a prismatic joint has two."""
+    names = []
+    for name, (first, last) in model.joint_rows.items():
+        two = last - first == 2 and hasattr(model.definition.joints[name], "prismatic")
+        names += [name] * (2 if two else 1)
+    return names
+
+
+def driver_words(model: Model, value: float) -> str:
+    """A value of the driver with its unit."""
+    if model.definition.driver.angle is not None:
+        return f"{np.degrees(value):.4f} deg"
+    return f"{value * 1e3:.3f} mm"
+
+
+def check_freedom(model: Model) -> None:
+    """Refuse joints that hold the same freedom twice at the start.
+
+    Raises
+    ------
+    InputError : the joints concerned, and the degrees of freedom that are left.
+    """
+    motion = solve(model, [model.start])
+    rows = 3 * model.linkage.n_bodies
+    residual, jacobian = np.zeros((1, rows)), np.zeros((1, rows, rows))
+    kernel.jacobians(model.linkage, motion.s, motion.q, motion.arcs, residual, jacobian)
+    joints = jacobian[0, :-1]
+    left, singular, _ = np.linalg.svd(joints)
+    rank = int(np.sum(singular > 1e-9 * singular[0]))
+    if rank == rows - 1:
+        return
+    weight = np.abs(left[:, rank:]).max(axis=1)
+    names = [n for n, (a, b) in model.joint_rows.items() if weight[a:b].max() > 1e-6]
+    found = f"hold the same freedom twice: {rows - rank} degrees of freedom left"
+    where = f"joints {', '.join(names)} {found}"
+    raise InputError([Fault(model.definition.name, "joints", where, "1 is needed")])
+
+
+def tangents(motion: Motion, names: Sequence[str], s: NDArray[Any] | None = None) -> Motion:
+    """The same positions with derivatives by parameters in the imaginary parts.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions of a real model.
+    names : sequence of str
+        Parameters, one lane each; an imaginary part is `STEP` times the derivative.
+    s : complex ndarray, shape (lane, position), optional
+        Driver where it depends on the parameters itself.
+    """
+    model = motion.model.lanes(names)
+    if s is None:
+        s = np.repeat(motion.s[None].astype(complex), len(names), axis=0)
+    q = np.repeat(motion.q[None].astype(complex), len(names), axis=0)
+    q1, q2 = np.zeros_like(q), np.zeros_like(q)
+    kernel.tangents(model.linkage, s, q, q1, q2, motion.arcs)
+    return Motion(model, s, q, q1, q2, motion.arcs)
+
+
+def derivative(values: Any) -> Floats:
+    """Derivatives by the parameters from a complex result, shape (lane, ...)."""
+    found: Floats = np.imag(values) / STEP
+    return found

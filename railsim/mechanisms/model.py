@@ -1,0 +1,330 @@
+"""From a mechanism file to the flat arrays of `kernels.linkage`.
+
+A `Model` holds one mechanism with real numbers, or the same with several parameters moved by a tiny
+imaginary step each (`lanes`): whatever is computed from its numbers then carries exact derivatives.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.mechanism import (
+    AUTO,
+    Cam,
+    Link,
+    Mechanism,
+    Prismatic,
+    Revolute,
+    Slot,
+)
+from railsim.definitions.mechanism_faults import number, parameter_values, place, point_names, sizes
+from railsim.kernels import linkage as kernel
+from railsim.kernels.linkage import Linkage
+
+Values = Any  # float or complex ndarray, shape (lane, 1)
+STEP = 1e-30
+"""Imaginary step: its square vanishes beside any real number."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A mechanism ready to be computed.
+
+    Attributes
+    ----------
+    definition : Mechanism
+        What the file says.
+    values : dict
+        Values of the parameters: floats, or complex arrays of shape (lane, 1).
+    linkage : Linkage
+        The arrays of the kernel.
+    points, bodies : dict
+        Number of every point and body by name; the ground is body 0.
+    pose : float64, shape (body, 3)
+        Where the assembly at the start is looked for.
+    start, end : float
+        Range of the driver [rad or m].
+    """
+
+    definition: Mechanism
+    values: dict[str, Any]
+    linkage: Linkage
+    points: dict[str, int]
+    bodies: dict[str, int]
+    pose: NDArray[np.float64]
+    start: float
+    end: float
+
+    def number(self, quantity: float | str) -> Values:
+        """Value of a number of the file."""
+        return number(quantity, self.values)
+
+    def place(self, where: Any) -> tuple[Values, Values]:
+        """Coordinates of a place of the file in its body's axes [m]."""
+        return place(where, self.values)
+
+    def lanes(self, names: Sequence[str]) -> "Model":
+        """The same model with a lane for each parameter, moved by `1j * STEP`."""
+        values: dict[str, Any] = {}
+        for name in names:
+            moved = np.full((len(names), 1), self.values[name], dtype=complex)
+            moved[names.index(name)] += 1j * STEP
+            values[name] = moved
+        # expressions of the moved parameters follow; everything else keeps its value
+        fixed = {
+            name: self.values[name]
+            for name, written in self.definition.parameters.items()
+            if not isinstance(written, str)
+        }
+        return build(self.definition, {**fixed, **values})
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints."""
+        return list(self.definition.joints)
+
+    @property
+    def joint_rows(self) -> dict[str, tuple[int, int]]:
+        """First and last row (exclusive) of each joint in the constraints."""
+        rows, at = {}, 0
+        for name, joint in self.definition.joints.items():
+            count = 2 if isinstance(joint, Revolute | Prismatic) else 1
+            rows[name] = (at, at + count)
+            at += count
+        return rows
+
+
+def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Model:
+    """Return the model of a mechanism.
+
+    Parameters
+    ----------
+    definition : Mechanism
+        What the file says.
+    changed : mapping of str to float or complex ndarray of shape (lane, 1), optional
+        Values of parameters instead of the file's.
+
+    Raises
+    ------
+    InputError : an expression has no value with these parameters.
+    """
+    values = parameter_values(definition, changed)
+    lanes = max((np.size(v) for v in values.values()), default=1)
+    complex_values = any(np.iscomplexobj(v) for v in values.values())
+    arrays = _Arrays(definition, values, lanes, complex if complex_values else float)
+    driver = definition.driver
+    return Model(
+        definition,
+        values,
+        arrays.linkage(),
+        arrays.points,
+        arrays.bodies,
+        _pose(definition, values, arrays),
+        _real(number(driver.start, values)),
+        _real(number(driver.end, values)),
+    )
+
+
+def _real(value: Any) -> float:
+    return float(np.ravel(np.real(value))[0])
+
+
+class _Arrays:
+    """The kernel's arrays while they are filled."""
+
+    def __init__(
+        self, definition: Mechanism, values: Mapping[str, Any], lanes: int, dtype: type
+    ) -> None:
+        self.definition, self.values, self.lanes, self.dtype = definition, values, lanes, dtype
+        self.bodies = {"ground": 0, **{name: i + 1 for i, name in enumerate(definition.bodies)}}
+        self.points = {name: i for i, name in enumerate(point_names(definition))}
+        self.body_of = [self.bodies[name.partition(".")[0]] for name in self.points]
+        places = list(definition.ground.points.values())
+        places += [w for body in definition.bodies.values() for w in body.points.values()]
+        self.place = [self._filled(place(where, values)) for where in places]
+        self.joint: list[list[int]] = []
+        self.value: list[Any] = []
+        self.arc_point: list[int] = []
+        self.arc_radius: list[Any] = []
+        self.arc_ends: list[list[float]] = []
+        row = 0
+        for joint in definition.joints.values():
+            row = self._add(joint, row)
+
+    def _filled(self, numbers: Sequence[Any]) -> NDArray[Any]:
+        """Numbers as an array, shape (lane, number)."""
+        filled: NDArray[Any] = np.zeros((self.lanes, len(numbers)), dtype=self.dtype)
+        for i, value in enumerate(numbers):
+            filled[:, i] = np.ravel(value)
+        return filled
+
+    def _number(self, quantity: float | str) -> Any:
+        return number(quantity, self.values)
+
+    def _add(self, joint: Any, row: int) -> int:
+        def rows(kind: int, pair: Sequence[int], values: Sequence[Any], arcs: Any = (0, 0)) -> None:
+            self.joint.append([kind, *pair, row, *arcs])
+            self.value.append(self._filled(values))
+
+        if isinstance(joint, Cam):
+            first = len(self.arc_point)
+            body = self._add_arcs(joint)
+            arcs = (first, len(joint.arcs))
+            rows(kernel.CAM, (self.points[joint.cam], self.arc_point[first]), (1.0, body), arcs)
+            return row + 1
+        if isinstance(joint, Revolute):
+            rows(kernel.REVOLUTE, [self.points[p] for p in joint.revolute], (0.0, 0.0))
+            return row + 2
+        if isinstance(joint, Link):
+            pair = [self.points[p] for p in joint.link]
+            rows(kernel.LINK, pair, (self._number(joint.length), 0.0))
+            return row + 1
+        names = joint.slot if isinstance(joint, Slot) else joint.prismatic
+        line = (self._number(joint.angle), self._number(joint.offset))
+        rows(kernel.SLOT, [self.points[p] for p in names], line)
+        if isinstance(joint, Slot):
+            return row + 1
+        row += 1
+        pair = [self.body_of[self.points[p]] for p in names]
+        rows(kernel.PARALLEL, pair, (self._number(joint.turned), 0.0))
+        return row + 1
+
+    def _add_arcs(self, cam: Cam) -> int:
+        """Add the arcs' centres as points of the cam's body, whose number is returned."""
+        if cam.path is None:
+            assert cam.body is not None
+            body, arcs = self.bodies[cam.body], centred_arcs(cam, self.values)
+        else:
+            body = self.body_of[self.points[cam.path]]
+            start = self.place[self.points[cam.path]]
+            arcs = tangent_arcs(cam, start[:, :1], start[:, 1:], self.values)
+        for x, y, radius, ends in arcs:
+            self.arc_point.append(len(self.place))
+            self.place.append(self._filled((x, y)))
+            self.body_of.append(body)
+            self.arc_radius.append(self._filled((radius,))[:, 0])
+            self.arc_ends.append(ends)
+        return body
+
+    def linkage(self) -> Linkage:
+        driver = self.definition.driver
+        if driver.angle is not None:
+            drive = [kernel.ANGLE, self.bodies[driver.angle], 0]
+        elif driver.length is not None:
+            drive = [kernel.LENGTH, *(self.points[p] for p in driver.length)]
+        else:
+            assert driver.coordinate is not None
+            axis = kernel.X if driver.axis == "x" else kernel.Y
+            drive = [axis, self.points[driver.coordinate], 0]
+        radii: NDArray[Any] = np.array(self.arc_radius, dtype=self.dtype).reshape(-1, self.lanes)
+        largest = sizes(self.definition, _reals(self.values))
+        return Linkage(
+            len(self.bodies) - 1,
+            max(largest.values()),
+            np.array(self.body_of, dtype=np.int64),
+            np.ascontiguousarray(np.array(self.place).transpose(1, 0, 2)),
+            np.array(self.joint, dtype=np.int64),
+            np.ascontiguousarray(np.array(self.value).transpose(1, 0, 2)),
+            np.array(self.arc_point, dtype=np.int64),
+            np.ascontiguousarray(radii.T),
+            np.array(self.arc_ends, dtype=float).reshape(-1, 5),
+            np.array(drive, dtype=np.int64),
+            self._filled((self._number(driver.zero),))[:, 0],
+        )
+
+
+def _reals(values: Mapping[str, Any]) -> dict[str, float]:
+    return {name: _real(value) for name, value in values.items()}
+
+
+def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> list[Any]:
+    """Arcs that go on tangentially from a point: centre x, y, radius, ends of the kernel.
+
+    The centre of an arc that turns left is the radius to the left of the path.
+    """
+    found = []
+    direction = number(cam.tangent, values)
+    for arc in cam.arcs:
+        assert arc.length is not None
+        radius, turn = number(arc.radius, values), 1.0 if arc.turns == "left" else -1.0
+        u, v = -turn * np.sin(direction), turn * np.cos(direction)  # to the centre
+        cx, cy = x + radius * u, y + radius * v
+        direction = direction + turn * number(arc.length, values) / radius
+        u2, v2 = -turn * np.sin(direction), turn * np.cos(direction)
+        found.append((cx, cy, radius, [*map(_real, (-u, -v, -u2, -v2)), turn]))
+        x, y = cx - radius * u2, cy - radius * v2
+    return found
+
+
+def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
+    """Arcs with given centres: centre x, y, radius, ends of the kernel.
+
+    Where no angle is given an arc ends on the line through its centre and the next: there the
+    normals agree, and with them the rates of the motion.
+    """
+    centres = [place(arc.centre, values) for arc in cam.arcs]
+    radii = [number(arc.radius, values) for arc in cam.arcs]
+    shared: list[tuple[float, float]] = []
+    for i in range(len(cam.arcs) - 1):
+        dx, dy = (_real(b) - _real(a) for a, b in zip(centres[i], centres[i + 1], strict=True))
+        angle = float(np.arctan2(dy, dx))
+        same = cam.arcs[i].turns == cam.arcs[i + 1].turns
+        here = angle + (np.pi if same and _real(radii[i]) < _real(radii[i + 1]) else 0.0)
+        there = here if same else here + np.pi
+        shared.append((here, there))
+    found = []
+    for i, arc in enumerate(cam.arcs):
+        turn = 1.0 if arc.turns == "left" else -1.0
+        begin = shared[i - 1][1] if i > 0 else -turn * np.pi / 2
+        end = shared[i][0] if i < len(shared) else begin + turn * np.pi * 0.99
+        begin = begin if arc.begin is None else _real(number(arc.begin, values))
+        end = end if arc.end is None else _real(number(arc.end, values))
+        unit = [np.cos(begin), np.sin(begin), np.cos(end), np.sin(end), turn]
+        found.append((*centres[i], radii[i], [float(x) for x in unit]))
+    return found
+
+
+def _pose(
+    definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays
+) -> NDArray[np.float64]:
+    """Pose to start from: given coordinates, else carried on through revolute joints."""
+    pose = np.zeros((len(arrays.bodies), 3))
+    placed = {"ground"}
+    for name in definition.bodies:
+        start = definition.start.get(name)
+        if start is None:
+            continue
+        k = arrays.bodies[name]
+        pose[k, 2] = _real(number(start.angle, values))
+        if AUTO not in (start.x, start.y):
+            pose[k, :2] = _real(number(start.x, values)), _real(number(start.y, values))
+            placed.add(name)
+    if definition.driver.angle is not None:
+        driver = definition.driver
+        k = arrays.bodies[driver.angle or ""]
+        pose[k, 2] = _real(number(driver.zero, values)) + _real(number(driver.start, values))
+    moved = True
+    while moved:
+        moved = False
+        for joint in definition.joints.values():
+            if not isinstance(joint, Revolute):
+                continue
+            for known, new in (joint.revolute, joint.revolute[::-1]):
+                body, other = known.partition(".")[0], new.partition(".")[0]
+                if body in placed and other not in placed:
+                    k = arrays.bodies[other]
+                    at = _world(pose[arrays.bodies[body]], arrays.place[arrays.points[known]])
+                    pose[k, :2] = 0.0
+                    pose[k, :2] = at - _world(pose[k], arrays.place[arrays.points[new]])
+                    placed.add(other)
+                    moved = True
+    return pose
+
+
+def _world(pose: NDArray[np.float64], local: NDArray[Any]) -> NDArray[np.float64]:
+    u, v = local[0].real
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.array([pose[0] + c * u - s * v, pose[1] + s * u + c * v])

@@ -1,0 +1,129 @@
+"""Results as plain numbers by name, in SI: what ``--json`` prints and the report page reads.
+
+The keys are part of the interface and documented in docs/user/mechanisms.md.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from railsim.definitions.mechanism import Mechanism
+from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.selection import checks, selection
+
+Data = dict[str, Any]
+
+
+def parameter_data(result: Analysis) -> Data:
+    """Values of all parameters, with what was left to the program."""
+    definition = result.definition
+    values = {name: float(result.model.values[name]) for name in definition.parameters}
+    for name in definition.automatic:
+        values[name] = result.contact.pressure if result.contact is not None else np.nan
+    return values
+
+
+def provenance_data(definition: Mechanism) -> dict[str, str]:
+    """Where every parameter is from."""
+    return {name: definition.provenance_of(name) for name in definition.parameters}
+
+
+def analysis_data(result: Analysis) -> Data:
+    """One analysis as plain numbers."""
+    definition = result.definition
+    data: Data = {
+        "name": definition.name,
+        "case": result.case,
+        "source": definition.source,
+        "remarks": list(definition.remarks),
+        "parameters": parameter_data(result),
+        "provenance": provenance_data(definition),
+        "travel": result.travel,
+    }
+    if "length" in result.output:
+        length = result.output["length"]
+        data["stroke"] = result.stroke
+        data["length_start"], data["length_end"] = float(length[0]), float(length[-1])
+    if "force" in result.output:
+        force = result.output["force"]
+        at = int(np.argmax(force))
+        data["max_force"], data["min_force"] = float(force[at]), float(np.min(force))
+        data["max_force_at"] = float(result.motion.s[at])
+        data["force_zeros"] = list(result.force_zeros)
+    if result.equilibria:
+        data["equilibria"] = [{"travel": s, "stable": ok} for s, ok in result.equilibria]
+    data["min_transmission_angles"] = result.min_angles
+    data["output"] = {name: _list(array) for name, array in result.output.items()}
+    if result.zone:
+        names = next(iter(result.zone.values()))
+        data["zone"] = {
+            name: {at: values[name] for at, values in result.zone.items()} for name in names
+        }
+    if result.timed is not None:
+        data["motion"] = motion_data(result)
+    if result.contact is not None:
+        data["contact"] = {
+            "pressure": result.contact.pressure,
+            "force": dict(result.contact.force),
+            "curve": _list(result.contact.curve),
+            "equilibria": [
+                {"height": y, "stable": stable} for y, stable in result.contact.equilibria
+            ],
+            "reason": result.contact.reason or None,
+        }
+    if result.release is not None:
+        released = result.release
+        data["release"] = {
+            "time": _list(released.time),
+            "travel": _list(released.s),
+            "speed": _list(released.speed),
+            "reached": released.reached,
+            "duration": float(released.time[-1]),
+        }
+    data["reactions"] = {
+        name: {"max": r.max, "at": r.at, "components": [_list(row) for row in r.components.T]}
+        for name, r in result.reactions.items()
+    }
+    data["selection"] = [
+        {"catalogue": c.catalogue, "name": c.name, "fits": c.fits, "reasons": list(c.reasons)}
+        for c in selection(result)
+    ]
+    made = checks(result)
+    data["checks"] = [
+        {
+            "name": check.name,
+            "value": check.value,
+            "limit": check.limit,
+            "ok": check.ok,
+            "unit": check.unit,
+            "must_be": check.sense,
+            "note": check.note,
+        }
+        for check in made
+    ]
+    data["ok"] = all(check.ok for check in made)
+    return data
+
+
+def motion_data(result: Analysis) -> Data:
+    """The motion in time as plain numbers."""
+    timed = result.timed
+    assert timed is not None
+    data: Data = {
+        "time": _list(timed.time),
+        "travel": _list(timed.motion.s),
+        "speed": _list(timed.speed),
+        "acceleration": _list(timed.acceleration),
+        "force": _list(timed.force),
+        "max_force": float(np.max(timed.force)),
+        "min_force": float(np.min(timed.force)),
+    }
+    if result.definition.output is not None:
+        v, a = timed.point(result.definition.output.point)
+        data["velocity_x"], data["velocity_y"] = _list(v[:, 0]), _list(v[:, 1])
+        data["acceleration_x"], data["acceleration_y"] = _list(a[:, 0]), _list(a[:, 1])
+    return data
+
+
+def _list(array: Any) -> list[float]:
+    return [float(x) for x in np.asarray(array)]
