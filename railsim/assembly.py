@@ -28,12 +28,12 @@ from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.creep import LAW_NUMBERS
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.lanes import LANES
+from railsim.kernels.rails import COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
 from railsim.kernels.support import (
     SUPPORT_COLUMNS,
     SUPPORT_ROW,
     SUPPORT_SIZE,
     SUPPORT_STEP,
-    Support,
 )
 from railsim.kernels.system import (
     AXLEBOX,
@@ -49,6 +49,7 @@ from railsim.kernels.system import (
     Bodies,
     Contact,
     Drive,
+    Support,
     System,
     Work,
 )
@@ -207,11 +208,14 @@ def work_arrays(system: System) -> Work:
         laws=aligned_zeros(9 * LANES),
         decay=aligned_zeros(len(system.internal.kind)),
         contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
+        plane=_smooth_planes(n_wheelsets),
+        rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
+        rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
+        above=aligned_zeros(8),
         look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
         weights=aligned_zeros(N_WEIGHT),
         stiffness=aligned_zeros(N_PATCH),
         approach=aligned_zeros(N_PATCH),
-        rail=aligned_zeros(4),
         patch_index=aligned_zeros((n_patches, 3), np.int64),
         patch=aligned_zeros((PATCH_ROWS, n_patches)),
         fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
@@ -222,6 +226,13 @@ def work_arrays(system: System) -> Work:
         events=aligned_zeros((n_wheelsets, 2), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
     )
+
+
+def _smooth_planes(n_wheelsets: int) -> Floats:
+    """Planes of rails that are not displaced: they turn nothing."""
+    plane = aligned_zeros((n_wheelsets, PLANE_SIZE))
+    plane[:, COSINE] = 1.0
+    return plane
 
 
 def level_track(system: System) -> System:

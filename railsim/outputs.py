@@ -15,7 +15,15 @@ from railsim.kernels import wheel_rail as patch
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Recorder
-from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_XI_X, W_XI_Y, W_Y
+from railsim.kernels.wheel_rail import (
+    W_PHI,
+    W_Q,
+    W_T_GAMMA,
+    W_T_GAMMA_SPIN,
+    W_XI_X,
+    W_XI_Y,
+    W_Y,
+)
 from railsim.notation import PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.time_step import empty_recorder
 from railsim.track.alignment import CANT_BASE, Alignment
@@ -69,6 +77,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "xi_y": wheel[..., W_XI_Y],
         "phi": wheel[..., W_PHI],
         "T_gamma": wheel[..., W_T_GAMMA],
+        "T_gamma_spin": wheel[..., W_T_GAMMA_SPIN],
         "body_position": position,
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],

@@ -18,13 +18,24 @@ from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
 from railsim.definitions.track import Track
 from railsim.equilibrium import Equilibrium, initial_state
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.rails import (
+    ASIDE,
+    ASIDE_SLOPE,
+    MIDDLE_Y,
+    MIDDLE_Z,
+    ROLL,
+    ROLL_SLOPE,
+    SINE,
+    SLOPE_Y,
+    SLOPE_Z,
+    locate_rails,
+)
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST, time_loop
-from railsim.kernels.track_frame import rail_state
 from railsim.time_step import empty_recorder
-from railsim.track.alignment import CANT_BASE, Alignment
+from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -94,11 +105,8 @@ def _approach(model: Model, start: float, speed: float, step: float) -> int:
     if not system.track.has_irregularity:
         return 0
     work = _located(model, start)
-    rails = np.zeros((2, 4))
-    smooth = True
-    for body in system.contact.body:
-        smooth &= not _rails(system, work, body, rails).any()
-    if smooth:
+    resting = np.abs(work.plane[:, [MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, SINE, ROLL_SLOPE]])
+    if not resting.any() and not work.rail[:, :, ASIDE : ASIDE_SLOPE + 1].any():
         return 0
     behind = -float(np.min(system.frame_offset))
     room = start - system.track.s_start - behind - SMOOTH
@@ -106,39 +114,33 @@ def _approach(model: Model, start: float, speed: float, step: float) -> int:
 
 
 def _located(model: Model, place: float) -> Work:
-    """Work arrays with the track frames of a vehicle at `place`."""
+    """Work arrays with the track frames and rails of a vehicle at `place`."""
     system = model.system
     work = work_arrays(system)
     reference = system.bodies.frame[system.bodies.references[0]]
     if locate_frames(system.track, system.frame_offset, reference, place, work.frames, work.cell,
                      work.cell_u) != RUNNING:
         raise ModelError("the vehicle is longer than the track's table allows")
+    locate_rails(system.track, system.contact.body, system.bodies.frame, work.cell, work.cell_u,
+                 work.plane, work.rail)
     return work
-
-
-def _rails(system: System, work: Work, body: int, rails: Floats) -> Floats:
-    """Displacements and slopes of both rails under a wheelset: y, z, dy/ds, dz/ds by rail."""
-    frame = system.bodies.frame[body]
-    for side in range(2):
-        rail_state(system.track, work.cell[frame], work.cell_u[frame], side, rails[side])
-    return rails
 
 
 def follow_rails(model: Model, state: Floats) -> None:
     """Put the wheelsets on irregular rails, moving as the rails lead them."""
-    system, speed = model.system, state[-1]
-    work = _located(model, float(state[-2]))
-    half_base = 0.5 * CANT_BASE
-    n = model.index.n_bodies
-    rails = np.zeros((2, 4))
-    for body in system.contact.body:
-        _rails(system, work, body, rails)
-        y, z, y_slope, z_slope = rails.mean(axis=0)
-        _, height, _, height_slope = rails[1] - rails[0]
-        state[6 * body + 1 : 6 * body + 4] += y, z, 0.5 * height / half_base
-        place = 6 * n + 6 * body
-        state[place + 1 : place + 3] += speed * y_slope, speed * z_slope
-        state[place + 3] += speed * 0.5 * height_slope / half_base
+    speed, n = state[-1], model.index.n_bodies
+    plane = _located(model, float(state[-2])).plane
+    for w, body in enumerate(model.system.contact.body):
+        place, rate = 6 * body, 6 * n + 6 * body
+        height = model.system.bodies.nominal[body, 1]
+        # the centre of the wheelset leans over with the rails
+        state[place + 1] += plane[w, MIDDLE_Y] - height * plane[w, SINE]
+        state[place + 2] += plane[w, MIDDLE_Z]
+        state[place + 3] += plane[w, ROLL]
+        state[place + 5] += plane[w, SLOPE_Y]
+        state[rate + 1] += speed * (plane[w, SLOPE_Y] - height * plane[w, ROLL_SLOPE])
+        state[rate + 2] += speed * plane[w, SLOPE_Z]
+        state[rate + 3] += speed * plane[w, ROLL_SLOPE]
 
 
 def _run(

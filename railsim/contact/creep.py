@@ -165,7 +165,8 @@ def creep_force(
     n = semi_a.size
     bound = friction * normal
     if friction_rest < 1.0:
-        falling_friction(n, bound, *creepages[:2], speed, friction_rest, friction_decay)
+        speeds = np.full(n, speed)
+        falling_friction(n, bound, *creepages[:2], speeds, friction_rest, friction_decay)
     table = creep_table(nu) if law == "table" else NO_TABLE
     T_x, T_y, M_z, beyond = np.zeros((4, n))
     creep_forces(

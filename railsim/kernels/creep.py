@@ -35,8 +35,8 @@ def falling_friction(n, mu_N, xi_x, xi_y, speed, rest, decay):
         Friction coefficient times normal force, on return at the patch's slip [N].
     xi_x, xi_y : ndarray, shape (>= n,)
         Creepages of the patch's centre [1].
-    speed : float
-        Speed of travel [m/s].
+    speed : ndarray, shape (>= n,)
+        Speed along the rail that the creepages refer to [m/s].
     rest : float
         A: friction at very large slip over that at rest, 0..1 [1].
     decay : float
@@ -47,7 +47,7 @@ def falling_friction(n, mu_N, xi_x, xi_y, speed, rest, decay):
     Source: Polach, O. (2005), Wear 258, 992-1000, eq. 10; dry rail A = 0.4, B = 0.6 s/m.
     """
     for i in range(n):
-        slip = speed * math.sqrt(xi_x[i] * xi_x[i] + xi_y[i] * xi_y[i])
+        slip = speed[i] * math.sqrt(xi_x[i] * xi_x[i] + xi_y[i] * xi_y[i])
         mu_N[i] *= (1.0 - rest) * math.exp(-decay * slip) + rest
 
 

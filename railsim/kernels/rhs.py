@@ -40,18 +40,21 @@ from railsim.kernels.support import locate_support, support_rates
 from railsim.kernels.system import (
     AXLEBOX,
     BODY_SIZE,
+    COS_ROLL,
     FORCE,
     FREE,
     I_2,
+    MOMENT,
     POSE_SIZE,
     PUSH,
     RATES_SIZE,
     RELATIVE_SIZE,
+    SIN_ROLL,
     TABLE,
     Y_0,
     Z_0,
 )
-from railsim.kernels.track_frame import FRAME_SIZE, OMEGA, cell_of, track_frames
+from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, cell_of, track_frames
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
@@ -150,6 +153,33 @@ def axlebox_kinematics(bodies, state, pose, rates):
         store_rows(pose, place, 8, (s * r6 + c * r8, x, y, z, vx, vy, vz, w1 + r1 * rate))
         store_rows(pose, place, 16, (w2 + r4 * rate, w3 + r7 * rate, zero, zero, zero, zero, zero,
                                      zero))
+
+
+@jit_merged
+def hold_axleboxes(bodies, axles, frames, C, state, pose):
+    """Take from the moments of elements on a wheelset what would turn it about its axle.
+
+    Elements sit on the axleboxes, which do not spin: of their moment M in the axes C = Rz(yaw)
+    Rx(roll) only M_1 about the first axis and M_2 sin roll + M_3 cos roll about the track's normal
+    act, and M_2 does no work on the spin.  It is carried by what keeps the axleboxes upright in the
+    track frame; so that this does no work along the track either, M_2 times the turn of the frame
+    per metre, less that of the axes held to it, goes into a force along the track:
+    F_x (1 + (omega x r)_x) = M_2 (omega_2 cos yaw - omega_1 sin yaw)/cos roll, some 0.1 N.
+    """
+    for w in range(axles.shape[0]):
+        b = axles[w]
+        f = bodies.frame[b]
+        sr, cr = C[b, SIN_ROLL], C[b, COS_ROLL]
+        m2 = (pose[b, MOMENT] * pose[b, 1] + pose[b, MOMENT + 1] * pose[b, 4]
+              + pose[b, MOMENT + 2] * pose[b, 7])
+        about_normal = m2 * sr / cr
+        turn = (C[b, 1] * frames[f, OMEGA] + C[b, 4] * frames[f, OMEGA + 1]) / (cr * cr)
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
+        along = m2 * turn / (1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y)
+        for k in range(3):
+            pose[b, MOMENT + k] += about_normal * pose[b, 3 * k + 2] - m2 * pose[b, 3 * k + 1]
+            pose[b, FORCE + k] += along * frames[f, ATTITUDE + 3 * k]
 
 
 @jit_inline
@@ -353,6 +383,7 @@ def mechanics(system, work, state, derivative):
     link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
     mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.laws,
                  work.pose)
+    hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:
         load_forces(system.loads, time, bodies, work.frames, work.pose)
     if system.drive.mode == FREE:

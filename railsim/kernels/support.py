@@ -28,12 +28,22 @@ Source of the model: moving track models as of Iwnicki (2006), Handbook of Railw
 chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 """
 
-from typing import NamedTuple
-
-import numpy as np
-
 from railsim.kernels import jit, jit_inline, jit_merged
-from railsim.kernels.track_frame import cell_of, rail_state
+from railsim.kernels.rails import (
+    ASIDE,
+    MIDDLE_Y,
+    MIDDLE_Z,
+    MOTION_Y,
+    MOTION_Y_RATE,
+    MOTION_Z,
+    MOTION_Z_RATE,
+    ROLL,
+    ROLL_SLOPE,
+    SLOPE_Z,
+    locate_displaced,
+)
+from railsim.kernels.system import Z_0
+from railsim.kernels.track_frame import cell_of
 
 # columns of a wheelset's track in the state: u, u', r_0, s_0
 RAIL_DOF, DOF = 4, 7
@@ -48,35 +58,17 @@ SUPPORT_SIZE = 4 * DOF
 SUPPORT_ROW = 14
 
 # columns of Work.support[w, side]: forces on the rail, their derivatives by the wheel's y, z and
-# roll and by their rates, the rail's irregularity (y, z) and vertical slope
+# roll and by their rates
 F_Y, F_Z = 0, 1
 K_Y_Y, K_Y_Z, K_Y_ROLL, K_Z_Y, K_Z_Z, K_Z_ROLL = range(2, 8)
 D_Y_Y, D_Y_Z, D_Y_ROLL, D_Z_Y, D_Z_Z, D_Z_ROLL = range(8, 14)
-PLACE_Y, PLACE_Z, SLOPE_Z = 14, 15, 16
-SUPPORT_COLUMNS = 17
-# columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's y, z,
-# roll and their rates before the step, and the factors of pads and ballast
-MOTION, PADS, BALLAST = DOF, DOF + 6, DOF + 7
-SUPPORT_STEP = 16
+SUPPORT_COLUMNS = 14
+# columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's motion
+# before the step, see `note_wheelset`, and the factors of pads and ballast
+MOTION, PADS, BALLAST = DOF, DOF + 8, DOF + 9
+SUPPORT_STEP = 24
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
-
-
-class Support(NamedTuple):
-    """Moving track model, the same under each wheelset.
-
-    Attributes
-    ----------
-    elastic, sleeper, massless : int   1 if so
-    row : float64[SUPPORT_ROW]         see the constants [kg, kg m2, N/m, N s/m, N m, N m s, m]
-    variation : float64[k, 3]          arc length [m], factors of pads and ballast; empty if none
-    """
-
-    elastic: int
-    sleeper: int
-    massless: int
-    row: np.ndarray
-    variation: np.ndarray
 
 
 @jit
@@ -315,31 +307,68 @@ def remember_track(system, work, state):
 
 @jit_merged
 def note_wheelsets(system, work, state):
-    """Keep lateral and vertical place, roll and their rates of the wheelsets before a step."""
-    n = system.bodies.kind.shape[0]
+    """Keep where the wheelsets are in the planes of their rails before a step."""
     for w in range(work.support.shape[0]):
-        q = 6 * system.contact.body[w]
-        for k in range(3):
-            work.support_step[w, MOTION + k] = state[q + 1 + k]
-            work.support_step[w, MOTION + 3 + k] = state[6 * n + q + 1 + k]
+        note_wheelset(system, work, state, w)
+
+
+@jit_merged
+def note_wheelset(system, work, state, w):
+    """Motion of a wheelset in the plane of its rails into its row of `work.support_step`.
+
+    Lateral and vertical place, roll and their rates, distances of the rails from their places.  The
+    lateral rate is that of the material (slip); to first order in the roll of the plane.
+    """
+    n = system.bodies.kind.shape[0]
+    b = system.contact.body[w]
+    track, plane, speed = work.support_step[w], work.plane, state[-1]
+    height = system.bodies.row[b, Z_0]
+    q = 6 * b
+    v = 6 * n + q
+    turn = speed * plane[w, ROLL_SLOPE]
+    track[MOTION] = state[q + 1] - plane[w, MIDDLE_Y] + height * plane[w, ROLL]
+    track[MOTION + 1] = state[q + 2] - plane[w, MIDDLE_Z]
+    track[MOTION + 2] = state[q + 3] - plane[w, ROLL]
+    track[MOTION + 3] = state[v + 1] + height * turn
+    track[MOTION + 4] = state[v + 2] - speed * plane[w, SLOPE_Z]
+    track[MOTION + 5] = state[v + 3] - turn
+    track[MOTION + 6] = work.rail[w, 0, ASIDE]
+    track[MOTION + 7] = work.rail[w, 1, ASIDE]
+
+
+@jit_inline
+def rail_motions(system, work, state):
+    """Displacements and velocities of the rails for `rails`."""
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        for side in range(2):
+            i = first + 2 * side
+            work.rail_motion[w, side, MOTION_Y] = state[i]
+            work.rail_motion[w, side, MOTION_Z] = state[i + 1]
+            work.rail_motion[w, side, MOTION_Y_RATE] = state[i + RATE]
+            work.rail_motion[w, side, MOTION_Z_RATE] = state[i + RATE + 1]
 
 
 @jit_merged
 def step_support(system, work, state, h):
     """Advance the track under all wheelsets by `h`; bodies, place and speed are those after it."""
     support = system.support
-    n = system.bodies.kind.shape[0]
-    row = support.row
+    row, before = support.row, work.above
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
         b = system.contact.body[w]
         track = work.support_step[w]
-        y = state[6 * b + 1] - track[MOTION]
-        z = state[6 * b + 2] - track[MOTION + 1]
-        roll = state[6 * b + 3] - track[MOTION + 2]
-        y_rate = state[6 * n + 6 * b + 1] - track[MOTION + 3]
-        z_rate = state[6 * n + 6 * b + 2] - track[MOTION + 4]
-        roll_rate = state[6 * n + 6 * b + 3] - track[MOTION + 5]
+        for k in range(8):
+            before[k] = track[MOTION + k]
+        if system.track.has_irregularity:
+            f = system.bodies.frame[b]
+            cell, cell_u = cell_of(system.track, state[-2] + system.frame_offset[f])
+            if cell >= 0:
+                locate_displaced(system.track.rail, cell, cell_u, w, work.plane, work.rail)
+        note_wheelset(system, work, state, w)
+        z, roll = track[MOTION + 1] - before[1], track[MOTION + 2] - before[2]
+        y_rate, z_rate = track[MOTION + 3] - before[3], track[MOTION + 4] - before[4]
+        roll_rate = track[MOTION + 5] - before[5]
         for k in range(DOF):
             track[k] = 0.0
         # what is known of -(C u' + K u) after the step
@@ -352,30 +381,21 @@ def step_support(system, work, state, h):
         for side in range(2):
             contact = work.support[w, side]
             i = first + 2 * side
-            d_y, d_z = y, z
+            y = track[MOTION] - before[0] - (track[MOTION + 6 + side] - before[6 + side])
             v_y = y_rate + state[i + RATE] + 0.5 * state[i + MEAN_RATE]
             v_z = z_rate + state[i + RATE + 1] + 0.5 * state[i + MEAN_RATE + 1]
-            if system.track.has_irregularity:
-                f = system.bodies.frame[b]
-                cell, cell_u = cell_of(system.track, state[-2] + system.frame_offset[f])
-                if cell >= 0:
-                    rail_state(system.track, cell, cell_u, side, work.rail)
-                    d_y -= work.rail[0] - contact[PLACE_Y]
-                    d_z -= work.rail[1] - contact[PLACE_Z]
-                    v_z -= state[-1] * (work.rail[3] - contact[SLOPE_Z])
             track[2 * side] += (
-                contact[F_Y] + contact[K_Y_Y] * d_y + contact[K_Y_Z] * d_z
+                contact[F_Y] + contact[K_Y_Y] * y + contact[K_Y_Z] * z
                 + contact[K_Y_ROLL] * roll + contact[D_Y_Y] * v_y + contact[D_Y_Z] * v_z
                 + contact[D_Y_ROLL] * roll_rate)
             track[2 * side + 1] += (
-                contact[F_Z] + contact[K_Z_Y] * d_y + contact[K_Z_Z] * d_z
+                contact[F_Z] + contact[K_Z_Y] * y + contact[K_Z_Z] * z
                 + contact[K_Z_ROLL] * roll + contact[D_Z_Y] * v_y + contact[D_Z_Z] * v_z
                 + contact[D_Z_ROLL] * roll_rate)
         solve_track(support, track, work.support[w], 2.25 / h, 1.5, h)
         for k in range(DOF):
-            before = state[first + RATE + k]
             rate = 1.5 * track[k] - 0.5 * state[first + MEAN_RATE + k]
             state[first + k] += h * track[k]
+            state[first + MEAN_CHANGE + k] = (rate - state[first + RATE + k]) / h
             state[first + RATE + k] = rate
             state[first + MEAN_RATE + k] = track[k]
-            state[first + MEAN_CHANGE + k] = (rate - before) / h

@@ -20,7 +20,6 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels.internal import Internal
-from railsim.kernels.support import Support
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
@@ -289,6 +288,23 @@ class Drive(NamedTuple):
     resistance: np.ndarray
 
 
+class Support(NamedTuple):
+    """Moving track model, the same under each wheelset.
+
+    Attributes
+    ----------
+    elastic, sleeper, massless : int   1 if so
+    row : float64[SUPPORT_ROW]         see `support` [kg, kg m2, N/m, N s/m, N m, N m s, m]
+    variation : float64[k, 3]          arc length [m], factors of pads and ballast; empty if none
+    """
+
+    elastic: int
+    sleeper: int
+    massless: int
+    row: np.ndarray
+    variation: np.ndarray
+
+
 class System(NamedTuple):
     """Everything the time loop reads.
 
@@ -327,7 +343,11 @@ class Work(NamedTuple):
     laws : float64[9 * LANES]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, 8]  see `wheel_rail`
-    look_up, weights, stiffness, approach, rail : of the wheel at hand, see `contact_table`
+    plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
+    rail_motion : float64[w, 2, MOTION_SIZE]   the rails under each wheelset, see `rails`
+    above : float64[8]          the wheelset at hand in the plane of its rails: y, z, roll, yaw and
+                                their rates, see `wheel_rail`
+    look_up, weights, stiffness, approach : of the wheel at hand, see `contact_table`
     patch_index : int64[p, 3]   wheelset, side and patch of each active contact patch
     patch : float64[PATCH_ROWS, p]  see `wheel_rail`
     fastsim : float64[WORK_ROWS, ...];  offsets : int64[16]   scratch of the creep laws
@@ -351,11 +371,14 @@ class Work(NamedTuple):
     laws: np.ndarray
     decay: np.ndarray
     contact_jacobian: np.ndarray
+    plane: np.ndarray
+    rail: np.ndarray
+    rail_motion: np.ndarray
+    above: np.ndarray
     look_up: np.ndarray
     weights: np.ndarray
     stiffness: np.ndarray
     approach: np.ndarray
-    rail: np.ndarray
     patch_index: np.ndarray
     patch: np.ndarray
     fastsim: np.ndarray

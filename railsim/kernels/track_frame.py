@@ -131,25 +131,3 @@ def track_frames(track, cell, cell_u, origin, frames):
             psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
             - theta_2 * sf - theta_1 * phi_1 * cf))
 
-
-@jit
-def rail_state(track, cell, u, side, out):
-    """Displacements y, z [m] and their slopes y', z' [1] of one rail into ``out[4]``; friction.
-
-    Returns
-    -------
-    float : friction coefficient at this rail [1].
-    """
-    c = track.rail
-    m = MU_LEFT + side
-    mu = c[cell, m, 0] + u * (c[cell, m, 1] + u * (c[cell, m, 2] + u * c[cell, m, 3]))
-    if track.has_irregularity:
-        for k in range(2):
-            row = 2 * side + k
-            c1, c2, c3 = c[cell, row, 1], c[cell, row, 2], c[cell, row, 3]
-            out[k] = c[cell, row, 0] + u * (c1 + u * (c2 + u * c3))
-            out[2 + k] = c1 + u * (2.0 * c2 + u * 3.0 * c3)
-    else:
-        for k in range(4):
-            out[k] = 0.0
-    return mu

@@ -4,15 +4,21 @@ Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`
 
 - penetration p = z - g, less what the loads of neighbouring patches bend the surfaces; elastic
   normal force as the gradient of the potential U, which includes the small terms from the change
-  of K along the profile (`coupled_approaches`);
+  of K along the profile (`coupled_approaches`); y, z, roll of the wheelset in the plane of the
+  rails, yaw against each rail's own direction (see `rails`);
 - contact damping c_N on the *geometric* rate of approach, faded in over 30 um, the sum never
   pulling;
-- creepages from the velocity of the wheel's material at the patch, c from the wheelset's centre:
-  v = V e_x + w_F x r + r' + w_abs x c, minus the rail's own slope times V;
+- the rail at the patch has the direction d = (1, t_y, t_z), from the turn of the frame at that
+  place, omega x rho, and the slopes of displaced rails; c from the wheelset's centre to the patch,
+  c_x = (c_x/yaw)(yaw - t_y) - t_y c_y - t_z c_z with the table's (c_x/yaw);
+- creepages from the velocity of the wheel's material at the patch, v = V e_x + w_F x r + r'
+  + w_abs x c less that of the rail's material (none where the rail is rigid: a slope of its shape
+  is no velocity), along d and at right angles to it, over V_p = V (1 + (omega x rho)_x), the
+  speed at which the patch runs along its rail;
 - tangential forces by the creep law for all patches of the vehicle in one call.
 
-Forces on the rail in track axes: Y = T_y cos g + N sin g, Q = -T_y sin g + N cos g with the angle
-g > 0 where the normal leans to the right; on the wheel the opposite, with moment c x F.
+Forces on the rail in the plane of the rails: Y = T_y cos g + N sin g, Q = -T_y sin g + N cos g with
+the angle g > 0 where the normal leans to the right; on the wheel the opposite, with moment c x F.
 """
 
 from math import sqrt
@@ -43,6 +49,26 @@ from railsim.kernels.contact_table import (
 from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.cube_root import cube_root
 from railsim.kernels.fastsim import kalker_lookup
+from railsim.kernels.rails import (
+    ASIDE,
+    ASIDE_SLOPE,
+    COSINE,
+    FRICTION,
+    MIDDLE_Y,
+    MIDDLE_Z,
+    MOTION_Y,
+    MOTION_Y_RATE,
+    MOTION_Z,
+    MOTION_Z_RATE,
+    RAIL_BEND,
+    RAIL_SLOPE,
+    ROLL,
+    ROLL_SLOPE,
+    SINE,
+    SLOPE_Y,
+    SLOPE_Z,
+    locate_rails,
+)
 from railsim.kernels.status import (
     DERAILED,
     FELL_BETWEEN_RAILS,
@@ -66,27 +92,25 @@ from railsim.kernels.support import (
     K_Z_ROLL,
     K_Z_Y,
     K_Z_Z,
-    PLACE_Y,
-    PLACE_Z,
-    RATE,
-    SLOPE_Z,
     SUPPORT_COLUMNS,
-    SUPPORT_SIZE,
-    support_begin,
+    rail_motions,
 )
 from railsim.kernels.system import COS_ROLL, Y_0, Z_0
-from railsim.kernels.track_frame import OMEGA, rail_state
+from railsim.kernels.track_frame import OMEGA
 
-# rows of Work.patch: one column per active patch
+# rows of Work.patch: one column per active patch.  Angle and foot are in the plane of the rails:
+# place of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal and C
+# in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
 (
     A, B, NORMAL, MU_N, ANGLE_SIN, ANGLE_COS, C_X, C_Y, C_Z, XI_X, XI_Y, PHI,
     C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION, BEYOND, NORMAL_STIFFNESS, NORMAL_DAMPING,
-) = range(23)
-PATCH_ROWS = 23
+    LEAD, FOOT_X, FOOT_Y, FOOT_Z, TURN_Y, TURN_Z, NORMAL_Y, NORMAL_Z, PATCH_SPEED,
+) = range(32)
+PATCH_ROWS = 32
 
 # columns of Work.wheel[w, side]
-W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL = range(8)
-WHEEL_COLUMNS = 8
+W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL, W_T_GAMMA_SPIN = range(9)
+WHEEL_COLUMNS = 9
 
 # columns of Work.contact_jacobian[b], what the contact takes from the wheelset's speeds, for the
 # implicit part of the step: creep forces along the track [N s/m], the same times the lever c_z
@@ -109,120 +133,158 @@ def normal_contact(system, work, speed, state):
         Status code, the wheelset it concerns, number of active patches.
     """
     contact = system.contact
-    force, wheel, column, t = work.rail_force, work.wheel, work.patch, work.look_up
+    force, plane, above = work.rail_force, work.plane, work.above
     jacobian = work.contact_jacobian
-    stiffness, approach, weights = work.stiffness, work.approach, work.weights
     n_bodies = system.bodies.kind.shape[0]
     n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
     for w in range(contact.body.shape[0]):
         b = contact.body[w]
-        f = system.bodies.frame[b]
         for k in range(6):
             force[b, k] = 0.0
         for k in range(CONTACT_JACOBIAN):
             jacobian[b, k] = 0.0
-        yaw = state[6 * b + 5]
-        y_rate = state[6 * n_bodies + 6 * b + 1]
-        z_rate = state[6 * n_bodies + 6 * b + 2]
+        # the wheelset in the plane of the rails, and its rates there
+        sine, cosine = plane[w, SINE], plane[w, COSINE]
+        height = system.bodies.row[b, Z_0]
+        y = state[6 * b + 1] - plane[w, MIDDLE_Y]
+        z = state[6 * b + 2] - plane[w, MIDDLE_Z] + height
+        y_rate = state[6 * n_bodies + 6 * b + 1] - speed * plane[w, SLOPE_Y]
+        z_rate = state[6 * n_bodies + 6 * b + 2] - speed * plane[w, SLOPE_Z]
+        y, z = cosine * y + sine * z, cosine * z - sine * y
+        turn = speed * plane[w, ROLL_SLOPE]
+        y_rate, z_rate = (cosine * y_rate + sine * z_rate + turn * z,
+                          cosine * z_rate - sine * y_rate - turn * y)
+        above[0], above[1] = y, z - height
+        above[2], above[3] = state[6 * b + 3] - plane[w, ROLL], state[6 * b + 5]
+        above[4], above[5] = y_rate, z_rate
         # rates of the Euler angles were left here by the kinematics
-        roll_rate = work.acceleration[b, 3]
-        yaw_rate = work.acceleration[b, 5]
+        above[6], above[7] = work.acceleration[b, 3] - turn, work.acceleration[b, 5]
         for side in range(2):
-            sign = 2.0 * side - 1.0
-            mu = rail_state(system.track, work.cell[f], work.cell_u[f], side, work.rail)
-            y = sign * (state[6 * b + 1] - work.rail[0])
-            z = state[6 * b + 2] - work.rail[1]
-            y_dot = sign * (y_rate - speed * work.rail[2])
-            z_dot = z_rate - speed * work.rail[3]
-            if system.support.elastic:
-                begin_support(work.support, w, side, work.rail)
-                i = support_begin(system) + SUPPORT_SIZE * w + 2 * side
-                y -= sign * state[i]
-                z -= state[i + 1]
-                y_dot -= sign * state[i + RATE]
-                z_dot -= state[i + RATE + 1]
-            roll = sign * state[6 * b + 3]
-            table = contact.table[w, side]
-            where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, yaw * yaw)
-            if where != INSIDE:
-                return outside(where), w, n
-            cell_weights(contact, ty, tr, weights)
-            normal = 0.0
-            lateral = 0.0
-            lift = 1.0
-            for patch in range(N_PATCH):
-                stiffness[patch] = 0.0
-                approach[patch] = -1.0
-                if is_far(contact, table, patch, iy, ir, iw, tr, z):
-                    continue
-                first = patch * LOOK_UP_SIZE
-                look_up(contact, table, patch, iy, ir, iw, tw, weights, t, first)
-                stiffness[patch] = t[first + 1]
-                approach[patch] = z - t[first]
-                lift = min(lift, -approach[patch])
-            coupled_approaches(contact.coupling, table, stiffness, approach)
-            for patch in range(N_PATCH):
-                p = approach[patch]
-                if p <= 0.0:
-                    continue
-                k = patch * LOOK_UP_SIZE
-                p_rate = (z_dot - t[k + G_Y] * y_dot - t[k + G_ROLL] * sign * roll_rate
-                          - t[k + G_W] * 2.0 * yaw * yaw_rate)
-                root = sqrt(p)
-                elastic = t[k + 1] * p * root
-                # contact plane: the slope at the place of contact and the direction of the elastic
-                # force differ where the normal turns over the patch, in opposite senses from the
-                # boundary-element solution; their mean is within 3 % of it
-                of_force = 0.4 * p * t[k + K_Y] / t[k + 1] - t[k + G_Y]
-                tangent = 0.5 * (t[k + TAN_GAMMA] + of_force)
-                cos_2 = 1.0 / (1.0 + tangent * tangent)
-                fade = min(1.0, p / FADE)
-                vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
-                if vertical > 0.0:
-                    damping = contact.damping * cos_2 * fade
-                    jacobian[b, J_Z] += damping
-                    jacobian[b, J_Y] += damping * t[k + G_Y] * t[k + G_Y]
-                    jacobian[b, J_ROLL] += damping * t[k + G_ROLL] * t[k + G_ROLL]
-                stretch = 0.4 * p * p * root
-                q_y = sign * (vertical * t[k + G_Y] - stretch * t[k + K_Y])
-                force[b, 0] -= q_y * work.rail[2] - vertical * work.rail[3]
-                force[b, 1] += q_y
-                force[b, 2] -= vertical
-                force[b, 3] += sign * (vertical * t[k + G_ROLL] - stretch * t[k + K_ROLL])
-                force[b, 5] += (vertical * t[k + G_W] - stretch * t[k + K_W]) * 2.0 * yaw
-                normal += vertical
-                lateral -= q_y
-                cos_g = sqrt(cos_2)
-                N = vertical / cos_g
-                if N <= 0.0:
-                    continue
-                column[A, n] = t[k + 5]
-                column[B, n] = t[k + 6]
-                column[NORMAL, n] = N
-                column[MU_N, n] = mu * N
-                column[ANGLE_COS, n] = cos_g
-                column[ANGLE_SIN, n] = sign * tangent * cos_g
-                column[C_X, n] = sign * yaw * t[k + 4]
-                column[C_Y, n] = sign * t[k + 2]
-                column[C_Z, n] = t[k + 3]
-                column[PENETRATION, n] = p
-                column[NORMAL_STIFFNESS, n] = 1.5 * t[k + 1] * root / cos_2
-                column[NORMAL_DAMPING, n] = contact.damping * fade
-                work.patch_index[n, 0] = w
-                work.patch_index[n, 1] = side
-                work.patch_index[n, 2] = patch
-                n += 1
-            wheel[w, side, W_Q] = normal
-            wheel[w, side, W_Y] = lateral
-            wheel[w, side, W_NORMAL] = 0.0
-            wheel[w, side, W_XI_X] = 0.0
-            wheel[w, side, W_XI_Y] = 0.0
-            wheel[w, side, W_PHI] = 0.0
-            wheel[w, side, W_T_GAMMA] = 0.0
-            wheel[w, side, W_LIFT] = lift
-            if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, z):
-                return WHEEL_LIFT, w, n
+            status, n = wheel_contact(system, work, w, side, speed, n)
+            if status != RUNNING:
+                return status, w, n
+        # from the plane to the track's axes; -dU/ds in place of the force along the track
+        f_y, f_z = force[b, 1], force[b, 2]
+        along = plane[w, ROLL_SLOPE] * (f_y * z - f_z * y - force[b, 3])
+        f_y, f_z = cosine * f_y - sine * f_z, sine * f_y + cosine * f_z
+        force[b, 0] += along - f_y * plane[w, SLOPE_Y] - f_z * plane[w, SLOPE_Z]
+        force[b, 1] = f_y
+        force[b, 2] = f_z
     return RUNNING, 0, n
+
+
+@jit_inline
+def wheel_contact(system, work, w, side, speed, n):
+    """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
+
+    `work.above` holds the wheelset in the plane of its rails, `n` counts the active patches so far.
+
+    Returns
+    -------
+    status, n : int
+    """
+    contact, rail, above = system.contact, work.rail, work.above
+    force, wheel, t = work.rail_force, work.wheel, work.look_up
+    stiffness, approach, weights = work.stiffness, work.approach, work.weights
+    b = contact.body[w]
+    jacobian = work.contact_jacobian
+    sign = 2.0 * side - 1.0
+    motion = work.rail_motion
+    aside, aside_slope = rail[w, side, ASIDE], rail[w, side, ASIDE_SLOPE]
+    bend = rail[w, side, RAIL_BEND]
+    y = sign * (above[0] - aside - motion[w, side, MOTION_Y])
+    z = above[1] - motion[w, side, MOTION_Z]
+    roll = sign * above[2]
+    yaw = above[3] - rail[w, side, RAIL_SLOPE]
+    y_rate = sign * (above[4] - speed * aside_slope - motion[w, side, MOTION_Y_RATE])
+    z_rate = above[5] - motion[w, side, MOTION_Z_RATE]
+    roll_rate = sign * above[6]
+    yaw_rate = above[7] - speed * bend
+    table = contact.table[w, side]
+    where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, yaw * yaw)
+    if where != INSIDE:
+        return outside(where), n
+    cell_weights(contact, ty, tr, weights)
+    normal = 0.0
+    lateral = 0.0
+    lift = 1.0
+    for patch in range(N_PATCH):
+        stiffness[patch] = 0.0
+        approach[patch] = -1.0
+        if is_far(contact, table, patch, iy, ir, iw, tr, z):
+            continue
+        first = patch * LOOK_UP_SIZE
+        look_up(contact, table, patch, iy, ir, iw, tw, weights, t, first)
+        stiffness[patch] = t[first + 1]
+        approach[patch] = z - t[first]
+        lift = min(lift, -approach[patch])
+    coupled_approaches(contact.coupling, table, stiffness, approach)
+    for patch in range(N_PATCH):
+        p = approach[patch]
+        if p <= 0.0:
+            continue
+        k = patch * LOOK_UP_SIZE
+        p_rate = (z_rate - t[k + G_Y] * y_rate - t[k + G_ROLL] * roll_rate
+                  - t[k + G_W] * 2.0 * yaw * yaw_rate)
+        root = sqrt(p)
+        elastic = t[k + 1] * p * root
+        # contact plane: the slope at the place of contact and the direction of the elastic
+        # force differ where the normal turns over the patch, in opposite senses from the
+        # boundary-element solution; their mean is within 3 % of it
+        of_force = 0.4 * p * t[k + K_Y] / t[k + 1] - t[k + G_Y]
+        tangent = 0.5 * (t[k + TAN_GAMMA] + of_force)
+        cos_2 = 1.0 / (1.0 + tangent * tangent)
+        fade = min(1.0, p / FADE)
+        vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
+        if vertical > 0.0:
+            damping = contact.damping * cos_2 * fade
+            jacobian[b, J_Z] += damping
+            jacobian[b, J_Y] += damping * t[k + G_Y] * t[k + G_Y]
+            jacobian[b, J_ROLL] += damping * t[k + G_ROLL] * t[k + G_ROLL]
+        stretch = 0.4 * p * p * root
+        q_y = sign * (vertical * t[k + G_Y] - stretch * t[k + K_Y])
+        q_yaw = (vertical * t[k + G_W] - stretch * t[k + K_W]) * 2.0 * yaw
+        force[b, 0] -= q_y * aside_slope + q_yaw * bend
+        force[b, 1] += q_y
+        force[b, 2] -= vertical
+        force[b, 3] += sign * (vertical * t[k + G_ROLL] - stretch * t[k + K_ROLL])
+        force[b, 5] += q_yaw
+        normal += vertical
+        lateral -= q_y
+        cos_g = sqrt(cos_2)
+        N = vertical / cos_g
+        if N <= 0.0:
+            continue
+        column = work.patch
+        column[A, n] = t[k + 5]
+        column[B, n] = t[k + 6]
+        column[NORMAL, n] = N
+        column[MU_N, n] = rail[w, side, FRICTION] * N
+        column[ANGLE_COS, n] = cos_g
+        column[ANGLE_SIN, n] = sign * tangent * cos_g
+        column[LEAD, n] = sign * t[k + 4]
+        column[FOOT_X, n] = sign * yaw * t[k + 4]
+        column[FOOT_Y, n] = sign * t[k + 2]
+        column[FOOT_Z, n] = t[k + 3]
+        column[PENETRATION, n] = p
+        column[NORMAL_STIFFNESS, n] = 1.5 * t[k + 1] * root / cos_2
+        column[NORMAL_DAMPING, n] = contact.damping * fade
+        work.patch_index[n, 0] = w
+        work.patch_index[n, 1] = side
+        work.patch_index[n, 2] = patch
+        n += 1
+    wheel[w, side, W_Q] = normal
+    wheel[w, side, W_Y] = lateral
+    wheel[w, side, W_NORMAL] = 0.0
+    wheel[w, side, W_XI_X] = 0.0
+    wheel[w, side, W_XI_Y] = 0.0
+    wheel[w, side, W_PHI] = 0.0
+    wheel[w, side, W_T_GAMMA] = 0.0
+    wheel[w, side, W_T_GAMMA_SPIN] = 0.0
+    wheel[w, side, W_LIFT] = lift
+    if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, z):
+        return WHEEL_LIFT, n
+    return RUNNING, n
 
 
 @jit
@@ -248,16 +310,15 @@ def outside(where):
 
 @jit_inline
 def creepages(system, work, n, speed, state):
-    """Creepages of the active patches, see the module's equations."""
-    patch, C, frames = work.patch, work.relative, work.frames
+    """Places and creepages of the active patches, see the module's equations."""
+    patch, C, frames, plane = work.patch, work.relative, work.frames, work.plane
     n_bodies = system.bodies.kind.shape[0]
     for k in range(n):
-        w = work.patch_index[k, 0]
+        w, side = work.patch_index[k, 0], work.patch_index[k, 1]
         b = system.contact.body[w]
         f = system.bodies.frame[b]
-        w1 = speed * frames[f, OMEGA]
-        w2 = speed * frames[f, OMEGA + 1]
-        w3 = speed * frames[f, OMEGA + 2]
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        x = state[6 * b]
         y = state[6 * b + 1] + system.bodies.row[b, Y_0]
         z = state[6 * b + 2] + system.bodies.row[b, Z_0]
         v = 6 * n_bodies + 6 * b
@@ -265,25 +326,41 @@ def creepages(system, work, n, speed, state):
         a1 = C[b, 0] * u1 + C[b, 1] * u2 + C[b, 2] * u3
         a2 = C[b, 3] * u1 + C[b, 4] * u2 + C[b, 5] * u3
         a3 = C[b, 6] * u1 + C[b, 7] * u2 + C[b, 8] * u3
-        cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
-        # the rail itself runs along e_x + omega x rho: on curved and twisted track only what the
-        # material moves relative to the frame is slip across it
-        vx = speed + w2 * z - w3 * y + state[v] + a2 * cz - a3 * cy
-        vy = state[v + 1] + (a3 - w3) * cx - (a1 - w1) * cz
-        vz = state[v + 2] + (a1 - w1) * cy - (a2 - w2) * cx
-        if system.track.has_irregularity:
-            rail_state(system.track, work.cell[f], work.cell_u[f], work.patch_index[k, 1],
-                       work.rail)
-            vy -= speed * work.rail[2]
-            vz -= speed * work.rail[3]
-        if system.support.elastic:  # here the rail's material moves
-            i = support_begin(system) + SUPPORT_SIZE * w + 2 * work.patch_index[k, 1] + RATE
-            vy -= state[i]
-            vz -= state[i + 1]
-        s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
-        patch[XI_X, k] = vx / speed
-        patch[XI_Y, k] = (vy * c - vz * s) / speed
-        patch[PHI, k] = (a2 * s + a3 * c) / speed
+        # place and normal from the plane of the rails to the track's axes
+        sine, cosine = plane[w, SINE], plane[w, COSINE]
+        cy = cosine * patch[FOOT_Y, k] - sine * patch[FOOT_Z, k]
+        cz = sine * patch[FOOT_Y, k] + cosine * patch[FOOT_Z, k]
+        s = cosine * patch[ANGLE_SIN, k] - sine * patch[ANGLE_COS, k]
+        c = cosine * patch[ANGLE_COS, k] + sine * patch[ANGLE_SIN, k]
+        # direction of the rail at the patch, (1, turn_y, turn_z); the patch leads accordingly
+        slope = work.rail[w, side, RAIL_SLOPE]
+        cx = patch[FOOT_X, k] - slope * cy
+        roll_slope = plane[w, ROLL_SLOPE]
+        more = (w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z]))
+        turn_y = slope + more
+        turn_z = (w1 * (y + cy) - w2 * (x + cx) + plane[w, SLOPE_Z]
+                  + roll_slope * (y + cy - plane[w, MIDDLE_Y]))
+        cx -= (patch[LEAD, k] + cy) * more + turn_z * cz
+        # velocity of the wheel's material against that of the rail, along the rail and across it
+        rail_y, rail_z = (work.rail_motion[w, side, MOTION_Y_RATE],
+                          work.rail_motion[w, side, MOTION_Z_RATE])
+        vx = speed * (1.0 + w2 * z - w3 * y) + state[v] + a2 * cz - a3 * cy
+        vy = (state[v + 1] + speed * (w3 * x - w1 * z) + a3 * cx - a1 * cz
+              - cosine * rail_y + sine * rail_z)
+        vz = (state[v + 2] + speed * (w1 * y - w2 * x) + a1 * cy - a2 * cx
+              - sine * rail_y - cosine * rail_z)
+        rolling = speed * (1.0 + w2 * (z + cz) - w3 * (y + cy))
+        patch[C_X, k] = cx
+        patch[C_Y, k] = cy
+        patch[C_Z, k] = cz
+        patch[TURN_Y, k] = turn_y
+        patch[TURN_Z, k] = turn_z
+        patch[NORMAL_Y, k] = s
+        patch[NORMAL_Z, k] = c
+        patch[PATCH_SPEED, k] = rolling
+        patch[XI_X, k] = (vx + turn_y * vy + turn_z * vz) / rolling
+        patch[XI_Y, k] = ((vy - turn_y * vx) * c - (vz - turn_z * vx) * s) / rolling
+        patch[PHI, k] = (a2 * s + a3 * c - a1 * (turn_y * s + turn_z * c)) / rolling
 
 
 @jit_inline
@@ -310,13 +387,12 @@ def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
 
 
 @jit_inline
-def begin_support(support, w, side, rail):
-    """Nothing yet acts on a rail; where its irregularity has it."""
-    for k in range(SUPPORT_COLUMNS):
-        support[w, side, k] = 0.0
-    support[w, side, PLACE_Y] = rail[0]
-    support[w, side, PLACE_Z] = rail[1]
-    support[w, side, SLOPE_Z] = rail[3]
+def begin_support(support):
+    """Nothing yet acts on the rails."""
+    for w in range(support.shape[0]):
+        for side in range(2):
+            for k in range(SUPPORT_COLUMNS):
+                support[w, side, k] = 0.0
 
 
 @jit_inline
@@ -328,7 +404,7 @@ def add_slopes(support, w, side, patch, k, across):
     t d'.
     """
     s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
-    cy, cz = patch[C_Y, k], patch[C_Z, k]
+    cy, cz = patch[FOOT_Y, k], patch[FOOT_Z, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
     f_y, f_z = s + share * c, c - share * s
     stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
@@ -356,27 +432,33 @@ def add_creep_forces(system, work, n, speed):
     for k in range(n):
         w, side = work.patch_index[k, 0], work.patch_index[k, 1]
         b = contact.body[w]
-        s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
-        fx = -patch[T_X, k]
-        fy = -patch[T_Y, k] * c
-        fz = patch[T_Y, k] * s
+        s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
+        turn_y, turn_z = patch[TURN_Y, k], patch[TURN_Z, k]
+        T_x, T_y = patch[T_X, k], patch[T_Y, k]
+        # T_x along (1, turn_y, turn_z), T_y and the normal at right angles to it
+        fx = -T_x + T_y * (turn_y * c - turn_z * s)
+        fy = -T_x * turn_y - T_y * c
+        fz = -T_x * turn_z + T_y * s
         cx, cy, cz = patch[C_X, k], patch[C_Y, k], patch[C_Z, k]
         mz = patch[M_Z, k]
         force[b, 0] += fx
         force[b, 1] += fy
         force[b, 2] += fz
-        force[b, 3] += cy * fz - cz * fy
+        force[b, 3] += cy * fz - cz * fy + mz * (turn_y * s + turn_z * c)
         force[b, 4] += cz * fx - cx * fz - mz * s
         force[b, 5] += cx * fy - cy * fx - mz * c
-        wheel[w, side, W_Q] -= fz
-        wheel[w, side, W_Y] -= fy
-        wheel[w, side, W_T_GAMMA] += (patch[T_X, k] * patch[XI_X, k]
-                                      + patch[T_Y, k] * patch[XI_Y, k] + mz * patch[PHI, k])
+        # in the plane of the rails
+        wheel[w, side, W_Q] -= T_y * patch[ANGLE_SIN, k]
+        wheel[w, side, W_Y] += T_y * patch[ANGLE_COS, k]
+        # written over the speed of travel: friction work per metre of the vehicle's way
+        scale = patch[PATCH_SPEED, k] / speed
+        wheel[w, side, W_T_GAMMA] += scale * (T_x * patch[XI_X, k] + T_y * patch[XI_Y, k])
+        wheel[w, side, W_T_GAMMA_SPIN] += scale * mz * patch[PHI, k]
         if patch[NORMAL, k] > wheel[w, side, W_NORMAL]:
             wheel[w, side, W_NORMAL] = patch[NORMAL, k]
-            wheel[w, side, W_XI_X] = patch[XI_X, k]
-            wheel[w, side, W_XI_Y] = patch[XI_Y, k]
-            wheel[w, side, W_PHI] = patch[PHI, k]
+            wheel[w, side, W_XI_X] = scale * patch[XI_X, k]
+            wheel[w, side, W_XI_Y] = scale * patch[XI_Y, k]
+            wheel[w, side, W_PHI] = scale * patch[PHI, k]
         if patch[MU_N, k] > 0.0:
             along, across = creep_slopes(
                 patch[A, k] * patch[B, k], patch[C11, k], patch[C22, k], patch[C23, k],
@@ -413,6 +495,11 @@ def wheel_rail(system, work, speed, state):
     status, wheelset, n : int
         Status code, the wheelset it concerns, number of active patches.
     """
+    locate_rails(system.track, system.contact.body, system.bodies.frame, work.cell, work.cell_u,
+                 work.plane, work.rail)
+    if system.support.elastic:
+        rail_motions(system, work, state)
+        begin_support(work.support)
     status, w, n = normal_contact(system, work, speed, state)
     if status != RUNNING:
         return status, w, n
@@ -430,8 +517,8 @@ def wheel_rail(system, work, speed, state):
     kalker_lookup(n, patch[A], patch[B], contact.creep, patch[C11], patch[C22], patch[C23],
                   patch[C33], patch[BEYOND])
     if contact.friction_rest < 1.0:
-        falling_friction(n, patch[MU_N], patch[XI_X], patch[XI_Y], speed, contact.friction_rest,
-                         contact.friction_decay)
+        falling_friction(n, patch[MU_N], patch[XI_X], patch[XI_Y], patch[PATCH_SPEED],
+                         contact.friction_rest, contact.friction_decay)
     creep_forces(
         contact.law, n, contact.n_x, contact.n_y, patch[A], patch[B], patch[MU_N],
         patch[C11], patch[C22], patch[C23], patch[C33], contact.shear_modulus,

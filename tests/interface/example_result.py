@@ -70,6 +70,7 @@ def arrays(speed=20.0, duration=49.0, rate=50.0, gain=1.0):
         "xi_y": 5e-3 * np.stack([ramp * lead, ramp * lead], axis=-1),
         "phi": 0.1 * np.stack([1.0 - ramp, ramp - 1.0], axis=-1),
         "T_gamma": 200.0 * np.stack([ramp * lead, ramp * lead], axis=-1),
+        "T_gamma_spin": 2.0 * np.stack([ramp * lead, ramp * lead], axis=-1),
         "body_position": body,
         "body_velocity": np.gradient(body, time, axis=0),
         "body_acceleration": 0.1 * body,

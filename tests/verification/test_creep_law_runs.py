@@ -58,7 +58,7 @@ def test_loop_has_the_forces_of_creep_force(law, coach):
     track = curve(friction_falling={"rest": 0.5, "decay": 1.0}, third_body=(0.8, 0.5))
     _, work, n = patches(coach, law, track, in_curve(coach, law, track))
     patch = work.patch[:, :n]
-    slip = SPEED * np.hypot(patch[columns.XI_X], patch[columns.XI_Y])
+    slip = patch[columns.PATCH_SPEED] * np.hypot(patch[columns.XI_X], patch[columns.XI_Y])
     mu_N = 0.4 * patch[columns.NORMAL] * (0.5 * np.exp(-1.0 * slip) + 0.5)
     np.testing.assert_allclose(patch[columns.MU_N], mu_N, rtol=1e-12)
     expected = creep_force(

@@ -1,0 +1,94 @@
+"""Where the rails are under each wheelset, and the plane through their tops.
+
+Irregularities displace the rails in the axes of the track frame, (y_l, z_l) and (y_r, z_r) over
+the arc length.  Under a wheelset they make a track of their own, with
+
+- its middle y_m, z_m, the mean of both rails: alignment and longitudinal level;
+- its roll rho = asin((z_r - z_l)/2 b_0), 2 b_0 = 1.5 m: the cross level.  It turns the rail heads
+  and the axes of Y and Q as cant does;
+- the rails' distances from the middle in that plane, +-(y_r - y_l)/2: the gauge.
+
+So rails are the same whether written as plan, vertical profile and cant or as irregularities.
+Slopes along the track are those of the rails' *shape*: rails are at rest, and a wheel that follows
+them does not slip.
+
+**Motion of a rail itself.**  `Work.rail_motion[w, side]` holds what a rail yields under its wheel,
+in the axes of the plane: displacement y, z [m] and velocity y', z' [m/s].  It adds to the rail's
+place and to its rate and, other than a shape, is a velocity of the rail's material, against which
+the wheel slips.  On rigid rails all four are zero.
+"""
+
+from math import asin, sqrt
+
+from railsim.kernels import jit_inline, jit_merged
+from railsim.kernels.track_frame import MU_LEFT, Y_LEFT, Y_RIGHT, Z_LEFT, Z_RIGHT, polynomial
+
+CANT_BASE = 1.5  # m, 2 b_0
+
+# columns of Work.plane[w]: middle of the rails, their slopes; roll of the plane, its sine, cosine
+# and rate along the track
+MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, ROLL, SINE, COSINE, ROLL_SLOPE = range(8)
+PLANE_SIZE = 8
+
+# columns of Work.rail[w, side]: friction; distance of the rail to the right of its nominal place in
+# the plane, its slope; slope of the rail in the frame's lateral direction, and that slope's change
+FRICTION, ASIDE, ASIDE_SLOPE, RAIL_SLOPE, RAIL_BEND = range(5)
+RAIL_SIZE = 8
+
+# columns of Work.rail_motion[w, side]
+MOTION_Y, MOTION_Z, MOTION_Y_RATE, MOTION_Z_RATE = range(4)
+MOTION_SIZE = 4
+
+
+@jit_inline
+def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
+    """Rails under all wheelsets into `plane` and `rail`.
+
+    Parameters
+    ----------
+    track : TrackTables
+    wheelset_body, frame : int64[w], int64[n]
+        Body of each wheelset, track frame of each body.
+    cell, cell_u : int64[f], float64[f]
+        Where the frames are, see `track_frame.cell_of`.
+    plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
+        Where no rail is displaced only the friction is written.
+    """
+    c = track.rail
+    for w in range(wheelset_body.shape[0]):
+        f = frame[wheelset_body[w]]
+        i, u = cell[f], cell_u[f]
+        for side in range(2):
+            m = MU_LEFT + side
+            rail[w, side, FRICTION], _, _ = polynomial(c[i, m, 0], c[i, m, 1], c[i, m, 2],
+                                                       c[i, m, 3], u)
+        if track.has_irregularity:
+            locate_displaced(c, i, u, w, plane, rail)
+
+
+@jit_merged
+def locate_displaced(c, i, u, w, plane, rail):
+    """Plane and rails of wheelset `w` from the displacements in cell `i` of the tables `c`."""
+    y_l, y_l1, y_l2 = polynomial(c[i, Y_LEFT, 0], c[i, Y_LEFT, 1], c[i, Y_LEFT, 2],
+                                 c[i, Y_LEFT, 3], u)
+    z_l, z_l1, _ = polynomial(c[i, Z_LEFT, 0], c[i, Z_LEFT, 1], c[i, Z_LEFT, 2],
+                              c[i, Z_LEFT, 3], u)
+    y_r, y_r1, y_r2 = polynomial(c[i, Y_RIGHT, 0], c[i, Y_RIGHT, 1], c[i, Y_RIGHT, 2],
+                                 c[i, Y_RIGHT, 3], u)
+    z_r, z_r1, _ = polynomial(c[i, Z_RIGHT, 0], c[i, Z_RIGHT, 1], c[i, Z_RIGHT, 2],
+                              c[i, Z_RIGHT, 3], u)
+    sine = (z_r - z_l) / CANT_BASE
+    cosine = sqrt(1.0 - sine * sine)
+    plane[w, MIDDLE_Y] = 0.5 * (y_l + y_r)
+    plane[w, MIDDLE_Z] = 0.5 * (z_l + z_r)
+    plane[w, SLOPE_Y] = 0.5 * (y_l1 + y_r1)
+    plane[w, SLOPE_Z] = 0.5 * (z_l1 + z_r1)
+    plane[w, ROLL] = asin(sine)
+    plane[w, SINE] = sine
+    plane[w, COSINE] = cosine
+    plane[w, ROLL_SLOPE] = (z_r1 - z_l1) / (CANT_BASE * cosine)
+    wider, widening = 0.5 * (y_r - y_l), 0.5 * (y_r1 - y_l1)
+    rail[w, 0, ASIDE], rail[w, 0, ASIDE_SLOPE] = -wider, -widening
+    rail[w, 1, ASIDE], rail[w, 1, ASIDE_SLOPE] = wider, widening
+    rail[w, 0, RAIL_SLOPE], rail[w, 0, RAIL_BEND] = y_l1, y_l2
+    rail[w, 1, RAIL_SLOPE], rail[w, 1, RAIL_BEND] = y_r1, y_r2

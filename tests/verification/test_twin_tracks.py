@@ -1,0 +1,65 @@
+"""The same rails written twice give the same run: plan, profile and cant, or irregularities.
+
+Displaced rails are at rest, only their shape has a rate along the way: a wheelset that follows
+them (yaw = y_r', y' = V y_r') has no lateral creepage, and cross level turns rail heads and the
+axes of Y and Q as cant does.
+"""
+
+import numpy as np
+import pytest
+from dynamics import Settings, load_vehicle
+from twin_tracks import Wave, alignment, cross_level, differences, level, runs, widening
+
+SPEED = 20.0  # m/s
+EXACT = Settings(scheme="rk4")
+FREE = Settings(scheme="rk4", drive={"mode": "free"})
+R300 = 1.0 / 300.0
+LATERAL = [(100.0, 0.010), (40.0, 0.004), (20.0, 0.004), (10.0, 0.002)]
+HEIGHT = [(40.0, 0.008), (20.0, 0.004), (10.0, 0.002)]
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return load_vehicle("coach_manchester")
+
+
+def tolerance(length):
+    """1 % of the amplitude: second order in slopes of 1 mrad, and the wave as ramps of 0.25 m."""
+    return 0.01 if length >= 20.0 else 0.02
+
+
+def assert_same(coach, tracks, length, settings=EXACT, **more):
+    one, two = runs(coach, tracks, SPEED, settings=settings)
+    assert one.attributes["status"] == two.attributes["status"] == "complete"
+    found = differences(one, two, **more)
+    assert max(found.values()) < tolerance(length), found
+
+
+@pytest.mark.parametrize(("length", "height"), LATERAL)
+@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0), (R300, 0.10)])
+def test_alignment_is_a_wave_of_the_plan(coach, length, height, curvature, cant):
+    assert_same(coach, alignment(Wave(length, height), curvature, cant), length)
+
+
+@pytest.mark.parametrize(("length", "height"), HEIGHT)
+@pytest.mark.parametrize("curvature", [0.0, R300])
+def test_longitudinal_level_is_a_wave_of_the_gradient(coach, length, height, curvature):
+    assert_same(coach, level(Wave(length, height), curvature), length, FREE)
+
+
+@pytest.mark.parametrize(("length", "height"), HEIGHT)
+@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0), (R300, 0.10)])
+def test_cross_level_is_a_wave_of_the_cant(coach, length, height, curvature, cant):
+    assert_same(coach, cross_level(Wave(length, height), curvature, cant), length)
+
+
+def test_widening_of_one_rail_is_a_wider_track_beside_its_place(coach):
+    assert_same(coach, widening(0.005), 5.0)
+
+
+def test_gauge_widening_gives_little_lateral_force(coach):
+    """10 mm over 5 m: the treads roll on other radii, 0.4 kN; a slope taken as slip gives 9 kN."""
+    wider, _ = widening(0.010)
+    wider = wider.replace(gauge_widening=[[40.0, 0.0], [45.0, 0.010]])
+    (run,) = runs(coach, [wider], SPEED)
+    assert np.max(np.abs(run.Y - run.Y[0])) < 600.0
