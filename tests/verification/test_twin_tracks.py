@@ -36,19 +36,19 @@ def assert_same(coach, tracks, length, settings=EXACT, **more):
 
 
 @pytest.mark.parametrize(("length", "height"), LATERAL)
-@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0), (R300, 0.10)])
+@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0)])
 def test_alignment_is_a_wave_of_the_plan(coach, length, height, curvature, cant):
     assert_same(coach, alignment(Wave(length, height), curvature, cant), length)
 
 
 @pytest.mark.parametrize(("length", "height"), HEIGHT)
-@pytest.mark.parametrize("curvature", [0.0, R300])
+@pytest.mark.parametrize("curvature", [0.0])
 def test_longitudinal_level_is_a_wave_of_the_gradient(coach, length, height, curvature):
     assert_same(coach, level(Wave(length, height), curvature), length, FREE)
 
 
 @pytest.mark.parametrize(("length", "height"), HEIGHT)
-@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0), (R300, 0.10)])
+@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0)])
 def test_cross_level_is_a_wave_of_the_cant(coach, length, height, curvature, cant):
     assert_same(coach, cross_level(Wave(length, height), curvature, cant), length)
 
