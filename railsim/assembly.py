@@ -109,6 +109,8 @@ class Model:
         Contact tables in the order of `System.contact.values`.
     profiles : dict
         Profiles used, by name.
+    design : Model or None
+        The vehicle in its design load, whose preloads these are, where a load case is in force.
     """
 
     system: System
@@ -116,6 +118,7 @@ class Model:
     flat: FlatVehicle
     tables: tuple[ContactTable, ...]
     profiles: Mapping[str, Profile]
+    design: "Model | None" = None
 
     @property
     def n_state(self) -> int:
@@ -186,7 +189,11 @@ def assemble(
         links=tuple(row["name"] for row in elements.link_rows),
         mounts=tuple(row["name"] for row in elements.mount_rows),
     )
-    return Model(system, index, flat, tables, book.used)
+    design = None
+    if vehicle.load is not None:
+        unloaded = vehicle.model_copy(update={"load": None})
+        design = assemble(unloaded, track, settings, profiles, shared)
+    return Model(system, index, flat, tables, book.used, design)
 
 
 def work_arrays(system: System) -> Work:

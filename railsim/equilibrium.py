@@ -11,7 +11,7 @@ Three steps, each on straight level track:
 What cannot be balanced is named: body, component, force or moment.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,30 +91,84 @@ def with_preloads(model: Model) -> Model:
     Unknowns are the vertical force of each mount and the force of each link so marked; conditions
     the vertical force, roll and pitch moment of each rigid body and the pitch moment of each
     axlebox, with the preloads given by the user and gravity as loads.
+
+    A load case takes the preloads of the design load: its bodies find their heights, rolls and
+    pitches themselves.  So does a vehicle with springs of known free length: their preloads are
+    given, and what they leave unbalanced moves the bodies.
     """
+    if model.design is not None:
+        return _levelled(_with_preloads_of(model, with_preloads(model.design)))
+    conditions = _conditions(model.system)
+    filled, rest = _with_solved_preloads(model, _auto_preloads(model), conditions)
+    if not any(getattr(e.definition, "has_free_length", False) for e in model.flat.elements):
+        _check_balance(model, conditions, rest)
+    return filled
+
+
+def _levelled(model: Model) -> Model:
+    """Fill the air springs of a load case so that what stands on them alone keeps its height.
+
+    A levelling valve feeds or drains a bellows until it has its nominal height over the body below.
+    """
+    carried = _carried_by_levelled_springs(model)
+    if not carried:
+        return model
+    names = {e.name for e in model.flat.elements if getattr(e.definition, "levelling", False)}
+    support = {
+        (group, i): stiffness
+        for (group, i), stiffness in _auto_preloads(model).items()
+        if getattr(model.index, group)[i] in names
+    }
+    conditions = [pair for pair in _conditions(model.system) if pair[0] in carried]
+    levelled, _ = _with_solved_preloads(model, support, conditions)
+    return levelled
+
+
+def _carried_by_levelled_springs(model: Model) -> set[int]:
+    """Bodies that stand on springs with levelling valves and on nothing else."""
+    on: dict[str, list[bool]] = {}
+    for element in model.flat.elements:
+        law = element.definition
+        if vertical_support(law) > 0.0 and getattr(law, "preload", 0.0) != 0.0:
+            for body in (element.body1, element.body2):
+                on.setdefault(body, []).append(bool(getattr(law, "levelling", False)))
+    return {model.index.bodies.index(name) for name, kinds in on.items() if all(kinds)}
+
+
+def _with_solved_preloads(
+    model: Model, support: dict[tuple[str, int], float], conditions: list[tuple[int, int]]
+) -> tuple[Model, Floats]:
+    """Solve the preloads of `support` for `conditions`; the model with them, and what is left."""
     system = model.system
-    support = _auto_preloads(model)
     unknowns = list(support)
-    conditions = _conditions(system)
     loads = np.array([_load(system, body, component) for body, component in conditions])
-    fixed = _preload_forces(system, system.links, system.mounts, conditions)
+    links = system.links._replace(row=aligned(system.links.row))
+    mounts = system.mounts._replace(row=aligned(system.mounts.row))
+    for group, element in unknowns:
+        _set_preload(links, mounts, group, element, 0.0)
+    fixed = _preload_forces(system, links, mounts, conditions)
     columns = []
     for group, element in unknowns:
-        links, mounts = _with_unit_preload(system, group, element)
-        columns.append(_preload_forces(system, links, mounts, conditions))
+        unit = _with_unit_preload(system, group, element)
+        columns.append(_preload_forces(system, *unit, conditions))
     matrix = np.array(columns).T.reshape(len(conditions), len(unknowns))
     # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
     scale = np.sqrt(np.array([support[unknown] for unknown in unknowns]))
     right_side = -(loads + fixed)
     scaled = _least_squares(matrix * scale, right_side, 1e-10)
     values = scaled * scale
-    _check_balance(model, conditions, matrix @ values - right_side)
-    links = system.links._replace(row=aligned(system.links.row))
-    mounts = system.mounts._replace(row=aligned(system.mounts.row))
     for (group, element), value in zip(unknowns, values, strict=True):
         _set_preload(links, mounts, group, element, value)
-    filled = system._replace(links=links, mounts=mounts)
-    return Model(filled, model.index, model.flat, model.tables, model.profiles)
+    filled = replace(model, system=system._replace(links=links, mounts=mounts))
+    return filled, matrix @ values - right_side
+
+
+def _with_preloads_of(model: Model, design: Model) -> Model:
+    links = model.system.links._replace(row=aligned(model.system.links.row))
+    mounts = model.system.mounts._replace(row=aligned(model.system.mounts.row))
+    links.spring[:, 2] = design.system.links.spring[:, 2]
+    mounts.preload[:] = design.system.mounts.preload
+    return replace(model, system=model.system._replace(links=links, mounts=mounts))
 
 
 def _least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:

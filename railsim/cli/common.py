@@ -37,6 +37,18 @@ def set_option(function: F) -> F:
     )(function)
 
 
+def load_option(function: F) -> F:
+    """Add ``--load NAME`` as the argument `load`."""
+    return click.option(
+        "--load", metavar="NAME", help="Load case of the vehicle; by default its design load."
+    )(function)
+
+
+def with_load(assignments: Sequence[str], load: str | None, prefix: str = "") -> tuple[str, ...]:
+    """Return the assignments with that of a load case."""
+    return (*assignments, f"{prefix}load={load}") if load is not None else tuple(assignments)
+
+
 def print_json(data: Any) -> None:
     """Print data as JSON; numbers that JSON lacks become null."""
     click.echo(json.dumps(_plain(data), indent=2, allow_nan=False))

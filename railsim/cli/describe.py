@@ -84,6 +84,9 @@ def vehicle_lines(vehicle: "Vehicle") -> list[str]:
         f"distance is that of '{data['reference']}'",
     ]
     lines += [f"  source: {vehicle.source}"] if vehicle.source else []
+    if vehicle.loads:
+        cases = ", ".join(vehicle.loads)
+        lines.append(f"  load case: {vehicle.load or 'design'}; also defined: {cases}")
     rows = []
     for body in data["bodies"]:
         inertia = body["inertia"] if body["kind"] != "axlebox" else (0, body["pitch_inertia"], 0)
@@ -150,7 +153,9 @@ def _assumption_lines(vehicle: "Vehicle") -> list[str]:
     found = [e.name for e in flat.elements if _finds_its_preload(e.definition)]
     if not found:
         return []
+    load = " in the design load" if vehicle.loads else ""
     text = f"preload of {len(found)} elements found so that the nominal position is in equilibrium"
+    text += load
     return ["", f"assumed: {text}"]
 
 

@@ -5,7 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import json_option, overwrite_option, print_json, set_option
+from railsim.cli.common import (
+    json_option,
+    load_option,
+    overwrite_option,
+    print_json,
+    set_option,
+    with_load,
+)
 from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
@@ -27,6 +34,7 @@ if TYPE_CHECKING:
 )
 @click.option("--draw", metavar="F.png", help="Draw a vehicle in three views, or a track.")
 @overwrite_option
+@load_option
 @set_option
 @json_option
 def command(
@@ -35,6 +43,7 @@ def command(
     static: bool,
     draw: str | None,
     overwrite: bool,
+    load: str | None,
     assignments: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -52,7 +61,7 @@ def command(
         return
     from railsim.definitions.loading import load_any
 
-    definition, known = load_any(file, assignments)
+    definition, known = load_any(file, with_load(assignments, load))
     if draw is not None:
         _draw(definition, Path(draw), overwrite)
     data, lines = _description(definition, known.kind, speeds, static)

@@ -98,11 +98,11 @@ def _entries(kind: str) -> list[dict[str, Any]]:
 
 
 def trust(text: str) -> str:
-    """Return the letters of trust of a file's numbers, the most frequent first.
+    r"""Return the letters of trust of a file's numbers, the most frequent first.
 
     Examples
     --------
-    >>> trust("mass = 3.0  # [R]\\nx = 1.0  # [A]\\ny = 2.0  # [R]; z [A]\\n radius = 4  # [R]")
+    >>> trust("mass = 3.0  # [R]\nx = 1.0  # [A]\ny = 2.0  # [R]; z [A]\n radius = 4  # [R]")
     'RA'
     """
     lines = (line.partition("#") for line in text.splitlines())

@@ -8,11 +8,13 @@ import click
 
 from railsim.cli.common import (
     json_option,
+    load_option,
     overwrite_option,
     print_json,
     quiet_option,
     set_option,
     table,
+    with_load,
 )
 from railsim.cli.progress import progress_bar
 
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 @click.option(
     "--continue", "before", metavar="R.h5", help="Begin where this result of the same inputs ended."
 )
+@load_option
 @click.option("--settings", metavar="F", help="Settings file.")
 @set_option
 @overwrite_option
@@ -53,6 +56,7 @@ def command(
     duration: float | None,
     until: float | None,
     before: str | None,
+    load: str | None,
     settings: str | None,
     assignments: tuple[str, ...],
     overwrite: bool,
@@ -77,6 +81,7 @@ def command(
     from railsim.definitions.layout import track_remarks
     from railsim.studies.run import run_case
 
+    assignments = with_load(assignments, load, "vehicle.")
     how = {"settings": settings, "duration": duration, "until": until, "assignments": assignments}
     resume = _opened(before, {"--speed": speed, "--start": start}) if before else None
     if resume:

@@ -7,10 +7,12 @@ import click
 
 from railsim.cli.common import (
     json_option,
+    load_option,
     overwrite_option,
     print_json,
     quiet_option,
     set_option,
+    with_load,
 )
 from railsim.cli.progress import progress_bar
 
@@ -73,6 +75,7 @@ def _is_number(text: str) -> bool:
 @click.option("--start", type=float, default=0.0, metavar="S", help="Start of all runs in m.")
 @click.option("--duration", type=float, metavar="T", help="End of all runs in s.")
 @click.option("--until", type=float, metavar="S", help="End of all runs in m along the track.")
+@load_option
 @click.option("--settings", metavar="F", help="Settings file for all runs.")
 @set_option
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Default: all cores.")
@@ -97,6 +100,7 @@ def command(
     speeds: tuple[float, ...],
     grids: tuple[str, ...],
     out: str,
+    load: str | None,
     assignments: tuple[str, ...],
     resume: bool,
     as_json: bool,
@@ -125,7 +129,7 @@ def command(
         "tracks": list(tracks),
         "speeds": list(speeds),
         "grid": _grid(grids),
-        "assignments": list(assignments),
+        "assignments": list(with_load(assignments, load, "vehicle.")),
         **{name: how.pop(name) for name in ("settings", "start", "duration", "until")},
     }
     if resume and not any(inputs.values()):

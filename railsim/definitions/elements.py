@@ -6,7 +6,8 @@ the other side or in a mirrored assembly.  Tables hold rows [displacement or vel
 """
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from math import dist
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -15,6 +16,7 @@ from railsim.definitions.base import (
     AutoOrVector,
     Definition,
     Finite,
+    Flag,
     NonNegative,
     NonNegativeVector,
     Positive,
@@ -88,6 +90,13 @@ class Element(Definition):
         """Return the element in a mirrored place; `signs` holds -1 for each reversed axis."""
         return self
 
+    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+        """Return the element with the preload that follows from its free length, if it has one.
+
+        `point1` and `point2`: its ends in the nominal position, vehicle axes [m].
+        """
+        return self
+
 
 class PairElement(Element):
     """An element between two bodies."""
@@ -125,7 +134,59 @@ class PointElement(SidedElement):
         return self.point, self.point
 
 
-class SpringDamper(SidedElement):
+class FreeLength(Definition):
+    """A spring whose preload follows from its length."""
+
+    free_length: Positive | None = None
+    """Length without load [m]; the preload follows from it and from the nominal length"""
+    load_at_length: tuple[Positive, Positive] | None = None
+    """Load and length at which it was measured [N, m], instead of `free_length`; compression"""
+
+    @property
+    def has_free_length(self) -> bool:
+        """Whether the preload follows from a length."""
+        return self.free_length is not None or self.load_at_length is not None
+
+    def compression(self, stiffness: float, length: float) -> float:
+        """Force of compression at a length [N], spring of this `stiffness` [N/m]."""
+        if self.free_length is not None:
+            return stiffness * (self.free_length - length)
+        assert self.load_at_length is not None  # by `has_free_length`
+        load, at = self.load_at_length
+        return load + stiffness * (at - length)
+
+    @model_validator(mode="after")
+    def _one_origin_of_the_preload(self) -> Self:
+        if self.free_length is not None and self.load_at_length is not None:
+            raise ValueError("either 'free_length' or 'load_at_length', not both")
+        if self.has_free_length and "preload" in self.model_fields_set:
+            raise ValueError("either 'preload' or a length, not both")
+        return self
+
+
+class VerticalSpring(FreeLength):
+    """A spring along z between two seats."""
+
+    if TYPE_CHECKING:  # the fields of its kinds
+        stiffness: NonNegativeVector
+        points: tuple[Vector, Vector] | None
+
+    @model_validator(mode="after")
+    def _length_needs_seats(self) -> Self:
+        if self.has_free_length and (self.points is None or self.stiffness[2] == 0.0):
+            raise ValueError("a free length needs 'points' at two heights and a stiffness along z")
+        return self
+
+    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+        """Return the spring with the preload of its length: compression pushes the seats apart."""
+        if not self.has_free_length:
+            return self
+        force = self.compression(self.stiffness[2], abs(point2[2] - point1[2]))
+        up = -1.0 if point1[2] < point2[2] else 1.0
+        return self.model_copy(update={"preload": (0.0, 0.0, up * force)})
+
+
+class SpringDamper(FreeLength, SidedElement):
     """Spring and damper along the line between two points."""
 
     kind: Literal["spring_damper"]
@@ -154,14 +215,24 @@ class SpringDamper(SidedElement):
             raise ValueError("either 'damping' or 'damper_table', not both")
         if self.series_stiffness > 0.0 and self.damping == 0.0 and self.damper_table is None:
             raise ValueError("'series_stiffness' needs 'damping' or 'damper_table'")
+        if self.has_free_length and self.stiffness == 0.0:
+            raise ValueError("a free length needs 'stiffness'")
         return self
+
+    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+        """Return the spring with the preload of its length, tension positive."""
+        if not self.has_free_length:
+            return self
+        return self.model_copy(
+            update={"preload": -self.compression(self.stiffness, dist(point1, point2))}
+        )
 
     def end_points(self) -> tuple[Vector, Vector]:
         """Points on body 1 and body 2 as written [m]."""
         return self.points
 
 
-class Bushing(PointElement):
+class Bushing(VerticalSpring, PointElement):
     """Three springs and dampers along the axes of body 1; the force acts at the point on body 2."""
 
     kind: Literal["bushing"]
@@ -190,7 +261,7 @@ class Bushing(PointElement):
         return self.model_copy(update=_mirrored_preload(self.preload, signs))
 
 
-class ShearSpring(SidedElement):
+class ShearSpring(VerticalSpring, SidedElement):
     """Coil spring or rubber block between two seats: shear, axial force, bending and torsion."""
 
     kind: Literal["shear_spring"]
@@ -206,6 +277,9 @@ class ShearSpring(SidedElement):
     """Stiffness about z [N m/rad]"""
     preload: AutoOrVector = "auto"
     """Force on body 1 in the nominal position along x, y, z [N], or `auto`: from the equilibrium"""
+    levelling: Flag = False
+    """Air spring with levelling valve: what stands on such springs alone keeps its height in
+    every load case"""
 
     def end_points(self) -> tuple[Vector, Vector]:
         """Points on body 1 and body 2 as written [m]."""
@@ -243,7 +317,7 @@ class BumpStop(PointElement):
         return self.model_copy(update={"table": turned})
 
 
-class Friction(PointElement):
+class Friction(VerticalSpring, PointElement):
     """Dry friction along the axes of body 1, with a spring in parallel: leaf spring, friction pad.
 
     Along each axis the sliding force is at most friction_force + friction_coefficient |N|, with N
@@ -304,6 +378,9 @@ class Airspring(PointElement):
     """Stiffness about z [N m/rad]"""
     preload: AutoOrVector = "auto"
     """Force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+    levelling: Flag = True
+    """With levelling valve: what stands on such springs alone keeps its height in every load
+    case"""
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the spring in a mirrored place: the preload turns with the axes."""

@@ -12,6 +12,7 @@ from typing import Literal
 
 from railsim.definitions.base import Vector
 from railsim.definitions.elements import Element
+from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
 from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
 from railsim.errors import Fault, InputError
@@ -173,6 +174,7 @@ def vehicle_faults(vehicle: Vehicle) -> list[Fault]:
 
 
 def _flat(vehicle: Vehicle) -> FlatVehicle:
+    vehicle = loaded(vehicle)
     known, _ = body_names(vehicle.model_dump())
     places = list(_places(vehicle, _Place()))
     bodies = [body for group, place in places for body in _bodies(group, place)]
@@ -228,13 +230,15 @@ def _elements(
                 at = (positions[ends[0]], positions[ends[-1]])
             else:
                 at = (place.point(points[0], side), place.point(points[1], side))
-            definition = element.mirrored(place.signs(side))
+            definition = element.mirrored(place.signs(side)).with_known_preload(*at)
             body2 = ends[1] if len(ends) == 2 else ""
             yield FlatElement(place.full(sided), ends[0], body2, at[0], at[1], definition)
 
 
 def position_faults(vehicle: Vehicle) -> list[Fault]:
     """Return which parts of a vehicle stand where they cannot; the faults' file is left empty."""
+    if wrong := load_faults(vehicle):
+        return wrong
     flat = _flat(vehicle)
     keys = _keys(vehicle)
     faults = _height_faults(flat, keys) + _axlebox_faults(flat, keys)

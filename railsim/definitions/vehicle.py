@@ -23,6 +23,7 @@ from railsim.definitions.base import (
     Vector,
 )
 from railsim.definitions.elements import AnyElement
+from railsim.definitions.loads import LoadCase
 
 VEHICLE_FORMAT = "railsim-vehicle/1"
 
@@ -107,6 +108,10 @@ class Vehicle(FileDefinition):
     """What the vehicle is called in tables and plots"""
     source: Text | None = None
     """Where the numbers come from"""
+    load: Text | None = None
+    """Load case in force; by default the design load, the numbers of the bodies themselves"""
+    loads: dict[Name, LoadCase] = Field(default_factory=dict)
+    """Load cases by name"""
     reference: Text | None = None
     """Full name of the body whose way is the vehicle's `distance`; by default the first body,
     else the first wheelset"""

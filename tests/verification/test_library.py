@@ -1,7 +1,7 @@
 """Shipped vehicles and tracks: their data against figures computed independently of railsim.
 
-Masses, wheel loads and undamped vertical modes (vertical springs alone, wheels held) of the vehicles
-were computed once outside railsim from the sources' numbers; a misplaced or mistyped number shows.
+Masses, wheel loads and undamped vertical modes (vertical springs alone, wheels held) of the
+vehicles were computed outside railsim from the sources' numbers; a mistyped number shows.
 """
 
 import numpy as np

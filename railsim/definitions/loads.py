@@ -1,0 +1,98 @@
+"""Load cases of a vehicle file: what passengers or goods change in the bodies.
+
+A vehicle's own numbers are those of its design load, in which it stands in its nominal position.  A
+load case replaces masses, inertias and centres of gravity; the springs stay as they are, and the
+static equilibrium finds ride height, roll and pitch.
+"""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import Definition, Name, Positive, PositiveVector, Text, Vector
+from railsim.errors import Fault, nearest
+
+if TYPE_CHECKING:
+    from railsim.definitions.vehicle import Assembly, Vehicle
+
+
+class BodyLoad(Definition):
+    """What a load case changes in one body."""
+
+    mass: Positive | None = None
+    """Mass with the load [kg]"""
+    inertia: PositiveVector | None = None
+    """Moments of inertia Ixx, Iyy, Izz about the common centre of gravity [kg m2]"""
+    position: Vector | None = None
+    """Common centre of gravity, where the body is in its nominal position [m]"""
+
+    @model_validator(mode="after")
+    def _something_changes(self) -> Self:
+        if self.mass is None and self.inertia is None and self.position is None:
+            raise ValueError("'mass', 'inertia' or 'position' is needed")
+        return self
+
+
+class LoadGroup(Definition):
+    """Bodies of the vehicle, or of one of its assemblies, that a load case changes."""
+
+    bodies: dict[Name, BodyLoad] = Field(default_factory=dict)
+    """Changed bodies by their names"""
+    assemblies: dict[Name, "LoadGroup"] = Field(default_factory=dict)
+    """Assemblies with changed bodies by their names"""
+
+
+class LoadCase(LoadGroup):
+    """One load case: tare, laden, crush, uneven."""
+
+    description: Text | None = None
+    """What it stands for"""
+
+
+def loaded(vehicle: "Vehicle") -> "Vehicle":
+    """Return the vehicle with the bodies of the load case in force."""
+    if vehicle.load is None:
+        return vehicle
+    return vehicle.model_copy(update=_changes(vehicle, vehicle.loads[vehicle.load]))
+
+
+def _changes(group: "Vehicle | Assembly", load: LoadGroup) -> dict[str, object]:
+    bodies = {
+        name: body.model_copy(update=load.bodies[name].model_dump(exclude_none=True))
+        if name in load.bodies
+        else body
+        for name, body in group.bodies.items()
+    }
+    assemblies = {
+        name: assembly.model_copy(update=_changes(assembly, load.assemblies[name]))
+        if name in load.assemblies
+        else assembly
+        for name, assembly in group.assemblies.items()
+    }
+    return {"bodies": bodies, "assemblies": assemblies}
+
+
+def load_faults(vehicle: "Vehicle") -> list[Fault]:
+    """Return what load cases name that is not there; the faults' file is left empty."""
+    faults = [
+        fault
+        for name, load in vehicle.loads.items()
+        for fault in _unknown(vehicle, load, f"loads.{name}")
+    ]
+    if vehicle.load is not None and vehicle.load not in vehicle.loads:
+        allowed = nearest(vehicle.load, list(vehicle.loads)) if vehicle.loads else "none defined"
+        faults.append(Fault("", "load", f"no load case '{vehicle.load}'", allowed))
+    return faults
+
+
+def _unknown(group: "Vehicle | Assembly", load: LoadGroup, key: str) -> Iterator[Fault]:
+    for table, word in (("bodies", "body"), ("assemblies", "assembly")):
+        known = list(getattr(group, table))
+        for name in getattr(load, table):
+            if name not in known:
+                found = f"no {word} '{name}' at this place of the vehicle"
+                yield Fault("", f"{key}.{table}.{name}", found, nearest(name, known))
+    for name, inner in load.assemblies.items():
+        if name in group.assemblies:
+            yield from _unknown(group.assemblies[name], inner, f"{key}.assemblies.{name}")
