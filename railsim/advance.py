@@ -5,8 +5,8 @@ over one track advance together in one call (`railsim.ensemble`) for as long as 
 run is the ensemble of one.
 
 Each run is what it would be alone.  A chunk in which one of several vehicles leaves the range of
-the model is taken back: that vehicle goes on alone, to its own end, and the others without it.
-Runs also part where their steps differ.
+the model, or lifts or strikes a rail, is taken back: that vehicle goes on alone, to its own end,
+and the others without it.  Runs also part where their steps differ.
 """
 
 import math
@@ -17,17 +17,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, work_arrays
+from railsim.assembly import Model, no_extremes, work_arrays
 from railsim.definitions.settings import Settings
 from railsim.ensemble import Ensemble, contact_grid
 from railsim.equilibrium import Equilibrium
+from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import time_loop
 from railsim.outputs import OutputPlan
 from railsim.pace import Pace, duration
 from railsim.result import Sink
-from railsim.time_step import SCHEMES
+from railsim.time_step import SCHEMES, divide_strikes
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -36,8 +37,8 @@ Progress = Callable[[float], None]
 # computing by the fast scheme, and below a second by the other one
 ROWS, STEPS = 500, 64_000
 
-# state, whether nothing was before it, whether it is to be recorded, counts of patches
-_Before = tuple[Floats, bool, bool, NDArray[np.int64]]
+# state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes
+_Before = tuple[Floats, bool, bool, NDArray[np.int64], Floats, Floats]
 
 
 @dataclass
@@ -90,6 +91,12 @@ class Run:
         How it ended, see `railsim.kernels.status`.
     events : int64[2]
         Loaded contact patches so far, and those out of the creep law's range.
+    extremes : float64[6, w, EXTREMES]
+        Largest and smallest values so far, see `railsim.kernels.extremes`.
+    unloaded : float64[w, 2]
+        Time during which each wheel has carried nothing [s].
+    divided : int
+        Steps that were divided because a wheel lifted or struck.
     cpu_time, wall_time : float
         Its share of what the time loop, and all of the run, took [s].
     together : int
@@ -109,11 +116,17 @@ class Run:
     status: int = RUNNING
     where: int = 0
     events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, dtype=np.int64))
+    divided: int = 0
     cpu_time: float = 0.0
     wall_time: float = 0.0
     together: int = 1
     error: Exception | None = None
     remarks: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        wheelsets = len(self.prepared.model.index.wheelsets)
+        self.extremes: Floats = no_extremes(wheelsets)
+        self.unloaded: Floats = np.zeros((wheelsets, 2))
 
 
 def advance(
@@ -186,7 +199,8 @@ class _Convoy:
         """Advance to the end, or to where runs part; return in which groups they go on."""
         while self._left() > 1e-9 or self._due:
             begin = time.perf_counter()
-            before = self._state.copy(), self._fresh, self._due, self._work.events.copy()
+            before = (self._state.copy(), self._fresh, self._due, self._work.events.copy(),
+                      self._work.extremes.copy(), self._work.unloaded.copy())
             paces = self._paces()
             if len(set(paces)) > 1 or self._errors():
                 return self._parted(paces, before)
@@ -255,6 +269,7 @@ class _Convoy:
     ) -> tuple[int, int, int, int]:
         begin = time.thread_time()  # a library's idle threads may still be spinning
         most = max(1, STEPS // len(self._runs))
+        divide_strikes(self._work, self._scheme, step)
         at, end, rows = first, first + n_steps, 0
         while True:
             # more than one call only within one output interval, which records at its begin:
@@ -290,7 +305,9 @@ class _Convoy:
     ) -> list[list[Run]]:
         """Runs grouped by equal keys, as they were before; those with an error are at their end."""
         if before is not None:
-            self._state, self._fresh, self._due, self._work.events[:] = before
+            work = self._work
+            self._state, self._fresh, self._due = before[:3]
+            work.events[:], work.extremes[:], work.unloaded[:] = before[3:]
         self._give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [
@@ -305,3 +322,12 @@ class _Convoy:
             run.state = self._state[part.state]
             run.fresh, run.due = self._fresh, self._due
             run.events += self._work.events[part.wheelsets].sum(axis=0)
+            _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
+            run.unloaded += self._work.unloaded[part.wheelsets]
+            run.divided += int(self._work.parts[1])
+
+
+def _take_extremes(before: Floats, later: Floats) -> None:
+    """Take the extremes of a later part of a run into those of all before it."""
+    for row, beyond in ((MAX, later[MAX] > before[MAX]), (MIN, later[MIN] < before[MIN])):
+        before[row : row + 3][:, beyond] = later[row : row + 3][:, beyond]

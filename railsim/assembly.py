@@ -26,9 +26,10 @@ from railsim.errors import ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.creep import LAW_NUMBERS
+from railsim.kernels.extremes import EXTREMES, MAX, MIN
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.lanes import LANES
-from railsim.kernels.rails import COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
 from railsim.kernels.support import (
     SUPPORT_COLUMNS,
     SUPPORT_ROW,
@@ -232,6 +233,14 @@ def work_arrays(system: System) -> Work:
         compliance=aligned_zeros(2),
         events=aligned_zeros((n_wheelsets, 2), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
+        swing=aligned_zeros(n_wheelsets),
+        watch=aligned_zeros(2),
+        coming=aligned_zeros((2, COMING)),
+        parts=aligned_zeros(2, np.int64),
+        extremes=no_extremes(n_wheelsets),
+        present=aligned_zeros(EXTREMES),
+        unloaded=aligned_zeros((n_wheelsets, 2)),
+        decay_part=aligned_zeros(len(system.internal.kind)),
     )
 
 
@@ -240,6 +249,14 @@ def _smooth_planes(n_wheelsets: int) -> Floats:
     plane = aligned_zeros((n_wheelsets, PLANE_SIZE))
     plane[:, COSINE] = 1.0
     return plane
+
+
+def no_extremes(n_wheelsets: int) -> Floats:
+    """`Work.extremes` before anything has been seen, shape (6, wheelset, EXTREMES)."""
+    extremes = aligned_zeros((6, n_wheelsets, EXTREMES))
+    extremes[MAX] = -np.inf
+    extremes[MIN] = np.inf
+    return extremes
 
 
 def level_track(system: System) -> System:
@@ -413,9 +430,11 @@ def _contact(
     falling = track.friction_falling
     law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
     names = _names(flat.bodies)
+    weight = GRAVITY * sum(body.mass for body in flat.bodies)
     contact = Contact(
         body=np.array([names.index(body.name) for body in wheelsets], dtype=np.int64),
         table=which,
+        load=np.full(len(wheelsets), weight / (2.0 * len(wheelsets))),
         values=side_by_side([t.values for t in tables]),
         shear=np.array([t.shear for t in tables]),
         coupling=np.array([

@@ -25,6 +25,7 @@ from railsim.kernels.status import (
     FELL_BETWEEN_RAILS,
     NOT_FINITE,
     ROLL_RANGE,
+    STRIKES,
     WHEEL_LIFT,
     YAW_RANGE,
 )
@@ -48,7 +49,7 @@ Group = TypeVar("Group", bound=tuple[Any, ...])
 # the grid of the contact tables, which a system has but one of
 GRID = ("y0", "dy", "roll0", "droll", "dw")
 # statuses that concern a wheelset
-OF_WHEELSET = (DERAILED, FELL_BETWEEN_RAILS, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE)
+OF_WHEELSET = (DERAILED, FELL_BETWEEN_RAILS, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
 
 
 def contact_grid(model: Model) -> tuple[float | int, ...]:
@@ -237,6 +238,7 @@ def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
             np.array([number[id(table)] for table in model.tables])[contact.table]
             for model, contact in zip(models, contacts, strict=True)
         ]),
+        load=np.concatenate([c.load for c in contacts]),
         values=side_by_side(values) if len(rows) > len(models[0].tables) else contacts[0].values,
         shear=np.array(shear),
         coupling=np.array(coupling),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 SIDES = ("left", "right")
+EXTREMES = ("max", "min")
 DECIMALS = {"kN": 2, "mm": 2, "mrad": 2, "%": 2, "-": 3, "N": 1, "1e-3": 3, "s": 2, "m": 1}
 """Decimals in printed tables by shown unit; four digits for the others."""
 

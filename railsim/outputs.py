@@ -11,6 +11,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import element_outputs as element
+from railsim.kernels import extremes as seen
 from railsim.kernels import wheel_rail as patch
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
@@ -98,6 +99,42 @@ def rail_deflection(model: Model, state: Floats) -> Floats:
     end = state.shape[1] - N_SCALARS
     track = state[:, end - wheelsets * SUPPORT_SIZE : end].reshape(rows, wheelsets, SUPPORT_SIZE)
     return track[..., :RAIL_DOF].reshape(rows, wheelsets, 2, 2)
+
+
+def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
+    """Largest and smallest values over all steps of a run, each with its time and place.
+
+    Parameters
+    ----------
+    extremes : float64[6, wheelset, EXTREMES]
+        See `railsim.kernels.extremes`.
+    Q0 : float64[wheelset, side]
+        Static wheel loads [N].
+
+    Returns
+    -------
+    dict of str to ndarray
+        For each quantity ``Q`` its values (extreme, wheelset, side), extremes in the order of
+        `railsim.notation.EXTREMES`; ``Q_time`` [s] and ``Q_distance`` [m]: when, and where the
+        reference body was.
+    """
+    columns: dict[str, int | slice] = {
+        name: slice(first, first + 2)
+        for name, first in (("Q", seen.X_Q), ("Y", seen.X_Y), ("Y_over_Q", seen.X_Y_OVER_Q),
+                            ("T_gamma", seen.X_T_GAMMA))
+    }
+    columns |= {"sum_Y": seen.X_SUM_Y, "sum_abs_Y": seen.X_SUM_ABS_Y,
+                "wheelset_lateral": seen.X_LATERAL, "wheelset_roll": seen.X_ROLL,
+                "wheelset_yaw": seen.X_YAW}
+    found: dict[str, Floats] = {}
+    for name, column in columns.items():
+        for row, ending in enumerate(("", "_time", "_distance")):
+            found[name + ending] = extremes[[seen.MAX + row, seen.MIN + row]][..., column]
+        found[name][~np.isfinite(found[name])] = np.nan  # a quotient of a wheel never loaded
+    for ending in ("_time", "_distance"):
+        found["dQ_over_Q0" + ending] = found["Q" + ending]
+    found["dQ_over_Q0"] = (found["Q"] - Q0) / Q0
+    return found
 
 
 class OutputPlan:

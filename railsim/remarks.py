@@ -5,13 +5,105 @@ attribute ``remarks`` holds them, one a line; tables, summaries and comparisons 
 remark is added here, from what the run has counted, or to `Run.remarks` while it is computed.
 """
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
 from railsim.advance import Run
+from railsim.notation import SIDES
+from railsim.outputs import run_extremes
+
+Floats = NDArray[np.float64]
+
+# Vertical impacts: twice the ratio at which North American wagons are taken out of service (AAR
+# Rule 41: 400 kN on wheels of 159 kN)
+MOST_Q = 5.0  # times the static wheel load
+# Track shifting forces: this many times the limit 10 kN + P0/3 of EN 14363, P0 the axle load
+MOST_SUM_Y = 3.0
 
 
 def run_remarks(run: Run) -> tuple[str, ...]:
     """Return the remarks on a run that has ended, each once."""
-    found = [*run.remarks, *creep_range(int(run.events[1]), int(run.events[0]))]
+    wheelsets = run.prepared.model.index.wheelsets
+    Q0 = run.prepared.balance.Q0
+    extremes = run_extremes(run.extremes, Q0)
+    found = [
+        *run.remarks,
+        *beyond_experience(extremes, Q0, wheelsets),
+        *lifted_wheels(extremes, run.unloaded, wheelsets),
+        *creep_range(int(run.events[1]), int(run.events[0])),
+    ]
     return tuple(dict.fromkeys(found))
+
+
+def beyond_experience(
+    extremes: Mapping[str, Floats], Q0: Floats, wheelsets: Sequence[str]
+) -> tuple[str, ...]:
+    """Remarks on forces larger than any that are known from railways.
+
+    Parameters
+    ----------
+    extremes : mapping of str to ndarray
+        See `railsim.outputs.run_extremes`.
+    Q0 : float64[wheelset, side]
+        Static wheel loads [N].
+    wheelsets : sequence of str
+        Their names.
+    """
+    found = []
+    ratio = extremes["Q"][0] / Q0
+    w, side = (int(k) for k in np.unravel_index(np.nanargmax(ratio), ratio.shape))
+    if ratio[w, side] > MOST_Q:
+        place = _place(extremes, "Q", (0, w, side), f"{wheelsets[w]}, {SIDES[side]}")
+        found.append(
+            f"The largest Q is {ratio[w, side]:.3g} times the static wheel load ({place}), beyond "
+            f"all experience (limit {MOST_Q:g}): the forces of this run are not to be relied upon."
+        )
+    limit = 10e3 + Q0.sum(axis=1) / 3.0
+    ratio = np.abs(extremes["sum_Y"]) / limit
+    row, w = (int(k) for k in np.unravel_index(np.nanargmax(ratio), ratio.shape))
+    if ratio[row, w] > MOST_SUM_Y:
+        place = _place(extremes, "sum_Y", (row, w), wheelsets[w])
+        found.append(
+            f"The largest sum_Y is {abs(extremes['sum_Y'][row, w]) / 1e3:.4g} kN ({place}), "
+            f"{ratio[row, w]:.3g} times the limit 10 kN + P0/3 of EN 14363, beyond all experience "
+            f"(limit {MOST_SUM_Y:g}): the forces of this run are not to be relied upon."
+        )
+    return tuple(found)
+
+
+def lifted_wheels(
+    extremes: Mapping[str, Floats], unloaded: Floats, wheelsets: Sequence[str]
+) -> tuple[str, ...]:
+    """Remark on wheels that carried nothing for some time.
+
+    Parameters
+    ----------
+    extremes, wheelsets
+        As for `beyond_experience`.
+    unloaded : float64[wheelset, side]
+        Time during which each wheel has carried nothing [s].
+    """
+    number = int(np.count_nonzero(unloaded))
+    if number == 0:
+        return ()
+    w, side = (int(k) for k in np.unravel_index(np.argmax(unloaded), unloaded.shape))
+    place = _place(extremes, "Q", (1, w, side), "first at")
+    who = f"{wheelsets[w]}, {SIDES[side]}"
+    others = "" if number == 1 else f"; {number} wheels in all were off their rails"
+    return (
+        f"A wheel lifts off its rail: {who}, for {1e3 * unloaded[w, side]:.3g} ms altogether "
+        f"({place}){others}.",
+    )
+
+
+def _place(
+    extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str
+) -> str:
+    """Say when and where an extreme value occurs."""
+    time, s = (float(extremes[f"{name}_{fact}"][index]) for fact in ("time", "distance"))
+    return f"{words}{'' if words.endswith('at') else ','} t = {time:.2f} s, s = {s:.1f} m"
 
 
 def creep_range(outside: int, patches: int) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST, time_loop
-from railsim.time_step import empty_recorder
+from railsim.time_step import divide_strikes, empty_recorder
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
@@ -148,8 +148,10 @@ def _run(
     start: float, where: str,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
+    work = work_arrays(system)
+    divide_strikes(work, scheme, step)
     status, *_ = time_loop(
-        system, work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
+        system, work, state, np.zeros_like(state), np.zeros((3, len(state))),
         empty_recorder(model, 1), scheme, step, 1, steps, steps + 2, 1, 0,
     )
     if status != RUNNING:

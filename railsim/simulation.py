@@ -23,7 +23,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.status import NOT_FINITE, STATUS
-from railsim.outputs import OutputPlan
+from railsim.outputs import OutputPlan, run_extremes
 from railsim.pace import Pace
 from railsim.profiles import Profile
 from railsim.remarks import run_remarks
@@ -285,13 +285,17 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
         "runs_together": run.together,
         "patches_evaluated": int(run.events[0]),
         "patches_out_of_range": int(run.events[1]),
+        "steps_divided": run.divided,
         "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
     }
     result = run.sink.close(
         attributes,
         {"Q0": prepared.balance.Q0},
         prepared.model.profiles,
-        {"state": {"end": run.state} | ({} if before is None else {"start": before})},
+        {
+            "state": {"end": run.state} | ({} if before is None else {"start": before}),
+            "peaks": run_extremes(run.extremes, prepared.balance.Q0),
+        },
     )
     for remark in result.remarks:
         _LOG.warning(remark)

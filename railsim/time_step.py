@@ -5,6 +5,8 @@ where no mode of the map grows faster than the vehicle itself does (a vehicle be
 speed grows, and may).  The margin leaves room for the stiffer contacts of flange and curve.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import N_SCALARS, System
+from railsim.kernels.system import N_SCALARS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
 from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
 
@@ -29,6 +31,12 @@ SHORTEST_STEP = 1e-6  # s
 # a step is taken if one longer by this factor is stable too: a wheel load of twice the static one
 # raises the frequency of the contact by 2^(1/6) = 1.12
 MARGIN = 1.2
+# Where a wheel lifts or strikes a step is divided into parts of at most this length (s): a fiftieth
+# of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
+PART = {FAST: 1e-4, RK4: 2.5e-4}
+# share of the static wheel load by which a contact force may change in a step that is not divided:
+# on smooth curves and on ERRI B176 track at 40 m/s no step is
+SWING = 0.1
 GROWTH = 5.0  # 1/s, growth beyond that of the vehicle that counts as instability of the scheme
 _NEVER = 1 << 40
 
@@ -57,6 +65,21 @@ def empty_recorder(
         chosen=chosen,
         element=np.zeros((rows, len(chosen), ELEMENT_COLUMNS)),
     )
+
+
+def divide_strikes(work: Work, scheme: int, step: float) -> None:
+    """Have the time loop divide the steps over which a wheel lifts or strikes.
+
+    Parameters
+    ----------
+    work : Work
+        With which the loop is called.
+    scheme, step : int, float
+        FAST or RK4; time step [s].
+    """
+    parts = math.ceil(step / PART[scheme] * (1.0 - 1e-9))
+    work.parts[0] = parts if parts > 1 else 0
+    work.watch[1] = SWING
 
 
 def choose_step(

@@ -21,7 +21,15 @@ the wheel slips.  On rigid rails all four are zero.
 from math import asin, sqrt
 
 from railsim.kernels import jit_inline, jit_merged
-from railsim.kernels.track_frame import MU_LEFT, Y_LEFT, Y_RIGHT, Z_LEFT, Z_RIGHT, polynomial
+from railsim.kernels.track_frame import (
+    MU_LEFT,
+    Y_LEFT,
+    Y_RIGHT,
+    Z_LEFT,
+    Z_RIGHT,
+    cell_of,
+    polynomial,
+)
 
 CANT_BASE = 1.5  # m, 2 b_0
 
@@ -38,6 +46,10 @@ RAIL_SIZE = 8
 # columns of Work.rail_motion[w, side]
 MOTION_Y, MOTION_Z, MOTION_Y_RATE, MOTION_Z_RATE = range(4)
 MOTION_SIZE = 4
+
+# columns of Work.coming[side], by how much the rates of a wheel beside its rail are about to change
+COMING_Y, COMING_Z, COMING_ROLL = range(3)
+COMING = 4
 
 
 @jit_inline
@@ -92,3 +104,35 @@ def locate_displaced(c, i, u, w, plane, rail):
     rail[w, 1, ASIDE], rail[w, 1, ASIDE_SLOPE] = wider, widening
     rail[w, 0, RAIL_SLOPE], rail[w, 0, RAIL_BEND] = y_l1, y_l2
     rail[w, 1, RAIL_SLOPE], rail[w, 1, RAIL_BEND] = y_r1, y_r2
+
+
+@jit_merged
+def foresee(track, s, speed, w, plane, rail, state, own, h, coming):
+    """How the rates of wheelset `w` beside its rails will have changed after `h`, into `coming`.
+
+    The rails' slopes are those at `s`, where the wheelset will then be; the wheelset is taken to
+    keep its acceleration, so that nothing changes for one that follows its rails.
+
+    Parameters
+    ----------
+    plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
+        Where the wheelsets are now.
+    own : int
+        Where its smoothed accelerations begin in the state.
+    coming : float64[2, COMING]
+        Rates of y, z [m/s] and roll [rad/s] by side; zero beyond the end of the track's table.
+    """
+    i, u = cell_of(track, s)
+    change = speed if i >= 0 else 0.0
+    for side in range(2):
+        y_slope, z_slope = 0.0, 0.0
+        if i >= 0:
+            y, z = (Y_RIGHT, Z_RIGHT) if side else (Y_LEFT, Z_LEFT)
+            c = track.rail
+            _, y_slope, _ = polynomial(c[i, y, 0], c[i, y, 1], c[i, y, 2], c[i, y, 3], u)
+            _, z_slope, _ = polynomial(c[i, z, 0], c[i, z, 1], c[i, z, 2], c[i, z, 3], u)
+        arm = (side - 0.5) * CANT_BASE * plane[w, COSINE]
+        now = plane[w, SLOPE_Z] + arm * plane[w, ROLL_SLOPE]
+        coming[side, COMING_Y] = change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[own + 1]
+        coming[side, COMING_Z] = change * (now - z_slope) + h * state[own + 2]
+        coming[side, COMING_ROLL] = h * state[own + 3]

@@ -9,6 +9,7 @@ YAW_RANGE = 5
 NOT_FINITE = 6
 END_OF_TRACK = 7
 STANDSTILL = 8
+STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; it goes on alone
 
 # code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
 STATUS = {

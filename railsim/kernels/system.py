@@ -9,6 +9,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
     then 28w      of each wheelset on elastic rails: track under it, see `support`
+    -4            memory of the fast scheme: length of the last step (s), 0 where there was none
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
@@ -27,7 +28,7 @@ RIGID, WHEELSET, AXLEBOX = range(3)
 
 # ways of driving
 CONSTANT, TABLE, FREE = range(3)
-N_SCALARS = 3  # t, s, V at the end of the state
+N_SCALARS = 4  # last step, t, s, V at the end of the state
 
 
 # columns of Bodies.row
@@ -109,6 +110,7 @@ class Contact(NamedTuple):
     ----------
     body : int64[w]              body index of each wheelset
     table : int64[w, 2]          which table serves each wheel
+    load : float64[w]            mean static wheel load of its vehicle [N]
     values : float64[t, 3, n_w, n_roll, n_y, 8]  tables, see `contact_table`
     shear : float64[t]           lever of roll in the tables' lateral coordinate [m]
     coupling : float64[t, 2]     compliance between neighbouring patches [m/N]
@@ -124,6 +126,7 @@ class Contact(NamedTuple):
 
     body: np.ndarray
     table: np.ndarray
+    load: np.ndarray
     values: np.ndarray
     shear: np.ndarray
     coupling: np.ndarray
@@ -358,6 +361,16 @@ class Work(NamedTuple):
                                 [m/(N s)]
     events : int64[w, 2]        of each wheelset: loaded patches so far, and how many of them were
                                 outside the range of the creep law
+    swing : float64[w]          largest rate of the contact forces of each wheelset [N/s]
+    watch : float64[2]          time for which contact forces are foreseen [s]; share of the static
+                                wheel load by which they may change in a step
+    coming : float64[2, COMING] of the wheelset at hand, see `rails.foresee`
+    parts : int64[2]            parts of a step over which a wheel lifts or strikes, 0 where that is
+                                not looked for; steps that were divided so far
+    extremes : float64[6, w, EXTREMES]  see `extremes`
+    present : float64[EXTREMES] scratch of the extremes
+    unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]
+    decay_part : float64[m]     as `decay` for a part of a step
     """
 
     frames: np.ndarray
@@ -388,3 +401,11 @@ class Work(NamedTuple):
     compliance: np.ndarray
     events: np.ndarray
     wheel: np.ndarray
+    swing: np.ndarray
+    watch: np.ndarray
+    coming: np.ndarray
+    parts: np.ndarray
+    extremes: np.ndarray
+    present: np.ndarray
+    unloaded: np.ndarray
+    decay_part: np.ndarray

@@ -14,6 +14,7 @@ import numpy as np
 
 from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
 from railsim.kernels.element_outputs import element_outputs
+from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.internal import (
     MAXWELL_CURVE,
     PAD,
@@ -22,7 +23,7 @@ from railsim.kernels.internal import (
     within_table,
 )
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
-from railsim.kernels.status import NOT_FINITE, RUNNING
+from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import (
     note_wheelsets,
     remember_track,
@@ -193,6 +194,7 @@ def remember(system, work, state, derivative, h):
         state[first + 6 * n + i] = work.drive[i, 0]
     if system.support.elastic:
         remember_track(system, work, state)
+    state[-4] = h
 
 
 @jit_inline
@@ -201,6 +203,9 @@ def step_fast(system, work, state, derivative, decay, h):
 
     With the acceleration a of this step and b, the smoothed one of the steps before:
     u = v + h (a - b/2), q <- q + h u, b <- b + SMOOTHING (a - b), v <- u + h/2 b.
+
+    v - h/2 b is the velocity in the middle of the last step; where that was of another length h_0,
+    v is moved by (h_0 - h)/2 (a - b), so that it is that of a last step of length h.
     """
     bodies, C = system.bodies, work.relative
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
@@ -208,34 +213,39 @@ def step_fast(system, work, state, derivative, decay, h):
     rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
     if system.support.elastic:
         note_wheelsets(system, work, state)
+    last = state[-4] if state[-4] > 0.0 else h
+    shift = 0.5 * (last - h)
     for b in range(n):
         q = 6 * b
         v = 6 * n + q
         kind = bodies.kind[b]
         if kind == WHEELSET:
-            soften_contact(bodies, work.contact_jacobian, b, rate, before, h)
-        d1 = h * (rate[q + 3] - 0.5 * before[q + 3])
-        d2 = h * (rate[q + 4] - 0.5 * before[q + 4])
-        d3 = h * (rate[q + 5] - 0.5 * before[q + 5])
+            soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
+        d1 = (h + shift) * rate[q + 3] - (0.5 * h + shift) * before[q + 3]
+        d2 = (h + shift) * rate[q + 4] - (0.5 * h + shift) * before[q + 4]
+        d3 = (h + shift) * rate[q + 5] - (0.5 * h + shift) * before[q + 5]
         if kind != AXLEBOX:
             d1, d2, d3 = euler_rates(C[b, SIN_ROLL], C[b, COS_ROLL], C[b, SIN_PITCH],
                                      C[b, COS_PITCH], d1, d2, d3)
         for k in range(3):
-            state[q + k] += h * (state[v + k] + h * (rate[q + k] - 0.5 * before[q + k]))
+            state[q + k] += h * (state[v + k] + (h + shift) * rate[q + k]
+                                 - (0.5 * h + shift) * before[q + k])
         state[q + 3] += h * (derivative[q + 3] + d1)
         state[q + 4] += h * (derivative[q + 4] + d2)
         state[q + 5] += h * (derivative[q + 5] + d3)
         for k in range(6):
             change = rate[q + k] - before[q + k]
-            state[v + k] += h * (rate[q + k] + 0.5 * SMOOTHING * change)
+            state[v + k] += h * rate[q + k] + (0.5 * SMOOTHING * h + shift) * change
             before[q + k] += SMOOTHING * change
     drives = first + 6 * n
+    ratio = h / last
     for i in range(m):
         k = 12 * n + i
-        drive = 1.5 * work.drive[i, 0] - 0.5 * state[drives + i]
+        drive = work.drive[i, 0] + 0.5 * ratio * (work.drive[i, 0] - state[drives + i])
         state[drives + i] = work.drive[i, 0]
         state[k] = advanced(system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h,
                             decay[i])
+    state[-4] = h
     advance_place(system.drive, state, derivative, h)
     if system.support.elastic:
         step_support(system, work, state, h)
@@ -300,6 +310,18 @@ def step_rk4(system, work, state, derivative, stages, h):
     return RUNNING, 0
 
 
+@jit_inline
+def striking(contact, swing, h, share):
+    """First wheelset with a contact force about to change by more than a share of the wheel load.
+
+    There wheels lift, strike, or ring afterwards; -1 where nothing does.
+    """
+    for w in range(contact.body.shape[0]):
+        if swing[w] * h > share * contact.load[w]:
+            return w
+    return -1
+
+
 @jit_merged
 def all_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
@@ -333,36 +355,60 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
     status, where, steps, rows : int
         Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
     """
-    decay = work.decay
-    constant_decays(system.internal, h, decay)
+    parts = work.parts[0]
+    work.watch[0] = h if parts > 0 else 0.0
+    constant_decays(system.internal, h, work.decay)
+    if parts > 0:
+        constant_decays(system.internal, h / parts, work.decay_part)
     if system.support.elastic:
         step_compliance(system.support, h, work.compliance)
     rows = np.int64(0)
-    end = first_step + n_steps
-    for step in range(first_step, end + closing):
+    step, end = first_step, first_step + n_steps
+    left = np.int64(0)  # parts of a divided step that are still to be taken
+    decay, length = work.decay, h
+    while step < end + closing:
         if scheme == RK4:
             status, where, patches = balanced_mechanics(system, work, state, derivative)
         else:
             status, where, patches = mechanics(system, work, state, derivative)
         if status == RUNNING:
+            note_extremes(system, work.wheel, state, work.present, work.extremes)
             if scheme == RK4:
                 internal_rates(system, work, state, derivative)
                 support_rates(system, work, state, derivative)
-            if step % every == 0:
-                record(recorder, rows, system, state, derivative, work, patches)
-                rows += 1
-            if step == end:
-                return RUNNING, 0, n_steps, rows
-            if scheme == FAST:
-                if fresh and step == first_step:
+            if left == 0:
+                if step % every == 0:
+                    record(recorder, rows, system, state, derivative, work, patches)
+                    rows += 1
+                if step == end:
+                    return RUNNING, 0, n_steps, rows
+                if scheme == FAST and fresh and step == first_step:
                     remember(system, work, state, derivative, h)
-                step_fast(system, work, state, derivative, decay, h)
+                decay, length = work.decay, h
+                w = striking(system.contact, work.swing, h, work.watch[1]) if parts > 0 else -1
+                if w >= 0:
+                    if system.bodies.references.shape[0] > 1:
+                        return STRIKES, w, step - first_step, rows
+                    decay, length = work.decay_part, h / parts
+                    left = parts
+                    work.parts[1] += 1
+                    if system.support.elastic:
+                        step_compliance(system.support, length, work.compliance)
+            note_unloaded(work.wheel, length, work.unloaded)
+            if scheme == FAST:
+                step_fast(system, work, state, derivative, decay, length)
             else:
-                status, where = step_rk4(system, work, state, derivative, stages, h)
-        if status != RUNNING or step % every == 0:
+                status, where = step_rk4(system, work, state, derivative, stages, length)
+            if left > 0:
+                left -= 1
+                if left == 0 and system.support.elastic:
+                    step_compliance(system.support, h, work.compliance)
+        if status != RUNNING or (left == 0 and step % every == 0):
             bad = all_finite(state)
             if bad >= 0:
                 return NOT_FINITE, bad, step - first_step, rows
         if status != RUNNING:
             return status, where, step - first_step, rows
+        if left == 0:
+            step += 1
     return RUNNING, 0, n_steps, rows

@@ -52,6 +52,9 @@ from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
+    COMING_ROLL,
+    COMING_Y,
+    COMING_Z,
     COSINE,
     FRICTION,
     MIDDLE_Y,
@@ -67,6 +70,7 @@ from railsim.kernels.rails import (
     SINE,
     SLOPE_Y,
     SLOPE_Z,
+    foresee,
     locate_rails,
 )
 from railsim.kernels.status import (
@@ -119,6 +123,8 @@ WHEEL_COLUMNS = 9
 J_ALONG, J_ALONG_LEVER, J_ACROSS, J_ACROSS_LEVER, J_YAW, J_Y, J_Z, J_ROLL = range(8)
 CONTACT_JACOBIAN = 8
 
+# a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
+NEAR = 2e-3
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
@@ -136,6 +142,8 @@ def normal_contact(system, work, speed, state):
     force, plane, above = work.rail_force, work.plane, work.above
     jacobian = work.contact_jacobian
     n_bodies = system.bodies.kind.shape[0]
+    smoothed = 12 * n_bodies + system.internal.kind.shape[0]
+    ahead = work.watch[0]
     n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
     for w in range(contact.body.shape[0]):
         b = contact.body[w]
@@ -159,6 +167,12 @@ def normal_contact(system, work, speed, state):
         above[4], above[5] = y_rate, z_rate
         # rates of the Euler angles were left here by the kinematics
         above[6], above[7] = work.acceleration[b, 3] - turn, work.acceleration[b, 5]
+        work.swing[w] = 0.0
+        if ahead > 0.0 and system.track.has_irregularity:
+            own = smoothed + 6 * b
+            place = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
+            foresee(system.track, place, speed, w, plane, work.rail, state, own, ahead,
+                    work.coming)
         for side in range(2):
             status, n = wheel_contact(system, work, w, side, speed, n)
             if status != RUNNING:
@@ -189,7 +203,8 @@ def wheel_contact(system, work, w, side, speed, n):
     b = contact.body[w]
     jacobian = work.contact_jacobian
     sign = 2.0 * side - 1.0
-    motion = work.rail_motion
+    motion, coming, ahead = work.rail_motion, work.coming, work.watch[0]
+    swing = 0.0
     aside, aside_slope = rail[w, side, ASIDE], rail[w, side, ASIDE_SLOPE]
     bend = rail[w, side, RAIL_BEND]
     y = sign * (above[0] - aside - motion[w, side, MOTION_Y])
@@ -221,12 +236,21 @@ def wheel_contact(system, work, w, side, speed, n):
     coupled_approaches(contact.coupling, table, stiffness, approach)
     for patch in range(N_PATCH):
         p = approach[patch]
-        if p <= 0.0:
+        if p <= -NEAR:
             continue
         k = patch * LOOK_UP_SIZE
         p_rate = (z_rate - t[k + G_Y] * y_rate - t[k + G_ROLL] * roll_rate
                   - t[k + G_W] * 2.0 * yaw * yaw_rate)
+        p_change = (coming[side, COMING_Z] - sign * (t[k + G_Y] * coming[side, COMING_Y]
+                    + t[k + G_ROLL] * coming[side, COMING_ROLL]))
+        if p <= 0.0:
+            p += ahead * (p_rate + max(p_change, 0.0))
+            if p > 0.0:
+                swing = max(swing, t[k + 1] * p * sqrt(p) / ahead)
+            continue
         root = sqrt(p)
+        change = max(abs(p_rate), abs(p_rate + p_change))
+        swing = max(swing, 1.5 * t[k + 1] * root * change)
         elastic = t[k + 1] * p * root
         # contact plane: the slope at the place of contact and the direction of the elastic
         # force differ where the normal turns over the patch, in opposite senses from the
@@ -282,6 +306,7 @@ def wheel_contact(system, work, w, side, speed, n):
     wheel[w, side, W_T_GAMMA] = 0.0
     wheel[w, side, W_T_GAMMA_SPIN] = 0.0
     wheel[w, side, W_LIFT] = lift
+    work.swing[w] = max(work.swing[w], swing)
     if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, z):
         return WHEEL_LIFT, n
     return RUNNING, n

@@ -48,7 +48,8 @@ class Result:
         Every wheel and rail profile that was used, by its name in the vehicle or track.
     groups : mapping of str to mapping of str to ndarray
         Further arrays by group: ``state`` holds the whole state at the ``end`` of the run, and the
-        one at its ``start`` where that went on from another run.
+        one at its ``start`` where that went on from another run; ``peaks`` the largest and smallest
+        values over all steps, see `railsim.peaks`.
 
     Examples
     --------
@@ -182,7 +183,7 @@ class Result:
 
     @property
     def groups(self) -> Mapping[str, Mapping[str, Array]]:
-        """Further arrays by group: the states at the ``end`` and ``start`` in ``state``."""
+        """Further arrays by group: ``state`` and ``peaks``."""
         return self._groups
 
     @property

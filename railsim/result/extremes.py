@@ -84,7 +84,13 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
         Quantity with time as its first dimension.
     kind : {"abs", "max", "min"}
         Largest magnitude, largest or smallest value; values that are not a number are left out.
+
+    Notes
+    -----
+    Of the quantities in the group ``peaks`` over all steps of the run, of others over its outputs.
     """
+    if name in result.groups.get("peaks", {}):
+        return _peak_of_steps(result, name, kind)
     array = result[name]
     keys: dict[str, Array] = {"abs": np.abs(array), "max": array, "min": -array}
     key = keys[kind]
@@ -97,6 +103,22 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
         _labels(result, name, place[1:]),
         float(result["time"][instant]),
         float(result["distance"][instant]),
+        kind,
+    )
+
+
+def _peak_of_steps(result: Result, name: str, kind: str) -> Peak:
+    found = result.groups["peaks"]
+    rows = {"abs": slice(0, 2), "max": slice(0, 1), "min": slice(1, 2)}[kind]
+    values = found[name][rows]
+    key = {"abs": np.abs(values), "max": values, "min": -values}[kind]
+    place = np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
+    return Peak(
+        result.quantities[name],
+        float(values[place]),
+        _labels(result, name, place[1:]),
+        float(found[f"{name}_time"][rows][place]),
+        float(found[f"{name}_distance"][rows][place]),
         kind,
     )
 

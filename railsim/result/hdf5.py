@@ -25,7 +25,7 @@ import numpy as np
 
 from railsim.errors import Fault, InputError
 from railsim.files import check_file, partial_path
-from railsim.notation import QUANTITIES, Quantity
+from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
 from railsim.result.data import Array, Attributes, FrozenArrays, Result, frozen
 from railsim.result.sinks import (
@@ -38,6 +38,7 @@ from railsim.result.sinks import (
     timed,
 )
 
+PEAKS = "peaks"  # group of largest and smallest values over all steps
 CHUNK_BYTES = 2**18
 # what the result of every run holds
 ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
@@ -147,6 +148,8 @@ class Hdf5Sink(SinkContext):
         for group, arrays in groups.items():
             for name, array in arrays.items():
                 self._file.create_dataset(f"{group}/{name}", data=frozen(array))
+            if group == PEAKS:
+                _describe_peaks(self._file[group], self._file)
         self._file.attrs.update(root_attributes(self._attributes, attributes))
         self._file.close()
         os.replace(self._partial, self.path)
@@ -224,7 +227,10 @@ def _read(file: h5py.File, path: Path) -> Result:
     groups: dict[str, Mapping[str, Array]] = {}
     for name, member in file.items():
         if isinstance(member, h5py.Group) and name != "profiles":
-            groups[name] = {key: array[()] for key, array in member.items()}
+            groups[name] = {
+                key: array[()] for key, array in member.items()
+                if not h5py.check_string_dtype(array.dtype)
+            }
         elif isinstance(member, h5py.Group):
             profiles |= {unquote(key): _profile(dataset) for key, dataset in member.items()}
         elif h5py.check_string_dtype(member.dtype):
@@ -269,7 +275,7 @@ class StoredArrays(FrozenArrays):
         return len(self._names)
 
 
-def _write_names(file: h5py.File, dim: str, labels: Sequence[str]) -> None:
+def _write_names(file: h5py.Group, dim: str, labels: Sequence[str]) -> None:
     encoded = [label.encode() for label in labels]
     kind = h5py.string_dtype("utf-8", max((len(label) for label in encoded), default=1))
     dataset = file.create_dataset(dim, data=np.array(encoded, dtype=kind))
@@ -305,6 +311,26 @@ def _describe(dataset: h5py.Dataset, quantity: Quantity) -> None:
     if quantity.name != "time":
         for axis, dim in enumerate(quantity.dims):
             dataset.dims[axis].attach_scale(dataset.file[dim])
+
+
+def _describe_peaks(group: h5py.Group, file: h5py.File) -> None:
+    """Units, names and dimensions of largest and smallest values, their times and places."""
+    _write_names(group, "extreme", EXTREMES)
+    for name, dataset in group.items():
+        if name == "extreme":
+            continue
+        base = name.removesuffix("_time").removesuffix("_distance")
+        quantity = QUANTITIES[base]
+        words = f"largest and smallest {quantity.long_name}"
+        if name == base:
+            dataset.attrs["units"], dataset.attrs["long_name"] = quantity.unit, words
+        else:
+            other = QUANTITIES[name.removeprefix(f"{base}_")]
+            dataset.attrs["units"] = other.unit
+            dataset.attrs["long_name"] = f"{words}: {other.long_name}"
+        dataset.dims[0].attach_scale(group["extreme"])
+        for axis, dim in enumerate(quantity.dims[1:], start=1):
+            dataset.dims[axis].attach_scale(file[dim])
 
 
 def _quantity(name: str, dataset: h5py.Dataset) -> Quantity:

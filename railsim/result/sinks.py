@@ -68,7 +68,8 @@ class Sink(Protocol):
         profiles : mapping of str to Profile
             Every profile that was used, by its name in the vehicle or track.
         groups : mapping of str to mapping of str to ndarray
-            Further arrays, such as the states at start and end in the group ``state``.
+            Further arrays: the states at start and end in ``state``, largest and smallest values
+            over all steps in ``peaks``.
         """
 
     def abort(self) -> None:

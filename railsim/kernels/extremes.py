@@ -1,0 +1,68 @@
+"""Largest and smallest values of a run, taken at the time loop's own steps.
+
+Outputs are samples: between two of them a wheel may have struck its rail.  Rows of `Work.extremes`
+are the largest value, its time and the arc length of the reference body there, then the same of the
+smallest one; columns the quantities of each wheelset.
+"""
+
+import numpy as np
+
+from railsim.kernels import jit_inline
+from railsim.kernels.support import HALF_BASE, SUPPORT_SIZE, support_begin
+from railsim.kernels.wheel_rail import W_Q, W_T_GAMMA, W_Y
+
+# columns of Work.extremes; those of a wheel are followed by the same of the right one
+(
+    X_Q, X_Q_RIGHT, X_Y, X_Y_RIGHT, X_Y_OVER_Q, X_Y_OVER_Q_RIGHT, X_T_GAMMA, X_T_GAMMA_RIGHT,
+    X_SUM_Y, X_SUM_ABS_Y, X_LATERAL, X_ROLL, X_YAW,
+) = range(13)
+EXTREMES = 16
+# rows
+MAX, MIN = 0, 3
+
+
+@jit_inline
+def note_unloaded(wheel, h, unloaded):
+    """Add a step of length `h` to the time of every wheel that carries nothing."""
+    for w in range(wheel.shape[0]):
+        for side in range(2):
+            if wheel[w, side, W_Q] <= 0.0:
+                unloaded[w, side] += h
+
+
+@jit_inline
+def note_extremes(system, wheel, state, present, extremes):
+    """Take the values of this instant into the extremes; `present` is scratch of their size."""
+    time, s = state[-3], state[-2]
+    body = system.contact.body
+    rails = support_begin(system)
+    for w in range(body.shape[0]):
+        b = 6 * body[w]
+        for side in range(2):
+            Q, Y = wheel[w, side, W_Q], wheel[w, side, W_Y]
+            present[X_Q + side] = Q
+            present[X_Y + side] = Y
+            # a wheel that carries nothing has no derailment quotient
+            present[X_Y_OVER_Q + side] = (2 * side - 1) * Y / Q if Q > 0.0 else np.nan
+            present[X_T_GAMMA + side] = wheel[w, side, W_T_GAMMA]
+        left, right = present[X_Y], present[X_Y_RIGHT]
+        present[X_SUM_Y] = left + right
+        present[X_SUM_ABS_Y] = abs(left) + abs(right)
+        present[X_LATERAL] = state[b + 1]
+        present[X_ROLL] = state[b + 3]
+        present[X_YAW] = state[b + 5]
+        if system.support.elastic:
+            # relative to the rails where they are
+            i = rails + SUPPORT_SIZE * w
+            present[X_LATERAL] -= 0.5 * (state[i] + state[i + 2])
+            present[X_ROLL] -= (state[i + 3] - state[i + 1]) / (2.0 * system.support.row[HALF_BASE])
+        for k in range(X_YAW + 1):
+            value = present[k]
+            if value > extremes[MAX, w, k]:
+                extremes[MAX, w, k] = value
+                extremes[MAX + 1, w, k] = time
+                extremes[MAX + 2, w, k] = s
+            if value < extremes[MIN, w, k]:
+                extremes[MIN, w, k] = value
+                extremes[MIN + 1, w, k] = time
+                extremes[MIN + 2, w, k] = s
