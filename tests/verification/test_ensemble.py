@@ -242,8 +242,10 @@ def test_states_come_back_as_they_went_in():
     members = models([coach(), test_vehicle("two_axle_wagon")], load_track("straight"))
     ensemble = Ensemble(members, [empty_recorder(model, 1) for model in members])
     rng = np.random.default_rng(0)
-    states = [np.append(rng.normal(size=model.n_state - 3), (1.0, 2.0, 3.0)) for model in members]
+    common = 1e-3, 1.0, 2.0, 3.0  # last step, time, place, speed
+    own = [model.n_state - len(common) for model in members]
+    states = [np.append(rng.normal(size=size), common) for size in own]
     joint = ensemble.state(states)
-    assert len(joint) == sum(len(state) for state in states) - 3
+    assert len(joint) == sum(own) + len(common)
     for part, state in zip(ensemble.parts, states, strict=True):
         np.testing.assert_array_equal(joint[part.state], state)

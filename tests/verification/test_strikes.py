@@ -1,0 +1,123 @@
+"""Wheels that lift and strike: divided steps against the reference scheme, peaks from all steps.
+
+A dip of 1 m and 2 mm at 40 m/s, in which the wheels leave the rail for milliseconds.  The reference
+is RK4 at 0.125 ms; at 0.0625 ms its peaks change by less than 1e-4.
+"""
+
+import numpy as np
+import pytest
+import xarray
+from dynamics import Settings, load_track, load_vehicle
+
+import railsim
+from railsim.remarks import MOST_Q
+from railsim.simulation import simulate, simulate_together
+
+SPEED, UNTIL = 40.0, 36.0
+AT = {"type": "dip", "s": 20.0, "length": 1.0, "depth": 2e-3}
+
+
+def over_the_dip(rail="left", support="rigid", vehicle="coach_manchester", **settings):
+    track = load_track("straight").replace(
+        irregularities=[{**AT, "rail": rail}], support={"preset": support}
+    )
+    return simulate(load_vehicle(vehicle), track, speed=SPEED, until=UNTIL,
+                    settings=Settings(**settings))
+
+
+def peak_values(result):
+    return {(p.quantity.name, p.kind): p.value for p in railsim.peaks(result)}
+
+
+@pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
+@pytest.mark.parametrize(("rail", "support"), [
+    ("left", "rigid"), ("both", "rigid"), ("left", "co-running"),
+])
+def test_peaks_of_a_strike_are_those_of_the_reference(rail, support, vehicle):
+    result = over_the_dip(rail, support, vehicle)
+    reference = over_the_dip(rail, support, vehicle, scheme="rk4", step=0.125e-3, output_rate=1e3)
+    assert result.attributes["step"] == 1.25e-3
+    found, expected = peak_values(result), peak_values(reference)
+    # 0.4 % of the ring's amplitude from parts of 0.1 ms; sum_Y takes the errors of both wheels
+    for name, tolerance in (("Q", 0.01), ("sum_abs_Y", 0.02)):
+        assert found[name, "abs"] == pytest.approx(expected[name, "abs"], rel=tolerance)
+    assert found["dQ_over_Q0", "min"] == expected["dQ_over_Q0", "min"] == -1.0
+
+
+def test_peaks_do_not_depend_on_the_output_rate():
+    runs = [over_the_dip(output_rate=rate) for rate in (50.0, 200.0, 800.0)]
+    assert {run.attributes["step"] for run in runs} == {1.25e-3}
+    for run in runs[1:]:
+        for name, values in run.groups["peaks"].items():
+            np.testing.assert_array_equal(values, runs[0].groups["peaks"][name])
+    # what the samples miss
+    assert np.max(runs[0].Q) < 0.9 * peak_values(runs[0])["Q", "abs"]
+
+
+def test_no_step_is_divided_where_nothing_strikes():
+    coach = load_vehicle("coach_manchester")
+    rough = load_track("straight").replace(
+        irregularities=[{"type": "random", "spectrum": "erri_b176_low", "seed": 1}]
+    )
+    for track, speed, until in ((load_track("curve_r250"), 20.0, 400.0), (rough, 40.0, 150.0)):
+        result = simulate(coach, track, speed=speed, until=until)
+        assert result.attributes["steps_divided"] == 0
+        assert result.remarks == ()
+
+
+def test_run_that_ends_while_a_wheel_rings_goes_on_to_the_same_bytes():
+    whole = over_the_dip()
+    coach, track = whole.vehicle(), whole.track()
+    first = simulate(coach, track, speed=SPEED, until=10.0)  # the leading wheelset is in the dip
+    assert 0 < first.attributes["steps_divided"] < whole.attributes["steps_divided"]
+    second = simulate(coach, track, until=UNTIL, resume=first)
+    np.testing.assert_array_equal(second.groups["state"]["end"], whole.groups["state"]["end"])
+
+
+def test_vehicle_that_lifts_a_wheel_goes_on_as_alone():
+    track = load_track("straight").replace(irregularities=[{**AT, "rail": "left"}])
+    coaches = [load_vehicle("coach_manchester"), load_vehicle("coach_flexicoil")]
+    how = {"speed": SPEED, "until": UNTIL}
+    for vehicle, result in zip(coaches, simulate_together(coaches, track, **how), strict=True):
+        alone = simulate(vehicle, track, **how)
+        for name in alone:
+            np.testing.assert_array_equal(result[name], alone[name])
+        for name, values in alone.groups["peaks"].items():
+            np.testing.assert_array_equal(result.groups["peaks"][name], values)
+        assert result.remarks == alone.remarks
+
+
+def test_peaks_are_at_least_those_of_the_outputs():
+    result = over_the_dip()
+    for name in ("Q", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y", "T_gamma", "wheelset_lateral",
+                 "wheelset_roll", "wheelset_yaw", "dQ_over_Q0"):
+        largest, smallest = result.groups["peaks"][name]
+        assert (largest >= np.nanmax(result[name], axis=0)).all()
+        assert (smallest <= np.nanmin(result[name], axis=0)).all()
+
+
+def test_file_holds_peaks_with_units_times_and_places(tmp_path):
+    result = over_the_dip()
+    path = result.to_hdf5(tmp_path / "run.h5")
+    assert railsim.peaks(railsim.open_result(path)) == railsim.peaks(result)
+    with xarray.open_dataset(path, group="peaks", engine="h5netcdf") as data:
+        assert data.Q.dims == ("extreme", "wheelset", "side")
+        assert list(data.extreme.values) == ["max", "min"]
+        assert [data[name].units for name in ("Q", "Q_time", "Q_distance")] == ["N", "s", "m"]
+        largest = data.Q.sel(extreme="max")[0, 0]
+        assert float(largest) == result.groups["peaks"]["Q"][0, 0, 0]
+
+
+def test_lifted_wheels_are_remarked_on():
+    (remark,) = over_the_dip().remarks
+    assert "lifts off its rail: front.outer.wheelset, left" in remark
+    assert "4 wheels in all" in remark
+
+
+def test_forces_beyond_experience_are_remarked_on():
+    track = load_track("straight").replace(irregularities=[{**AT, "depth": 8e-3, "rail": "left"}])
+    result = simulate(load_vehicle("coach_manchester"), track, speed=SPEED, until=UNTIL)
+    assert result.status == "complete"
+    largest = np.max(result.groups["peaks"]["Q"][0] / result.Q0)
+    assert largest > MOST_Q
+    assert f"The largest Q is {largest:.3g} times the static wheel load" in result.remarks[0]
