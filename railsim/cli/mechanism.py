@@ -1,5 +1,6 @@
 """``railsim mechanism``: kinematics, forces and optimisation of planar linkages."""
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,10 +22,16 @@ from railsim.files import check_folder, make_folder, whole_file
 if TYPE_CHECKING:
     from railsim.definitions.mechanism import Mechanism
     from railsim.mechanisms.analysis import Analysis
+    from railsim.mechanisms.optimisation import Optimum
+
+REPORT, OPTIMISED = "report.html", "optimised.toml"
 
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.option("--optimise", "searched", is_flag=True, help="Search as the table [optimise] says.")
+@click.option("--starts", type=click.IntRange(min=1), metavar="N", help="Starts of the search.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Seed of its starts.")
 @click.option("--case", metavar="NAME", help="A case of the file instead of its base.")
 @click.option(
     "--at",
@@ -33,14 +40,21 @@ if TYPE_CHECKING:
     metavar="NAME=VALUE",
     help="Also all results where one of them has a value (SI), such as height=0.8955.",
 )
+@click.option(
+    "--out", metavar="DIR", help=f"Folder for {REPORT}, pictures, animation, positions.csv."
+)
 @set_option
 @overwrite_option
 @json_option
 @quiet_option
 def command(
     files: tuple[str, ...],
+    searched: bool,
+    starts: int | None,
+    seed: int | None,
     case: str | None,
     places: tuple[str, ...],
+    out: str | None,
     assignments: tuple[str, ...],
     overwrite: bool,
     as_json: bool,
@@ -49,42 +63,90 @@ def command(
     """Compute planar linkages with one degree of freedom: positions, forces, components.
 
     FILE is a mechanism file (format railsim-mechanism/1) or the name of a shipped one.  Of several
-    files the first is the reference of a comparison.
+    files the first is the reference of a comparison.  With --optimise, search for better
+    parameters; --out then also writes optimised.toml, which extends the file and runs again.
 
     \b
     Example:
-      railsim mechanism atr95_lift_5
-      railsim mechanism atr95_lift_5 --at height=0.8955 --set parameters.bore=0.125
+      railsim mechanism atr95_lift_5 --out lift_5 --overwrite
+      railsim mechanism atr95_lift_4 --optimise --starts 20 --seed 1
+      railsim mechanism atr95_lift_5 atr95_lift_4 --at height=0.8955
+      railsim mechanism tilting_one_spring --case bordolese_5000 --json
     """  # noqa: D301 - click reads the escape
-    results = [_analysed(file, assignments, case) for file in files]
+    _check_options(files, searched, starts, seed)
+    mechanisms = [_loaded(file, assignments) for file in files]
+    if out is not None:
+        check_folder(Path(out))
+    optimum = None
+    if searched:
+        with _faults_in(files[0], mechanisms[0]):
+            optimum = _optimised(mechanisms[0], case, starts, seed)
+        results = [optimum.after]
+    else:
+        results = []
+        for file, mechanism in zip(files, mechanisms, strict=True):
+            with _faults_in(file, mechanism):
+                results.append(_analysed(mechanism, case))
     found = [_values_at(result, places) for result in results]
+    cases = {} if searched else _cases(files[0], mechanisms[0], results[0])
+    written: list[Path] = []
+    if out is not None:
+        content = _content(results, cases, optimum)
+        if optimum is not None:
+            content[OPTIMISED] = _optimised_text(files[0], case, out, optimum, assignments)
+        written = _write(Path(out), content, overwrite)
     if as_json:
-        from railsim.mechanisms.summary import analysis_data
-
-        data = [analysis_data(result) for result in results]
-        for one, values in zip(data, found, strict=True):
-            if values:
-                one["at"] = values
-        print_json(data[0] if len(data) == 1 else {"mechanisms": data})
+        print_json(_data(results, cases, found, optimum))
         return
-    for number, (result, values) in enumerate(zip(results, found, strict=True)):
-        if number:
-            click.echo()
-        for line in _lines(result, values):
-            click.echo(line)
+    for line in _lines(results, found, optimum):
+        click.echo(line)
     if not quiet:
-        for result in results:
-            for remark in result.definition.remarks:
-                click.echo(f"remark: {result.definition.name}: {remark}", err=True)
+        for remark in dict.fromkeys(r for result in results for r in result.definition.remarks):
+            click.echo(f"remark: {remark}", err=True)
+        for path in written:
+            click.echo(str(path))
 
 
-def _analysed(file: str, assignments: Sequence[str], case: str | None) -> "Analysis":
+def _check_options(
+    files: Sequence[str], searched: bool, starts: int | None, seed: int | None
+) -> None:
+    if searched and len(files) > 1:
+        raise click.UsageError("--optimise takes one FILE")
+    if not searched and (starts is not None or seed is not None):
+        raise click.UsageError("--starts and --seed go with --optimise")
+
+
+def _loaded(file: str, assignments: Sequence[str]) -> "Mechanism":
     from railsim.definitions.loading import load_mechanism
+
+    return load_mechanism(file, assignments)
+
+
+def _analysed(mechanism: "Mechanism", case: str | None) -> "Analysis":
     from railsim.mechanisms.analysis import analyse
 
-    mechanism = load_mechanism(file, assignments)
+    return analyse(mechanism, case)
+
+
+def _cases(file: str, mechanism: "Mechanism", base: "Analysis") -> dict[str, "Analysis"]:
+    """All cases of the first file, the base first; none where it is computed in a case."""
+    if not mechanism.cases or base.case is not None:
+        return {}
     with _faults_in(file, mechanism):
-        return analyse(mechanism, case)
+        return {"base": base, **{name: _analysed(mechanism, name) for name in mechanism.cases}}
+
+
+def _optimised(
+    mechanism: "Mechanism", case: str | None, starts: int | None, seed: int | None
+) -> "Optimum":
+    from railsim.errors import Fault, InputError, nearest
+    from railsim.mechanisms.optimisation import optimise
+
+    if case is not None and case not in mechanism.cases:
+        raise InputError([Fault("--case", "", f"no case '{case}'", nearest(case, mechanism.cases))])
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    chosen = mechanism.in_case(case)
+    return optimise(chosen, starts=starts, seed=seed, workers=cores or 1)
 
 
 @contextmanager
@@ -118,9 +180,54 @@ def _values_at(result: "Analysis", places: Sequence[str]) -> list[dict[str, Any]
     return found
 
 
-def _lines(result: "Analysis", places: Sequence[dict[str, Any]]) -> list[str]:
+def _data(
+    results: Sequence["Analysis"],
+    cases: dict[str, "Analysis"],
+    found: Sequence[list[dict[str, Any]]],
+    optimum: "Optimum | None",
+) -> dict[str, Any]:
+    from railsim.mechanisms.comparison import compare
+    from railsim.mechanisms.summary import analysis_data, comparison_data, optimum_data
+
+    data = [optimum_data(optimum)] if optimum else [analysis_data(result) for result in results]
+    for one, values in zip(data, found, strict=True):
+        if values:
+            one["at"] = values
+    if len(data) > 1:
+        return {"mechanisms": data, "comparison": comparison_data(compare(results))}
+    data[0]["cases"] = {
+        name: analysis_data(result) for name, result in cases.items() if name != "base"
+    }
+    return data[0]
+
+
+def _lines(
+    results: Sequence["Analysis"],
+    found: Sequence[list[dict[str, Any]]],
+    optimum: "Optimum | None",
+) -> list[str]:
+    from railsim.mechanisms import tables
+    from railsim.mechanisms.comparison import compare
+
+    lines: list[str] = []
+    if optimum is not None:
+        lines += [*tables.optimum_sentences(optimum), ""]
+        lines += [*table(*tables.optimum_table(optimum)), ""]
+        if optimum.active:
+            lines += [*table(*tables.active_table(optimum), 2), ""]
+        lines += [*table(*tables.start_table(optimum)), ""]
+    for number, (result, values) in enumerate(zip(results, found, strict=True)):
+        lines += [""] if number else []
+        lines += _result_lines(result, values)
+    if len(results) > 1:
+        lines += ["", *table(*tables.comparison_table(compare(results)))]
+    return lines
+
+
+def _result_lines(result: "Analysis", places: Sequence[dict[str, Any]]) -> list[str]:
     from railsim.mechanisms import tables
     from railsim.mechanisms.selection import checks, selection
+    from railsim.mechanisms.tolerance import scatter
 
     definition = result.definition
     case = f", case {result.case}" if result.case else ""
@@ -129,60 +236,49 @@ def _lines(result: "Analysis", places: Sequence[dict[str, Any]]) -> list[str]:
     if places:
         rows = [(p["where"], {k: v for k, v in p.items() if k != "where"}) for p in places]
         lines += ["", *table(*tables.upright(tables.value_table(result, rows)))]
-    lines += ["", *_sentences(result)]
+    lines += ["", *tables.sentences(result)]
     lines += ["", *table(*tables.reaction_table(result))]
     if made := checks(result):
         lines += ["", *table(*tables.check_table(made))]
     if choices := selection(result):
         lines += ["", *table(*tables.selection_table(choices), 4)]
+    if definition.tolerances:
+        lines += ["", *table(*tables.scatter_table(scatter(definition)))]
     return lines
 
 
-def _sentences(result: "Analysis") -> list[str]:
-    """What is no table: stroke, zeros, contact force, motion."""
-    import numpy as np
+def _content(
+    results: Sequence["Analysis"], cases: dict[str, "Analysis"], optimum: "Optimum | None"
+) -> dict[str, bytes]:
+    """Page, pictures, animation and table, by the names of their files."""
+    from railsim.mechanisms.comparison import compare
+    from railsim.report import mechanisms as report
 
-    from railsim.mechanisms.quantities import quantity
-
-    travel = quantity("travel", result.definition)
-
-    def driver(value: float) -> str:
-        return f"{value * travel.scale:.4f} {travel.shown}"
-
-    lines = []
-    if "length" in result.output:
-        stroke = f"stroke {result.stroke * 1e3:.4f} mm"
-        lines.append(f"{stroke} over a travel of {driver(result.travel)}")
-    if result.force_zeros:
-        lines.append(f"force zero at {', '.join(driver(s) for s in result.force_zeros)}")
-    for s, stable in result.equilibria:
-        lines.append(f"at rest at {driver(s)}, {'stable' if stable else 'unstable'}")
-    if (contact := result.contact) is not None:
-        forces = ", ".join(f"{name} {value:.2f} N" for name, value in contact.force.items())
-        lines.append(f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces}")
-        lines += [f"  {contact.reason}"] if contact.reason else []
-        for y, stable in contact.equilibria:
-            word = "stable" if stable else "unstable"
-            lines.append(f"  rests at a height of {y * 1e3:.1f} mm without contact, {word}")
-    if (timed := result.timed) is not None:
-        lines.append(
-            f"motion in {timed.time[-1]:.3f} s: force {timed.force[0]:.2f} N at first, "
-            f"{np.min(timed.force):.2f} to {np.max(timed.force):.2f} N"
-        )
-    if (released := result.release) is not None:
-        end = "reaches" if released.reached else "is then at"
-        lines.append(
-            f"let go at {driver(released.s[0])} it {end} {driver(released.s[-1])} after "
-            f"{released.time[-1]:.5f} s"
-        )
-    return lines
+    comparison = compare(results) if len(results) > 1 else None
+    collected = report.Collected(results, cases, comparison, optimum)
+    drawn = {name: report.as_png(figure) for name, figure in report.figures(collected).items()}
+    content = {f"{name}.png": png for name, png in drawn.items()}
+    content["animation.gif"] = report.animation(collected.result)
+    content["positions.csv"] = report.positions(collected.result)
+    content[REPORT] = report.page(collected, drawn).encode()
+    return content
 
 
-def _write(folder: Path, files: dict[str, bytes], overwrite: bool) -> list[Path]:
-    """Write files into a folder, which is made if need be; all of them or none."""
-    check_folder(folder, files, overwrite=overwrite)
+def _optimised_text(
+    file: str, case: str | None, out: str, optimum: "Optimum", assignments: Sequence[str]
+) -> bytes:
+    """The file that extends another with the best parameters and whatever --set changed."""
+    from railsim.mechanisms.optimised_file import optimised_text
+
+    base = Path(os.path.relpath(file, out)).as_posix() if Path(file).is_file() else file
+    return optimised_text(base, optimum, assignments, case).encode()
+
+
+def _write(folder: Path, content: dict[str, bytes], overwrite: bool) -> list[Path]:
+    """Write files into a folder, which is made if need be; nothing on a fault."""
+    check_folder(folder, content, overwrite=overwrite)
     make_folder(folder)
-    for name, content in files.items():
+    for name, data in content.items():
         with whole_file(folder / name) as partial:
-            partial.write_bytes(content)
-    return [folder / name for name in files]
+            partial.write_bytes(data)
+    return [folder / name for name in content]

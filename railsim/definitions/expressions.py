@@ -8,7 +8,8 @@ here is analytic, or (`atan2`, `hypot`) continued to first order.
 
 import ast
 import math
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,9 @@ _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
 GRAMMAR = f"numbers, names of parameters, + - * / **, parentheses, pi, {', '.join(FUNCTIONS)}"
 
 
+Function = Callable[[Mapping[str, Any]], Any]
+
+
 class Expression(str):
     """The text of an expression, already parsed.
 
@@ -27,12 +31,15 @@ class Expression(str):
     ----------
     tree : ast.expr
         What it says.
+    function : callable
+        The same as nested functions of the values, without checks.
     names : frozenset of str
         Parameters that it uses.
     """
 
-    __slots__ = ("names", "tree")
+    __slots__ = ("function", "names", "tree")
     tree: ast.expr
+    function: Function
     names: frozenset[str]
 
     def __new__(cls, text: str) -> "Expression":
@@ -44,12 +51,17 @@ class Expression(str):
         """
         made = super().__new__(cls, text)
         made.tree = _parsed(text)
+        made.function = _nested(made.tree)
         made.names = frozenset(
             node.id
             for node in ast.walk(made.tree)
             if isinstance(node, ast.Name) and node.id not in (*FUNCTIONS, *CONSTANTS)
         )
         return made
+
+    def __reduce__(self) -> tuple[type["Expression"], tuple[str]]:
+        """Travel between processes as text."""
+        return Expression, (str(self),)
 
 
 def _parsed(text: str) -> ast.expr:
@@ -106,10 +118,53 @@ def evaluate(expression: Expression, values: Mapping[str, Any]) -> Any:
     5.0
     """
     with np.errstate(all="ignore"):
-        value = _value(expression.tree, values)
-    if not np.all(np.isfinite(value)):
-        raise ValueError(f"'{expression}' is not finite")
-    return value
+        try:
+            value = expression.function(values)
+        except (ZeroDivisionError, OverflowError, ValueError):
+            value = np.nan
+        if isinstance(value, np.ndarray):
+            # outside their domains functions of complex numbers leave the real axis
+            fine = bool(np.isfinite(value).all() and np.abs(value.imag).max() < 1e-9)
+        else:
+            fine = math.isfinite(value)
+        if fine:
+            return value
+        _value(expression.tree, values)
+    raise ValueError(f"'{expression}' is not finite")
+
+
+def _nested(node: ast.expr) -> Function:
+    """The functions of a checked tree, put into each other."""
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            constant = float(number)
+            return lambda values: constant
+        case ast.Name(id=name):
+            if name in CONSTANTS:
+                return lambda values: CONSTANTS[name]
+            return lambda values: values[name]
+        case ast.UnaryOp(op=op, operand=operand):
+            inner = _nested(operand)
+            return (lambda values: -inner(values)) if isinstance(op, ast.USub) else inner
+        case ast.BinOp(left=left, op=op, right=right):
+            a, b = _nested(left), _nested(right)
+            if isinstance(op, ast.Pow) and isinstance(right, ast.Constant):
+                return _power(a, right.value)
+            join = _JOINED[type(op)]
+            return lambda values: join(a(values), b(values))
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            function, inner = _CALLED[name], _nested(arguments[0])
+            if len(arguments) == 1:
+                return lambda values: function(inner(values))
+            second = _nested(arguments[1])
+            return lambda values: function(inner(values), second(values))
+    raise AssertionError(node)
+
+
+def _power(base: Function, exponent: Any) -> Function:
+    if exponent == 2:
+        return lambda values: (x := base(values)) * x
+    return lambda values: base(values) ** exponent
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
@@ -183,3 +238,22 @@ def hypot(x: Any, y: Any) -> Any:
     if not (np.iscomplexobj(x) or np.iscomplexobj(y)):
         return np.hypot(x, y)
     return np.sqrt(x * x + y * y)
+
+
+_JOINED: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_CALLED: dict[str, Callable[..., Any]] = {
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan2": atan2,
+    "hypot": hypot,
+}

@@ -527,35 +527,61 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
 
 
 @jit_outside
-def tangents(linkage, s, q, v, a, arcs):
+def tangents(real, linkage, s, q, v, a, arcs, second):
     """Positions and derivatives with their derivatives by a parameter in the imaginary parts.
 
-    One Newton step from the real solution is exact to first order in the imaginary part.
+    Every derivative solves the same real equations, `Phi_q dq = -dPhi`, and so on for q' and q'':
+    the right-hand sides are imaginary parts of the constraints of the moved mechanism.
 
     Parameters
     ----------
+    real : Linkage
+        The mechanism itself.
     linkage : Linkage
         Complex arrays, one lane for each parameter.
     s : complex128, shape (lane, position)
     q, v, a : complex128, shape (lane, position, n_bodies + 1, 3)
-        q holds the real solution and is refined; v, a are written.
+        Hold the real solution; their imaginary parts are written.
     arcs : int64, shape (position, joint)
+    second : bool
+        Whether the second derivatives are wanted too.
     """
     n = 3 * linkage.n_bodies
+    Phi_r, J_r, x = np.zeros(n), np.zeros((n, n)), np.zeros(n)
     Phi, J = np.zeros(n, dtype=np.complex128), np.zeros((n, n), dtype=np.complex128)
-    x, pivots = np.zeros(n, dtype=np.complex128), np.zeros(n, dtype=np.int64)
+    pivots = np.zeros(n, dtype=np.int64)
+    one_r, two_r, here = np.zeros(4), np.zeros(4), np.zeros((linkage.n_bodies + 1, 3))
     one, two = np.zeros(4, dtype=np.complex128), np.zeros(4, dtype=np.complex128)
-    for lane in range(q.shape[0]):
-        for i in range(q.shape[1]):
-            at = q[lane, i]
+    for i in range(q.shape[1]):
+        for k in range(n):
+            here[1 + k // 3, k % 3] = q[0, i, 1 + k // 3, k % 3].real
+        constraints(real, 0, arcs[i], here, s[0, i].real, Phi_r, J_r, one_r, two_r)
+        factor(J_r, pivots, n)
+        for lane in range(q.shape[0]):
+            at, rate, bend = q[lane, i], v[lane, i], a[lane, i]
             constraints(linkage, lane, arcs[i], at, s[lane, i], Phi, J, one, two)
-            factor(J, pivots, n)
-            substitute(J, pivots, Phi, n)
             for k in range(n):
-                at[1 + k // 3, k % 3] -= Phi[k]
+                x[k] = -Phi[k].imag
+            substitute(J_r, pivots, x, n)
+            for k in range(n):
+                at[1 + k // 3, k % 3] += 1j * x[k]
             constraints(linkage, lane, arcs[i], at, s[lane, i], Phi, J, one, two)
-            factor(J, pivots, n)
-            derivatives(linkage, lane, arcs[i], at, J, pivots, x, v[lane, i], a[lane, i], one, two)
+            for k in range(n):
+                x[k] = 0.0
+                for m in range(n):
+                    x[k] -= J[k, m].imag * rate[1 + m // 3, m % 3].real
+            substitute(J_r, pivots, x, n)
+            for k in range(n):
+                rate[1 + k // 3, k % 3] += 1j * x[k]
+            if second:
+                curvature(linkage, lane, arcs[i], at, rate, Phi, one, two)
+                for k in range(n):
+                    x[k] = Phi[k].imag
+                    for m in range(n):
+                        x[k] -= J[k, m].imag * bend[1 + m // 3, m % 3].real
+                substitute(J_r, pivots, x, n)
+                for k in range(n):
+                    bend[1 + k // 3, k % 3] += 1j * x[k]
 
 
 @jit_outside

@@ -13,6 +13,11 @@ module             job
 `dynamics`         motion laws and free motion
 `components`       gas spring, air spring, cylinder
 `selection`        checks and catalogues
+`comparison`       several mechanisms at equal output
+`targets`          positions and ratios of a reference
+`judgement`        objective and constraints with exact gradients
+`optimised_file`   the file that a search writes
+`drawing`          lines and points for pictures
 `summary`          results as plain numbers, for ``--json``
 `tables`           results as texts, for the terminal and the page
 `quantities`       names and units of the results

@@ -5,7 +5,7 @@ Complex models give complex results, whose imaginary parts are derivatives by pa
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -43,11 +43,14 @@ class Motion:
     q1: NDArray[Any]
     q2: NDArray[Any]
     arcs: NDArray[np.int64]
+    known: dict[str, Triple] = field(default_factory=dict, repr=False, compare=False)
 
     def point(self, name: str) -> Triple:
         """Place of a named point with two derivatives, shapes (..., position, 2)."""
-        k = self.model.points[name]
-        return self.at(self.model.linkage.point_body[k], *self._local(k))
+        if name not in self.known:
+            k = self.model.points[name]
+            self.known[name] = self.at(self.model.linkage.point_body[k], *self._local(k))
+        return self.known[name]
 
     def arc_centre(self, joint: int) -> Any:
         """Place of the centre of the arc that a cam's roller is on, shape (position, 2)."""
@@ -202,25 +205,26 @@ def check_freedom(model: Model) -> None:
     raise InputError([Fault(model.definition.name, "joints", where, "1 is needed")])
 
 
-def tangents(motion: Motion, names: Sequence[str], s: NDArray[Any] | None = None) -> Motion:
+def tangents(motion: Motion, moved: Model, *, second: bool = True) -> Motion:
     """The same positions with derivatives by parameters in the imaginary parts.
 
     Parameters
     ----------
     motion : Motion
         Positions of a real model.
-    names : sequence of str
-        Parameters, one lane each; an imaginary part is `STEP` times the derivative.
-    s : complex ndarray, shape (lane, position), optional
-        Driver where it depends on the parameters itself.
+    moved : Model
+        The model with a lane for each parameter (`Model.lanes`); an imaginary part of a result is
+        `STEP` times the derivative.
+    second : bool
+        Whether the second derivatives by the driver are wanted too.
     """
-    model = motion.model.lanes(names)
-    if s is None:
-        s = np.repeat(motion.s[None].astype(complex), len(names), axis=0)
-    q = np.repeat(motion.q[None].astype(complex), len(names), axis=0)
-    q1, q2 = np.zeros_like(q), np.zeros_like(q)
-    kernel.tangents(model.linkage, s, q, q1, q2, motion.arcs)
-    return Motion(model, s, q, q1, q2, motion.arcs)
+    count = moved.linkage.point.shape[0]
+    s, q, q1, q2 = (
+        np.repeat(array[None].astype(complex), count, axis=0)
+        for array in (motion.s, motion.q, motion.q1, motion.q2)
+    )
+    kernel.tangents(motion.model.linkage, moved.linkage, s, q, q1, q2, motion.arcs, second)
+    return Motion(moved, s, q, q1, q2, motion.arcs)
 
 
 def derivative(values: Any) -> Floats:

@@ -5,7 +5,7 @@ imaginary step each (`lanes`): whatever is computed from its numbers then carrie
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from railsim.definitions.mechanism import (
     Revolute,
     Slot,
 )
-from railsim.definitions.mechanism_faults import number, parameter_values, place, point_names, sizes
+from railsim.definitions.mechanism_faults import number, parameter_values, place, point_names
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 
@@ -68,18 +68,24 @@ class Model:
 
     def lanes(self, names: Sequence[str]) -> "Model":
         """The same model with a lane for each parameter, moved by `1j * STEP`."""
-        values: dict[str, Any] = {}
-        for name in names:
-            moved = np.full((len(names), 1), self.values[name], dtype=complex)
-            moved[names.index(name)] += 1j * STEP
-            values[name] = moved
         # expressions of the moved parameters follow; everything else keeps its value
         fixed = {
             name: self.values[name]
             for name, written in self.definition.parameters.items()
             if not isinstance(written, str)
         }
-        return build(self.definition, {**fixed, **values})
+        moved = {name: self.values[name] for name in names}
+        return build(self.definition, {**fixed, **with_lanes(moved)})
+
+    def real(self) -> "Model":
+        """The real model of one with lanes."""
+        arrays: dict[str, Any] = {
+            name: np.ascontiguousarray(value[:1].real)
+            for name, value in self.linkage._asdict().items()
+            if np.iscomplexobj(value)
+        }
+        values = {name: _real(value) for name, value in self.values.items()}
+        return replace(self, values=values, linkage=self.linkage._replace(**arrays))
 
     @property
     def joints(self) -> list[str]:
@@ -126,6 +132,15 @@ def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Mo
         _real(number(driver.start, values)),
         _real(number(driver.end, values)),
     )
+
+
+def with_lanes(values: Mapping[str, float]) -> dict[str, NDArray[np.complex128]]:
+    """Values of parameters with a lane for each, in which it is moved by `1j * STEP`."""
+    moved = {}
+    for lane, (name, value) in enumerate(values.items()):
+        moved[name] = np.full((len(values), 1), value, dtype=complex)
+        moved[name][lane] += 1j * STEP
+    return moved
 
 
 def _real(value: Any) -> float:
@@ -220,12 +235,12 @@ class _Arrays:
             axis = kernel.X if driver.axis == "x" else kernel.Y
             drive = [axis, self.points[driver.coordinate], 0]
         radii: NDArray[Any] = np.array(self.arc_radius, dtype=self.dtype).reshape(-1, self.lanes)
-        largest = sizes(self.definition, _reals(self.values))
+        places = np.array(self.place)
         return Linkage(
             len(self.bodies) - 1,
-            max(largest.values()),
+            float(np.max(np.abs(places[:, 0].real))),
             np.array(self.body_of, dtype=np.int64),
-            np.ascontiguousarray(np.array(self.place).transpose(1, 0, 2)),
+            np.ascontiguousarray(places.transpose(1, 0, 2)),
             np.array(self.joint, dtype=np.int64),
             np.ascontiguousarray(np.array(self.value).transpose(1, 0, 2)),
             np.array(self.arc_point, dtype=np.int64),
@@ -234,10 +249,6 @@ class _Arrays:
             np.array(drive, dtype=np.int64),
             self._filled((self._number(driver.zero),))[:, 0],
         )
-
-
-def _reals(values: Mapping[str, Any]) -> dict[str, float]:
-    return {name: _real(value) for name, value in values.items()}
 
 
 def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> list[Any]:

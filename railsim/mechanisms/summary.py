@@ -3,13 +3,18 @@
 The keys are part of the interface and documented in docs/user/mechanisms.md.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from railsim.definitions.mechanism import Mechanism
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.selection import checks, selection
+from railsim.mechanisms.tolerance import scatter
+
+if TYPE_CHECKING:
+    from railsim.mechanisms.optimisation import Optimum
 
 Data = dict[str, Any]
 
@@ -88,6 +93,8 @@ def analysis_data(result: Analysis) -> Data:
         {"catalogue": c.catalogue, "name": c.name, "fits": c.fits, "reasons": list(c.reasons)}
         for c in selection(result)
     ]
+    if definition.tolerances:
+        data["scatter"] = [dict(vars(one)) for one in scatter(definition)]
     made = checks(result)
     data["checks"] = [
         {
@@ -123,6 +130,36 @@ def motion_data(result: Analysis) -> Data:
         data["velocity_x"], data["velocity_y"] = _list(v[:, 0]), _list(v[:, 1])
         data["acceleration_x"], data["acceleration_y"] = _list(a[:, 0]), _list(a[:, 1])
     return data
+
+
+def comparison_data(comparison: Comparison) -> list[Data]:
+    """Mechanisms side by side as plain numbers; the first is the reference."""
+    return [{"name": row.name, **row.values, "error": row.error} for row in comparison.rows]
+
+
+def optimum_data(optimum: "Optimum") -> Data:
+    """A search as plain numbers, and everything about the optimum."""
+    return {
+        **analysis_data(optimum.after),
+        "objective": optimum.objective,
+        "objective_before": optimum.objective_before,
+        "feasible": optimum.feasible,
+        "breaches": dict(optimum.breaches),
+        "active": [dict(vars(active)) for active in optimum.active],
+        "starts": [
+            {
+                "number": start.number,
+                "begin": start.begin,
+                "parameters": start.end,
+                "objective": start.objective,
+                "violation": start.violation,
+                "feasible": start.feasible,
+                "evaluations": start.evaluations,
+            }
+            for start in optimum.starts
+        ],
+        "seed": optimum.seed,
+    }
 
 
 def _list(array: Any) -> list[float]:

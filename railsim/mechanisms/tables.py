@@ -1,14 +1,20 @@
 """Results as tables of texts in the field's units, for the terminal and for the page."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import SHOWN, quantity, shown
 from railsim.mechanisms.selection import Check, Choice
 from railsim.mechanisms.summary import parameter_data
+from railsim.mechanisms.tolerance import Scatter
+
+if TYPE_CHECKING:
+    from railsim.mechanisms.optimisation import Optimum
 
 Texts = tuple[list[str], list[list[str]]]
 
@@ -92,3 +98,134 @@ def reaction_table(result: Analysis) -> Texts:
         for name, r in result.reactions.items()
     ]
     return ["joint", "largest reaction / N", f"at {what.shown}"], rows
+
+
+def sentences(result: Analysis) -> list[str]:
+    """What is no table: stroke, zeros, contact force, motion."""
+    travel = quantity("travel", result.definition)
+
+    def driver(value: float) -> str:
+        return f"{value * travel.scale:.4f} {travel.shown}"
+
+    found = []
+    if "length" in result.output:
+        stroke = f"stroke {result.stroke * 1e3:.4f} mm"
+        found.append(f"{stroke} over a travel of {driver(result.travel)}")
+    if result.force_zeros:
+        found.append(f"force zero at {', '.join(driver(s) for s in result.force_zeros)}")
+    for s, stable in result.equilibria:
+        found.append(f"at rest at {driver(s)}, {'stable' if stable else 'unstable'}")
+    if (contact := result.contact) is not None:
+        forces = ", ".join(f"{name} {value:.2f} N" for name, value in contact.force.items())
+        found.append(f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces}")
+        found += [contact.reason] if contact.reason else []
+        for y, stable in contact.equilibria:
+            word = "stable" if stable else "unstable"
+            found.append(f"rests at a height of {y * 1e3:.1f} mm without contact, {word}")
+    if (timed := result.timed) is not None:
+        found.append(
+            f"motion in {timed.time[-1]:.3f} s: force {timed.force[0]:.2f} N at first, "
+            f"{np.min(timed.force):.2f} to {np.max(timed.force):.2f} N"
+        )
+    if (released := result.release) is not None:
+        end = "reaches" if released.reached else "is then at"
+        found.append(
+            f"let go at {driver(released.s[0])} it {end} {driver(released.s[-1])} after "
+            f"{released.time[-1]:.5f} s"
+        )
+    return found
+
+
+def comparison_table(comparison: Comparison) -> Texts:
+    """One row for each mechanism; the first is the reference of the error."""
+    scales = {
+        "stroke": ("stroke / mm", 1e3, 4),
+        "length_start": ("length closed / mm", 1e3, 3),
+        "max_force": ("largest force / N", 1.0, 1),
+        "work_force": ("at work / N", 1.0, 1),
+        "zone_spread": ("spread in the zone / %", 100.0, 2),
+        "min_angle": ("least angle / deg", float(np.degrees(1.0)), 3),
+    }
+    rows = []
+    for row in comparison.rows:
+        cells = [row.name]
+        for name, (_, scale, digits) in scales.items():
+            value = row.values.get(name, np.nan) * scale
+            cells.append(f"{value:.{digits}f}" if np.isfinite(value) else "-")
+        rows.append([*cells, f"{row.error:.4g}" if np.isfinite(row.error) else "-"])
+    return ["mechanism", *(title for title, _, _ in scales.values()), "error of ratio"], rows
+
+
+def optimum_sentences(optimum: "Optimum") -> list[str]:
+    """How the search went."""
+    kept = sum(start.feasible for start in optimum.starts if np.isfinite(start.objective))
+    lost = sum(not np.isfinite(start.objective) for start in optimum.starts)
+    before = (
+        f"{optimum.objective_before:.6g}"
+        if np.isfinite(optimum.objective_before)
+        else "none: the file's own parameters cannot be assembled"
+    )
+    found = [
+        f"objective {optimum.objective:.6g}, before {before}",
+        f"{len(optimum.starts)} starts with seed {optimum.seed}: {kept} keep all constraints, "
+        f"{lost} could not be assembled",
+    ]
+    if not optimum.feasible:
+        breaches = ", ".join(f"{name} by {value:.6g}" for name, value in optimum.breaches.items())
+        found.append(f"no start keeps all constraints; least broken (SI): {breaches}")
+    return found
+
+
+def optimum_table(optimum: "Optimum") -> Texts:
+    """Parameters before and after, with their bounds' names where they are active."""
+    definition = optimum.definition
+    own = next((start for start in optimum.starts if start.number == 0), optimum.starts[0])
+    rows = [
+        [
+            name,
+            shown(own.begin[name], definition.unit_of(name), 8),
+            shown(value, definition.unit_of(name), 8),
+        ]
+        for name, value in optimum.parameters.items()
+    ]
+    return ["parameter", "before", "after"], rows
+
+
+def active_table(optimum: "Optimum") -> Texts:
+    """Limits that hold the optimum."""
+    rows = [
+        [a.name, a.side, f"{a.slack:.3g}", f"{a.multiplier:.4g}"] for a in optimum.active
+    ]
+    return ["active limit", "side", "slack / SI", "multiplier / SI"], rows
+
+
+def start_table(optimum: "Optimum") -> Texts:
+    """One row for each start."""
+    rows = [
+        [
+            str(start.number),
+            f"{start.objective:.5g}" if np.isfinite(start.objective) else "not assembled",
+            "yes" if start.feasible else "no",
+            str(start.evaluations),
+        ]
+        for start in optimum.starts
+    ]
+    return ["start", "objective", "constraints kept", "evaluations"], rows
+
+
+def scatter_table(found: Sequence[Scatter]) -> Texts:
+    """One row for each result: its scatter and the parameter that matters most."""
+    rows = []
+    for one in found:
+        unit, scale = SHOWN.get(one.unit, (one.unit, 1.0))
+        worst = max(one.single, key=lambda name: abs(one.single[name]))
+        rows.append(
+            [
+                one.name,
+                f"{one.value * scale:.4f} {unit}".rstrip(),
+                f"+- {one.random * scale:.4f}",
+                f"+- {one.worst * scale:.4f}",
+                f"{worst} ({one.single[worst] * scale:+.4f})",
+            ]
+        )
+    return ["result", "nominal", "random", "worst case", "most by"], rows

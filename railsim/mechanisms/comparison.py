@@ -1,0 +1,91 @@
+"""Several mechanisms side by side at equal output; the first is the reference."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.definitions.mechanism_faults import ends
+from railsim.errors import InputError
+from railsim.mechanisms.analysis import Analysis, actuator_of
+from railsim.mechanisms.inversion import driver_at
+from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.targets import Positions, follow_error, heights_and_ratios
+
+POINTS = 215
+"""Positions in the zone at which ratios are compared, in equal steps of the reference's length."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One mechanism against the reference.
+
+    Attributes
+    ----------
+    name : str
+    values : dict of str to float
+        Results by name; NaN where the mechanism has none.
+    error : float
+        Sum of squared differences of the ratio from the reference's at equal heights.
+    """
+
+    name: str
+    values: dict[str, float]
+    error: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Mechanisms by their file, the reference first."""
+
+    rows: tuple[Compared, ...]
+
+
+def compare(results: Sequence[Analysis]) -> Comparison:
+    """Compare mechanisms with the first one."""
+    reference = _reference(results[0])
+    rows = []
+    for result in results:
+        values = {
+            "stroke": result.stroke,
+            "max_force": result.max_force,
+            "length_start": float(result.output.get("length", [np.nan])[0]),
+            "min_angle": min(
+                (v for n, v in result.min_angles.items() if result.definition.angles[n].limited),
+                default=np.nan,
+            ),
+        }
+        if result.zone and "force" in result.zone["work"]:
+            forces = [result.zone[k]["force"] for k in ("low", "work", "high")]
+            values["work_force"] = forces[1]
+            values["zone_spread"] = (max(forces) - min(forces)) / float(np.mean(forces))
+        name = result.definition.name + (f", {result.case}" if result.case else "")
+        rows.append(Compared(name, values, _error(result, reference)))
+    return Comparison(tuple(rows))
+
+
+def _reference(result: Analysis) -> Positions | None:
+    """Heights and ratios of a mechanism in its zone, else over its whole travel."""
+    definition = result.definition
+    name = actuator_of(definition)
+    pair = ends(definition.actuators[name]) if name is not None else None
+    if pair is None or definition.output is None:
+        return None
+    edges = [result.model.start, result.model.end]
+    if result.zone:
+        edges = [result.zone[k]["travel"] for k in ("low", "high")]
+    dense = solve(result.model, np.linspace(edges[0], edges[1], 101))
+    length = dense.length(pair)[0]
+    wanted = np.linspace(length[0], length[-1], POINTS)
+    s = driver_at(dense, lambda motion: motion.length(pair)[:2], wanted)
+    height, ratio = heights_and_ratios(solve(result.model, s), pair, definition.output.point)
+    return Positions(s, height, ratio)
+
+
+def _error(result: Analysis, reference: Positions | None) -> float:
+    if reference is None:
+        return float("nan")
+    try:
+        return follow_error(result.definition, reference)
+    except InputError:  # its output does not reach the reference's heights
+        return float("nan")

@@ -1,0 +1,139 @@
+"""A mechanism as lines and named points at every position: for pictures, animation and page."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.mechanism import GasSpring, Link, Prismatic, Revolute, Slot, Spring
+from railsim.definitions.mechanism_faults import ends
+from railsim.mechanisms.kinematics import Motion
+
+Floats = NDArray[np.float64]
+ARC_POINTS = 24
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of the drawing.
+
+    Attributes
+    ----------
+    kind : {'body', 'link', 'guide', 'cam', 'actuator', 'spring', 'damper'}
+    name : str
+        Part that it shows.
+    xy : ndarray, shape (position, point, 2)
+        [m]
+    """
+
+    kind: str
+    name: str
+    xy: Floats
+
+
+def lines(motion: Motion) -> list[Line]:
+    """All lines of a mechanism at the positions of a motion."""
+    definition = motion.model.definition
+    found = []
+    for name, body in definition.bodies.items():
+        names = list(body.outline or body.points)
+        if len(names) > 1:
+            closed = names + names[:1] if len(names) > 2 and not body.outline else names
+            xy = np.stack([motion.point(f"{name}.{p}")[0] for p in closed], axis=1)
+            found.append(Line("body", name, xy))
+    for row, (name, joint) in enumerate(definition.joints.items()):
+        if isinstance(joint, Link):
+            found.append(_between(motion, "link", name, joint.link))
+        elif isinstance(joint, Slot | Prismatic):
+            found.append(_guide(motion, name, joint))
+        elif not isinstance(joint, Revolute):
+            found.append(_cam(motion, name, row))
+    for name, actuator in definition.actuators.items():
+        if (pair := ends(actuator)) is not None:
+            found.append(_between(motion, "actuator", name, pair))
+    for name, element in definition.elements.items():
+        if (pair := ends(element)) is not None:
+            kind = "spring" if isinstance(element, Spring | GasSpring) else "damper"
+            found.append(_between(motion, kind, name, pair))
+    return found
+
+
+def _between(motion: Motion, kind: str, name: str, pair: Any) -> Line:
+    return Line(kind, name, np.stack([motion.point(p)[0] for p in pair], axis=1))
+
+
+def _guide(motion: Motion, name: str, joint: Slot | Prismatic) -> Line:
+    """The line of a slot, over the part that its pin uses."""
+    n = motion.model.number
+    pin, origin = joint.slot if isinstance(joint, Slot) else joint.prismatic
+    body = motion.model.bodies[origin.partition(".")[0]]
+    angle = n(joint.angle) + motion.q[:, body, 2]
+    along = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
+    across = np.stack((-along[:, 1], along[:, 0]), axis=-1)
+    base = motion.point(origin)[0] + n(joint.offset) * across
+    used = np.sum((motion.point(pin)[0] - base) * along, axis=-1)
+    margin = 0.15 * max(float(np.ptp(used)), 0.2 * float(np.max(np.abs(used)))) + 1e-3
+    low, high = float(np.min(used)) - margin, float(np.max(used)) + margin
+    return Line("guide", name, np.stack((base + low * along, base + high * along), axis=1))
+
+
+def _cam(motion: Motion, name: str, row: int) -> Line:
+    """The path of a roller's centre on its cam."""
+    linkage = motion.model.linkage
+    rows = [k for k in range(len(linkage.joint)) if linkage.joint[k, 5] > 0]
+    cams = [j for j, joint in enumerate(motion.model.definition.joints.values())
+            if hasattr(joint, "cam")]  # fmt: skip
+    _, _, _, _, first, count = linkage.joint[rows[cams.index(row)]]
+    parts = []
+    for arc in range(first, first + count):
+        u0, v0, u1, v1, turn = linkage.arc_ends[arc]
+        begin = np.arctan2(v0, u0)
+        swept = (turn * (np.arctan2(v1, u1) - begin)) % (2.0 * np.pi)
+        angles = begin + turn * np.linspace(0.0, swept, ARC_POINTS)
+        radius, k = linkage.arc_radius[0, arc], linkage.arc_point[arc]
+        cx, cy = linkage.point[0, k]
+        places = [
+            motion.at(linkage.point_body[k], cx + radius * np.cos(a), cy + radius * np.sin(a))[0]
+            for a in angles
+        ]
+        parts.append(np.stack(places, axis=1))
+    return Line("cam", name, np.concatenate(parts, axis=1))
+
+
+def points(motion: Motion) -> dict[str, Floats]:
+    """All named points, shape (position, 2) [m]."""
+    return {name: motion.point(name)[0] for name in motion.model.points}
+
+
+def joint_points(motion: Motion) -> dict[str, str]:
+    """The name under which each place is shown: points held together have one, by first point."""
+    shown: dict[str, str] = {}
+    known = points(motion)
+    taken: list[tuple[Floats, str]] = []
+    size = float(motion.model.linkage.size)
+    for name, xy in known.items():
+        same = [other for place, other in taken if np.max(np.abs(place - xy)) < 1e-9 * size]
+        shown[name] = same[0] if same else name
+        if not same:
+            taken.append((xy, name))
+    return shown
+
+
+def working_box(motion: Motion) -> tuple[float, float, float, float]:
+    """Box around the ground's points, the actuators and their bodies' pins: x0, x1, y0, y1 [m]."""
+    definition = motion.model.definition
+    names = [f"ground.{p}" for p in definition.ground.points]
+    for part in (*definition.actuators.values(), *definition.elements.values()):
+        names += ends(part) or ()
+    for joint in definition.joints.values():
+        if isinstance(joint, Link | Slot | Prismatic):
+            names += ends(joint) or ()
+        elif hasattr(joint, "cam"):
+            names.append(joint.cam)
+    heavy = definition.output.point.partition(".")[0] if definition.output else ""
+    names = [n for n in names if n.partition(".")[0] != heavy] or list(motion.model.points)
+    xy = np.concatenate([motion.point(name)[0][:1] for name in names])
+    (x0, y0), (x1, y1) = xy.min(axis=0), xy.max(axis=0)
+    margin = 0.12 * max(x1 - x0, y1 - y0)
+    return float(x0 - margin), float(x1 + margin), float(y0 - margin), float(y1 + margin)

@@ -1,0 +1,519 @@
+"""Search for the parameters of a mechanism: many seeded starts, exact gradients, active limits.
+
+Each start runs sequential least-squares programming (D. Kraft, A software package for sequential
+quadratic programming, DFVLR-FB 88-28, 1988; scipy's SLSQP) in coordinates in which the Gauss-Newton
+matrix of the sum of squares is the unit matrix, set anew until nothing improves: the quasi-Newton
+updates then begin with the right curvature.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, minimize, nnls
+
+from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism_faults import number
+from railsim.errors import Fault, InputError
+from railsim.mechanisms.analysis import Analysis, analyse
+from railsim.mechanisms.judgement import Judge, Judgement
+from railsim.mechanisms.kinematics import check_freedom, solve
+from railsim.mechanisms.model import build
+
+Floats = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class Effort:
+    """How far a start is followed: rounds, steps in each, and the relative gain that ends it."""
+
+    rounds: int
+    steps: int
+    gain: float
+
+
+SEARCH = Effort(2, 20, 1e-2)
+FINISH = Effort(4, 25, 1e-3)
+EVERY = 5
+"""Share of the positions that every start is first judged at."""
+FINALISTS = 3
+"""Starts that are followed to the end, at all positions."""
+FEASIBLE = 1e-7
+"""Breach of a constraint, in its scale, that counts as none."""
+ACTIVE = 1e-5
+"""Margin, in its scale, below which a constraint is active."""
+DRAWS = 60
+"""Draws for each start until the links can be assembled."""
+REFUSED = 1e6
+"""Objective, against that at the start, of parameters that cannot be assembled."""
+
+
+@dataclass(frozen=True)
+class Active:
+    """A limit that holds the optimum in place.
+
+    Attributes
+    ----------
+    name : str
+        Constraint, or parameter with `side` 'lower' or 'upper'.
+    side : str
+    slack : float
+        What is left to the limit, SI.
+    multiplier : float
+        Decrease of the objective for each unit (SI) that the limit gives way.
+    """
+
+    name: str
+    side: str
+    slack: float
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start of the search.
+
+    Attributes
+    ----------
+    number : int
+        0 is the file's own.
+    begin, end : dict of str to float
+        Parameters.
+    objective, violation : float
+        At the end; NaN where it never could be assembled.
+    evaluations : int
+    """
+
+    number: int
+    begin: dict[str, float]
+    end: dict[str, float]
+    objective: float
+    violation: float
+    evaluations: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all constraints are kept."""
+        return bool(self.violation <= FEASIBLE)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Result of a search.
+
+    Attributes
+    ----------
+    definition : Mechanism
+        The mechanism with the best parameters.
+    before, after : Analysis
+        Results with the file's own parameters and with the best.
+    objective, objective_before : float
+        NaN for parameters of the file that cannot be assembled.
+    feasible : bool
+        Whether all constraints are kept; else it is the compromise with the smallest breach.
+    breaches : dict of str to float
+        Broken constraints and by how much, SI.
+    active : tuple of Active
+    starts : tuple of Start
+    seed : int
+    """
+
+    definition: Mechanism
+    before: Analysis | None
+    after: Analysis
+    objective: float
+    objective_before: float
+    feasible: bool
+    breaches: dict[str, float]
+    active: tuple[Active, ...]
+    starts: tuple[Start, ...]
+    seed: int
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The best parameters among those that may change."""
+        best = best_of(self.starts)
+        return best.end
+
+
+def optimise(
+    definition: Mechanism,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+) -> Optimum:
+    """Search for the best parameters within their bounds.
+
+    Parameters
+    ----------
+    definition : Mechanism
+        With a table [optimise].
+    starts, seed : int, optional
+        Instead of the file's.
+    workers : int
+        Processes; the result does not depend on them.
+
+    Raises
+    ------
+    InputError : there is no [optimise]; no start within the bounds can be assembled.
+    """
+    if definition.optimise is None:
+        fault = Fault(definition.name, "optimise", "missing", "the table [optimise] is needed")
+        raise InputError([fault])
+    wanted = definition.optimise
+    count = wanted.starts if starts is None else starts
+    chosen_seed = wanted.seed if seed is None else seed
+    judge = Judge(definition)
+    begins = first_points(judge, count, chosen_seed)
+    jobs = [(definition, i, begin, choice) for i, (begin, choice) in enumerate(begins)]
+    found = _search(definition, judge, jobs, workers)
+    usable = [start for start in found if np.isfinite(start.objective)]
+    if not usable:
+        bounds = "bounds within which the links can be assembled over the whole travel"
+        fault = Fault(definition.name, "optimise.bounds", "exclude every assembly", bounds)
+        raise InputError([fault])
+    best = best_of(found)
+    return _optimum(definition, judge, best, tuple(found), chosen_seed)
+
+
+def best_of(starts: Sequence[Start]) -> Start:
+    """The feasible start with the smallest objective, else that with the smallest breach."""
+    usable = [start for start in starts if np.isfinite(start.objective)]
+    feasible = [start for start in usable if start.feasible]
+    if feasible:
+        return min(feasible, key=lambda start: start.objective)
+    return min(usable, key=lambda start: start.violation)
+
+
+def first_points(
+    judge: Judge, count: int, seed: int
+) -> list[tuple[Floats, dict[str, float]]]:
+    """Parameters from which the starts begin: the file's own, then drawn evenly from the bounds.
+
+    Draws that cannot be assembled are drawn again, `DRAWS` times; the values of `assemblies` take
+    turns.
+    """
+    generator = np.random.default_rng(seed)
+    choices = _choices(judge)
+    own = np.array([float(judge.values[name]) for name in judge.names])
+    found = [(np.clip(own, judge.lower, judge.upper), _own_choice(judge))]
+    for i in range(1, count):
+        choice = choices[i % len(choices)]
+        for _ in range(DRAWS):
+            x = generator.uniform(judge.lower, judge.upper)
+            if _assembles(judge, x, choice):
+                break
+        found.append((x, choice))
+    return found
+
+
+def _choices(judge: Judge) -> list[dict[str, float]]:
+    choices: list[dict[str, float]] = [{}]
+    for name, values in judge.wanted.assemblies.items():
+        choices = [
+            {**choice, name: float(number(value, judge.values))}
+            for choice in choices
+            for value in values
+        ]
+    return choices
+
+
+def _own_choice(judge: Judge) -> dict[str, float]:
+    return {name: float(judge.values[name]) for name in judge.wanted.assemblies}
+
+
+def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
+    try:
+        values = dict(zip(judge.names, map(float, x), strict=True))
+        model = build(judge.definition, {**judge.fixed, **choice, **values})
+        motion = solve(model, judge.grid(model))
+    except InputError:
+        return False
+    rate = motion.length(judge.pair)[1]
+    return bool(np.all(rate * rate[0] > 0.0))
+
+
+def _search(
+    definition: Mechanism, judge: Judge, jobs: Sequence[Any], workers: int
+) -> list[Start]:
+    """All starts, the most promising ones to the end; over processes where there are many."""
+    if workers <= 1 or len(jobs) < 4:
+        rough = Judge(definition, EVERY)
+        found = [_run(rough, index, begin, choice, SEARCH) for _, index, begin, choice in jobs]
+        return _finished(judge, found, [_run(judge, *job) for job in _finals(judge, found)])
+    with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as pool:
+        found = list(pool.map(_run_job, [(*job, SEARCH, EVERY) for job in jobs], chunksize=1))
+        finals = [(definition, *job, 1) for job in _finals(judge, found)]
+        return _finished(judge, found, list(pool.map(_run_job, finals, chunksize=1)))
+
+
+_JUDGES: dict[tuple[str, int], Judge] = {}
+
+
+def _run_job(job: Any) -> Start:
+    definition, index, begin, choice, effort, every = job
+    key = definition.model_dump_json(), every
+    if key not in _JUDGES:
+        _JUDGES[key] = Judge(definition, every)
+    return _run(_JUDGES[key], index, begin, choice, effort)
+
+
+def _finals(judge: Judge, starts: Sequence[Start]) -> list[Any]:
+    """The most promising starts, and the file's own, from where they have come to."""
+    usable = [start for start in starts if np.isfinite(start.objective)]
+    ranked = sorted(usable, key=lambda start: (max(start.violation, FEASIBLE), start.objective))
+    own = [start for start in ranked[FINALISTS:] if start.number == 0]
+    chosen = [*ranked[:FINALISTS], *own]
+    return [
+        (
+            start.number,
+            np.array([start.end[name] for name in judge.names]),
+            {name: start.end[name] for name in judge.wanted.assemblies},
+            FINISH,
+        )
+        for start in chosen
+    ]
+
+
+def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) -> list[Start]:
+    """All starts judged at all positions."""
+    ends = {start.number: start for start in finals}
+    found = []
+    for start in starts:
+        if not np.isfinite(start.objective):
+            found.append(start)
+            continue
+        if start.number in ends:
+            end = ends[start.number]
+            count = start.evaluations + end.evaluations
+            found.append(replace(end, begin=start.begin, evaluations=count))
+        else:
+            x = np.array([start.end[name] for name in judge.names])
+            judged = judge(x, {name: start.end[name] for name in judge.wanted.assemblies})
+            found.append(replace(start, objective=judged.objective, violation=judged.violation))
+    return found
+
+
+class _Problem:
+    """Objective and constraints in scaled coordinates, each evaluated once."""
+
+    def __init__(self, judge: Judge, choice: dict[str, float]) -> None:
+        self.judge, self.choice = judge, choice
+        self.span = judge.upper - judge.lower
+        self.evaluations = 0
+        self.known: tuple[bytes, Judgement | None] = (b"", None)
+
+    def __call__(self, u: Floats) -> Judgement | None:
+        """Judgement at u in [0, 1], with gradients by u; None where nothing can be assembled."""
+        key = u.tobytes()
+        if self.known[0] != key:
+            self.evaluations += 1
+            try:
+                found = self.judge(self.judge.lower + u * self.span, self.choice)
+                self.known = key, Judgement(
+                    found.residuals,
+                    found.jacobian * self.span,
+                    found.peak,
+                    found.peak_gradient * self.span,
+                    found.margins,
+                    found.slopes * self.span,
+                )
+            except InputError:
+                self.known = key, None
+        return self.known[1]
+
+
+def _run(
+    judge: Judge, index: int, begin: Floats, choice: dict[str, float], effort: Effort
+) -> Start:
+    """One start from begin to end."""
+    problem = _Problem(judge, choice)
+    u = np.clip((begin - judge.lower) / problem.span, 0.0, 1.0)
+    here = problem(u)
+    if here is None:
+        nan = float("nan")
+        named = dict(zip(judge.names, map(float, begin), strict=True)) | choice
+        return Start(index, named, named, nan, nan, problem.evaluations)
+    for _ in range(effort.rounds):
+        new = _round(problem, u, here, effort.steps)
+        after = problem(new)
+        if after is None:
+            break
+        worse = after.violation > max(here.violation, FEASIBLE)
+        gain = here.objective - after.objective
+        if worse or (here.violation <= FEASIBLE and gain <= 0.0):
+            break
+        small = gain <= effort.gain * abs(here.objective) + 1e-14
+        settled = small and here.violation - after.violation <= FEASIBLE
+        u, here = new, after
+        if settled:
+            break
+    if here.violation > FEASIBLE:
+        u, here = _least_breach(problem, u, here)
+    x = judge.lower + u * problem.span
+    return Start(
+        index,
+        dict(zip(judge.names, map(float, begin), strict=True)) | choice,
+        dict(zip(judge.names, map(float, x), strict=True)) | choice,
+        here.objective,
+        here.violation,
+        problem.evaluations,
+    )
+
+
+def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats:
+    """A round of SLSQP in coordinates z with u = u0 + S z, S from the Gauss-Newton matrix."""
+    scale = max(here.objective, 1e-12)
+    m = len(u0)
+    J = here.jacobian / np.sqrt(0.5 * scale)
+    # directions that the residuals do not feel keep the scale of the bounds
+    damping = 1e-3 * max(float(np.linalg.norm(J, 2)), 1e-3) if np.any(J) else 1.0
+    R = np.linalg.qr(np.vstack((J, damping * np.eye(m))), mode="r")
+    S = np.linalg.inv(R)
+
+    def at(z: Floats) -> Judgement | None:
+        return problem(np.clip(u0 + S @ z, 0.0, 1.0))
+
+    def objective(z: Floats) -> float:
+        found = at(z)
+        return REFUSED if found is None else found.objective / scale
+
+    def gradient(z: Floats) -> Floats:
+        found = at(z)
+        slope: Floats = S.T @ (here if found is None else found).gradient / scale
+        return slope
+
+    def margins(z: Floats) -> Floats:
+        found = at(z)
+        u = u0 + S @ z
+        inner = -np.ones_like(here.margins) if found is None else found.margins
+        return np.concatenate((inner, u, 1.0 - u))
+
+    def slopes(z: Floats) -> Floats:
+        known = at(z) or here
+        return np.vstack((known.slopes @ S, S, -S))
+
+    found: Any = minimize(
+        objective,
+        np.zeros(m),
+        jac=gradient,
+        method="SLSQP",
+        constraints=_kept(margins, slopes),
+        options={"maxiter": steps, "ftol": 1e-10},
+    )
+    end: Floats = np.clip(u0 + S @ found.x, 0.0, 1.0)
+    return end
+
+
+def _kept(margins: Any, slopes: Any) -> Any:
+    """Constraints for scipy: margins that must not be negative."""
+    return [{"type": "ineq", "fun": margins, "jac": slopes}]
+
+
+def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Floats, Judgement]:
+    """Parameters with the smallest breach t: least t with every margin above -t."""
+    m = len(u0)
+
+    def margins(y: Floats) -> Floats:
+        found = problem(y[:m])
+        inner = -10.0 * np.ones_like(here.margins) if found is None else found.margins
+        moved: Floats = inner + y[m]
+        return moved
+
+    def slopes(y: Floats) -> Floats:
+        found = problem(y[:m]) or here
+        return np.hstack((found.slopes, np.ones((len(found.margins), 1))))
+
+    def breach(y: Floats) -> float:
+        return float(y[m])
+
+    def unit(y: Floats) -> Floats:
+        return np.eye(m + 1)[m]
+
+    found = minimize(
+        breach,
+        np.append(u0, here.violation),
+        jac=unit,
+        method="SLSQP",
+        bounds=Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf)),
+        constraints=_kept(margins, slopes),
+        options={"maxiter": 100, "ftol": 1e-9},
+    )
+    u: Floats = np.clip(found.x[:m], 0.0, 1.0)
+    after = problem(u)
+    if after is None or after.violation >= here.violation:
+        return u0, here
+    return u, after
+
+
+def _optimum(
+    definition: Mechanism, judge: Judge, best: Start, starts: tuple[Start, ...], seed: int
+) -> Optimum:
+    x = np.array([best.end[name] for name in judge.names])
+    choice = {name: best.end[name] for name in judge.wanted.assemblies}
+    judged = judge(x, choice)
+    listed = {
+        name: tuple(names) for name, names in definition.provenance.items() if name != "optimised"
+    }
+    listed["optimised"] = tuple(best.end)
+    better = definition.with_parameters(best.end).model_copy(update={"provenance": listed})
+    check_freedom(build(better))
+    after = analyse(better)
+    try:
+        before: Analysis | None = analyse(definition)
+        own = np.array([float(judge.values[name]) for name in judge.names])
+        objective_before = judge(own, _own_choice(judge)).objective
+        judge(x, choice)
+    except InputError:
+        before, objective_before = None, float("nan")
+    breaches: dict[str, float] = {}
+    for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
+        if margin < -FEASIBLE:
+            breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
+    return Optimum(
+        better,
+        before,
+        after,
+        judged.objective,
+        objective_before,
+        best.feasible,
+        breaches,
+        _active(judge, judged, x),
+        starts,
+        seed,
+    )
+
+
+def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
+    """Limits that hold the optimum: their slack, and multipliers by least squares."""
+    rows: list[tuple[str, str, float, Floats]] = []
+    span = judge.upper - judge.lower
+    seen: dict[str, int] = {}
+    for i, (name, _) in enumerate(judge.labels):
+        if judged.margins[i] < ACTIVE and (
+            name not in seen or judged.margins[i] < judged.margins[seen[name]]
+        ):
+            seen[name] = i
+    for name, i in seen.items():
+        scale = judge.labels[i][1]
+        rows.append((name, "", float(judged.margins[i]) * scale, judged.slopes[i] * scale))
+    for k, name in enumerate(judge.names):
+        unit = np.eye(len(x))[k]
+        if x[k] - judge.lower[k] < ACTIVE * span[k]:
+            rows.append((name, "lower", float(x[k] - judge.lower[k]), unit))
+        if judge.upper[k] - x[k] < ACTIVE * span[k]:
+            rows.append((name, "upper", float(judge.upper[k] - x[k]), -unit))
+    if not rows:
+        return ()
+    matrix = np.array([row[3] for row in rows]).T * span[:, None]
+    norms = np.linalg.norm(matrix, axis=0)
+    norms[norms == 0.0] = 1.0
+    weights, _ = nnls(matrix / norms, judged.gradient * span)
+    return tuple(
+        Active(name, side, slack, float(weight))
+        for (name, side, slack, _), weight in zip(rows, weights / norms, strict=True)
+    )

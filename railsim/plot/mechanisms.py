@@ -1,0 +1,429 @@
+"""Pictures of a mechanism: drawing, kinematics, ratios, forces, pressures, motion, search.
+
+Every function takes results of `railsim.mechanisms` and returns a figure in the field's habits: mm,
+degrees, N, MPa.  Lines are told apart without colour too.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from railsim.definitions.mechanism import AirSpring
+from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.drawing import Line, joint_points, lines, points, working_box
+from railsim.mechanisms.forces import table_of
+from railsim.mechanisms.kinematics import Motion, folded, solve
+from railsim.mechanisms.quantities import quantity
+from railsim.plot.style import DISTINCT, LIMIT
+
+if TYPE_CHECKING:
+    from railsim.mechanisms.optimisation import Optimum
+
+Floats = NDArray[np.float64]
+DASHES: tuple[Any, ...] = (
+    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1))
+)  # fmt: skip
+MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
+SHADES = ("0.72", "0.55", "0.35", "#004a80")
+WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8, "actuator": 3.2, "spring": 2.4,
+          "damper": 1.6}  # fmt: skip
+STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
+
+
+def _line(i: int) -> dict[str, Any]:
+    return {"color": DISTINCT[i % len(DISTINCT)], "ls": DASHES[i % len(DASHES)]}
+
+
+def _label(name: str, result: Analysis, words: str = "") -> str:
+    unit = quantity(name, result.definition).shown
+    text = words or name.replace("_", " ")
+    return f"{text} / {unit.replace('deg', '°')}" if unit else text
+
+
+def _values(name: str, result: Analysis) -> Floats:
+    found: Floats = np.asarray(result.output[name]) * quantity(name, result.definition).scale
+    return found
+
+
+def _zone(axes: Axes, result: Analysis, over: str) -> None:
+    """Shade the zone and mark the work height over a quantity."""
+    if not result.zone or over not in result.zone["low"]:
+        return
+    scale = quantity(over, result.definition).scale
+    low, work, high = (result.zone[k][over] * scale for k in ("low", "work", "high"))
+    axes.axvspan(min(low, high), max(low, high), color="0.93", lw=0, zorder=0)
+    axes.axvline(work, color="0.5", lw=0.8, ls=(0, (4, 2)), zorder=1)
+
+
+def drawing_figure(result: Analysis) -> Figure:
+    """The mechanism in four positions, and its working parts with the names of their points."""
+    model = result.model
+    s = np.linspace(model.start, model.end, 4)
+    if result.zone:
+        s[1] = result.zone["work"]["travel"]
+        s[2] = 0.5 * (s[1] + s[3])
+    motion = solve(model, s)
+    box = working_box(motion)
+    every = np.concatenate([xy for xy in points(motion).values()])
+    size = float(np.max(np.ptp(every, axis=0)))
+    small = max(box[1] - box[0], box[3] - box[2]) < 0.6 * size
+    figure = Figure(figsize=(9.0, 4.6) if small else (6.6, 5.2), layout="constrained")
+    axes = figure.subplots(1, 2, width_ratios=[1.0, 1.25]) if small else [figure.subplots()]
+    scale = quantity("travel", result.definition)
+    for k in range(4):
+        label = f"{s[k] * scale.scale:.1f} {scale.shown.replace('deg', '°')}"
+        draw(axes[0], lines(motion), k, SHADES[k], label)
+    named = axes[-1]
+    if small:
+        draw(named, lines(motion), 3, "0.8", "")
+        draw(named, lines(motion), 0, "#004a80", "")
+        named.set_xlim(box[0] * 1e3, box[1] * 1e3)
+        named.set_ylim(box[2] * 1e3, box[3] * 1e3)
+        named.set_title("working parts at the start (grey: at the end)")
+    _name_points(named, motion, box if small else None)
+    for one in axes:
+        one.set_aspect("equal")
+        one.set_xlabel("x / mm")
+        one.set_ylabel("y / mm")
+    axes[0].legend(loc="best", title="driver at")
+    return figure
+
+
+def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> None:
+    """Draw the lines of a mechanism at one of its positions [mm]."""
+    for i, line in enumerate(drawn):
+        axes.plot(
+            *(line.xy[k] * 1e3).T,
+            color=colour,
+            lw=WIDTHS[line.kind],
+            ls=STYLES.get(line.kind, "-"),
+            solid_capstyle="round",
+            marker="o" if line.kind in ("body", "link") else "",
+            ms=2.5,
+            label=label if i == 0 else None,
+        )
+
+
+def _name_points(axes: Axes, motion: Motion, box: Any) -> None:
+    shown = joint_points(motion)
+    known = points(motion)
+    corners = ((5, 5, "left"), (-5, -9, "right"), (5, -9, "left"), (-5, 5, "right"))
+    for i, name in enumerate(dict.fromkeys(shown.values())):
+        x, y = known[name][0]
+        if box is not None and not (box[0] < x < box[1] and box[2] < y < box[3]):
+            continue
+        ground = name.startswith("ground.")
+        axes.plot(x * 1e3, y * 1e3, "^" if ground else "o", color="k", ms=5 if ground else 3)
+        axes.annotate(
+            name.partition(".")[2] if ground else name,
+            (x * 1e3, y * 1e3),
+            xytext=corners[i % 4][:2],
+            ha=corners[i % 4][2],
+            textcoords="offset points",
+            fontsize=7,
+        )
+
+
+def kinematics_figure(result: Analysis) -> Figure:
+    """Angles of the bodies over the driver, their rates and accelerations."""
+    motion = result.motion
+    figure = Figure(figsize=(7.6, 5.6), layout="constrained")
+    rows = figure.subplots(3, 1, sharex=True)
+    travel = _values("travel", result)
+    s1: Any = 1.0
+    s2: Any = 0.0
+    timed = result.timed
+    if timed is not None:
+        motion, s1, s2 = timed.motion, timed.speed, timed.acceleration
+        travel = motion.s * quantity("travel", result.definition).scale
+    for i, name in enumerate(result.definition.bodies):
+        k = result.model.bodies[name]
+        theta, w, w1 = (a[:, k, 2] for a in (motion.q, motion.q1, motion.q2))
+        turned = np.degrees(np.unwrap(theta) - theta[0])
+        for axes, values in zip(
+            rows, (turned, np.degrees(w * s1), np.degrees(w1 * s1**2 + w * s2)), strict=True
+        ):
+            axes.plot(travel, values, label=name, **_line(i))
+    words = ("rate / (°/s)", "acceleration / (°/s²)")
+    if timed is None:
+        words = ("d angle/d driver / (°/unit)", "second derivative")
+    rows[0].set_ylabel("angle since start / °")
+    rows[1].set_ylabel(words[0])
+    rows[2].set_ylabel(words[1])
+    rows[2].set_xlabel(_label("travel", result, "driver"))
+    rows[0].legend(ncols=3)
+    for axes in rows:
+        _zone(axes, result, "travel")
+    return figure
+
+
+def path_figure(result: Analysis) -> Figure:
+    """Path of the output, with the zone."""
+    figure = Figure(figsize=(4.6, 5.2), layout="constrained")
+    axes = figure.subplots()
+    x, y = _values("x", result), _values("height", result)
+    axes.plot(x, y, color=MAIN)
+    for name, values in result.zone.items():
+        axes.plot(values["x"] * 1e3, values["height"] * 1e3, "o", color="k", ms=4)
+        place = (values["x"] * 1e3, values["height"] * 1e3)
+        axes.annotate(name, place, xytext=(6, -3), textcoords="offset points", fontsize=8)
+    axes.set_xlabel("x since start / mm")
+    axes.set_ylabel("height over start / mm")
+    return figure
+
+
+def angles_figure(result: Analysis) -> Figure:
+    """Transmission angles, folded, with their limit, and pressure angles of cams."""
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.subplots()
+    travel = _values("travel", result)
+    names = list(result.definition.angles)
+    for i, name in enumerate(names):
+        values = np.degrees(folded(result.output[name]))
+        axes.plot(travel, values, label=name, **_line(i))
+    for i, name in enumerate(n for n in result.output if n.endswith("_pressure_angle")):
+        label = name.replace("_", " ")
+        axes.plot(travel, _values(name, result), label=label, lw=1.8, **_line(len(names) + i))
+    limits = result.definition.optimise
+    if limits is not None and limits.min_transmission_angle is not None:
+        limit = np.degrees(result.model.number(limits.min_transmission_angle))
+        axes.axhline(limit, color=LIMIT, lw=0.9)
+        axes.annotate("limit", (1.0, limit), xycoords=("axes fraction", "data"), fontsize=8,
+                      color=LIMIT, ha="right", va="bottom")  # fmt: skip
+    _zone(axes, result, "travel")
+    axes.set_xlabel(_label("travel", result, "driver"))
+    axes.set_ylabel("angle / °")
+    axes.legend(ncols=3)
+    return figure
+
+
+def cam_figure(result: Analysis) -> Figure:
+    """Rate of the rocker on every arc of the cam, with the transitions."""
+    motion = result.motion
+    cams = np.flatnonzero(result.model.linkage.joint[:, 5] > 0)
+    row = int(cams[0])
+    names = [n for n, j in result.definition.joints.items() if hasattr(j, "cam")]
+    roller = result.definition.joints[names[0]].cam  # type: ignore[union-attr]
+    body = result.model.bodies[roller.partition(".")[0]]
+    first = int(result.model.linkage.joint[row, 4])
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.subplots()
+    travel = _values("travel", result)
+    rate = motion.q1[:, body, 2]
+    words = "driver's rate over the rocker's, |ds/dσ|"
+    for i, arc in enumerate(np.unique(motion.arcs[:, row])):
+        on = motion.arcs[:, row] == arc
+        arcs = result.definition.joints[names[0]].arcs  # type: ignore[union-attr]
+        label = f"arc {arc - first + 1}, turns {arcs[arc - first].turns}"
+        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.0, **_line(i))
+    for k in np.flatnonzero(np.diff(motion.arcs[:, row])):
+        at = 0.5 * (travel[k] + travel[k + 1])
+        axes.axvline(at, color="0.4", lw=0.8)
+        axes.annotate(f"{at:.2f}°", (at, 1.0), xycoords=("data", "axes fraction"), fontsize=8,
+                      xytext=(3, -10), textcoords="offset points")  # fmt: skip
+    _zone(axes, result, "travel")
+    axes.set_xlabel(_label("travel", result, "driver"))
+    axes.set_ylabel(words)
+    axes.legend()
+    return figure
+
+
+def force_figure(result: Analysis) -> Figure:
+    """Ratios and force of the actuator over its length and over the height."""
+    over = [name for name in ("length", "height") if name in result.output]
+    shown = [name for name in ("ratio", "force") if name in result.output]
+    figure = Figure(figsize=(7.8, 5.4), layout="constrained")
+    grid = figure.subplots(len(shown), len(over), sharex="col", sharey="row", squeeze=False)
+    for i, name in enumerate(shown):
+        for j, x in enumerate(over):
+            axes = grid[i, j]
+            axes.plot(_values(x, result), _values(name, result), color=MAIN, label="along y")
+            if name == "ratio":
+                axes.plot(_values(x, result), _values("ratio_x", result), color=SECOND,
+                          ls=DASHES[1], label="along x")  # fmt: skip
+            elif "force_back" in result.output:
+                axes.plot(_values(x, result), _values("force_back", result), color=SECOND,
+                          ls=DASHES[1], label="on the way back")  # fmt: skip
+            _zone(axes, result, x)
+            if i == len(shown) - 1:
+                axes.set_xlabel(_label(x, result))
+        words = {"ratio": "ratio dy/dL, dx/dL", "force": "force of the unknown"}[name]
+        grid[i, 0].set_ylabel(_label(name, result, words))
+        if name == "ratio" or "force_back" in result.output:
+            grid[i, 0].legend()
+    return figure
+
+
+def pressure_figure(result: Analysis) -> Figure:
+    """Pressure that the mechanism needs, over the height."""
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(_values("height", result), _values("pressure", result), color=MAIN, label="needed")
+    if result.contact is not None:
+        axes.axhline(result.contact.pressure / 1e6, color=SECOND, ls=DASHES[1], label="held")
+        axes.legend()
+    _zone(axes, result, "height")
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(_label("height", result))
+    axes.set_ylabel("pressure / MPa")
+    return figure
+
+
+def contact_figure(result: Analysis) -> Figure:
+    """Static contact force at constant pressure, over the height."""
+    contact = result.contact
+    assert contact is not None
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    axes = figure.subplots()
+    label = f"at {contact.pressure / 1e6:.4f} MPa"
+    axes.plot(_values("height", result), contact.curve, color=MAIN, label=label)
+    axes.axhline(0.0, color="0.4", lw=0.8)
+    for y, stable in contact.equilibria:
+        axes.plot(y * 1e3, 0.0, "o", mfc="k" if stable else "w", color="k", ms=6, clip_on=False)
+    _zone(axes, result, "height")
+    axes.set_xlabel(_label("height", result))
+    axes.set_ylabel("static contact force / N")
+    axes.legend()
+    return figure
+
+
+def carpet_figure(result: Analysis) -> Figure:
+    """Carpet of the air spring: force over height and pressure, with the mechanism's load."""
+    assert result.definition.solve is not None
+    spring = result.definition.actuators[result.definition.solve.unknown]
+    assert isinstance(spring, AirSpring)
+    table = table_of(result.motion, spring)
+    figure = Figure(figsize=(6.6, 4.2), layout="constrained")
+    axes = figure.subplots()
+    heights = table.heights * 1e3
+    for i, pressure in enumerate(table.pressures):
+        axes.plot(heights, table.forces[:, i] / 1e3, color="0.55", lw=0.9, marker=".", ms=3)
+        place = (heights[0], table.forces[0, i] / 1e3)
+        axes.annotate(f"{pressure / 1e6:g} MPa", place, xytext=(-4, 0), fontsize=8,
+                      textcoords="offset points", ha="right", va="center")  # fmt: skip
+    length = _values("length", result)
+    axes.plot(length, result.output["force"] / 1e3, color=MAIN, lw=2.2, label="load")
+    if result.zone:
+        _zone(axes, result, "length")
+    axes.set_xlim(left=heights[0] - 0.14 * (heights[-1] - heights[0]))
+    axes.set_xlabel("height of the air spring / mm")
+    axes.set_ylabel("force / kN")
+    axes.legend()
+    return figure
+
+
+def gas_spring_figure(result: Analysis) -> Figure:
+    """Length and force of the gas springs over the driver."""
+    names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
+    figure = Figure(figsize=(7.2, 3.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    travel = _values("travel", result)
+    for i, name in enumerate(names):
+        left.plot(travel, _values(f"{name}_length", result), label=name, **_line(i))
+        right.plot(travel, _values(f"{name}_force", result), label=name, **_line(i))
+    left.set_ylabel("length / mm")
+    right.set_ylabel("push / N")
+    for axes in (left, right):
+        axes.set_xlabel(_label("travel", result, "driver"))
+    left.legend()
+    return figure
+
+
+def cases_figure(results: Mapping[str, Analysis]) -> Figure:
+    """Unknown force over the driver, for all cases of a mechanism."""
+    figure = Figure(figsize=(6.6, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for i, (name, result) in enumerate(results.items()):
+        axes.plot(_values("travel", result), _values("force", result), label=name, **_line(i))
+    first = next(iter(results.values()))
+    axes.axhline(0.0, color="0.4", lw=0.8)
+    axes.set_xlabel(_label("travel", first, "driver"))
+    unknown = first.definition.solve.unknown if first.definition.solve is not None else ""
+    axes.set_ylabel(_label("force", first, f"force of '{unknown}'"))
+    axes.legend()
+    return figure
+
+
+def time_figure(result: Analysis) -> Figure:
+    """Motion in time: driver, output's speed and acceleration, driving force."""
+    timed = result.timed
+    assert timed is not None
+    figure = Figure(figsize=(7.6, 5.6), layout="constrained")
+    (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
+    travel = quantity("travel", result.definition)
+    a.plot(timed.time, timed.motion.s * travel.scale, color=MAIN)
+    a.set_ylabel(_label("travel", result, "driver"))
+    law = result.definition.motion
+    assert law is not None
+    b.plot(timed.time, timed.force, color=MAIN)
+    b.set_ylabel(f"force of '{law.unknown or law.actuator}' / N")
+    if result.definition.output is not None:
+        v, acceleration = timed.point(result.definition.output.point)
+        for axes, values in ((c, v), (d, acceleration)):
+            axes.plot(timed.time, values[:, 0] * 1e3, label="x", **_line(0))
+            axes.plot(timed.time, values[:, 1] * 1e3, label="y", **_line(1))
+            absolute = np.hypot(values[:, 0], values[:, 1]) * 1e3
+            axes.plot(timed.time, absolute, label="absolute", **_line(2))
+    c.set_ylabel("speed of the output / (mm/s)")
+    d.set_ylabel("acceleration / (mm/s²)")
+    c.legend()
+    for axes in (c, d):
+        axes.set_xlabel("time / s")
+    return figure
+
+
+def comparison_figure(results: Sequence[Analysis], *, zoom: bool = False) -> Figure:
+    """Ratio and force of several mechanisms over the height; with `zoom`, in the zone only."""
+    figure = Figure(figsize=(7.6, 3.8), layout="constrained")
+    panels = figure.subplots(1, 2)
+    for axes, name in zip(panels, ("ratio", "force"), strict=True):
+        for i, result in enumerate(results):
+            if name not in result.output or "height" not in result.output:
+                continue
+            x, y = _values("height", result), _values(name, result)
+            if zoom and result.zone:
+                low, high = (result.zone[k]["height"] * 1e3 for k in ("low", "high"))
+                inside = (x >= low) & (x <= high)
+                x, y = x[inside], y[inside]
+            label = result.definition.name + (f", {result.case}" if result.case else "")
+            axes.plot(x, y, label=label, **_line(i))
+        if not zoom:
+            _zone(axes, results[0], "height")
+        axes.set_xlabel("height over start / mm")
+    panels[0].set_ylabel("ratio dy/dL")
+    panels[1].set_ylabel("force / N")
+    panels[0].legend(fontsize=7.5)
+    return figure
+
+
+def search_figure(optimum: "Optimum") -> Figure:
+    """Objective at the end of every start, feasible or not, and the best."""
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    axes = figure.subplots()
+    starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
+    for kept, marker, fill, label in (
+        (True, "o", "k", "all constraints kept"),
+        (False, "x", "k", "a constraint broken"),
+    ):
+        chosen = [s for s in starts if s.feasible is kept]
+        if chosen:
+            axes.plot([s.number for s in chosen], [s.objective for s in chosen], marker, mfc=fill,
+                      color="0.3", ms=5, label=label)  # fmt: skip
+    lost = [s.number for s in optimum.starts if not np.isfinite(s.objective)]
+    if lost:
+        axes.plot(lost, [max(s.objective for s in starts)] * len(lost), "s", mfc="w", color="0.5",
+                  ms=5, label="not assembled")  # fmt: skip
+    if optimum.objective > 0.0:
+        axes.axhline(optimum.objective, color=MAIN, label=f"best {optimum.objective:.4g}")
+    if optimum.objective_before > 0.0:
+        before = f"file {optimum.objective_before:.4g}"
+        axes.axhline(optimum.objective_before, color=SECOND, ls=DASHES[1], label=before)
+    axes.set_yscale("log")
+    axes.set_xlabel("start")
+    axes.set_ylabel("objective")
+    axes.legend()
+    return figure

@@ -1,0 +1,407 @@
+"""One self-contained page about a mechanism: player, inputs with provenance, results, pictures.
+
+`figures` draws everything that the results allow, `page` writes it down, `animation` makes a GIF,
+`positions` a table of all positions.
+"""
+
+import csv
+import json
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from io import BytesIO, StringIO
+from typing import TYPE_CHECKING, Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from railsim.definitions.mechanism import AirSpring
+from railsim.mechanisms import drawing, tables
+from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.comparison import Comparison
+from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.quantities import quantity
+from railsim.mechanisms.selection import checks, selection
+from railsim.mechanisms.tables import Texts
+from railsim.mechanisms.tolerance import Scatter, scatter
+from railsim.plot import mechanisms as pictures
+from railsim.plot.style import styled
+from railsim.version import __version__
+
+if TYPE_CHECKING:
+    from railsim.mechanisms.optimisation import Optimum
+
+DPI = 130
+FRAMES = 121
+GIF_FRAMES = 40
+DASHES = {"guide": [2, 3], "spring": [7, 4], "damper": [4, 3]}
+COLOURS = {"actuator": "#004a80", "spring": "#b8450a", "cam": "#00664b"}
+
+METHOD = (
+    "Body coordinates and constraints of the joints, Newton's method with continuation along the "
+    "driver; derivatives from the constraints' Jacobian. Forces by virtual work, reactions by "
+    "Lagrange's multipliers. Angles of the tables are folded to 0 to 90 degrees.",
+    "The table of parameters says where every number is from: printed in the source, derived from "
+    "printed numbers alone, reconstructed (it agrees with what is printed but is not the only "
+    "value that does), new (our choice), optimised, or set by the caller. A result is only as "
+    "certain as the least certain of its parameters.",
+)
+
+
+@dataclass(frozen=True)
+class Collected:
+    """What the page is about.
+
+    Attributes
+    ----------
+    results : sequence of Analysis
+        One for each file; the first is the one that the page describes.
+    cases : mapping of str to Analysis
+        Its base and cases, where it has cases.
+    comparison : Comparison or None
+    optimum : Optimum or None
+    """
+
+    results: Sequence[Analysis]
+    cases: Mapping[str, Analysis]
+    comparison: Comparison | None = None
+    optimum: "Optimum | None" = None
+
+    @property
+    def result(self) -> Analysis:
+        """The analysis that the page describes: the optimum, else the first file's."""
+        return self.optimum.after if self.optimum is not None else self.results[0]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the page; `words` are the columns with text, `failed` the rows in red."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+    words: frozenset[int] = frozenset({0})
+    failed: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the page: PNG in base64, its width on the screen, its caption."""
+
+    png: str
+    width: int
+    caption: str
+
+
+@dataclass
+class Section:
+    """A section of the page."""
+
+    title: str
+    texts: list[str] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    figures: list[Picture] = field(default_factory=list)
+
+
+CAPTIONS = {
+    "drawing": "Four positions, and the working parts with the names of their points.",
+    "path": "Path of the output.",
+    "kinematics": "Angles of the bodies, their rates and accelerations.",
+    "angles": "Transmission angles folded to 90 degrees, pressure angles of cams; zone shaded.",
+    "cam": "Rate on the arcs of the cam, with the transitions.",
+    "ratio_force": "Ratio and force over length and height; zone shaded, work height dashed.",
+    "pressure": "Pressure that holds the mechanism.",
+    "contact": "Static contact force at constant pressure; a full circle is a stable rest.",
+    "carpet": "Carpet of the air spring with the load of the mechanism.",
+    "gas_springs": "Length and force of the gas springs.",
+    "cases": "Force of the unknown in all cases.",
+    "time": "The motion in time.",
+    "comparison": "The mechanisms side by side over the height.",
+    "comparison_zone": "The same in the zone.",
+    "search": "Objective at the end of every start of the search.",
+}
+
+
+def figures(collected: Collected) -> dict[str, Figure]:
+    """Draw all pictures, by the names of their files."""
+    result = collected.result
+    definition, output = result.definition, result.output
+    with styled():
+        drawn = {
+            "drawing": pictures.drawing_figure(result),
+            "kinematics": pictures.kinematics_figure(result),
+        }
+        if "height" in output:
+            drawn["path"] = pictures.path_figure(result)
+        if definition.angles:
+            drawn["angles"] = pictures.angles_figure(result)
+        if any(hasattr(joint, "cam") for joint in definition.joints.values()):
+            drawn["cam"] = pictures.cam_figure(result)
+        if "force" in output or "ratio" in output:
+            drawn["ratio_force"] = pictures.force_figure(result)
+        if "pressure" in output:
+            drawn["pressure"] = pictures.pressure_figure(result)
+            assert definition.solve is not None
+            if isinstance(definition.actuators[definition.solve.unknown], AirSpring):
+                drawn["carpet"] = pictures.carpet_figure(result)
+        if result.contact is not None:
+            drawn["contact"] = pictures.contact_figure(result)
+        if any(name.endswith("_length") for name in output):
+            drawn["gas_springs"] = pictures.gas_spring_figure(result)
+        if len(collected.cases) > 1 and "force" in output:
+            drawn["cases"] = pictures.cases_figure(collected.cases)
+        if result.timed is not None:
+            drawn["time"] = pictures.time_figure(result)
+        if (compared := _compared(collected)) and "ratio" in output:
+            drawn["comparison"] = pictures.comparison_figure(compared)
+            if result.zone:
+                drawn["comparison_zone"] = pictures.comparison_figure(compared, zoom=True)
+        if collected.optimum is not None:
+            drawn["search"] = pictures.search_figure(collected.optimum)
+    return {name: drawn[name] for name in CAPTIONS if name in drawn}
+
+
+def _compared(collected: Collected) -> list[Analysis]:
+    """Mechanisms side by side: several files, or before and after a search."""
+    if len(collected.results) > 1:
+        return list(collected.results)
+    optimum = collected.optimum
+    if optimum is None or optimum.before is None:
+        return []
+    return [optimum.before, optimum.after]
+
+
+def as_png(figure: Figure) -> bytes:
+    """Draw a figure as the bytes of a PNG file."""
+    buffer = BytesIO()
+    with styled():
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def positions(result: Analysis) -> bytes:
+    """All results at all positions as CSV; the header names quantity and unit."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = list(result.output)
+    writer.writerow([f"{name} [{quantity(name, result.definition).unit}]" for name in names])
+    for row in zip(*(result.output[name] for name in names), strict=True):
+        writer.writerow([repr(float(value)) for value in row])
+    return text.getvalue().encode()
+
+
+def animation(result: Analysis) -> bytes:
+    """The mechanism moving to its end and back, as the bytes of a GIF file."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    model = result.model
+    motion = solve(model, np.linspace(model.start, model.end, GIF_FRAMES))
+    drawn = drawing.lines(motion)
+    every = np.concatenate([line.xy.reshape(-1, 2) for line in drawn]) * 1e3
+    (x0, y0), (x1, y1) = every.min(axis=0), every.max(axis=0)
+    margin = 0.06 * max(x1 - x0, y1 - y0)
+    frames = []
+    with styled():
+        figure = Figure(figsize=(5.2, 4.6), dpi=80, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.subplots()
+        for k in range(GIF_FRAMES):
+            axes.clear()
+            pictures.draw(axes, drawn, k, "#1d2429", "")
+            axes.set_xlim(x0 - margin, x1 + margin)
+            axes.set_ylim(y0 - margin, y1 + margin)
+            axes.set_aspect("equal")
+            axes.set_xlabel("x / mm")
+            axes.set_ylabel("y / mm")
+            axes.set_title(_told(result, motion.s[k]))
+            canvas.draw()  # type: ignore[no-untyped-call]
+            pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+            frames.append(Image.fromarray(pixels).convert("RGB").quantize(32))
+    buffer = BytesIO()
+    both = frames + frames[-2:0:-1]
+    both[0].save(buffer, "GIF", save_all=True, append_images=both[1:], duration=60, loop=0)
+    return buffer.getvalue()
+
+
+def _told(result: Analysis, s: float) -> str:
+    what = quantity("travel", result.definition)
+    return f"driver at {s * what.scale:.1f} {what.shown.replace('deg', '°')}"
+
+
+def player(result: Analysis) -> dict[str, Any]:
+    """What the page's player needs: lines as SVG coordinates in mm, y downwards."""
+    model = result.model
+    motion = solve(model, np.linspace(model.start, model.end, FRAMES))
+    drawn = drawing.lines(motion)
+    every = np.concatenate([line.xy.reshape(-1, 2) for line in drawn]) * [1e3, -1e3]
+    (x0, y0), (x1, y1) = every.min(axis=0), every.max(axis=0)
+    margin = 0.06 * max(x1 - x0, y1 - y0)
+    whole = [x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin]
+    a, b, c, d = (1e3 * edge for edge in drawing.working_box(motion))
+    fixed = [
+        [round(x * 1e3, 1), round(-y * 1e3, 1)]
+        for name, xy in drawing.points(motion).items()
+        if name.startswith("ground.")
+        for x, y in xy[:1]
+    ]
+    data = {
+        "lines": [
+            {
+                "width": 1.4 * pictures.WIDTHS[line.kind],
+                "dash": DASHES.get(line.kind),
+                "colour": COLOURS.get(line.kind, "#1d2429"),
+                "places": [
+                    " ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in place)
+                    for place in line.xy
+                ],
+            }
+            for line in drawn
+        ],
+        "fixed": fixed,
+        "told": _sentences(result, motion.s),
+        "whole": [round(float(v), 1) for v in whole],
+        "near": [round(float(v), 1) for v in (a, -d, b - a, d - c)],
+    }
+    return {
+        "box": " ".join(f"{v:.1f}" for v in whole),
+        "last": FRAMES - 1,
+        "data": Markup(json.dumps(data).replace("</", "<\\/")),  # our own numbers
+    }
+
+
+def _sentences(result: Analysis, s: Any) -> list[str]:
+    """What the player says at each of its positions."""
+    names = [n for n in ("height", "force") if n in result.output]
+    order = np.argsort(result.output["travel"])
+    known = {n: np.interp(s, result.output["travel"][order], result.output[n][order])
+             for n in names}  # fmt: skip
+    told = []
+    for k, value in enumerate(s):
+        parts = [_told(result, value)]
+        for name in names:
+            what = quantity(name, result.definition)
+            parts.append(f"{name} {known[name][k] * what.scale:.0f} {what.shown}")
+        told.append(", ".join(parts))
+    return told
+
+
+def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    collected : Collected
+        What to write about.
+    drawn : mapping of str to bytes
+        PNG pictures by the names of `figures`.
+    """
+    result = collected.result
+    definition = result.definition
+    sections = [_results(result, drawn)]
+    if collected.optimum is not None:
+        sections.append(_search(collected.optimum, drawn))
+    if collected.comparison is not None:
+        sections.append(_comparison(collected.comparison, drawn))
+    elif "comparison" in drawn:
+        shown = _shown(drawn, "comparison", "comparison_zone")
+        sections.append(Section("Before and after the search", [], [], shown))
+    sections += [_kinematics(drawn), _forces(result, drawn)]
+    if choices := selection(result):
+        rows = tables.selection_table(choices)
+        failed = frozenset(i for i, c in enumerate(choices) if not c.fits)
+        words = frozenset({0, 1, 2, 3})
+        sections.append(Section("Selection", [], [_table(rows, words=words, failed=failed)]))
+    if definition.tolerances:
+        sections.append(_tolerances(scatter(definition)))
+    made = tables.parameter_table(result)
+    sections.append(Section("Parameters", list(definition.remarks), [
+        _table(made, words=frozenset({0, 2}))
+    ]))  # fmt: skip
+    template = files("railsim.report").joinpath("templates/mechanisms.html").read_text("utf-8")
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    source = definition.source or "no source given"
+    return environment.from_string(template).render(
+        title=f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else ""),
+        lead=f"{source}. Written by railsim {__version__}.",
+        verdict=_verdict(result),
+        player=player(result),
+        sections=[s for s in sections if s.texts or s.tables or s.figures],
+        method=METHOD,
+    )
+
+
+def _verdict(result: Analysis) -> dict[str, Any]:
+    made = checks(result)
+    failed = [check.name for check in made if not check.ok]
+    if not made:
+        return {"ok": True, "text": "The file states no limits to check."}
+    text = f"Not met: {', '.join(failed)}." if failed else f"All {len(made)} checks are met."
+    return {"ok": not failed, "text": text}
+
+
+def _shown(drawn: Mapping[str, bytes], *names: str) -> list[Picture]:
+    found = []
+    for name in names:
+        if name in drawn:
+            png = drawn[name]
+            width = int.from_bytes(png[16:20], "big")  # the header of a PNG file
+            code = b64encode(png).decode()
+            found.append(Picture(code, round(width * 96 / DPI), CAPTIONS[name]))
+    return found
+
+
+def _table(
+    texts: Texts,
+    caption: str = "",
+    words: frozenset[int] = frozenset({0}),
+    failed: frozenset[int] = frozenset(),
+) -> Table:
+    header, rows = texts
+    return Table(header, rows, caption, words, failed)
+
+
+def _results(result: Analysis, drawn: Mapping[str, bytes]) -> Section:
+    shown = [_table(tables.upright(tables.position_table(result)))]
+    if made := checks(result):
+        failed = frozenset(i for i, check in enumerate(made) if not check.ok)
+        header, rows = tables.check_table(made)
+        noted = [[*row, check.note] for row, check in zip(rows, made, strict=True)]
+        words = frozenset({0, 5})
+        shown.append(_table(([*header, "what it compares"], noted), words=words, failed=failed))
+    return Section("Results", tables.sentences(result), shown, _shown(drawn, "drawing", "path"))
+
+
+def _kinematics(drawn: Mapping[str, bytes]) -> Section:
+    return Section("Kinematics", [], [], _shown(drawn, "kinematics", "angles", "cam"))
+
+
+def _forces(result: Analysis, drawn: Mapping[str, bytes]) -> Section:
+    names = ("ratio_force", "pressure", "carpet", "contact", "gas_springs", "cases", "time")
+    shown = [_table(tables.reaction_table(result), "Reactions")]
+    return Section("Forces and motion", [], shown, _shown(drawn, *names))
+
+
+def _search(optimum: "Optimum", drawn: Mapping[str, bytes]) -> Section:
+    texts = tables.optimum_sentences(optimum)
+    shown = [_table(tables.optimum_table(optimum), "Parameters")]
+    if optimum.active:
+        shown.append(_table(tables.active_table(optimum), "Active limits", frozenset({0, 1})))
+    shown.append(_table(tables.start_table(optimum), "Starts"))
+    return Section("Search", texts, shown, _shown(drawn, "search"))
+
+
+def _comparison(comparison: Comparison, drawn: Mapping[str, bytes]) -> Section:
+    shown = [_table(tables.comparison_table(comparison))]
+    return Section("Comparison", [], shown, _shown(drawn, "comparison", "comparison_zone"))
+
+
+def _tolerances(found: Sequence[Scatter]) -> Section:
+    text = (
+        "First order. Random: root of the sum of squares of the single deviations; worst case: "
+        "sum of their amounts."
+    )
+    return Section("Tolerances", [text], [_table(tables.scatter_table(found))])
