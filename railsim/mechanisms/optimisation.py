@@ -434,7 +434,7 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
     def unit(y: Floats) -> Floats:
         return np.eye(m + 1)[m]
 
-    found = minimize(
+    found: Any = minimize(
         breach,
         np.append(u0, here.violation),
         jac=unit,
