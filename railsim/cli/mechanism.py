@@ -139,11 +139,12 @@ def _cases(file: str, mechanism: "Mechanism", base: "Analysis") -> dict[str, "An
 def _optimised(
     mechanism: "Mechanism", case: str | None, starts: int | None, seed: int | None
 ) -> "Optimum":
-    from railsim.errors import Fault, InputError, nearest
+    from railsim.errors import InputError
+    from railsim.mechanisms.analysis import no_case
     from railsim.mechanisms.optimisation import optimise
 
     if case is not None and case not in mechanism.cases:
-        raise InputError([Fault("--case", "", f"no case '{case}'", nearest(case, mechanism.cases))])
+        raise InputError([no_case(mechanism, case)])
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     chosen = mechanism.in_case(case)
     return optimise(chosen, starts=starts, seed=seed, workers=cores or 1)

@@ -200,7 +200,7 @@ def _by_key(*keys: str) -> Any:
     def tag(value: Any) -> str | None:
         for key in keys:
             if (key in value) if isinstance(value, Mapping) else hasattr(value, key):
-                return key
+                return f"a {key}"
         return None
 
     listed = ", ".join(keys)
@@ -212,11 +212,11 @@ def _by_key(*keys: str) -> Any:
 
 
 Joint = Annotated[
-    Annotated[Revolute, Tag("revolute")]
-    | Annotated[Link, Tag("link")]
-    | Annotated[Slot, Tag("slot")]
-    | Annotated[Prismatic, Tag("prismatic")]
-    | Annotated[Cam, Tag("cam")],
+    Annotated[Revolute, Tag("a revolute")]
+    | Annotated[Link, Tag("a link")]
+    | Annotated[Slot, Tag("a slot")]
+    | Annotated[Prismatic, Tag("a prismatic")]
+    | Annotated[Cam, Tag("a cam")],
     _by_key("revolute", "link", "slot", "prismatic", "cam"),
 ]
 
@@ -298,11 +298,11 @@ class HandTorque(Definition):
 
 
 Actuator = Annotated[
-    Annotated[Cylinder, Tag("cylinder")]
-    | Annotated[AirSpring, Tag("air_spring")]
-    | Annotated[Piston, Tag("piston")]
-    | Annotated[HandForce, Tag("push")]
-    | Annotated[HandTorque, Tag("turn")],
+    Annotated[Cylinder, Tag("a cylinder")]
+    | Annotated[AirSpring, Tag("a air_spring")]
+    | Annotated[Piston, Tag("a piston")]
+    | Annotated[HandForce, Tag("a push")]
+    | Annotated[HandTorque, Tag("a turn")],
     _by_key("cylinder", "air_spring", "piston", "push", "turn"),
 ]
 
@@ -405,13 +405,13 @@ class GasSpring(Definition):
 
 
 Element = Annotated[
-    Annotated[PointMass, Tag("point_mass")]
-    | Annotated[Force, Tag("force")]
-    | Annotated[Torque, Tag("torque")]
-    | Annotated[Spring, Tag("spring")]
-    | Annotated[Damper, Tag("damper")]
-    | Annotated[Stop, Tag("stop")]
-    | Annotated[GasSpring, Tag("gas_spring")],
+    Annotated[PointMass, Tag("a point_mass")]
+    | Annotated[Force, Tag("a force")]
+    | Annotated[Torque, Tag("a torque")]
+    | Annotated[Spring, Tag("a spring")]
+    | Annotated[Damper, Tag("a damper")]
+    | Annotated[Stop, Tag("a stop")]
+    | Annotated[GasSpring, Tag("a gas_spring")],
     _by_key("point_mass", "force", "torque", "spring", "damper", "stop", "gas_spring"),
 ]
 

@@ -35,7 +35,7 @@ def mechanism_faults(mechanism: Mechanism) -> list[Fault]:
     for case in (None, *mechanism.cases):
         faults += _value_faults(mechanism, case)
     if faults:
-        return faults
+        return [*_unit_faults(mechanism), *faults]
     return [*_freedom_faults(mechanism), *_size_faults(mechanism)]
 
 
@@ -115,7 +115,7 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
     except ValueError as error:
         hint = ""
         if "acos" in str(error) or "asin" in str(error) or "root" in str(error):
-            hint = "the links cannot be assembled with these parameters"
+            hint = "the links cannot be assembled at the start with these parameters"
         raise InputError([Fault("", key, str(error), hint)]) from None
 
 
@@ -395,6 +395,17 @@ def _table_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> list
     if not np.all(np.diff(forces, axis=1) > 0.0):
         return [Fault("", f"{key}.forces", "not rising with pressure", "rising along each row")]
     return []
+
+
+def _unit_faults(mechanism: Mechanism) -> list[Fault]:
+    """Parameters that are lengths and look like millimetres: told where something is wrong."""
+    return [
+        Fault("", f"parameters.{name}", f"{value:g} m, out of proportion", "lengths in metres")
+        for name, value in mechanism.parameters.items()
+        if not isinstance(value, str)
+        and mechanism.unit_of(name) == "m"
+        and abs(value) >= LARGEST
+    ]
 
 
 def _freedom_faults(mechanism: Mechanism) -> list[Fault]:

@@ -1,6 +1,6 @@
 """Everything that a mechanism file asks for, computed: `analyse` is the place to begin reading."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -181,8 +181,7 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     113.668 mm, 9803 N
     """
     if case is not None and case not in definition.cases:
-        fault = Fault("--case", "", f"no case '{case}'", nearest(case, definition.cases))
-        raise InputError([fault])
+        raise InputError([no_case(definition, case)])
     definition = definition.in_case(case)
     model = build(definition)
     check_freedom(model)
@@ -209,6 +208,13 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
         _release(model),
         case,
     )
+
+
+def no_case(definition: Mechanism, case: str) -> Fault:
+    """The fault of a case that a mechanism does not have."""
+    cases = definition.cases
+    allowed = nearest(case, cases) if cases else "the file has no cases"
+    return Fault("--case", "", f"no case '{case}'", allowed)
 
 
 def actuator_of(definition: Mechanism) -> str | None:
@@ -485,8 +491,3 @@ def _release(model: Model) -> FreeMotion | None:
             found = driver_words(model, value)
             raise InputError([Fault(model.definition.name, f"release.{key}", found, allowed)])
     return free_motion(model, start, until, model.number(release.duration))
-
-
-def cases_of(definition: Mechanism) -> Sequence[str]:
-    """Names of a mechanism's cases."""
-    return tuple(definition.cases)

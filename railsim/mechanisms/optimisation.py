@@ -432,7 +432,8 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
         return float(y[m])
 
     def unit(y: Floats) -> Floats:
-        return np.eye(m + 1)[m]
+        slope: Floats = np.eye(m + 1)[m]
+        return slope
 
     found: Any = minimize(
         breach,

@@ -1,4 +1,4 @@
-"""Planar linkages in two independent ways: closed forms, multipliers, power, differences, energy."""
+"""Planar linkages in two ways: closed forms, multipliers, power, differences, energy."""
 
 import numpy as np
 import pytest

@@ -1,0 +1,331 @@
+"""``railsim mechanism``: keys of --json, exit status, files of --out, every kind of bad input."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from railsim import cli
+from railsim.definitions.loading import load_mechanism
+from railsim.definitions.sources import shipped_names
+
+FEW = ["--set", "sampling.points=51"]
+FOUR_BAR = """
+format = "railsim-mechanism/1"
+[parameters]
+ground = {ground}
+crank = {crank}
+coupler = {coupler}
+rocker = {rocker}
+[ground.points]
+left = [0.0, 0.0]
+right = ["ground", 0.0]
+[bodies.crank]
+points = {{ pin = [0.0, 0.0], end = ["crank", 0.0] }}
+[bodies.rocker]
+points = {{ pin = [0.0, 0.0], end = ["rocker", 0.0] }}
+[joints.left]
+revolute = ["ground.left", "crank.pin"]
+[joints.right]
+revolute = ["ground.right", "rocker.pin"]
+[joints.coupler]
+link = ["crank.end", "rocker.end"]
+length = "coupler"
+[start]
+crank = {{ angle = 1.0 }}
+rocker = {{ angle = 1.0 }}
+[driver]
+angle = "crank"
+start = {start}
+end = {end}
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text, name="mine.toml"):
+        path = tmp_path / name
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def four_bar(write, ground=1.0, crank=0.4, coupler=1.0, rocker=0.8, start=1.0, end=2.0):
+    return write(FOUR_BAR.format(**locals()))
+
+
+def answer(capsys, *arguments):
+    assert cli.main(["mechanism", *arguments, "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return json.loads(out)
+
+
+def refused(capsys, *arguments):
+    """Lines on stderr of a command that ends with status 2 and prints nothing else."""
+    assert cli.main(["mechanism", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Traceback" not in err
+    return err.splitlines()
+
+
+def test_every_shipped_mechanism_is_valid_and_listed(capsys):
+    names = shipped_names("mechanism")
+    wanted = {"atr95", *(f"atr95_lift_{i}" for i in range(1, 7)), "tilting_one_spring",
+              "tilting_two_springs", "watt_axlebox_guide"}  # fmt: skip
+    assert wanted <= set(names)
+    assert cli.main(["validate", *names]) == 0
+    assert capsys.readouterr().out.count("mechanism, no faults") == len(names)
+    for name in names:
+        mechanism = load_mechanism(name)
+        for parameter in mechanism.parameters:
+            assert mechanism.provenance_of(parameter) != "not stated"
+
+
+def test_json_of_a_lift_has_the_promised_keys(capsys):
+    data = answer(capsys, "atr95_lift_5", *FEW)
+    keys = "parameters travel stroke length_start length_end max_force max_force_at force_zeros"
+    keys += " min_transmission_angles output zone motion contact reactions cases selection checks"
+    assert set(keys.split()) <= set(data)
+    arrays = "travel length height x ratio ratio_x force pressure effective_weight effective_mass"
+    assert set(arrays.split()) <= set(data["output"])
+    assert {len(array) for array in data["output"].values()} == {51}
+    assert {"mu", "mu_prime", "mu_s"} == set(data["min_transmission_angles"])
+    for name in ("travel", "ratio", "force"):
+        assert set(data["zone"][name]) == {"low", "work", "high"}
+    assert set(data["contact"]["force"]) == {"low", "work", "high"}
+    assert {"time", "travel", "force", "max_force", "min_force"} <= set(data["motion"])
+    assert {"max", "at"} <= set(data["reactions"]["boom_pin"])
+    for check in data["checks"]:
+        assert {"name", "value", "limit", "ok"} <= set(check)
+    assert data["parameters"]["held_pressure"] == data["contact"]["pressure"]
+    assert data["provenance"]["a1"] == "printed"
+    assert data["provenance"]["upper_a"] == "reconstructed"
+
+
+def test_json_of_the_tilting_machine_has_springs_and_cases(capsys):
+    data = answer(capsys, "tilting_two_springs", *FEW)
+    assert {"travel", "force", "front_length", "rear_length", "front_force"} <= set(data["output"])
+    assert data["output"]["travel"][0] == pytest.approx(np.radians(-35.0))
+    heavy = data["cases"]["bordolese_5000"]
+    assert heavy["force_zeros"]
+    assert not data["force_zeros"]
+    alone = answer(capsys, "tilting_two_springs", "--case", "bordolese_5000", *FEW)
+    assert alone["output"]["force"] == heavy["output"]["force"]
+
+
+def test_at_gives_all_results_where_one_has_a_value(capsys):
+    data = answer(capsys, "atr95_lift_5", "--at", "height=0.8955", "--at", "length=0.2", *FEW)
+    work, length = data["at"]
+    assert work["ratio"] == pytest.approx(data["zone"]["ratio"]["work"], rel=1e-9)
+    assert length["length"] == pytest.approx(0.2, rel=1e-12)
+
+
+def test_a_set_parameter_says_so(capsys):
+    data = answer(capsys, "atr95_lift_5", "--set", "parameters.a1=0.165", *FEW)
+    assert data["parameters"]["a1"] == 0.165
+    assert data["provenance"]["a1"] == "set"
+
+
+def test_several_files_are_compared_with_the_first(capsys):
+    data = answer(capsys, "atr95_lift_5", "atr95_lift_2", *FEW)
+    assert [row["name"] for row in data["comparison"]] == ["ATR95 lift 5", "ATR95 lift 2"]
+    assert data["comparison"][0]["error"] == pytest.approx(0.0, abs=1e-20)
+    assert data["comparison"][1]["error"] == pytest.approx(0.2823, rel=5e-3)
+
+
+@pytest.mark.parametrize("by", ["travel", "length", "time"])
+def test_one_quantity_is_sampled_evenly(capsys, by):
+    changes = ["--set", f"sampling.by={by}", "--set", "sampling.points=21"]
+    data = answer(capsys, "atr95_lift_4", *changes)
+    # the lifts move at constant speed of the length: equal times are equal lengths
+    steps = np.diff(data["output"]["travel" if by == "travel" else "length"])
+    assert steps == pytest.approx(np.full(20, steps.mean()), rel=1e-9)
+
+
+class Text(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.tags, self.text = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.mark.slow
+def test_out_writes_a_self_contained_page_pictures_and_positions(tmp_path, capsys):
+    folder = tmp_path / "out"
+    assert cli.main(["mechanism", "atr95", "--out", str(folder), *FEW]) == 0
+    capsys.readouterr()
+    names = {path.name for path in folder.iterdir()}
+    pictures = "drawing kinematics path angles cam ratio_force pressure contact carpet time"
+    assert {f"{name}.png" for name in pictures.split()} <= names
+    assert {"report.html", "animation.gif", "positions.csv"} <= names
+    page = Text()
+    html = (folder / "report.html").read_text()
+    page.feed(html)
+    sources = [attributes.get("src", "") for _, attributes in page.tags]
+    assert not [source for source in sources if source and not source.startswith("data:")]
+    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", html)
+    text = " ".join(page.text)
+    assert "reconstructed" in text
+    assert "printed" in text
+    assert any(tag == "svg" for tag, _ in page.tags)
+    rows = (folder / "positions.csv").read_text().splitlines()
+    assert len(rows) == 52
+    assert rows[0].startswith("travel [rad],length [m]")
+    lines = refused(capsys, "atr95", "--out", str(folder), *FEW)
+    assert "--overwrite" in lines[0]
+
+
+@pytest.mark.slow
+def test_optimised_file_extends_the_searched_one_and_runs_to_the_same(tmp_path, capsys):
+    folder = tmp_path / "out"
+    changes = ["--set", "parameters.bore=0.2", *FEW]
+    search = ["--optimise", "--starts", "1", "--out", str(folder)]
+    data = answer(capsys, "atr95_lift_2", *search, *changes)
+    assert {"objective", "active", "starts", "seed"} <= set(data)
+    assert data["objective"] <= data["objective_before"]
+    again = answer(capsys, str(folder / "optimised.toml"))
+    for name in ("stroke", "max_force", "parameters"):
+        assert again[name] == pytest.approx(data[name])
+    assert again["provenance"]["c"] == "optimised"
+    assert again["provenance"]["bore"] == "set"
+    assert (folder / "search.png").exists()
+
+
+@pytest.mark.slow
+def test_search_without_a_solution_gives_the_least_broken_compromise(capsys):
+    changes = ["--set", "optimise.min_transmission_angle=1.2"]
+    data = answer(capsys, "atr95_lift_4", "--optimise", "--starts", "4", *changes, *FEW)
+    assert data["feasible"] is False
+    assert max(data["breaches"].values()) > 0.0
+    angles = data["min_transmission_angles"]
+    least = 1.2 - min(angles["mu"], angles["mu_prime"])
+    assert least == pytest.approx(max(data["breaches"].values()), rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "key", "words"),
+    [
+        ("atr95_lift_5", ["parameters.a2=0.02"], "derived.rocker_angle", "assembled at the start"),
+        ("atr95_lift_5", ["parameters.travel=1.4"], "joints.rod", "57.04"),
+        ("atr95", ["parameters.cam_length_1=0.05"], "joints.cam", "leaves the cam"),
+        ("atr95_lift_5", ["joints.x={link=['ground.foot','coupler.end'],length=0.2}"], "joints",
+         "0 degrees of freedom"),
+        ("atr95_lift_5", ["bodies.more={points={a=[0,0]}}"], "joints", "4 degrees of freedom"),
+        ("atr95_lift_5", ["derived.unused='a1*2'"], "derived.unused", "is used nowhere"),
+        ("atr95_lift_5", ["joints.rocker.length='a33'"], "joints.rocker.length", "mean 'a3'"),
+        ("atr95_lift_5", ["joints.rocker.length='open(a1)'"], "joints.rocker.length", "allowed"),
+        ("atr95_lift_5", ["joints.rocker.length='a1.real'"], "joints.rocker.length", "allowed"),
+        ("atr95_lift_5", ["joints.rocker.length='9**9**9'"], "joints.rocker.length", "finite"),
+        ("atr95_lift_5", ["parameters.a3=285.1563"], "parameters.a3", "lengths in metres"),
+        ("atr95_lift_2", ["ground.points.line=[0.0,120.0]"], "ground.points.line", "metres"),
+        ("tilting_one_spring", ["parameters.front_stroke=0.1"], "elements.front", "17.40 mm"),
+        ("atr95", ["parameters.m_head=300"], "actuators.lift", "outside the table"),
+        ("atr95_lift_5", ["parameters.zone_high=3.0"], "zone.high", "never reached"),
+        ("atr95_lift_5", ["joints.rocker.link=['ground.rock','coupler.end']"],
+         "joints.rocker.link.0", "did you mean 'ground.rocker'"),
+        ("atr95_lift_5", ["joints.rocker={link=['ground.rocker','coupler.end']}"],
+         "joints.rocker.length", "missing"),
+        ("atr95_lift_5", ["joints.rocker={bolt=1}"], "joints.rocker", "revolute, link, slot"),
+        ("atr95_lift_5", ["provenance.printed=['nothing']"], "provenance.printed", "nothing"),
+        ("atr95_lift_5", ["elements.head.mass=-1"], "elements.head.mass", "0 or greater"),
+        ("atr95", ["actuators.lift.heights=[0.1,0.2]"], "actuators.lift", "rows of 'forces'"),
+        ("atr95_lift_5", ["optimise.objective=constant"], "optimise.target", "needs one"),
+        ("tilting_one_spring", ["release.start=2.0"], "release.start", "114.59"),
+        ("watt_axlebox_guide", ["parameters.lift=0.5"], "joints.", "cannot be assembled"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_in_a_line(capsys, name, changes, key, words):
+    options = [part for change in changes for part in ("--set", change)]
+    lines = refused(capsys, name, *options)
+    assert any(f": {key}" in line and words in line for line in lines), lines
+
+
+def test_bounds_that_exclude_every_assembly(capsys):
+    bounds = ["--set", "optimise.bounds.a2=[0.01,0.011]"]
+    (line,) = refused(capsys, "atr95_lift_5", "--optimise", "--starts", "2", *bounds)
+    assert "optimise.bounds: exclude every assembly" in line
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--at", "height=9"], "never reached"),
+        (["--at", "hight=0.5"], "did you mean 'height'"),
+        (["--at", "height"], "NAME=VALUE"),
+        (["--case", "x"], "no cases"),
+        (["--starts", "3"], "--optimise"),
+        (["--out", "page.html"], "is the name of a file"),
+    ],
+)
+def test_bad_options_are_told(capsys, options, words):
+    assert words in " ".join(refused(capsys, "atr95_lift_5", *options))
+
+
+def test_crank_that_cannot_turn_round_is_told_where(write, capsys):
+    # Grashof: 0.9 + 1.3 > 1.0 + 0.8, no crank turns; lost where coupler and rocker stretch
+    file = four_bar(write, crank=0.9, coupler=1.3, rocker=0.8, start=1.0, end=6.0)
+    (line,) = refused(capsys, file)
+    assert line.startswith(f"{file}: joints.")
+    cosine = (1.0 + 0.9**2 - 2.1**2) / (2 * 0.9)
+    stretched = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    found = float(re.search(r"driver at ([\d.]+) deg", line).group(1))
+    folded = np.degrees(2 * np.pi - np.arccos((1.0 + 0.81 - 0.25) / 1.8))
+    assert found in (pytest.approx(stretched, abs=0.01), pytest.approx(folded, abs=0.01))
+
+
+def test_parallelogram_at_its_change_point_is_no_branch_to_trust(write, capsys):
+    file = four_bar(write, ground=1.0, crank=0.4, coupler=1.0, rocker=0.4, start=1.0, end=4.0)
+    (line,) = refused(capsys, file)
+    assert "driver at 1" in line  # 180 deg: all links in one line
+    assert "dead point" in line or "another branch" in line or "cannot be assembled" in line
+
+
+def test_redundant_joint_is_named(write, capsys):
+    text = FOUR_BAR.format(ground=1.0, crank=0.4, coupler=1.0, rocker=0.4, start=1.0, end=2.0)
+    text += (
+        '[bodies.third]\npoints = { pin = [0.0, 0.0], end = ["crank", 0.0] }\n'
+        '[joints.a]\nlink = ["crank.end", "third.end"]\nlength = 0.5\n'
+        '[joints.b]\nlink = ["ground.left", "third.pin"]\nlength = 0.5\n'
+        '[joints.c]\nlink = ["crank.pin", "third.pin"]\nlength = 0.5\n'
+    ).replace("[bodies.third]", "[start.third]\nx = 0.5\nangle = 1.0\n[bodies.third]")
+    (line,) = refused(capsys, write(text))
+    assert "hold the same freedom twice" in line
+    assert "b, c" in line
+
+
+def test_actuator_through_its_dead_point(capsys, write):
+    text = FOUR_BAR.format(ground=1.0, crank=0.4, coupler=1.0, rocker=0.8, start=1.0, end=5.0)
+    text += '[actuators.ram]\npiston = ["ground.right", "crank.end"]\n[solve]\nunknown = "ram"\n'
+    (line,) = refused(capsys, write(text))
+    assert "actuators.ram" in line
+    assert "dead point" in line
+
+
+def test_catalogue_without_a_fit_is_a_result_with_reasons(capsys):
+    data = answer(capsys, "tilting_one_spring", "--set", "parameters.front_F1=5000", *FEW)
+    rows = [row for row in data["selection"] if row["catalogue"] == "vapsint"]
+    assert rows
+    assert not any(row["fits"] for row in rows)
+    assert all("F1 5000 N" in row["reasons"][0] for row in rows)
+
+
+def test_air_spring_outside_its_table_is_no_value_in_the_contact_force(capsys):
+    data = answer(capsys, "atr95", "--set", "parameters.held_pressure=0.15e6", *FEW)
+    assert data["contact"]["force"]["work"] is None
+    assert "table" in data["contact"]["reason"]
+
+
+def test_info_shows_parameters_with_their_provenance(capsys):
+    assert cli.main(["info", "atr95_lift_5"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"a1 +0.1641893 +m +printed", out)
