@@ -39,12 +39,12 @@ def _quantity_or_auto(value: Any) -> float | str:
 Quantity = Annotated[
     float | str,
     PlainValidator(_quantity),
-    WithJsonSchema({"type": ["number", "string"]}),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]
 QuantityOrAuto = Annotated[
     float | str,
     PlainValidator(_quantity_or_auto),
-    WithJsonSchema({"type": ["number", "string"]}),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]
 PointName = Annotated[
     str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*\.[A-Za-z_][A-Za-z0-9_-]*$")

@@ -189,14 +189,23 @@ def check_freedom(model: Model) -> None:
     ------
     InputError : the joints concerned, and the degrees of freedom that are left.
     """
-    motion = solve(model, [model.start])
+    s, pose = np.array([model.start]), model.pose[None]
+    arcs = model.linkage.joint[:, 4][None].copy()
+    lost: InputError | None = None
+    try:
+        motion = solve(model, s)
+        pose, arcs = motion.q, motion.arcs
+    except InputError as error:
+        lost = error
     rows = 3 * model.linkage.n_bodies
     residual, jacobian = np.zeros((1, rows)), np.zeros((1, rows, rows))
-    kernel.jacobians(model.linkage, motion.s, motion.q, motion.arcs, residual, jacobian)
+    kernel.jacobians(model.linkage, s, pose, arcs, residual, jacobian)
     joints = jacobian[0, :-1]
     left, singular, _ = np.linalg.svd(joints)
     rank = int(np.sum(singular > 1e-9 * singular[0]))
     if rank == rows - 1:
+        if lost is not None:
+            raise lost
         return
     weight = np.abs(left[:, rank:]).max(axis=1)
     names = [n for n, (a, b) in model.joint_rows.items() if weight[a:b].max() > 1e-6]

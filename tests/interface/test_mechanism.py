@@ -237,10 +237,10 @@ def test_search_without_a_solution_gives_the_least_broken_compromise(capsys):
          "joints.rocker.length", "missing"),
         ("atr95_lift_5", ["joints.rocker={bolt=1}"], "joints.rocker", "revolute, link, slot"),
         ("atr95_lift_5", ["provenance.printed=['nothing']"], "provenance.printed", "nothing"),
-        ("atr95_lift_5", ["elements.head.mass=-1"], "elements.head.mass", "0 or greater"),
+        ("atr95_lift_5", ["parameters.m_head=-1"], "elements.head.mass", "0 or greater"),
         ("atr95", ["actuators.lift.heights=[0.1,0.2]"], "actuators.lift", "rows of 'forces'"),
         ("atr95_lift_5", ["optimise.objective=constant"], "optimise.target", "needs one"),
-        ("tilting_one_spring", ["release.start=2.0"], "release.start", "114.59"),
+        ("tilting_one_spring", ["parameters.release_at=2.0"], "release.start", "114.59"),
         ("watt_axlebox_guide", ["parameters.lift=0.5"], "joints.", "cannot be assembled"),
     ],
 )  # fmt: skip
