@@ -58,7 +58,7 @@ def source_equation_19(case, *, slips):
     """Operator's force at the start, `M1/Z1`, after the source's equation 19.
 
     `M1 = Fp dyD/df1 - Fm dZ4/df1`, yD = Z1 sin f1 + Z2 sin(f1 + alpha) with Z2 from C to the centre
-    of gravity.  With its slips: Z2 sin(f1 + alpha) in the derivative, +Fm, and the spring's law over
+    of gravity.  With its slips: Z2 sin(f1 + alpha) in the derivative, +Fm, and the law over
     the index of the angle, which gives F1 at the start.
     """
     model = analyse(load_mechanism("tilting_one_spring", FEW), case).model
