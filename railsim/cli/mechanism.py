@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     overwrite_option,
     print_json,
@@ -69,13 +70,13 @@ def command(
         return
     for number, (result, values) in enumerate(zip(results, found, strict=True)):
         if number:
-            click.echo()
+            echo()
         for line in _lines(result, values):
-            click.echo(line)
+            echo(line)
     if not quiet:
         for result in results:
             for remark in result.definition.remarks:
-                click.echo(f"remark: {result.definition.name}: {remark}", err=True)
+                echo(f"remark: {result.definition.name}: {remark}", err=True)
 
 
 def _analysed(file: str, assignments: Sequence[str], case: str | None) -> "Analysis":
