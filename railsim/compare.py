@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
 
+from railsim.errors import Fault, InputError
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
+from railsim.text import spreadsheet_cell
 
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
@@ -82,6 +84,12 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
             for peak in curve.peaks:
                 rows.setdefault((where, peak.quantity.name), {})[label] = peak
     first = next(iter(results))
+    empty = [label for label, result in results.items() if not len(result["time"])]
+    if empty:
+        raise InputError(
+            Fault(label, "time", f"holds no instants ({results[label].status})", "leave it out")
+            for label in empty
+        )
     return tuple(
         Comparison(found[first].quantity, where, found)
         for (where, _), found in rows.items()
@@ -99,5 +107,6 @@ def comparison_csv(rows: Sequence[Comparison]) -> str:
     for row in rows:
         for label, value in row.record()["values"].items():
             facts = {"quantity": row.quantity.name, "where": row.where, "result": label}
-            writer.writerow({**value, **facts})
+            row_cells = {**value, **facts}
+            writer.writerow({name: spreadsheet_cell(cell) for name, cell in row_cells.items()})
     return text.getvalue()

@@ -9,6 +9,7 @@ from railsim.assembly import Model, level_track_with_friction
 from railsim.definitions.settings import Settings
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError
+from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.time_step import choose_step
 
 Floats = NDArray[np.float64]
@@ -37,7 +38,8 @@ class Pace:
             interval = duration(self._settings.output_spacing, speed, rate)
         key = speed
         if self.varies:
-            key = self.CLASS ** math.floor(math.log(speed, self.CLASS))
+            lowest = self.CLASS ** math.floor(math.log(speed, self.CLASS))
+            key = max(lowest, 1.02 * STANDSTILL_SPEED)  # below there is no steady rolling
         longest = self._known.get((key, 0.0)) or self._choose(key, interval)
         self._known[key, 0.0] = longest
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))

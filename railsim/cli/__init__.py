@@ -6,15 +6,17 @@ function, so that ``railsim --help`` answers at once.
 """
 
 import logging
-import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
 import click
 
+from railsim.cli.common import echo
 from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
+from railsim.cli.streams import silence, usable_streams
 from railsim.errors import InputError, ModelError, words_of
 from railsim.threads import use_one_thread
 from railsim.version import __version__
@@ -103,34 +105,61 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted by Ctrl-C (143
-        by SIGTERM), 1 anything else, such as a full disk.  Unforeseen exceptions pass: Python
-        prints their traceback and ends with 1.
+        by SIGTERM), 1 anything else, such as a full disk.  An error that nobody foresaw is one
+        line too, with the path of a report (`railsim.cli.fault_report`).
     """
     # the commands print themselves what the library logs
     logging.getLogger("railsim").addHandler(logging.NullHandler())
+    usable_streams()
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        status = _status(arguments)
+        for sentence in _cache_notices():
+            echo(f"remark: {sentence}", err=True)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        silence(sys.stdout)
+        return DONE
+    except OSError as error:  # nobody can read what is printed: a full disk behind `>`
+        silence(sys.stdout)
+        with suppress(OSError):
+            echo(f"railsim: {words_of(error)}", err=True)
+        return FAILED
+    return status
+
+
+def _status(arguments: list[str]) -> int:
+    """Call a command and return the exit status that its end stands for."""
     with remembered_interrupts():
         try:
-            status = _called(sys.argv[1:] if arguments is None else list(arguments))
-            sys.stdout.flush()
-            return status
+            return _called(arguments)
         except InputError as error:
             for fault in error.faults:
-                click.echo(str(fault), err=True)
+                echo(fault, err=True)
             return WRONG_INPUT
         except ModelError as error:
-            click.echo(f"railsim: {error}", err=True)
+            echo(f"railsim: {error}", err=True)
             return WRONG_INPUT
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
-            click.echo(f"railsim: {request}", err=True)
+            echo(f"railsim: {request}", err=True)
             return request.status
         except BrokenPipeError:
-            # the reader of a pipe has seen enough; keep the interpreter from flushing into it again
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return DONE
+            raise
         except (OSError, MemoryError) as error:
-            click.echo(f"railsim: {words_of(error)}", err=True)
+            echo(f"railsim: {words_of(error)}", err=True)
             return FAILED
+        except Exception as error:
+            from railsim.cli.fault_report import write_report
+
+            echo(f"railsim: {write_report(error, arguments)}", err=True)
+            return FAILED
+
+
+def _cache_notices() -> list[str]:
+    """Return what there is to say of the cache; nothing where no compiled code was needed."""
+    module = sys.modules.get("railsim.kernels.cache")
+    return list(getattr(module, "notices", ()))
 
 
 def _called(arguments: list[str]) -> int:
@@ -152,6 +181,9 @@ def _invoked(arguments: list[str]) -> int:
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.ClickException as error:
-        error.show()
+        where: click.Context | None = getattr(error, "ctx", None)
+        if where is not None:
+            echo(where.get_usage(), err=True)
+        echo(f"railsim: {error.format_message()}", err=True)
         return WRONG_INPUT
     return status if isinstance(status, int) else DONE

@@ -2,7 +2,7 @@
 
 import click
 
-from railsim.cli.common import json_option, print_json, table
+from railsim.cli.common import echo, json_option, print_json, table
 from railsim.cli.progress import progress_bar
 
 
@@ -33,11 +33,11 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
         print_json(found)
         return
     facts = found["hardware"]
-    click.echo(
+    echo(
         f"{facts['processor']}, {facts['cores']} cores, {facts['memory']}, {facts['system']}; "
         f"FASTSIM's vectors: {facts['vectors']}"
     )
-    click.echo(", ".join(f"{name} {number}" for name, number in found["versions"].items()))
+    echo(", ".join(f"{name} {number}" for name, number in found["versions"].items()))
     for header, rows in tables(found):
-        click.echo("")
-        click.echo("\n".join(table(header, rows)))
+        echo("")
+        echo("\n".join(table(header, rows)))

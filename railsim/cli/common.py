@@ -6,7 +6,14 @@ from typing import Any, TypeVar
 
 import click
 
+from railsim.text import printable
+
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def echo(text: object = "", *, err: bool = False) -> None:
+    """Print a line, on stderr with `err`; what would steer the terminal is shown as its code."""
+    click.echo(printable(str(text)), err=err)
 
 
 def json_option(function: F) -> F:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     overwrite_option,
     print_json,
@@ -59,9 +60,9 @@ def command(
     if as_json:
         print_json(_record(rows, results))
         return
-    click.echo("\n".join(_lines(rows, results)))
+    echo("\n".join(_lines(rows, results)))
     for path in written:
-        click.echo(str(path))
+        echo(str(path))
 
 
 def _opened(files: tuple[str, ...]) -> "dict[str, Result]":

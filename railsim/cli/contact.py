@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     overwrite_option,
     print_json,
@@ -209,14 +210,14 @@ def command(
         print_json(data | ({"creep": creep_rows} if patch else {}))
         return
     for note in notes:
-        click.echo(note, err=True)
+        echo(note, err=True)
     for line in _lines(geometry, amplitudes, conicity, contacts, solutions, load):
-        click.echo(line)
+        echo(line)
     if patch:
         for line in creep_part.lines_of(patch, creep_rows):
-            click.echo(line)
+            echo(line)
     if folder and not quiet:
-        click.echo(f"wrote {', '.join(written)} to {folder}", err=True)
+        echo(f"wrote {', '.join(written)} to {folder}", err=True)
 
 
 def _check_counts(**given: Sequence[Any]) -> None:

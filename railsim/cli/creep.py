@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from railsim.cli.common import print_json, table
+from railsim.cli.common import echo, print_json, table
 from railsim.cli.progress import progress_bar
 from railsim.files import check_folder, whole_file
 
@@ -156,7 +154,7 @@ def build_table(out: str | None, workers: int, as_json: bool, quiet: bool) -> No
     if as_json:
         print_json({"file": str(folder / TABLE_FILE), "largest_difference": difference})
         return
-    click.echo(
+    echo(
         f"wrote {folder / TABLE_FILE}; largest difference from the shipped table "
         f"{difference:.1e} of mu N"
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     load_option,
     overwrite_option,
@@ -68,9 +69,9 @@ def command(
     if as_json:
         print_json(data)
         return
-    click.echo("\n".join(lines))
+    echo("\n".join(lines))
     for remark in known.remarks(definition):
-        click.echo(f"remark: {remark}")
+        echo(f"remark: {remark}")
 
 
 def _show_result(file: str, as_json: bool) -> None:
@@ -81,7 +82,7 @@ def _show_result(file: str, as_json: bool) -> None:
     if as_json:
         print_json(describe.result_data(result))
     else:
-        click.echo("\n".join(describe.result_lines(result)))
+        echo("\n".join(describe.result_lines(result)))
 
 
 def _description(

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import json_option, overwrite_option, print_json, table
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, table
 
 PROFILES = "profiles"
 # Marks of trust beside a number, as the shipped files explain them: read, re-entered, computed,
@@ -62,10 +62,10 @@ def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: 
             for entry in entries
             if entry["kind"] == kind
         ]
-        click.echo("\n".join([f"{kind}", *table(["name", "trust", ""], rows, numbers=3), ""]))
+        echo("\n".join([f"{kind}", *table(["name", "trust", ""], rows, numbers=3), ""]))
     if any(entry["trust"] for entry in entries):
         meanings = ", ".join(f"{letter} {meaning}" for letter, meaning in MEANING.items())
-        click.echo(f"trust of the numbers, the most frequent first: {meanings}")
+        echo(f"trust of the numbers, the most frequent first: {meanings}")
 
 
 def _entries(kind: str) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     overwrite_option,
     print_json,
@@ -99,12 +100,12 @@ def command(
         print_json(_data(results, cases, found, optimum))
         return
     for line in _lines(results, found, optimum):
-        click.echo(line)
+        echo(line)
     if not quiet:
         for remark in dict.fromkeys(r for result in results for r in result.definition.remarks):
-            click.echo(f"remark: {remark}", err=True)
+            echo(f"remark: {remark}", err=True)
         for path in written:
-            click.echo(str(path))
+            echo(str(path))
 
 
 def _check_options(

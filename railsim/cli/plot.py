@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
 from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def command(
     if as_json:
         print_json({"file": str(path)})
     elif not quiet:
-        click.echo(str(path))
+        echo(str(path))
 
 
 def _result_figure(

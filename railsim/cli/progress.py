@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Timer
 
-import click
-
+from railsim.cli.common import echo
 from railsim.cli.interrupts import obey
 
 PATIENCE = 5.0  # seconds without progress before the user is told why
@@ -36,7 +35,7 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
         return
     from tqdm import tqdm
 
-    notice = Timer(PATIENCE, click.echo, (FIRST_RUN,), {"err": True})
+    notice = Timer(PATIENCE, echo, (FIRST_RUN,), {"err": True})
     notice.daemon = True
     notice.start()
     bar = tqdm(

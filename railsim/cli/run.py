@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     load_option,
     overwrite_option,
@@ -91,19 +92,19 @@ def command(
     case, path = _checked((vehicle, track, speed), how, out, plots, overwrite)
     if not quiet:
         for remark in track_remarks(case.track):
-            click.echo(f"{track}: {remark}", err=True)
+            echo(f"{track}: {remark}", err=True)
     if not (quiet or as_json):
-        click.echo("\n".join(_assumption_lines(case)))
+        echo("\n".join(_assumption_lines(case)))
     with progress_bar(case.name, quiet=quiet) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **result_record(result)}
     lines = _report_lines(result, path)
-    if plots:
+    if plots and len(result["time"]):
         from railsim.plot.histories import histories
         from railsim.plot.style import save
 
         lines.append(str(save(histories(result), path.with_suffix(".png"), overwrite=overwrite)))
-    if check_step:
+    if check_step and len(result["time"]):
         from railsim.check_step import difference_record, half_step, step_differences
 
         with progress_bar("half the step", quiet=quiet) as progress:
@@ -114,7 +115,7 @@ def command(
     if as_json:
         print_json(record)
     else:
-        click.echo("\n".join(lines))
+        echo("\n".join(lines))
     return DONE if result.status == "complete" else ENDED_EARLY
 
 
@@ -261,13 +262,17 @@ def _report_lines(result: "Result", path: Path) -> list[str]:
 
     facts = result.attributes
     end = f"{result.status}: {facts['status_reason']}"
+    if len(result["time"]):
+        end += f"; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m"
+    else:
+        end += "; at its start, before the first instant was recorded"
     lines = [
-        f"  {end}; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m",
+        f"  {end}",
         f"  step {1e3 * float(facts['step']):g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
         *(f"  remark: {remark}" for remark in result.remarks),
         "",
-        *peak_lines(result, peaks(result)),
+        *(peak_lines(result, peaks(result)) if len(result["time"]) else ()),
     ]
     for curve in mid_curves(result):
         lines += ["", *_mid_curve_lines(result, curve)]

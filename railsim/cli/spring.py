@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     overwrite_option,
     print_json,
@@ -97,11 +98,11 @@ def design(
         print_json(data)
         return
     for line in _design_lines(suspension, result):
-        click.echo(line)
+        echo(line)
     if found is not None:
-        click.echo()
+        echo()
         for line in _search_lines(found):
-            click.echo(line)
+            echo(line)
     _tell(suspension, written, quiet)
 
 
@@ -146,9 +147,9 @@ def verify(
         print_json(data)
         return
     for line in _verification_lines(result):
-        click.echo(line)
+        echo(line)
     for line in _ride_height_lines(heights):
-        click.echo(line)
+        echo(line)
     _tell(suspension, written, quiet)
 
 
@@ -187,7 +188,7 @@ def fatigue(
         print_json(fatigue_data(suspension, result, loads))
         return
     for line in _fatigue_lines(result, loads):
-        click.echo(line)
+        echo(line)
     _tell(suspension, written, quiet)
 
 
@@ -242,12 +243,12 @@ def vehicle(
             }
         )
     elif not out:
-        click.echo(text, nl=False)
+        echo(text.rstrip("\n"))
     if not quiet:
         for remark in part.remarks:
-            click.echo(remark, err=True)
+            echo(remark, err=True)
         if out and not as_json:
-            click.echo(out)
+            echo(out)
 
 
 def _loaded(file: str, assignments: Sequence[str]) -> "TrailingArmSuspension":
@@ -330,9 +331,9 @@ def _tell(suspension: "TrailingArmSuspension", written: Sequence[Path], quiet: b
     if quiet:
         return
     for remark in spring_remarks(suspension):
-        click.echo(f"remark: {remark}", err=True)
+        echo(f"remark: {remark}", err=True)
     for path in written:
-        click.echo(str(path))
+        echo(str(path))
 
 
 def _design_lines(suspension: "TrailingArmSuspension", result: "Design") -> list[str]:

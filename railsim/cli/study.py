@@ -1,11 +1,13 @@
 """``railsim study``: every combination of vehicles, tracks and speeds."""
 
+from contextlib import chdir
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     load_option,
     overwrite_option,
@@ -18,7 +20,7 @@ from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from railsim.studies import Outcome
-    from railsim.studies.summary import Record
+    from railsim.studies.journal import Record
 
 MANY = ("--vehicles", "--tracks", "--speeds", "--grid")
 
@@ -132,16 +134,23 @@ def command(
         "assignments": list(with_load(assignments, load, "vehicle.")),
         **{name: how.pop(name) for name in ("settings", "start", "duration", "until")},
     }
+    base = Path.cwd()
     if resume and not any(inputs.values()):
-        inputs = _stored_inputs(Path(out))
+        from railsim.studies.study import stored_inputs
+
+        stored, base = stored_inputs(Path(out))
+        out = out if base == Path.cwd() else str(Path(out).absolute())
+        inputs = stored.model_dump(exclude={"railsim_version", "folder"})
     else:
         _require(vehicles, tracks, speeds)
-    with progress_bar("study", quiet=quiet) as progress:
+    # names of files in a study that goes on count from where it was started
+    with chdir(base), progress_bar("study", quiet=quiet) as progress:
         outcome = study(
             out=out,
             resume=resume,
             progress=progress,
             on_record=None if quiet or as_json else _print_record,
+            on_remark=_print_remark,
             **inputs,
             **how,
         )
@@ -183,17 +192,8 @@ def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[f
         raise InputError(faults)
 
 
-def _stored_inputs(folder: Path) -> dict[str, Any]:
-    from railsim.errors import Fault, InputError
-    from railsim.studies.summary import read_index
-
-    try:
-        inputs: dict[str, Any] = read_index(folder / "study.json")["inputs"]
-    except InputError:
-        found = f"no study in {folder} to resume"
-        allowed = "give --vehicles, --tracks and --speeds"
-        raise InputError([Fault("--resume", "", found, allowed)]) from None
-    return {name: value for name, value in inputs.items() if name != "railsim_version"}
+def _print_remark(text: str) -> None:
+    echo(f"remark: {text}", err=True)
 
 
 def _print_record(record: "Record") -> None:
@@ -212,19 +212,19 @@ def _print_record(record: "Record") -> None:
     if status != "complete":
         status += f" ({record['status_reason']})"
     with tqdm.external_write_mode():
-        click.echo("  ".join([record["name"], status, *values]))
+        echo("  ".join([record["name"], status, *values]))
         for remark in record.get("remarks", ()):
-            click.echo(f"  remark: {remark}")
+            echo(f"  remark: {remark}")
 
 
 def _print_end(outcome: "Outcome") -> None:
     there = len(outcome.records) - outcome.computed
     kept = f", {there} were there" if there else ""
     done = outcome.computed - len(outcome.failed)
-    click.echo(f"{done} of {len(outcome.records)} runs computed{kept}")
+    echo(f"{done} of {len(outcome.records)} runs computed{kept}")
     if outcome.failed:
-        click.echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
-    click.echo(str(outcome.folder / "summary.csv"))
+        echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
+    echo(str(outcome.folder / "summary.csv"))
 
 
 def _status(outcome: "Outcome") -> int:

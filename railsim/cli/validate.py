@@ -1,20 +1,15 @@
 """``railsim validate``: check files and list every fault."""
 
-from collections.abc import Iterator
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from railsim.cli.common import json_option, print_json, quiet_option
-from railsim.files import RESULTS
+from railsim.cli.common import echo, json_option, print_json, quiet_option
+from railsim.files import RESULTS, is_file
 
-if TYPE_CHECKING:
-    from railsim.definitions.vehicle import Assembly, Vehicle
-    from railsim.errors import Fault
-    from railsim.profiles.profile import Kind
-
-PROFILE_SUFFIXES = {".csv", ".prw", ".prr", ".ban", ".whl"}
+PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
 
 @click.command()
@@ -55,12 +50,12 @@ def _report(file: str) -> dict[str, Any]:
 
 def _print(report: dict[str, Any], quiet: bool) -> None:
     for fault in report["faults"]:
-        click.echo(fault["text"], err=True)
+        echo(fault["text"], err=True)
     if quiet or report["faults"]:
         return
-    click.echo(f"{report['file']}: {report['kind']}, no faults")
+    echo(f"{report['file']}: {report['kind']}, no faults")
     for remark in report["remarks"]:
-        click.echo(f"{report['file']}: {remark['key']}: remark: {remark['text']}")
+        echo(f"{report['file']}: {remark['key']}: remark: {remark['text']}")
 
 
 def checked(file: str) -> tuple[str, list[dict[str, str]]]:
@@ -71,7 +66,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     InputError : all its faults.
     """
     suffix = Path(file).suffix.lower()
-    if suffix in PROFILE_SUFFIXES:
+    if suffix in PROFILE_SUFFIXES or _is_profile(file):
         from railsim.profiles import load_profile
 
         profile = load_profile(file)
@@ -79,58 +74,31 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
             {"key": "points", "text": note} for note in profile.notes
         ]
     if suffix in RESULTS:
-        from railsim.result import open_run
+        from railsim.result import check_result
 
-        return f"result, {open_run(file).status}", []
+        result = check_result(file)
+        remarks = [{"key": "remarks", "text": remark} for remark in result.remarks]
+        return f"result, {result.status}", remarks
     if suffix == ".json":
         from railsim.studies.summary import check_index
 
         index = check_index(Path(file))
-        return f"study of {len(index['runs'])} runs, {index['status']}", []
+        return f"study of {len(index.runs)} runs, {index.status}", []
 
     from railsim.definitions.loading import load_any
     from railsim.errors import InputError
+    from railsim.profiles.used import profile_faults
 
     definition, known = load_any(file)
-    if faults := _profile_faults(definition, file):
+    if faults := profile_faults(definition, file):
         raise InputError(faults)
     return known.kind, [dict(vars(remark)) for remark in known.remarks(definition)]
 
 
-def _profile_faults(definition: Any, file: str) -> "list[Fault]":
-    """Return a fault for every wheel or rail profile of a definition that cannot be loaded."""
-    from railsim.definitions.track import Track
-    from railsim.definitions.vehicle import Vehicle
+def _is_profile(name: str) -> bool:
+    """Whether a bare name is that of a built-in profile, and of nothing else."""
+    if Path(name).suffix or os.sep in name or is_file(name):
+        return False
+    from railsim.profiles.builtin import DEFINITIONS
 
-    faults: list[Fault] = []
-    if isinstance(definition, Track):
-        for name in dict.fromkeys(definition.rail):
-            faults += _unusable(name, "rail", file, "rail")
-    elif isinstance(definition, Vehicle):
-        for key, name in dict.fromkeys(_wheel_profiles(definition, ())):
-            faults += _unusable(name, "wheel", file, key)
-    return faults
-
-
-def _wheel_profiles(
-    group: "Vehicle | Assembly", path: tuple[str, ...]
-) -> Iterator[tuple[str, str]]:
-    for name, wheelset in group.wheelsets.items():
-        for profile in wheelset.profile:
-            yield ".".join((*path, "wheelsets", name, "profile")), profile
-    for name, assembly in group.assemblies.items():
-        yield from _wheel_profiles(assembly, (*path, "assemblies", name))
-
-
-def _unusable(name: str, kind: "Kind", file: str, key: str) -> "list[Fault]":
-    from railsim.errors import Fault, InputError
-    from railsim.profiles import load_profile
-
-    try:
-        load_profile(name, kind)
-    except InputError as error:
-        return [
-            Fault(file, key, f"profile '{name}': {fault.found}", fault.allowed)
-            for fault in error.faults
-        ]
-    return []
+    return name in DEFINITIONS

@@ -43,18 +43,17 @@ the wheelset's centre.  The left wheel is the mirror image (y and roll change si
 right differ in profile or radius a second table is built for the left, as a right one.
 """
 
+import functools
 import hashlib
 import json
 import os
-import tempfile
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
 from railsim.contact.curves import (
@@ -66,6 +65,7 @@ from railsim.contact.curves import (
     wheel_curve,
 )
 from railsim.errors import InputError
+from railsim.kernels import cache
 from railsim.kernels import contact_geometry as kernel
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
@@ -200,7 +200,7 @@ def zone_windows(wheel: WheelCurve) -> Array:
     return np.stack((1.0 - root, root - flange, flange))
 
 
-@cache
+@functools.cache
 def ellipse_functions(G: float, nu: float) -> tuple[float, float, Array]:
     """Unit-load ellipses over ln(A/B), for the generator: start, spacing and logarithms.
 
@@ -213,7 +213,7 @@ def ellipse_functions(G: float, nu: float) -> tuple[float, float, Array]:
     return float(x[0]), float(x[1] - x[0]), np.ascontiguousarray(rows)
 
 
-@cache
+@functools.cache
 def strip_influence() -> tuple[float, float, Array, Array]:
     """Influences for the non-elliptic patch, as logarithms over a logarithm.
 
@@ -416,10 +416,10 @@ def gap_offsets(wheel: WheelCurve, eps: float) -> Array:
     return offsets
 
 
-def cache_folder() -> Path:
-    """Folder of the stored tables: $RAILSIM_CACHE_DIR/tables or the user's cache folder."""
-    base = os.environ.get("RAILSIM_CACHE_DIR") or platformdirs.user_cache_dir("railsim")
-    return Path(base) / "tables"
+def cache_folder() -> Path | None:
+    """Folder of the stored tables; None where none may be used, see `railsim.kernels.cache`."""
+    base = cache.cache_base()
+    return cache.safe_folder(base and base / "tables")
 
 
 def generator_hash() -> str:
@@ -456,7 +456,7 @@ def cached_contact_table(
     The name of the stored table is a hash of everything that enters: both profiles, all numbers,
     the grid and the generator's sources.  Tables are written under a temporary name and renamed,
     so that parallel runs never see half a table; they are memory-mapped, so that parallel runs
-    share one copy.
+    share one copy.  A table that is not, byte for byte, what was stored is built anew.
     """
     grid = _chosen_grid(grid, normal)
     numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu, centre_height)
@@ -464,13 +464,10 @@ def cached_contact_table(
     digest.update(repr((numbers, grid)).encode())
     digest.update(wheel.key())
     digest.update(rail.key())
-    path = cache_folder() / f"{digest.hexdigest()[:32]}.npy"
-    facts_path = path.with_suffix(".json")
-    try:
-        facts = json.loads(facts_path.read_text())
-        return ContactTable(values=np.load(path, mmap_mode="r"), **facts)
-    except (OSError, ValueError, TypeError, EOFError):
-        pass  # not there, or damaged: build it
+    folder = cache_folder()
+    path = folder and folder / f"{digest.hexdigest()[:32]}.npy"
+    if path and (stored := _stored_table(path)):
+        return stored
     table = build_contact_table(
         wheel,
         rail,
@@ -484,24 +481,35 @@ def cached_contact_table(
         centre_height=centre_height,
         grid=grid,
     )
-    facts = {name: getattr(table, name) for name in ContactTable.__dataclass_fields__}
-    del facts["values"]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _write(path, lambda file: np.save(file, table.values))
-        _write(facts_path, lambda file: file.write(json.dumps(facts).encode()))
-    except OSError:
-        pass  # no cache folder to write to: the table serves this process only
+    if path:
+        _store_table(table, path)
     return table
 
 
-def _write(path: Path, write) -> None:  # type: ignore[no-untyped-def]
-    """Write a file under a temporary name beside `path`, then rename it."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
+def _stored_table(path: Path) -> ContactTable | None:
+    text = cache.stored(path.with_suffix(".json"))
+    if text is None or not path.exists():
+        return None
     try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+        facts = json.loads(text)
+        crc = facts.pop("crc32")
+        table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
+    except (OSError, ValueError, TypeError, KeyError, EOFError):
+        cache.discard(path)
+        return None
+    if zlib.crc32(table.values.data) != crc:
+        cache.discard(path)
+        return None
+    return table
+
+
+def _store_table(table: ContactTable, path: Path) -> None:
+    facts = {name: getattr(table, name) for name in ContactTable.__dataclass_fields__}
+    facts["crc32"] = zlib.crc32(facts.pop("values").data)
+
+    def write(handle: int) -> None:
+        with os.fdopen(os.dup(handle), "wb") as file:
+            np.save(file, table.values)
+
+    if cache.store_file(path, write):
+        cache.store(path.with_suffix(".json"), json.dumps(facts).encode())

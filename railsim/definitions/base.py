@@ -6,6 +6,7 @@ nothing infinite.  What may be given once for both sides is always stored as the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -82,6 +83,11 @@ class FileDefinition(Definition):
 
     def to_toml(self) -> str:
         """Return the whole definition as TOML text, defaults included, `extends` resolved."""
+        return self._toml
+
+    @cached_property
+    def _toml(self) -> str:
+        # a study asks for it once for every run
         return tomli_w.dumps(self.model_dump(exclude_none=True))
 
     def replace(self, **changes: Any) -> Self:

@@ -4,6 +4,7 @@
 `format` key which definition it stands for and what is checked beyond the single values.
 """
 
+import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -177,6 +178,17 @@ def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:
 def load_track_text(text: str, file: str = "track_toml") -> Track:
     """Load a track from the text of a file, for instance that kept in a result."""
     return _loaded(Track, sources.text_source(text, file, "track"), ())
+
+
+def load_settings_json(text: str, file: str = "settings_json") -> Settings:
+    """Load settings from the JSON that a result keeps."""
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError([Fault(file, "", f"broken JSON: {error}", "")]) from None
+    if not isinstance(data, dict):
+        raise InputError([Fault(file, "", "no table", "")])
+    return _loaded(Settings, Source(file, {"format": SETTINGS_FORMAT, **data}), ())
 
 
 def load_any(path: str | Path, overrides: Iterable[str] = ()) -> tuple[FileDefinition, Format]:

@@ -15,7 +15,8 @@ from pydantic import ValidationError
 
 from railsim.definitions.irregularity import COLUMNS, READING, Measured
 from railsim.definitions.recording import BANDS, band_passed, equal_step, from_chord
-from railsim.errors import Fault, nearest
+from railsim.errors import Fault, InputError, nearest
+from railsim.files import TABLE_BYTES, is_file, read_text
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
 # what a column adds to y_left, z_left, y_right, z_right
@@ -59,9 +60,13 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
         if "rows" in table:
             continue  # refused by the definition: either one or the other
         path = Path(table["file"])
-        if not path.is_file():
-            key = f"irregularities.{index}.file"
-            faults.append(Fault("", key, f"no file '{path}'", "a CSV beside the track file"))
+        key = f"irregularities.{index}.file"
+        if not is_file(path):
+            shown = table["file"] if len(table["file"]) < 60 else f"{table['file'][:57]}..."
+            faults.append(Fault("", key, f"no file '{shown}'", "a CSV beside the track file"))
+            continue
+        if path.suffix.lower() != ".csv":
+            faults.append(Fault("", key, f"'{path.name}' is no CSV", "the name must end in .csv"))
             continue
         how = Reading.of(table)
         if how is None:
@@ -104,9 +109,14 @@ class Reading:
 def read_measured(path: Path, how: Reading = Reading()) -> tuple[Rows, list[Fault]]:
     """Read rows [s, y_left, z_left, y_right, z_right] in m, and the faults of the file."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError):
-        return [], [Fault(str(path), "", "cannot be read as text", "a CSV file")]
+        return _rows_of(path, read_text(path, TABLE_BYTES), how)
+    except InputError as error:
+        return [], list(error.faults)
+    except csv.Error as error:
+        return [], [Fault(str(path), "", f"no CSV ({error})", "a header and rows of numbers")]
+
+
+def _rows_of(path: Path, text: str, how: Reading) -> tuple[Rows, list[Fault]]:
     numbered = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)

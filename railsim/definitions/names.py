@@ -13,6 +13,8 @@ from railsim.errors import Fault, nearest
 
 Scope = tuple[str, ...]
 SIDES = ("left", "right")
+MOST_PARTS = 5000  # a train of twenty coaches has some 2000
+DEEPEST_ASSEMBLY = 10
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,33 @@ def groups(
     for name, assembly in _members(parts, "assemblies").items():
         for placement in placement_names(assembly):
             yield from groups(assembly, (*scope, placement), (*path, "assemblies", name))
+
+
+def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
+    """Return a fault where assemblies stand so often, or so deeply, that nobody can mean it.
+
+    Counts without placing anything: ten assemblies of ten places each within one another are 1e10.
+    """
+    total = 0
+    level: list[tuple[Mapping[str, Any], tuple[str, ...], int]] = [(parts, (), 1)]
+    while level:
+        inner = []
+        for group, path, copies in level:
+            tables = (_members(group, key) for key in ("bodies", "wheelsets", "axleboxes",
+                                                       "elements"))
+            total += copies * sum(len(table) for table in tables)
+            if total > MOST_PARTS or len(path) > 2 * DEEPEST_ASSEMBLY:
+                key = ".".join(path)
+                found = "assemblies nested too deeply"
+                if total > MOST_PARTS:
+                    found = f"more than {MOST_PARTS} bodies and elements with all placements"
+                return [Fault("", key, found, "fewer placements or parts")]
+            for name, assembly in _members(group, "assemblies").items():
+                placed = len(placement_names(assembly))
+                total += placed  # also an empty one takes time
+                inner.append((assembly, (*path, "assemblies", name), copies * placed))
+        level = inner
+    return []
 
 
 def placement_names(assembly: Mapping[str, Any]) -> list[str]:
@@ -130,6 +159,8 @@ def visible(scope: Scope, known: Mapping[str, Any]) -> list[str]:
 
 def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
     """Return every fault of the names in a vehicle's tables; the faults' file is left empty."""
+    if too_many := size_faults(parts):
+        return too_many
     known, faults = body_names(parts)
     wheelsets = {full: kind for full, kind in known.items() if kind == "wheelset"}
     if not wheelsets:

@@ -15,6 +15,7 @@ from typing import Any
 
 from railsim.definitions.paths import descend, key_path
 from railsim.errors import Fault, InputError, nearest
+from railsim.files import DEFINITION_BYTES, is_file, read_text
 
 PACKAGE = Path(__file__).resolve().parent.parent
 FOLDERS = {
@@ -25,6 +26,9 @@ FOLDERS = {
 }
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}
+
+DEEPEST = 50  # levels of tables and lists
+LONGEST_CHAIN = 20  # files that extend each other
 
 KeyPath = tuple[str, ...]
 
@@ -124,7 +128,8 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
         in_libraries = (folder / f"{name}.toml" for folder in library_folders(kind))
     own = None
     for candidate in itertools.chain(candidates, in_libraries):
-        if not candidate.is_file():
+        # a file of somebody else leads to definitions only
+        if not is_file(candidate) or (beside is not None and candidate.suffix != ".toml"):
             continue
         # a file that extends its own name means the shipped one
         if beside is None or candidate.resolve() != beside.resolve():
@@ -142,19 +147,19 @@ def find_any(name: str | Path) -> Path:
     ------
     InputError : there is no such file.
     """
-    if Path(name).is_file():
+    if is_file(name):
         return Path(name)
     for kind in FOLDERS:
         if str(name) in shipped_names(kind):
             return find_file(name, kind)
-    found = f"'{name}' is a folder" if Path(name).is_dir() else f"no file '{name}'"
+    found = f"'{name}' is a folder" if os.path.isdir(name) else f"no file '{name}'"
     known = [name for kind in FOLDERS for name in shipped_names(kind)]
     hint = nearest(str(name), known).removeprefix("allowed: ")
     raise InputError([Fault(str(name), "", found, f"a path, or a shipped name: {hint}")])
 
 
 def _no_file(name: str | Path, kind: str, path: Path, beside: Path | None) -> Fault:
-    found = f"'{name}' is a folder" if path.is_dir() else f"no file '{name}'"
+    found = f"'{name}' is a folder" if os.path.isdir(path) else f"no file '{name}'"
     allowed = "a path"
     if kind in FOLDERS:
         names = nearest(str(name), shipped_names(kind))
@@ -171,13 +176,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     ------
     InputError : it cannot be read, is no text or no TOML (with the line).
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")  # some editors put a mark at its beginning
-    except OSError as error:
-        raise InputError([Fault(str(path), "", f"cannot be read ({error.strerror})", "")]) from None
-    except UnicodeDecodeError:
-        raise InputError([Fault(str(path), "", "not a UTF-8 text", "a TOML file")]) from None
-    return parse_toml(text, str(path))
+    return parse_toml(read_text(path, DEFINITION_BYTES), str(path))
 
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:
@@ -185,10 +184,16 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
 
     Raises
     ------
-    InputError : a syntax error, with its line.
+    InputError : a syntax error, with its line; tables nested too deeply, too long a number.
     """
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
+        if _depth(data) <= DEEPEST:
+            return data
+        raise RecursionError
+    except RecursionError:
+        found = "values nested too deeply"
+        raise InputError([Fault(file, "", found, f"{DEEPEST} levels at most")]) from None
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
         if place:
@@ -199,6 +204,20 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"
         raise InputError([Fault(file, key, found, "")]) from None
+    except (ValueError, OverflowError) as error:  # a whole number of thousands of digits
+        raise InputError([Fault(file, "", f"a value is out of range: {error}", "")]) from None
+
+
+def _depth(data: Any) -> int:
+    """Return how deeply tables and lists are nested; at most one more than `DEEPEST`."""
+    level, depth = [data], 0
+    while level and depth <= DEEPEST:
+        inner: list[Any] = []
+        for node in level:
+            members = node.values() if isinstance(node, dict) else node
+            inner += [member for member in members if isinstance(member, dict | list)]
+        level, depth = inner, depth + 1
+    return depth
 
 
 def read_source(path: Path, kind: str) -> Source:
@@ -227,6 +246,9 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
         names = " -> ".join(p.name for p in (*chain, base_path))
         fault = Fault(str(path), "extends", f"a circle: {names}", "a chain with an end")
         raise InputError([fault])
+    if len(chain) > LONGEST_CHAIN:
+        found = f"the {len(chain)}th file in a chain"
+        raise InputError([Fault(str(path), "extends", found, f"{LONGEST_CHAIN} at most")])
     base = _extended(read_toml(base_path), base_path, kind, (*chain, base_path.resolve()))
     if faults := [fault for key in removed for fault in _remove(base, key, str(path))]:
         raise InputError(faults)
@@ -319,6 +341,6 @@ def _anchor_files(node: Any, folder: Path) -> None:
 def _anchored(value: Any, folder: Path) -> Any:
     if isinstance(value, list):
         return [_anchored(member, folder) for member in value]
-    if isinstance(value, str) and value and (folder / value).is_file():
+    if isinstance(value, str) and value and is_file(folder / value):
         return str((folder / value).resolve())
     return value

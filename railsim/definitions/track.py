@@ -25,6 +25,7 @@ from railsim.definitions.irregularity import Irregularity
 from railsim.definitions.support import Support
 
 TRACK_FORMAT = "railsim-track/1"
+MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
 
 def _curved(radius: float) -> float:
@@ -220,14 +221,14 @@ class Track(FileDefinition):
     """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
     cant_rotation: Literal["centre", "inner_rail"] = "centre"
     """Cant turns the track about its centre line, or about the inner (lower) rail"""
-    plan: tuple[PlanElement, ...] = Field(min_length=1)
+    plan: tuple[PlanElement, ...] = Field(min_length=1, max_length=MOST_ELEMENTS)
     """Elements of the plan, from s = 0 on; the first and the last continue beyond the ends"""
-    cant: tuple[CantElement, ...] = ()
+    cant: tuple[CantElement, ...] = Field(default=(), max_length=MOST_ELEMENTS)
     """Elements of the cant; where shorter than the plan, the last value continues"""
-    vertical: tuple[VerticalElement, ...] = ()
+    vertical: tuple[VerticalElement, ...] = Field(default=(), max_length=MOST_ELEMENTS)
     """Elements of the vertical profile; where shorter than the plan, the last gradient continues"""
 
-    irregularities: tuple[Irregularity, ...] = ()
+    irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
     """Displacements of the rails from their ideal places; they add up"""
     support: Support = Support()
     """What carries the rails: rigid, or elastic as a moving track model"""

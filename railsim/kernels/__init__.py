@@ -13,14 +13,20 @@ on what the process compiled or called before.
 import hashlib
 import os
 import shutil
+import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 
+import llvmlite
 import numba
 from llvmlite.binding import Linkage
 from numba.core import config as _config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 from numba.core.registry import CPUDispatcher
+
+from railsim.kernels.cache import KernelCache, cache_base, safe_folder
 
 # The subset of fastmath that keeps NaN and infinity visible to the blow-up checks.
 FASTMATH = {"contract", "arcp", "reassoc", "nsz"}
@@ -30,7 +36,8 @@ ORDERED = {"nsz"}
 
 def source_hash(folder: Path) -> str:
     """Hash of all kernel sources in `folder` and of the versions that compile them."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    versions = f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag}"
+    digest = hashlib.sha256(versions.encode())
     for path in sorted(folder.glob("*.py")):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
@@ -38,31 +45,30 @@ def source_hash(folder: Path) -> str:
 
 
 def _cache_folder() -> Path | None:
-    """Folder of these sources' compiled code; None where nothing can be written."""
-    base = os.environ.get("RAILSIM_CACHE_DIR")
-    if base is None:
-        base = os.environ.get("XDG_CACHE_HOME", "") or str(Path.home() / ".cache")
-        base = str(Path(base) / "railsim")
-    folder = Path(base) / "kernels" / source_hash(Path(__file__).parent)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    if not os.access(folder, os.W_OK):
-        return None
-    for old in folder.parent.iterdir():
-        # another version of railsim may be in use beside this one
-        if old != folder and old.is_dir() and _is_stale(old, folder):
-            shutil.rmtree(old, ignore_errors=True)
+    """Folder of these sources' compiled code; None where it must not or cannot be used."""
+    own = os.environ.get("NUMBA_CACHE_DIR")  # a user's choice comes first
+    base = Path(own) if own else cache_base()
+    hashed = source_hash(Path(__file__).parent)
+    folder = safe_folder(base and (base / "kernels" / hashed))
+    if folder is not None:
+        with suppress(OSError):
+            _drop_old(folder)
     return folder
 
 
-def _is_stale(old: Path, current: Path) -> bool:
-    month = 30 * 24 * 3600.0
-    return old.stat().st_mtime < current.stat().st_mtime - month
+def _drop_old(folder: Path) -> None:
+    """Remove code of sources that nobody has used for a month, and files never finished."""
+    now = folder.stat().st_mtime
+    for old in folder.parent.iterdir():
+        # another version of railsim may be in use beside this one
+        if old != folder and old.is_dir() and old.stat().st_mtime < now - 30 * 24 * 3600.0:
+            shutil.rmtree(old, ignore_errors=True)
+    for part in folder.glob("*.part"):
+        if part.stat().st_mtime < time.time() - 3600.0:
+            part.unlink(missing_ok=True)
 
 
-_FOLDER = os.environ.get("NUMBA_CACHE_DIR") or _cache_folder()  # a user's choice comes first
+_FOLDER = _cache_folder()
 
 
 class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
@@ -102,20 +108,17 @@ class _Compiler(Compiler):  # type: ignore[misc]
 
 
 def _compiled(function, fastmath=FASTMATH, **options):
-    """Compile into the cache of these sources, leaving numba's own choice to everybody else."""
-    before = _config.CACHE_DIR
-    _config.CACHE_DIR = str(_FOLDER or before)
-    try:
-        return numba.njit(
-            cache=_FOLDER is not None,
-            error_model="numpy",
-            fastmath=fastmath,
-            pipeline_class=_Compiler,
-            no_cfunc_wrapper=True,
-            **options,
-        )(function)
-    finally:
-        _config.CACHE_DIR = before
+    """Compile into the cache of these sources."""
+    compiled = numba.njit(
+        error_model="numpy",
+        fastmath=fastmath,
+        pipeline_class=_Compiler,
+        no_cfunc_wrapper=True,
+        **options,
+    )(function)
+    if _FOLDER is not None and not _config.DISABLE_JIT:
+        compiled._cache = KernelCache(function, _FOLDER)
+    return compiled
 
 
 def jit(function):

@@ -20,6 +20,7 @@ from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
 from railsim.plot.style import DISTINCT, SIDE_LINES, styled
 from railsim.profiles.profile import Profile
+from railsim.text import unformatted
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,8 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
         for side, (name, pair) in enumerate(zip(SIDES, pairs, strict=True)):
             axes = figure.add_subplot(grid[0, side])
             _draw_pair(axes, geometry, pair, side)
-            axes.set_title(f"{name}: {pair.wheel.name} on {pair.rail.name}")
+            words = f"{name}: {pair.wheel.name} on {pair.rail.name}"
+            axes.set_title(unformatted(words))
             if side == 0:
                 _explain(axes)
         if unique:
@@ -152,7 +154,8 @@ def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
         tangent = np.stack((np.gradient(profile.y), np.gradient(profile.z)))
         tangent /= np.hypot(*tangent)
         normal = moved[1] * tangent[0] - moved[0] * tangent[1]
-        axes.plot(1e3 * profile.y, 1e6 * normal, ".", ms=2, color=colour, label=profile.name)
+        name = unformatted(profile.name)
+        axes.plot(1e3 * profile.y, 1e6 * normal, ".", ms=2, color=colour, label=name)
     axes.axhline(0.0, color="0.35", lw=0.7)
     axes.set_xlabel("place on the profile $y$ (mm)")
     axes.set_ylabel("measured − smoothed (µm)")
@@ -228,7 +231,8 @@ def conicity_figure(conicity: Mapping[str, tuple[Array, Array]]) -> Figure:
         figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
         axes = figure.subplots()
         for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
-            axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=name)
+            words = unformatted(name)
+            axes.plot(1e3 * amplitudes, values, color=colour, marker=".", ms=4, label=words)
         axes.axvline(3.0, color="0.75", lw=0.6, zorder=0)
         axes.set_xlabel("amplitude $\\hat y$ (mm)")
         axes.set_ylabel("equivalent conicity $\\tan\\gamma_e$")

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from railsim.definitions.layout import curvature_sections
 from railsim.errors import Fault, InputError
-from railsim.notation import Quantity
+from railsim.notation import QUANTITIES, Quantity
 from railsim.plot.selection import Line, Panel, panels
 from railsim.plot.style import (
     DISTINCT,
@@ -26,6 +26,7 @@ from railsim.plot.style import (
 )
 from railsim.result import Result
 from railsim.result.data import Array
+from railsim.text import unformatted
 
 STUDY = (
     "dQ_over_Q0",
@@ -73,6 +74,7 @@ def histories(
     ------
     InputError : a quantity or place that the result does not have, an empty part.
     """
+    check_not_empty(result)
     window = slice(None) if between is None else _window(result[over], between)
     with styled():
         rows = panels(result, tuple(selections))
@@ -85,6 +87,13 @@ def histories(
             grid = [list(rows[i : i + columns]) for i in range(0, len(rows), columns)]
             grid[-1] += [None] * (columns - len(grid[-1]))
         return _figure(result, grid, over, by, window)
+
+
+def check_not_empty(result: Result, name: str = "") -> None:
+    """Raise InputError where a run ended before its first instant: there is nothing to draw."""
+    if not len(result["time"]):
+        found = f"holds no instants: {result.status}, {result.attributes.get('status_reason', '')}"
+        raise InputError([Fault(name or "result", "time", found, "give a run of some length")])
 
 
 def _window(horizontal: Array, between: tuple[float, float]) -> slice:
@@ -137,7 +146,8 @@ def _figure(
 def title(result: Result) -> str:
     """Return what a figure of a result is called: vehicle, track and speed."""
     speed = f"{result.speed:.4g} m/s ({3.6 * result.speed:.4g} km/h)"
-    return f"{result.vehicle().name}\n{result.track().name} · {speed}"
+    names = unformatted(result.vehicle().name), unformatted(result.track().name)
+    return f"{names[0]}\n{names[1]} · {speed}"
 
 
 def _draw(
@@ -168,8 +178,11 @@ def _draw(
     if by == "wheelset" and len(places) == 1:
         place = places.pop()
         number = result.wheelsets.index(place) + 1
-        heading = f"{heading}: {number} {short_names(result.wheelsets)[place]}"
-    names = [" ".join(v for k, v in line.labels.items() if k != "component") for line in others]
+        heading = f"{heading}: {number} {unformatted(short_names(result.wheelsets)[place])}"
+    names = [
+        unformatted(" ".join(v for k, v in line.labels.items() if k != "component"))
+        for line in others
+    ]
     if len(names) > 1:
         axes.legend(axes.lines[: len(others)], names, loc="best", ncols=2)
     elif names and names[0]:
@@ -182,6 +195,8 @@ def _draw(
 
 def unit_label(quantity: Quantity) -> str:
     """Return symbol and shown unit, for a vertical axis."""
+    if quantity.name not in QUANTITIES:  # from a file of others, perhaps
+        return unformatted(f"{quantity.symbol} ({quantity.shown_unit})")
     symbol = f"${quantity.symbol}$ " if quantity.symbol else ""
     unit = quantity.shown_unit.replace("s2", "s²")
     return f"{symbol}({unit})" if unit != "-" else symbol.strip()
@@ -216,7 +231,7 @@ def _legend(result: Result, drawn: Sequence[Panel], by: str) -> list[Line2D]:
         names = short_names(result.wheelsets)
         for number, name in enumerate(result.wheelsets, start=1):
             if any(line.labels.get("wheelset") == name for line in lines):
-                words = f"{number} {names[name]}"
+                words = f"{number} {unformatted(names[name])}"
                 handles.append(Line2D([], [], color=colours[name], lw=2.0, label=words))
     for index, (side, style) in enumerate(SIDE_LINES.items()):
         if any(line.labels.get("side") == side for line in lines):

@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.definitions.layout import curvature_sections
-from railsim.plot.histories import STUDY, draw_limit, unit_label
+from railsim.plot.histories import STUDY, check_not_empty, draw_limit, unit_label
 from railsim.plot.selection import Panel, panels
 from railsim.plot.style import DISTINCT, SIDE_LINES, shade, spans, styled
 from railsim.result import Result
 from railsim.result.data import Array
+from railsim.text import unformatted
 
 LEADING = tuple(f"{name}:1" for name in STUDY)
 """What is drawn unless told otherwise: the leading wheelset."""
@@ -37,6 +38,8 @@ def overlay(
     Figure
         One pair of axes for each quantity; a colour for each result.
     """
+    for label, result in results.items():
+        check_not_empty(result, label)
     drawn = {label: panels(result, tuple(selections)) for label, result in results.items()}
     first = next(iter(results.values()))
     plans = [curvature_sections(result.track()) for result in results.values()]
@@ -82,7 +85,7 @@ def _label(axes: Axes, panel: Panel) -> None:
     } - {quantity.long_name.rpartition(", ")[2]}
     heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
     if len(places) == 1:
-        heading += f": {places.pop()}"
+        heading += f": {unformatted(places.pop())}"
     axes.set_title(heading)
     axes.set_ylabel(unit_label(quantity))
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
@@ -92,7 +95,7 @@ def _label(axes: Axes, panel: Panel) -> None:
 
 def _legend(labels: Sequence[str], drawn: Mapping[str, Sequence[Panel]]) -> list[Line2D]:
     handles = [
-        Line2D([], [], color=DISTINCT[index % len(DISTINCT)], lw=2.0, label=label)
+        Line2D([], [], color=DISTINCT[index % len(DISTINCT)], lw=2.0, label=unformatted(label))
         for index, label in enumerate(labels)
     ]
     lines = [line for found in drawn.values() for panel in found for line in panel.lines]

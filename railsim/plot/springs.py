@@ -23,6 +23,7 @@ from railsim.springs.design import Design
 from railsim.springs.summary import coils_by_wire
 from railsim.springs.tolerance import RideHeight
 from railsim.springs.verification import Case, Fatigue, Verification, built, solid_heights
+from railsim.text import unformatted
 
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
@@ -89,7 +90,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     for case in result.cases:
         heights.axvline(case.load * 1e-3, color=FAINT, lw=0.7, zorder=0)
         heights.annotate(
-            case.name,
+            unformatted(case.name),
             (case.load * 1e-3, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 2),
@@ -222,7 +223,7 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     single.set_ylim(-0.6, max(len(rows), 4) - 0.4)
     single.grid(axis="y", visible=False)
     single.axvline(0.0, color="0.35", lw=0.8)
-    single.set_xlabel(f"change of the ride height at {shown.name} / mm")
+    single.set_xlabel(f"change of the ride height at {unformatted(shown.name)} / mm")
     single.legend(loc="lower right", fontsize=7.5)
     ordered = sorted(results, key=lambda result: result.load)
     places = np.arange(len(ordered))
@@ -243,7 +244,8 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
         )
     every.plot([], [], color=FAINT, lw=5, label="worst case")
     every.plot([], [], color=MAIN, lw=5, label="random")
-    every.set_xticks(places, [result.name for result in ordered], rotation=30, ha="right")
+    names = [unformatted(result.name) for result in ordered]
+    every.set_xticks(places, names, rotation=30, ha="right")
     every.set_xlim(-0.6, len(ordered) - 0.4)
     every.axhline(0.0, color="0.35", lw=0.8)
     every.set_ylabel("ride height / mm")
@@ -281,7 +283,7 @@ def _mark(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
         above = i % 2 == 0
         axes.plot(x, y, "o", color=MAIN, ms=4)
         axes.annotate(
-            name,
+            unformatted(name),
             (x, y),
             xytext=(-4, 3) if above else (4, -3),
             textcoords="offset points",
@@ -339,7 +341,8 @@ def _draw_arm(
     axes.text(
         x,
         y,
-        f"{case.name}  {case.load * 1e-3:.1f} kN\n{case.deflection * 1e3:.1f} mm, {degrees}",
+        f"{unformatted(case.name)}  {case.load * 1e-3:.1f} kN\n"
+        f"{case.deflection * 1e3:.1f} mm, {degrees}",
         fontsize=9,
         va="bottom",
     )

@@ -5,6 +5,7 @@ a bogie has a hue, its leading wheelset the dark shade, the left side a solid an
 dashed line.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +19,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from railsim.definitions.layout import Section
-from railsim.errors import Fault, InputError
 from railsim.files import PICTURES, check_file, whole_file
 from railsim.result.data import Array
 
@@ -158,15 +158,15 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
 
     Raises
     ------
-    InputError : the file exists and may not be overwritten, cannot be written, or its ending is
-        none that can be drawn.
+    InputError : the file exists and may not be overwritten, or its ending is none that can be
+        drawn.
+    OSError : the disk is full, or the folder is no longer there.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=PICTURES)
-    try:
+    with warnings.catch_warnings():
+        # letters that the font lacks are drawn as boxes, and that is seen
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
         with whole_file(path) as partial:
             figure.savefig(partial, format=path.suffix[1:].lower())
-    except OSError as error:
-        fault = Fault(str(path), "", f"cannot write it ({error})", "choose another place")
-        raise InputError([fault]) from None
     return path

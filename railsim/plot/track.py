@@ -12,6 +12,7 @@ from railsim.definitions.layout import Section, curvature_sections
 from railsim.definitions.track import Track
 from railsim.plot.style import DISTINCT, shade, spans, styled
 from railsim.result.data import Array
+from railsim.text import unformatted
 from railsim.track.alignment import Alignment
 
 KINDS = {"STR": ("straight", "0.35"), "CLO": ("transition", "#d99000"), "CIR": ("curve", "#004a80")}
@@ -39,7 +40,7 @@ def track_figure(track: Track) -> Figure:
     with styled():
         figure = Figure(figsize=(8.0, 3.6 + 1.5 * len(functions)), layout="constrained")
         rows = figure.subplots(1 + len(functions), 1, height_ratios=[1.9] + [1.0] * len(functions))
-        figure.suptitle(track.name, x=0.012, ha="left")
+        figure.suptitle(unformatted(track.name), x=0.012, ha="left")
         _plan(rows[0], alignment, sections, s)
         shown = spans(sections, s, s)
         for axes, (words, label, values) in zip(rows[1:], functions, strict=True):

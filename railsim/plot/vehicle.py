@@ -14,6 +14,7 @@ from railsim.definitions.base import Vector
 from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle import Vehicle
 from railsim.plot.style import DISTINCT, styled
+from railsim.text import unformatted
 
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
 TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
@@ -42,7 +43,7 @@ def vehicle_figure(vehicle: Vehicle) -> Figure:
     colours = {kind: DISTINCT[i % len(DISTINCT)] for i, kind in enumerate(kinds)}
     with styled():
         figure = Figure(figsize=(11.0, 9.0), layout="constrained")
-        figure.suptitle(vehicle.name, x=0.012, ha="left")
+        figure.suptitle(unformatted(vehicle.name), x=0.012, ha="left")
         grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
         end = _leading_end(flat)
         for place, view, limits in (
@@ -91,7 +92,7 @@ def _draw_view(
         if across == 0 and (limits is None or limits[0] < x < limits[1]):
             above = 18 if upright == 2 else 10  # points; out of the way of springs
             label = axes.annotate(
-                body.name, (x, y), (0, above), textcoords="offset points", ha="center",
+                unformatted(body.name), (x, y), (0, above), textcoords="offset points", ha="center",
                 fontsize=7, color=BODY, zorder=6,
             )
             label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])

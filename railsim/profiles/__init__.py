@@ -15,6 +15,7 @@ Read `profile` first: it states the frames.
 from pathlib import Path
 
 from railsim.errors import Fault, InputError, nearest
+from railsim.files import is_file
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
 
@@ -48,9 +49,9 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
     'wheel'
     """
     path = Path(name_or_path)
-    if name_or_path in DEFINITIONS and not path.is_file():
+    if name_or_path in DEFINITIONS and not is_file(path):
         profile = builtin_profile(name_or_path)
-    elif path.suffix or path.exists():
+    elif path.suffix or is_file(path):
         # reading is rare and needs scipy: not imported for built-in profiles
         from railsim.profiles.readers import read_profile_file
         from railsim.profiles.recognition import recognised_profile
@@ -60,7 +61,7 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
         raise InputError(
             [
                 Fault(
-                    name_or_path,
+                    name_or_path if len(name_or_path) < 60 else f"{name_or_path[:57]}...",
                     "",
                     "no such profile",
                     nearest(name_or_path, DEFINITIONS) + " or the path of a file",

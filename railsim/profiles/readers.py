@@ -18,13 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.errors import Fault, InputError
+from railsim.files import read_bytes
 from railsim.profiles.profile import Kind
 
 Array = NDArray[np.float64]
 
-LARGEST_FILE = 20_000_000
-"""Larger files are refused unread [bytes]; a profile of 10 000 points has some 0.5 MB."""
+PROFILE_BYTES = 5_000_000
+"""Larger files are refused unread; a profile of 10 000 points has some 0.5 MB."""
 
+SUFFIXES = (".csv", ".txt", ".dat", ".prw", ".prr", ".whl", ".ban")
 FORMATS = "CSV (header y_mm,z_mm or y,z), SIMPACK .prw/.prr, MiniProf .whl/.ban"
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 
@@ -117,20 +119,16 @@ def read_profile_file(path: str | Path) -> RawProfile:
     """
     path = Path(path)
     file = str(path)
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise InputError([Fault(file, "", f"{size / 1e6:.0f} MB", "a profile has less")])
-        content = path.read_bytes()
-    except OSError as error:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
         raise InputError(
-            [Fault(file, "", f"cannot be read: {error.strerror}", f"formats: {FORMATS}")]
-        ) from None
+            [Fault(file, "", f"unknown kind of file '{suffix}'", f"formats: {FORMATS}")]
+        )
+    content = read_bytes(path, PROFILE_BYTES)
     if b"\0" in content:
         raise InputError([Fault(file, "", "not a text file", f"formats: {FORMATS}")])
     # titles may hold any character; numbers are ASCII in every one of these encodings
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
-    suffix = path.suffix.lower()
     if suffix in (".prw", ".prr"):
         raw = _simpack(file, lines)
         told: Kind = "wheel" if suffix == ".prw" else "rail"
@@ -139,12 +137,8 @@ def read_profile_file(path: str | Path) -> RawProfile:
         raw = _miniprof(file, lines)
         raw.kind = "wheel" if suffix == ".whl" else "rail"
         raw.unit = raw.unit or 1e-3
-    elif suffix in (".csv", ".txt", ".dat"):
-        raw = _csv(file, lines)
     else:
-        raise InputError(
-            [Fault(file, "", f"unknown kind of file '{suffix}'", f"formats: {FORMATS}")]
-        )
+        raw = _csv(file, lines)
     raw.name = raw.name or path.stem
     return raw
 

@@ -4,7 +4,9 @@
 `data.py`       `Result`: arrays by name, coordinates, attributes, the embedded inputs
 `extremes.py`   largest values with wheelset, side, time and distance; values at mid-curve
 `sinks.py`      `Sink`, what a simulation writes to; `MemorySink`
-`hdf5.py`       layout of the result file, `Hdf5Sink`, `open_result`, `open_run`
+`hdf5.py`       layout of the result file, `Hdf5Sink`
+`reading.py`    `open_result`, `open_run`, `check_result`: any damage is an input error
+`integrity.py`  checksums, digest and seal of a result file
 ==============  ===========================================================================
 
 Begin reading in `data.py`.
@@ -12,7 +14,8 @@ Begin reading in `data.py`.
 
 from railsim.result.data import Result
 from railsim.result.extremes import MidCurve, Peak, mid_curves, peak, peaks
-from railsim.result.hdf5 import Hdf5Sink, open_result, open_run
+from railsim.result.hdf5 import Hdf5Sink
+from railsim.result.reading import check_result, open_result, open_run
 from railsim.result.sinks import MemorySink, Sink
 
 __all__ = [
@@ -22,6 +25,7 @@ __all__ = [
     "Peak",
     "Result",
     "Sink",
+    "check_result",
     "mid_curves",
     "open_result",
     "open_run",

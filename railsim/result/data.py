@@ -4,16 +4,16 @@ A `Result` never changes: its arrays are read-only, and what is derived from the
 functions beside it.  Arrays that come from a file are read when they are first asked for.
 """
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import nearest
+from railsim.errors import InputError, nearest
 from railsim.notation import Quantity
 from railsim.profiles.profile import Profile
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
+D = TypeVar("D")
 Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]
 
@@ -50,6 +51,8 @@ class Result:
         Further arrays by group: ``state`` holds the whole state at the ``end`` of the run, and the
         one at its ``start`` where that went on from another run; ``peaks`` the largest and smallest
         values over all steps, see `railsim.peaks`.
+    source : str
+        File that the result was read from, for messages.
 
     Examples
     --------
@@ -72,7 +75,10 @@ class Result:
         attributes: Attributes,
         profiles: Mapping[str, Profile] = MappingProxyType({}),
         groups: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+        *,
+        source: str = "",
     ) -> None:
+        self._source = source
         self._arrays = arrays if isinstance(arrays, FrozenArrays) else FrozenArrays(arrays)
         self._quantities = MappingProxyType(dict(quantities))
         self._coordinates = MappingProxyType(
@@ -206,7 +212,7 @@ class Result:
         from railsim.definitions.loading import load_vehicle_text
 
         if self._vehicle is None:
-            self._vehicle = load_vehicle_text(str(self._attributes["vehicle_toml"]))
+            self._vehicle = self._rebuilt("vehicle_toml", load_vehicle_text)
         return self._vehicle
 
     def track(self) -> "Track":
@@ -214,14 +220,24 @@ class Result:
         from railsim.definitions.loading import load_track_text
 
         if self._track is None:
-            self._track = load_track_text(str(self._attributes["track_toml"]))
+            self._track = self._rebuilt("track_toml", load_track_text)
         return self._track
 
     def settings(self) -> "Settings":
         """Rebuild the settings from what the result carries."""
-        from railsim.definitions.settings import Settings
+        from railsim.definitions.loading import load_settings_json
 
-        return Settings.model_validate(json.loads(str(self._attributes["settings_json"])))
+        return self._rebuilt("settings_json", load_settings_json)
+
+    def _rebuilt(self, name: str, load: Callable[[str], D]) -> D:
+        """Return what an attribute describes; its faults name the file that holds it."""
+        try:
+            return load(str(self._attributes[name]))
+        except InputError as error:
+            place = f"{self._source}: " if self._source else ""
+            raise InputError(
+                replace(fault, file=f"{place}{fault.file}") for fault in error.faults
+            ) from None
 
     def inputs(self) -> dict[str, Any]:
         """Return all that the run was made from: ``simulate(**result.inputs())`` runs it again."""

@@ -129,10 +129,17 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     Parameters
     ----------
     result : Result
-        Result with at least one instant.
+        Result of a run.
     names : iterable of str, optional
         Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
+
+    Returns
+    -------
+    tuple of Peak
+        None of them where the run ended before its first instant was recorded.
     """
+    if not len(result["time"]):
+        return ()
     if names is None:
         names = [name for name in PEAK_QUANTITIES if name in result]
     found: list[Peak] = []
@@ -191,7 +198,9 @@ def mid_curves(result: Result, names: Iterable[str] | None = None) -> tuple[MidC
     """
     wanted = list(names) if names is not None else [n for n in PEAK_QUANTITIES if n in result]
     distance = result["distance"]
-    found = []
+    found: list[MidCurve] = []
+    if not len(distance):
+        return ()
     for section in curvature_sections(result.track()):
         middle = 0.5 * (section.begin + section.end)
         if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:

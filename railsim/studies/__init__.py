@@ -2,9 +2,11 @@
 
 ==============  ===========================================================================
 `case.py`       `Case`: all that one run depends on, with its name and its key
+`points.py`     what each run is asked for, with a key, before anything is loaded
 `combine.py`    from lists and grids to cases; every fault of all of them at once
 `run.py`        a case becomes a file
 `execute.py`    cases over processes or a dask cluster
+`journal.py`    what is done, one line a run, appended
 `summary.py`    ``summary.csv`` and ``study.json``
 `study.py`      `study`: the whole job
 ==============  ===========================================================================

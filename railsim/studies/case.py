@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from railsim.definitions.flatten import flatten
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.profiles import load_profile
+from railsim.profiles.used import used_profiles
 from railsim.version import __version__
 
 
@@ -76,9 +76,8 @@ class Case:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def _profile_names(self) -> set[str]:
-        wheelsets = (body.wheelset for body in flatten(self.vehicle).bodies)
-        wheels = {name for wheelset in wheelsets if wheelset for name in wheelset.profile}
-        return wheels | set(self.track.rail)
+        used = (*used_profiles(self.vehicle), *used_profiles(self.track))
+        return {name for _, name, _ in used}
 
 
 def short_name(path: str | Path) -> str:

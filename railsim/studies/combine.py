@@ -1,23 +1,35 @@
 """From lists and grids to cases, with every fault of all of them at once."""
 
+import math
+import os
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
 
+from railsim.definitions.base import FileDefinition
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.overrides import OVERRIDE, split_overrides
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
+from railsim.profiles.used import profile_faults
 from railsim.simulation import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
+from railsim.studies.points import (
+    Fingerprints,
+    Grid,
+    Overrides,
+    Point,
+    check_number,
+    point_key,
+)
 
-T = TypeVar("T")
-Grid = Mapping[str, Sequence[str]]
+T = TypeVar("T", bound=FileDefinition)
+LONGEST_NAME = 250  # bytes of a file's name, ending included; file systems allow 255
 KINDS: dict[Any, str] = {load_vehicle: "vehicle", load_track: "track", load_settings: "settings"}
 
 
@@ -71,82 +83,164 @@ def combinations(
     tracks: Sequence[str | Path],
     speeds: Sequence[float | None],
     grid: Grid | None = None,
-    *,
-    settings: str | Path | None = None,
-    start: float = 0.0,
-    duration: float | None = None,
-    until: float | None = None,
-    assignments: Sequence[str] = (),
+    **how: Any,
 ) -> list[Case]:
-    """Return a case for every combination, vehicles outermost; see `load_case`.
-
-    Parameters
-    ----------
-    grid : mapping of str to sequence of str, optional
-        Values, written as in a file, of further keys.
+    """Return a case for every combination, vehicles outermost; see `Plan`.
 
     Raises
     ------
     InputError : everything that is wrong in any of them.
     """
-    faults: list[Fault] = []
-    grid = grid or {}
-    if not (vehicles and tracks and speeds and all(grid.values())):
-        raise InputError([Fault("study", "", "no combination", "give a vehicle, a track, a speed")])
+    plan = Plan(vehicles, tracks, speeds, grid, **how)
+    return plan.cases(plan.points)
 
-    @cache
-    def loaded(load: Callable[..., T], path: str | Path | None, own: tuple[str, ...]) -> T | None:
+
+class Plan:
+    """All points of a study, and the way from a point to its case.
+
+    Parameters
+    ----------
+    vehicles, tracks, speeds : sequences
+        What is combined, vehicles outermost.
+    grid : mapping of str to sequence of str, optional
+        Values, written as in a file, of further keys.
+    settings, start, duration, until, assignments
+        As in `load_case`, for all runs.
+    workers : int
+        Processes that will do the runs, for the time that a refused study would take.
+
+    Attributes
+    ----------
+    points : list of Point
+        In the order of the combinations.
+
+    Raises
+    ------
+    InputError : there is no combination, or there are too many.
+    """
+
+    def __init__(
+        self,
+        vehicles: Sequence[str | Path],
+        tracks: Sequence[str | Path],
+        speeds: Sequence[float | None],
+        grid: Grid | None = None,
+        *,
+        settings: str | Path | None = None,
+        start: float = 0.0,
+        duration: float | None = None,
+        until: float | None = None,
+        assignments: Sequence[str] = (),
+        workers: int = 1,
+    ) -> None:
+        grid = grid or {}
+        if not (vehicles and tracks and speeds and all(grid.values())):
+            raise InputError([Fault("study", "", "no combination",
+                                    "give a vehicle, a track, a speed")])
+        self._grid, self._settings = grid, settings
+        self._start, self._duration, self._until = start, duration, until
+        self._faults: dict[Fault, None] = {}
+        self._loaded = cache(self._load)
+        check_number(
+            [vehicles, tracks, speeds, *grid.values()],
+            workers,
+            lambda: self._simulated_time(tracks[0], speeds[0]),
+        )
+        common = self._split(assignments)
+        rows = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+        # one and the same for all vehicles, tracks and speeds
+        own = [self._own(common, row) for row in rows]
+        suffixes = [_suffix(row) for row in rows]
+        fingerprint = Fingerprints()
+        self.points = []
+        for vehicle, track, speed in product(vehicles, tracks, speeds):
+            short = {"vehicle": short_name(vehicle), "track": short_name(track)}
+            for row, overrides, suffix in zip(rows, own, suffixes, strict=True):
+                first = self._first_speed(overrides["settings"], speed)
+                key = point_key(
+                    fingerprint("vehicle", vehicle, overrides["vehicle"]),
+                    fingerprint("track", track, overrides["track"]),
+                    fingerprint("settings", settings, overrides["settings"]),
+                    first, start, duration, until,
+                )
+                name = run_name(vehicle, track, 0.0 if first is None else first) + suffix
+                told = math.nan if first is None else first
+                labels: dict[str, str | float] = {**short, "speed": told, **row}
+                self.points.append(Point(name, vehicle, track, first, overrides, labels, key))
+
+    def cases(self, points: Sequence[Point]) -> list[Case]:
+        """Load what the runs of some points need.
+
+        Raises
+        ------
+        InputError : everything that is wrong in any of them.
+        """
+        found = []
+        for point in points:
+            vehicle = self._loaded(load_vehicle, point.vehicle, point.overrides["vehicle"])
+            track = self._loaded(load_track, point.track, point.overrides["track"])
+            settings = self._loaded(load_settings, self._settings, point.overrides["settings"])
+            if track and point.speed is not None:
+                how = point.speed, self._start, self._duration, self._until
+                self._tell(_range_faults(track, *how))
+            if vehicle and track and settings and point.speed is not None:
+                found.append(Case(
+                    point.name, vehicle, track, settings, point.speed, self._start,
+                    self._duration, self._until, point.labels,
+                ))
+        if not self._faults:
+            self._tell(_name_faults(self.points))
+        if self._faults:
+            raise InputError(self._faults)
+        return found
+
+    def _tell(self, faults: Iterable[Fault]) -> None:
+        self._faults |= dict.fromkeys(faults)
+
+    def _load(
+        self, load: Callable[..., T], path: str | Path | None, overrides: Overrides
+    ) -> T | None:
         try:
-            return load(path, own)
+            definition = load(path, overrides)
+            self._tell(profile_faults(definition, str(path)))
+            return definition
         except InputError as error:
-            faults.extend(_as_written(fault, KINDS[load], grid) for fault in error.faults)
+            self._tell(_as_written(fault, KINDS[load], self._grid) for fault in error.faults)
             return None
 
-    cases: list[Case] = []
-    points = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
-    for vehicle, track, speed, point in product(vehicles, tracks, speeds, points):
-        own: dict[str, list[str]] = {"vehicle": [], "track": [], "settings": []}
-        for text in (*assignments, *(f"{key}={value}" for key, value in point.items())):
+    def _split(self, texts: Sequence[str]) -> dict[str, Overrides]:
+        own: dict[str, Overrides] = {"vehicle": (), "track": (), "settings": ()}
+        for text in texts:
             try:
-                for kind, texts in split_overrides([text]).items():
-                    own[kind].extend(texts)
+                for kind, some in split_overrides([text]).items():
+                    own[kind] += tuple(some)
             except InputError as error:
-                faults.extend(error.faults)
-        a_vehicle = loaded(load_vehicle, vehicle, tuple(own["vehicle"]))
-        a_track = loaded(load_track, track, tuple(own["track"]))
-        a_settings = loaded(load_settings, settings, tuple(own["settings"]))
-        first_speed = speed
-        if a_settings:
-            try:
-                first_speed = initial_speed(a_settings, speed, start)
-            except InputError as error:
-                faults.extend(error.faults)
-        if a_track and first_speed is not None:
-            faults.extend(_range_faults(a_track, first_speed, start, duration, until))
-        if a_vehicle and a_track and a_settings and first_speed is not None:
-            labels: dict[str, str | float] = {
-                "vehicle": short_name(vehicle),
-                "track": short_name(track),
-                "speed": first_speed,
-                **point,
-            }
-            case = Case(
-                run_name(vehicle, track, first_speed) + _suffix(point),
-                a_vehicle,
-                a_track,
-                a_settings,
-                first_speed,
-                start,
-                duration,
-                until,
-                labels,
-            )
-            cases.append(case)
-    if not faults:
-        faults += _profile_faults(cases) + _double_names(cases)
-    if faults:
-        raise InputError(dict.fromkeys(faults))
-    return cases
+                self._tell(error.faults)
+        return own
+
+    def _own(self, common: Mapping[str, Overrides], row: Mapping[str, str]) -> dict[str, Overrides]:
+        own = self._split([f"{key}={value}" for key, value in row.items()])
+        return {kind: common[kind] + own[kind] for kind in own}
+
+    def _first_speed(self, overrides: Overrides, speed: float | None) -> float | None:
+        settings = self._loaded(load_settings, self._settings, overrides)
+        if settings is None:
+            return speed
+        try:
+            return initial_speed(settings, speed, self._start)
+        except InputError as error:
+            self._tell(error.faults)
+            return None
+
+    def _simulated_time(self, track: str | Path, speed: float | None) -> float:
+        """Guess how long a run is [s]: that of the first track and speed."""
+        if self._duration is not None:
+            return self._duration
+        try:
+            length = self._until or load_track(track).length
+        except InputError:
+            return 0.0
+        return max(0.0, length - self._start) / max(speed or 1.0, 0.5)
 
 
 def _as_written(fault: Fault, kind: str, grid: Grid) -> Fault:
@@ -156,16 +250,6 @@ def _as_written(fault: Fault, kind: str, grid: Grid) -> Fault:
     key = f"{kind}.{fault.key}"
     of_grid = any(key == name or key.startswith(f"{name}.") for name in grid)
     return replace(fault, file="--grid" if of_grid else OVERRIDE, key=key)
-
-
-def _profile_faults(cases: Sequence[Case]) -> list[Fault]:
-    faults: list[Fault] = []
-    for case in cases:
-        try:
-            _ = case.key  # reads every profile
-        except InputError as error:
-            faults.extend(error.faults)
-    return faults
 
 
 def _range_faults(
@@ -192,13 +276,18 @@ def _suffix(point: Mapping[str, str]) -> str:
     return "".join("_" + re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", p)) for p in parts)
 
 
-def _double_names(cases: Sequence[Case]) -> list[Fault]:
-    counts = Counter(case.name for case in cases)
-    return [
+def _name_faults(points: Sequence[Point]) -> list[Fault]:
+    counts = Counter(point.name for point in points)
+    faults = [
         Fault("study", name, f"{count} runs of this name", "give files with different names")
         for name, count in counts.items()
         if count > 1
     ]
+    longest = max(counts, key=lambda name: len(os.fsencode(name)))
+    if len(os.fsencode(longest)) + len(".h5") > LONGEST_NAME:
+        found = f"the name of a run has {len(os.fsencode(longest))} bytes"
+        faults.append(Fault("study", f"{longest[:60]}...", found, "shorter names of files"))
+    return faults
 
 
 def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:

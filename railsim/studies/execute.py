@@ -13,6 +13,7 @@ import signal
 import threading
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -24,12 +25,13 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError, RailsimError, words_of
-from railsim.files import partial_path
+from railsim.files import sweep
 from railsim.kernels.time_loop import time_loop
 from railsim.result import Result
 from railsim.studies.case import Case
+from railsim.studies.journal import Record
 from railsim.studies.run import can_share_a_call, run_case, run_cases
-from railsim.studies.summary import Record, failed_record, finished_record
+from railsim.studies.summary import failed_record, finished_record
 from railsim.threads import one_thread_each
 
 GRACE = 3.0  # seconds that running jobs have to stop by themselves
@@ -75,10 +77,12 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
         No batch is larger than a worker's share of all jobs: none is to wait for another.
     """
     size = min(together, math.ceil(len(jobs) / workers))
+    if size <= 1:
+        return [(job,) for job in jobs]
     kinds: list[list[Job]] = []
     for job in jobs:
         for kind in kinds:
-            if size > 1 and can_share_a_call(kind[0].case, job.case):
+            if can_share_a_call(kind[0].case, job.case):
                 kind.append(job)
                 break
         else:
@@ -118,7 +122,7 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
     try:
         if isinstance(outcome, Exception):
             raise outcome
-        if job.picture is not None:
+        if job.picture is not None and len(outcome["time"]):
             from railsim.plot.histories import histories
             from railsim.plot.style import save
 
@@ -126,7 +130,9 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
         return finished_record(job.case, outcome)
     except RailsimError as error:
         return failed_record(job.case, str(error))
-    except (OSError, MemoryError) as error:
+    except OSError as error:
+        return failed_record(job.case, words_of(error), errno=error.errno or 0)
+    except MemoryError as error:
         return failed_record(job.case, words_of(error))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
@@ -149,48 +155,111 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
 
     Where the time loop has to be compiled, the first batch begins alone: the others find it done,
     and no two processes compile the same on cores and memory that they share.
+
+    A process that dies (killed, for want of memory for instance) takes its pool with it; what was
+    under way begins again in a new one.  A batch whose process has died twice is given up.
     """
-    # "spawn" everywhere: a fork of a process that has run compiled code with threads may hang
-    context = multiprocessing.get_context("spawn")
     shares = _shares(batches)
-    fractions = context.Array("d", len(batches), lock=False)
-    stop = context.Event()
-    others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(workers, context, _begin, (fractions, stop))
-    processes: set[BaseProcess] = set()
-    batch_of: dict[Future[list[Record]], Batch] = {}
+    todo = dict.fromkeys(range(len(batches)))
+    deaths = Counter[int]()
+    while todo:
+        done = sum(share for index, share in enumerate(shares) if index not in todo)
 
-    def submitted(some: range) -> set[Future[list[Record]]]:
+        def tell(more: float, done: float = done) -> None:
+            progress(done + more)
+
+        pool = _Pool(batches, list(todo), workers)
+        for index, records in pool.outcomes(tell):
+            del todo[index]
+            yield from records
+        deaths.update(pool.lost)
+        for index in [index for index in todo if deaths[index] > 1]:
+            del todo[index]
+            reason = "its process died twice, perhaps for want of memory"
+            yield from [failed_record(job.case, reason) for job in batches[index]]
+
+
+class _Pool:
+    """One pool of processes, to its end or to the death of one of them.
+
+    Attributes
+    ----------
+    lost : set of int
+        Batches that were under way in a process that died.
+    """
+
+    def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
+        # "spawn" everywhere: a fork of a process that has run compiled code with threads may hang
+        context = multiprocessing.get_context("spawn")
+        self._batches, self._indices = batches, indices
+        self._shares = _shares(batches)
+        self._fractions = context.Array("d", len(batches), lock=False)
+        self._holders = context.Array("l", len(batches), lock=False)  # process of each batch
+        self._stop = context.Event()
+        self._others = set(multiprocessing.active_children())
+        self._processes: set[BaseProcess] = set()
+        self._index_of: dict[Future[list[Record]], int] = {}
+        shared = self._fractions, self._holders, self._stop
+        self._pool = ProcessPoolExecutor(min(workers, len(indices)), context, _begin, shared)
+        self.lost: set[int] = set()
+
+    def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
+        new = set()
         with _interrupts_later(), one_thread_each():  # the processes inherit it
-            new = {
-                pool.submit(_work, index, batches[index]): batches[index] for index in some
-            }
-            processes.update(set(multiprocessing.active_children()) - others)
-        batch_of.update(new)
-        return set(new)
+            for index in indices:
+                future = self._pool.submit(_work, index, self._batches[index])
+                self._index_of[future] = index
+                new.add(future)
+            self._processes |= set(multiprocessing.active_children()) - self._others
+        return new
 
-    begun = len(batches) if is_compiled() else 1
-    try:
-        waiting = submitted(range(begun))
-        while waiting:
-            done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
-            progress(sum(f * share for f, share in zip(fractions, shares, strict=True)))
-            if begun < len(batches) and (done or fractions[0] > 0.0):
-                waiting |= submitted(range(begun, len(batches)))
-                begun = len(batches)
-            for future in done:
-                yield from _outcome(future, batch_of[future])
-    except BaseException:
-        stop.set()
-        pool.shutdown(wait=False, cancel_futures=True)
-        _end(processes)
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        for process in processes:  # one that was killed has left what it was writing
-            for batch in batches:
-                for job in batch:
-                    partial_path(job.path, process.pid or 0).unlink(missing_ok=True)
+    def outcomes(self, progress: Progress) -> Iterator[tuple[int, list[Record]]]:
+        """Yield index and records of every batch that ends."""
+        first, rest = self._indices[0], list(self._indices[1:])
+        done: set[int] = set()
+        broken = False
+        try:
+            waiting = self._submit([first])
+            if is_compiled():
+                waiting |= self._submit(rest)
+                rest = []
+            while waiting and not broken:
+                ended, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
+                progress(sum(self._fractions[i] * self._shares[i] for i in self._indices))
+                if rest and (ended or self._fractions[first] > 0.0):
+                    waiting |= self._submit(rest)
+                    rest = []
+                for future in ended:
+                    index = self._index_of[future]
+                    try:
+                        records = _outcome(future, self._batches[index])
+                    except BrokenProcessPool:
+                        broken = True
+                        continue
+                    done.add(index)
+                    yield index, records
+        except BrokenProcessPool:  # nothing more can be submitted
+            broken = True
+        except BaseException:
+            self._stop.set()
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            _end(self._processes)
+            raise
+        finally:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            for folder in {job.path.parent for batch in self._batches for job in batch}:
+                sweep(folder)  # what a process that was killed has left
+        if broken:
+            self.lost = self._lost(done)
+
+    def _lost(self, done: set[int]) -> set[int]:
+        """Return the batches of the process that died by itself; the pool has ended the others."""
+        for process in self._processes:
+            process.join(GRACE)
+        ended = (None, 0, -signal.SIGTERM)
+        dead = {process.pid for process in self._processes if process.exitcode not in ended}
+        begun = {i for i in self._indices if i not in done and self._holders[i]}
+        return {i for i in begun if self._holders[i] in dead} or begun or {self._indices[0]}
 
 
 def _shares(batches: Sequence[Batch]) -> list[float]:
@@ -246,20 +315,19 @@ def _outcome(future: Any, batch: Batch) -> list[Record]:
     try:
         records: list[Record] = future.result()
     except BrokenProcessPool:
-        reason = "its process died, perhaps for want of memory"
-        return [failed_record(job.case, reason) for job in batch]
+        raise
     except Exception as error:
         return [failed_record(job.case, f"{type(error).__name__}: {error}") for job in batch]
     return records
 
 
-# what a worker process knows: the progress of all jobs, and whether to stop
+# what a worker process knows: the progress and the process of all jobs, and whether to stop
 _shared: Any = None
 
 
-def _begin(fractions: Any, stop: Any) -> None:
+def _begin(fractions: Any, holders: Any, stop: Any) -> None:
     global _shared
-    _shared = fractions, stop
+    _shared = fractions, holders, stop
     threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
 
 
@@ -274,7 +342,8 @@ def _end_with_parent(stop: Any) -> None:
 
 
 def _work(index: int, batch: Batch) -> list[Record]:
-    fractions, stop = _shared
+    fractions, holders, stop = _shared
+    holders[index] = os.getpid()
 
     def progress(fraction: float) -> None:
         fractions[index] = fraction

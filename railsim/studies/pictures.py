@@ -15,7 +15,8 @@ def draw(outcome: Outcome) -> None:
     results = outcome.results()
     alike: dict[str, dict[str, str]] = {}
     for record in outcome.records:
-        if record["name"] not in results:
+        result = results.get(record["name"])
+        if result is None or not len(result["time"]):
             continue
         file = outcome.folder / record["file"]
         picture = file.with_suffix(".png")

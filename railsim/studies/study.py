@@ -1,20 +1,23 @@
 """`study`: vehicles x tracks x speeds x further values, one result file a run.
 
 A run whose file is there with the same inputs is not computed again, so an interrupted study goes
-on where it was when it is started again.
+on where it was when it is started again.  What is done stands in the journal.
 """
 
+import errno
+import logging
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError
-from railsim.files import check_folder, make_folder
+from railsim.files import check_folder, is_file, make_folder, sweep
 from railsim.result import Result, open_result
 from railsim.studies.case import Case
-from railsim.studies.combine import combinations
+from railsim.studies.combine import Plan
 from railsim.studies.execute import (
     Batch,
     Job,
@@ -24,14 +27,22 @@ from railsim.studies.execute import (
     in_this_process,
     on_cluster,
 )
+from railsim.studies.journal import JOURNAL, Journal, Record, Records
+from railsim.studies.points import Point
 from railsim.studies.summary import (
-    Record,
+    Inputs,
+    checked,
     finished_record,
     read_index,
     waiting_record,
     write_index,
 )
 from railsim.version import __version__
+
+_LOG = logging.getLogger(__name__)
+MANY = 10_000  # runs from which on an index that is up to date is not made once more
+# after one of these no other run could be written either
+NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
@@ -42,26 +53,25 @@ class Outcome:
     ----------
     folder : Path
         Holds the result files, ``summary.csv`` and ``study.json``.
-    records : tuple of dict
-        One for every run, in the order of the combinations.
+    records : sequence of dict
+        One for every run, in the order of the combinations; read when asked for.
     computed : int
         Number of runs that were computed now; the others were there.
     """
 
     folder: Path
-    records: tuple[Record, ...]
+    records: Records
     computed: int
 
     @property
     def failed(self) -> tuple[Record, ...]:
         """Runs without a result."""
-        return tuple(record for record in self.records if record["status"] == "failed")
+        return self.records.with_status("failed")
 
     @property
     def ended_early(self) -> tuple[Record, ...]:
         """Runs that ended early for a physical reason."""
-        whole = ("complete", "failed")
-        return tuple(record for record in self.records if record["status"] not in whole)
+        return self.records.with_status(but=("complete", "failed"))
 
     def results(self) -> dict[str, Result]:
         """Return the results by the names of their runs; arrays are read when asked for."""
@@ -92,6 +102,7 @@ def study(
     plots: bool = False,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
+    on_remark: Callable[[str], None] | None = None,
 ) -> Outcome:
     """Run every combination of vehicles, tracks, speeds and the values of a grid.
 
@@ -129,7 +140,10 @@ def study(
     progress : callable, optional
         Called with the finished fraction now and then.
     on_record : callable, optional
-        Called with the record of every run that is done or found done.
+        Called with the record of every run that is done.
+    on_remark : callable, optional
+        Called with every sentence on what was found in the folder, such as damaged results that
+        are computed again; by default they go to the log.
 
     Returns
     -------
@@ -154,7 +168,7 @@ def study(
     check_folder(folder)
     vehicles, tracks, speeds = _several(vehicles), _several(tracks), _several(speeds)
     written = {key: [str(v) for v in _several(values)] for key, values in (grid or {}).items()}
-    cases = combinations(
+    plan = Plan(
         vehicles,
         tracks,
         speeds,
@@ -164,9 +178,11 @@ def study(
         duration=duration,
         until=until,
         assignments=assignments,
+        workers=workers or cores(),
     )
     inputs = {
         "railsim_version": __version__,
+        "folder": os.path.relpath(Path.cwd(), folder),  # where names of files begin
         "vehicles": [str(vehicle) for vehicle in vehicles],
         "tracks": [str(track) for track in tracks],
         "speeds": list(speeds),
@@ -177,34 +193,191 @@ def study(
         "until": until,
         "assignments": list(assignments),
     }
-    if not (resume or overwrite):
-        _refuse_another_study(folder, inputs)
-    finished = {} if overwrite else _finished(cases, folder, resume=resume)
-    client = None if scheduler is None else cluster(scheduler)
-    make_folder(folder)
-    tell = on_record or (lambda _: None)
-    records = {case.name: waiting_record(case) for case in cases}
-    for case in cases:
-        if case.name in finished:
-            records[case.name] = finished_record(case, finished[case.name])
-            tell(records[case.name])
-    jobs = [_job(case, folder, plots) for case in cases if case.name not in finished]
-    write_index(folder, inputs, "running", list(records.values()))
-    status = "interrupted"
-    try:
-        for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
-            records[record["name"]] = record
-            write_index(folder, inputs, "running", list(records.values()))
-            tell(record)
-        status = "complete"
-    finally:
-        write_index(folder, inputs, status, list(records.values()))
-    outcome = Outcome(folder, tuple(records.values()), len(jobs))
+    with ExitStack() as stack:
+        known = None
+        if is_file(folder / JOURNAL):
+            known = stack.enter_context(Journal(folder))
+        if not (resume or overwrite):
+            _refuse_another_study(folder, known, inputs)
+        state = _State(folder, plan, known, resume=resume, overwrite=overwrite)
+        client = None if scheduler is None else cluster(scheduler)
+        make_folder(folder)
+        sweep(folder)
+        journal = known or stack.enter_context(Journal(folder))
+        if overwrite:
+            journal.clear()
+        elif known is None and journal.entries:
+            raise InputError([Fault("--out", "", f"another study has begun in {folder}", "")])
+        journal.begin(inputs)
+        remark = on_remark or _LOG.warning
+        for text in state.settle(journal):
+            remark(text)
+        jobs = [_job(case, folder, plots) for case in state.cases]
+        keys = {point.name: point.key for point in plan.points}
+        status = "interrupted"
+        try:
+            if jobs:
+                with suppress(FileNotFoundError):  # it would be out of date
+                    (folder / "study.json").unlink()
+            for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
+                file = folder / record["file"] if record["status"] != "failed" else None
+                journal.add(record, keys[record["name"]], None if file is None else file.stat())
+                if on_record is not None:
+                    on_record(record)
+                if record.get("errno") in NOTHING_MORE:
+                    raise OSError(record["errno"], os.strerror(record["errno"]), str(folder))
+            status = "complete"
+        except BaseException:
+            with suppress(OSError):  # the disk may be full
+                write_index(folder, inputs, status, state.records(journal))
+            raise
+        whole = len(plan.points) > MANY and _is_newer(folder / "study.json", journal.path)
+        if jobs or state.found or not whole:
+            write_index(folder, inputs, status, state.records(journal))
+        outcome = Outcome(folder, state.records(journal), len(jobs))
     if plots:
         from railsim.studies.pictures import draw
 
         draw(outcome)
     return outcome
+
+
+class _State:
+    """What of a study is done and what is to be computed.
+
+    Attributes
+    ----------
+    cases : list of Case
+        What is to be computed.
+    found : list of (Point, Record)
+        Results that are there and that the journal does not know.
+
+    Raises
+    ------
+    InputError : everything that is wrong in what is to be computed; without `resume` also results
+        that would have to be replaced.
+    """
+
+    def __init__(
+        self, folder: Path, plan: Plan, known: Journal | None, *, resume: bool, overwrite: bool
+    ) -> None:
+        self._folder, self._plan = folder, plan
+        self._entries = dict(known.entries) if known and not overwrite else {}
+        self._there = {} if overwrite else _files(folder)
+        self._damaged: dict[Path, str] = {}
+        self._changed: list[str] = []
+        self._lines = known.damaged if known else 0
+        self.found: list[tuple[Point, Record]] = []
+        points = [point for point in plan.points if not self._is_done(point)]
+        self._waiting = dict(zip(points, plan.cases(points), strict=True))
+        faults = [
+            fault
+            for point, case in self._waiting.items()
+            if case.file_name in self._there
+            for fault in self._look_at(point, case)
+        ]
+        if faults and not resume:
+            raise InputError(faults)
+        known_ones = {point for point, _ in self.found}
+        self.cases = [case for point, case in self._waiting.items() if point not in known_ones]
+
+    def _is_done(self, point: Point) -> bool:
+        """Whether the journal knows the result, of these inputs, and its file has not changed."""
+        entry = self._entries.get(point.name)
+        if entry is None or entry.status in ("failed", "waiting") or not point.key:
+            return False
+        return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
+
+    def _look_at(self, point: Point, case: Case) -> list[Fault]:
+        """Take a result that is there, or say why it cannot be taken."""
+        path = self._folder / case.file_name
+        try:
+            result = open_result(path)
+            if result.attributes.get("inputs_hash") == case.key:
+                self.found.append((point, finished_record(case, result)))
+                return []
+        except InputError as error:
+            self._damaged[path] = str(error.faults[0])
+            return list(error.faults)
+        self._changed.append(case.name)
+        allowed = "--resume computes what has changed, --overwrite everything; or another --out"
+        return [Fault("--out", str(path), "a result of other inputs", allowed)]
+
+    def settle(self, journal: Journal) -> list[str]:
+        """Record what was found, move away what is damaged; return what the user should know."""
+        remarks = []
+        if self._lines:
+            remarks.append(f"{self._lines} damaged lines of {JOURNAL} are left out")
+        for point, record in self.found:
+            journal.add(record, point.key, self._there[record["file"]])
+        for path, words in self._damaged.items():
+            kept = path.with_name(f"{path.name}.damaged")
+            os.replace(path, kept)
+            remarks.append(f"{words}: it is computed again; the old file is kept as {kept.name}")
+        lost = [
+            case.name
+            for case in self.cases
+            if self._entries.get(case.name) and case.file_name not in self._there
+            and self._entries[case.name].size
+        ]
+        for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
+            if names:
+                number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
+                remarks.append(f"{number} {words} and computed again: {_listed(names)}")
+        return remarks
+
+    def records(self, journal: Journal) -> Records:
+        """Return the records of all runs, done or waiting, in the order of the combinations."""
+        waiting = {point.name: case for point, case in self._waiting.items()}
+        return Records(journal.path, [
+            journal.entries.get(point.name) or waiting_record(waiting[point.name])
+            for point in self._plan.points
+        ])
+
+
+def _files(folder: Path) -> dict[str, os.stat_result]:
+    """Return the result files of a folder; a hundred thousand take less than a second."""
+    try:
+        with os.scandir(folder) as entries:
+            return {entry.name: entry.stat() for entry in entries if entry.name.endswith(".h5")}
+    except OSError:  # not there, or no folder
+        return {}
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more
+
+
+def _is_newer(one: Path, other: Path) -> bool:
+    try:
+        return one.stat().st_mtime_ns >= other.stat().st_mtime_ns
+    except OSError:
+        return False
+
+
+def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
+    """Return the inputs of the study in a folder, and the folder where its names of files begin.
+
+    Raises
+    ------
+    InputError : there is no study, or it cannot be read.
+    """
+    data: Any = None
+    if (folder / JOURNAL).is_file():
+        with Journal(folder) as journal:
+            data = journal.inputs
+    if data is None:
+        index = folder / "study.json"
+        if not index.is_file():
+            found = f"no study in {folder} to resume"
+            fault = Fault("--resume", "", found, "give --vehicles, --tracks and --speeds")
+            raise InputError([fault])
+        inputs = read_index(index).inputs
+    else:
+        inputs = checked(Inputs, data, str(folder / JOURNAL))
+    base = (folder / inputs.folder).resolve()
+    return inputs, base if base.is_dir() else Path.cwd()
 
 
 def _several(values: Any) -> list[Any]:
@@ -240,35 +413,17 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def _finished(cases: Sequence[Case], folder: Path, *, resume: bool) -> dict[str, Result]:
-    """Return the results that are there already; refuse files that would have to be replaced."""
-    finished: dict[str, Result] = {}
-    faults: list[Fault] = []
-    for case in cases:
-        path = folder / case.file_name
-        if not path.exists():
-            continue
+def _refuse_another_study(
+    folder: Path, known: Journal | None, inputs: Mapping[str, object]
+) -> None:
+    there = known.inputs if known else None
+    if there is None:
         try:
-            result = open_result(path)
-        except InputError as error:
-            faults.extend(error.faults)
-            continue
-        if result.attributes.get("inputs_hash") == case.key:
-            finished[case.name] = result
-        elif not resume:
-            allowed = "--resume computes what has changed, --overwrite everything; or another --out"
-            faults.append(Fault("--out", str(path), "a result of other inputs", allowed))
-    if faults:
-        raise InputError(faults)
-    return finished
-
-
-def _refuse_another_study(folder: Path, inputs: Mapping[str, object]) -> None:
-    try:
-        there = read_index(folder / "study.json")["inputs"]
-    except InputError:
-        return
-    differing = [name for name, value in inputs.items() if there.get(name) != value]
+            there = read_index(folder / "study.json").inputs.model_dump()
+        except InputError:
+            return
+    asked = {name: value for name, value in inputs.items() if name != "folder"}
+    differing = [name for name, value in asked.items() if there.get(name, value) != value]
     if differing:
         found = f"{folder} holds a study with other " + ", ".join(differing)
         allowed = "--resume goes on with these inputs, --overwrite computes everything; or another"

@@ -1,29 +1,33 @@
 """What a study leaves beside its result files: ``summary.csv`` and ``study.json``.
 
 ``study.json`` holds the inputs of the study and a record of every run with its peaks and mid-curve
-values; ``summary.csv`` holds one line a run for spreadsheets.  All numbers are SI.
+values; ``summary.csv`` holds one line a run for spreadsheets.  All numbers are SI.  Both are made
+from the journal (`railsim.studies.journal`) when the study ends or is interrupted.
 """
 
 import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from railsim.errors import Fault, InputError
-from railsim.files import whole_file
+from railsim.files import is_file, read_text, whole_file
 from railsim.result import Result, mid_curves, peaks
 from railsim.studies.case import Case
+from railsim.studies.journal import JOURNAL, Record, Records
+from railsim.text import spreadsheet_cell
 
+M = TypeVar("M", bound=BaseModel)
+INDEX_BYTES = 500_000_000
+MOST_FAULTS = 20
 FORMAT = "railsim-study-result/1"
 FACTS = (
     "status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor",
     "patches_out_of_range",
 )  # fmt: skip
-
-Record = dict[str, Any]
-
 
 def waiting_record(case: Case) -> Record:
     """Return the record of a run that has not been done yet."""
@@ -48,48 +52,111 @@ def finished_record(case: Case, result: Result) -> Record:
     }
 
 
-def failed_record(case: Case, reason: str, traceback: str = "") -> Record:
-    """Return the record of a run that has no result."""
+def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
+    """Return the record of a run that has no result; `errno` is the system's reason, if any."""
     return {
         **waiting_record(case),
         "status": "failed",
         "status_reason": reason,
         "traceback": traceback,
+        **({"errno": errno} if errno else {}),
     }
 
 
-def write_index(
-    folder: Path, inputs: Mapping[str, Any], status: str, records: Sequence[Record]
-) -> None:
+def write_index(folder: Path, inputs: Mapping[str, Any], status: str, records: Records) -> None:
     """Write ``study.json`` and ``summary.csv``, each appearing under its name when it is whole."""
-    index = {"format": FORMAT, "status": status, "inputs": dict(inputs), "runs": list(records)}
-    _replace(folder / "study.json", json.dumps(index, indent=1) + "\n")
-    _replace(folder / "summary.csv", summary_csv(records))
+    head = json.dumps({"format": FORMAT, "status": status, "inputs": dict(inputs)}, indent=1)
+    with whole_file(folder / "study.json") as partial, open(partial, "wb") as file:
+        file.write(head[:-2].encode() + b',\n "runs": [\n')
+        for number, text in enumerate(records.texts()):
+            file.write((b",\n" if number else b"") + text)
+        file.write(b"\n]}\n")
+    with (
+        whole_file(folder / "summary.csv") as partial,
+        open(partial, "w", encoding="utf-8", newline="") as stream,
+    ):
+        write_summary(records, stream)
 
 
-def read_index(path: Path) -> dict[str, Any]:
+class Inputs(BaseModel):
+    """What a study was asked for, as its journal and its index keep it."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    railsim_version: str = ""
+    folder: str = "."
+    vehicles: list[str]
+    tracks: list[str]
+    speeds: list[float | None]
+    grid: dict[str, list[str]] = {}
+    settings: str | None = None
+    start: float = 0.0
+    duration: float | None = None
+    until: float | None = None
+    assignments: list[str] = []
+
+
+class Run(BaseModel):
+    """What the index of a study must say of every run."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: str
+    file: str
+    status: str
+
+
+class Index(BaseModel):
+    """What a ``study.json`` must hold."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    status: str
+    inputs: Inputs
+    runs: list[Run]
+
+
+def read_index(path: Path) -> Index:
     """Return what a ``study.json`` holds.
 
     Raises
     ------
     InputError : it cannot be read, or is not the index of a study.
     """
+    text = read_text(path, INDEX_BYTES)
     try:
-        index: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        fault = Fault(str(path), "", f"cannot be read ({error})", "give the study.json of a study")
-        raise InputError([fault]) from None
+        index: Any = json.loads(text)
     except json.JSONDecodeError as error:
         fault = Fault(str(path), f"line {error.lineno}", f"broken JSON: {error.msg}", "")
         raise InputError([fault]) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError([Fault(str(path), "", f"broken JSON: {error}", "")]) from None
     found = index.get("format") if isinstance(index, dict) else None
     if found != FORMAT:
-        raise InputError([Fault(str(path), "format", repr(found), f"allowed: {FORMAT}")])
-    checked: dict[str, Any] = index
-    return checked
+        shown = repr(found)[:60]
+        raise InputError([Fault(str(path), "format", shown, f"allowed: {FORMAT}")])
+    return checked(Index, index, str(path))
 
 
-def check_index(path: Path) -> dict[str, Any]:
+def checked(model: type[M], data: Any, file: str) -> M:
+    """Return data as a model.
+
+    Raises
+    ------
+    InputError : everything in it that is not as the model wants it.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        details = error.errors(include_url=False)[:MOST_FAULTS]
+        raise InputError(
+            Fault(file, ".".join(map(str, detail["loc"])), repr(detail["input"])[:60],
+                  detail["msg"].lower())
+            for detail in details
+        ) from None
+
+
+def check_index(path: Path) -> Index:
     """Return what a ``study.json`` holds; every run that it calls done must have its result.
 
     Raises
@@ -98,31 +165,43 @@ def check_index(path: Path) -> dict[str, Any]:
     """
     index = read_index(path)
     allowed = "the same study with --resume computes it again"
-    faults = [
-        Fault(str(path), run["file"], "the result is not there", allowed)
-        for run in index["runs"]
-        if run["status"] not in ("waiting", "failed") and not (path.parent / run["file"]).exists()
-    ]
+    faults = []
+    for run in index.runs:
+        if run.status in ("waiting", "failed"):
+            continue
+        if Path(run.file).name != run.file:
+            faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
+        elif not is_file(path.parent / run.file):
+            faults.append(Fault(str(path), run.file, "the result is not there", allowed))
     if faults:
         raise InputError(faults)
     return index
 
 
-def summary_csv(records: Sequence[Record]) -> str:
-    """Return one line a run: what tells it apart, how it ended, its peaks and mid-curve values.
+def write_summary(records: Sequence[Record], stream: TextIO) -> None:
+    """Write one line a run: what tells it apart, how it ended, its peaks and mid-curve values.
 
     The columns of a quantity are ``Q_peak`` (or ``dQ_over_Q0_max`` and ``_min``), the same with
     ``_wheelset``, ``_side``, ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at
     the middle of the first curve (``Q_mid2`` of the second).  The column ``remarks`` holds all
     remarks on the run.
     """
-    rows = [_row(record) for record in records]
-    columns = list(dict.fromkeys(column for row in rows for column in row))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    # the records twice, rather than all of them in memory
+    columns = list(dict.fromkeys(name for record in records for name in _checked_row(record)))
+    writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+    for record in records:
+        cells = _checked_row(record)
+        writer.writerow({name: spreadsheet_cell(cell) for name, cell in cells.items()})
+
+
+def _checked_row(record: Record) -> dict[str, Any]:
+    try:
+        return _row(record)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        found = f"the record of '{record['name']}' cannot be used ({error!r})"
+        allowed = "remove the journal: results that are there are kept"
+        raise InputError([Fault(JOURNAL, "", found, allowed)]) from None
 
 
 def _row(record: Record) -> dict[str, Any]:
@@ -142,7 +221,3 @@ def _row(record: Record) -> dict[str, Any]:
             row[f"{name}_{ending}"] = value
     return row
 
-
-def _replace(path: Path, text: str) -> None:
-    with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")

@@ -82,7 +82,9 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
 def test_study_obeys_a_signal_that_python_loses(tmp_path, comes, way):
     comes(way, signal.SIGINT)
     assert main([*STUDY, "--out", str(tmp_path)]) == 130
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["study.json", "summary.csv"]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "study.journal", "study.json", "summary.csv",
+    }
 
 
 def test_signal_that_the_caller_ignores_stays_ignored(tmp_path, comes, monkeypatch):
@@ -109,5 +111,5 @@ def test_full_disk_leaves_nothing_and_is_told_in_a_line(tmp_path):
     limited = ["sh", "-c", 'ulimit -f 2000; exec "$@"', "sh", *run]
     done = subprocess.run(limited, capture_output=True, text=True)
     assert done.returncode == 1
-    assert done.stderr == "railsim: File too large\n"
+    assert done.stderr == f"railsim: File too large: {tmp_path / 'run.h5'}\n"
     assert list(tmp_path.iterdir()) == []

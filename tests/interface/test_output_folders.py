@@ -111,5 +111,5 @@ def test_picture_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch, c
         raise OSError("no space left on device")
 
     monkeypatch.setattr(Figure, "savefig", full_disk)
-    assert main([*commands["plot"], str(tmp_path / "x.png")]) == 2
+    assert main([*commands["plot"], str(tmp_path / "x.png")]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]

@@ -5,13 +5,16 @@ run the real thing over ten metres.
 """
 
 import csv
+import errno
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from example_result import ROOT, feed
@@ -23,8 +26,10 @@ from railsim.cli import main
 from railsim.errors import InputError, ModelError
 from railsim.studies import execute
 from railsim.studies.combine import combinations, parse_grid
+from railsim.studies.journal import Journal
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
+LEFT = {"study.journal", "study.json", "summary.csv"}  # beside the results
 
 
 @pytest.fixture
@@ -75,7 +80,7 @@ def test_every_combination_has_its_file_row_and_record(tmp_path, simulated):
     assert [row["name"] for row in rows(folder)] == names
     assert [record["name"] for record in index(folder)["runs"]] == names
     files = {f"{name}.h5" for name in names}
-    assert set(os.listdir(folder)) == files | {"summary.csv", "study.json"}
+    assert set(os.listdir(folder)) == files | LEFT
     row = rows(folder)[1]
     assert (row["vehicle"], row["track"], row["speed"], row["track.friction"]) == (
         COACH,
@@ -145,7 +150,7 @@ def test_interrupted_study_goes_on_from_what_it_has(tmp_path, simulated, monkeyp
     assert main(arguments(tmp_path, 10, 15, 20)) == 130
     assert index(tmp_path)["status"] == "interrupted"
     assert [row["status"] for row in rows(tmp_path)] == ["complete", "waiting", "waiting"]
-    assert len(list(tmp_path.iterdir())) == 3
+    assert set(os.listdir(tmp_path)) == {f"{COACH}_{CURVE}_10.h5", *LEFT}
     whole = lambda *a, sink, speed, **how: simulated.append(speed) or feed(sink)  # noqa: E731
     monkeypatch.setattr(railsim.studies.run, "simulate", whole)
     assert main(["study", "--resume", "--out", str(tmp_path), "--workers", "1"]) == 0
@@ -202,7 +207,7 @@ def test_json_holds_every_record(tmp_path, simulated, capsys):
         (["--resume"], "no study"),
         (
             ["--vehicles", COACH, "--tracks", CURVE, "--speeds", "20", "--set", "track.rail=worn"],
-            "worn: no such profile",
+            "curve_r250: rail: profile 'worn': no such profile",
         ),
         (
             ["--vehicles", "coach", COACH, "--tracks", "curve", "--speeds", "20", "-5"],
@@ -244,11 +249,93 @@ def test_folder_that_cannot_be_written_is_refused(tmp_path, simulated, place, ca
     assert simulated == []
 
 
-def test_foreign_file_is_not_replaced(tmp_path, simulated, capsys):
-    foreign = tmp_path / f"{COACH}_{CURVE}_20.h5"
-    foreign.write_text("a letter")
-    assert main(arguments(tmp_path, 20, more=["--resume"])) == 2
-    assert foreign.read_text() == "a letter"
+@pytest.mark.parametrize("content", ["a letter", "", "half a result"])
+def test_damaged_or_foreign_result_is_computed_again_and_kept(tmp_path, simulated, capsys, content):
+    assert main(arguments(tmp_path, 10, 20)) == 0
+    result = tmp_path / f"{COACH}_{CURVE}_20.h5"
+    whole = result.read_bytes()
+    damaged = whole[: len(whole) // 2] if content == "half a result" else content.encode()
+    result.write_bytes(damaged)
+    assert main(arguments(tmp_path, 10, 20)) == 2  # nothing is replaced unasked
+    assert result.read_bytes() == damaged
+    capsys.readouterr()
+    assert main(arguments(tmp_path, 10, 20, more=["--resume"])) == 0
+    assert simulated == [10.0, 20.0, 20.0]
+    remark = capsys.readouterr().err
+    assert f"{result}: " in remark
+    assert f"computed again; the old file is kept as {result.name}.damaged" in remark
+    assert (tmp_path / f"{result.name}.damaged").read_bytes() == damaged
+    assert [row["status"] for row in rows(tmp_path)] == ["complete", "complete"]
+
+
+def test_result_that_was_changed_in_its_file_is_computed_again(tmp_path, simulated):
+    assert main(arguments(tmp_path, 20)) == 0
+    with h5py.File(tmp_path / f"{COACH}_{CURVE}_20.h5", "r+") as file:
+        file["Q"][0] = 1e24
+    assert main(["study", "--resume", "--out", str(tmp_path), "--workers", "1"]) == 0
+    assert simulated == [20.0, 20.0]
+    (row,) = rows(tmp_path)
+    assert abs(float(row["Q_peak"])) < 1e6
+
+
+def test_resume_goes_on_from_any_folder(tmp_path, simulated, monkeypatch):
+    (tmp_path / "work").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    coach = tmp_path / "work" / "coach.toml"
+    coach.write_text((ROOT / "vehicles" / f"{COACH}.toml").read_text(encoding="utf-8"))
+    monkeypatch.chdir(tmp_path / "work")
+    given = ["--vehicles", "coach.toml", "--tracks", CURVE, "--speeds", "10", "15", "20"]
+    assert main(["study", *given, "--out", "out", "--workers", "1"]) == 130
+    monkeypatch.setattr(railsim.studies.run, "simulate", lambda *a, sink, **how: feed(sink))
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    out = tmp_path / "work" / "out"
+    assert main(["study", "--resume", "--out", "../work/out", "--workers", "1"]) == 0
+    assert [row["status"] for row in rows(out)] == ["complete"] * 3
+
+
+def test_torn_and_damaged_lines_of_the_journal_are_left_out(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 10, 20, 30)) == 0
+    journal = tmp_path / "study.journal"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    lines[2] = lines[2].replace(b"complete", b"Complete", 1)
+    journal.write_bytes(b"".join(lines)[:-40])
+    capsys.readouterr()
+    assert main(["study", "--resume", "--out", str(tmp_path), "--workers", "1"]) == 0
+    assert "2 damaged lines" in capsys.readouterr().err
+    assert simulated == [10.0, 20.0, 30.0]  # the results themselves are whole
+    assert [row["status"] for row in rows(tmp_path)] == ["complete"] * 3
+
+
+def test_second_study_into_a_folder_is_refused(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 10)) == 0
+    with Journal(tmp_path):
+        assert main(arguments(tmp_path, 10, 20, more=["--resume"])) == 2
+    assert "another study is writing into" in capsys.readouterr().err
+    assert simulated == [10.0]
+
+
+def test_a_million_runs_are_told_at_once(tmp_path, simulated, capsys):
+    values = ",".join(f"{0.1 + 1e-4 * i:.4f}" for i in range(1000))
+    grid = ["--grid", f"track.friction={values}", f"vehicle.bodies.carbody.mass={values}"]
+    assert main(arguments(tmp_path / "study", 20, more=grid)) == 2
+    assert "1,000,000 runs, some" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+
+
+def test_full_disk_ends_a_study_in_a_line_and_keeps_what_is_done(tmp_path, simulated, monkeypatch,
+                                                                 capsys):
+    simulate = railsim.studies.run.simulate
+
+    def full(*inputs, speed, **how):
+        if speed == 20.0:
+            raise OSError(errno.ENOSPC, "no space left", "run.h5")
+        return simulate(*inputs, speed=speed, **how)
+
+    monkeypatch.setattr(railsim.studies.run, "simulate", full)
+    assert main(arguments(tmp_path, 10, 20, 30)) == 1
+    assert capsys.readouterr().err.startswith("railsim: No space left on device: ")
+    assert simulated == [10.0]
+    assert [row["status"] for row in rows(tmp_path)] == ["complete", "failed", "waiting"]
 
 
 def test_validate_knows_the_index_of_a_study_and_misses_its_results(tmp_path, simulated, capsys):
@@ -397,7 +484,7 @@ def test_interrupt_leaves_only_whole_files(tmp_path, everyone, name, status):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == status
     assert "Traceback" not in errors
-    assert sorted(os.listdir(tmp_path)) == ["study.json", "summary.csv"]
+    assert set(os.listdir(tmp_path)) == LEFT
     assert index(tmp_path)["status"] == "interrupted"
 
 
@@ -406,7 +493,12 @@ def test_processes_end_after_a_study_that_was_killed(tmp_path):
     process = begun(tmp_path)
     process.kill()
     process.communicate(timeout=60)  # the standard error stays open as long as one of them lives
-    assert sorted(os.listdir(tmp_path)) == ["study.json", "summary.csv"]
+    assert {path for path in os.listdir(tmp_path) if not path.endswith(".partial")} == {
+        "study.journal"
+    }
+    # what the killed processes have left goes when the study goes on
+    assert main([*arguments(tmp_path, 20)[:-2], "--resume", "--until", "10"]) == 0
+    assert set(os.listdir(tmp_path)) == {f"{COACH}_{CURVE}_20.h5", *LEFT}
 
 
 def test_python_takes_single_values_too(tmp_path, simulated):
@@ -423,3 +515,50 @@ def test_python_raises_what_the_command_prints(tmp_path):
         railsim.study(["no_such_coach"], [CURVE], [20.0], out=tmp_path)
     assert "no_such_coach" in caught.value.faults[0].file
     assert list(tmp_path.iterdir()) == []
+
+
+def children(process):
+    """Worker processes of a study: those that it has spawned, besides the tracker of semaphores."""
+    found = []
+    for number in map(int, filter(str.isdecimal, os.listdir("/proc"))):
+        try:
+            status = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
+            line = Path(f"/proc/{number}/cmdline").read_bytes()
+        except OSError:
+            continue
+        if int(status[1]) == process.pid and b"spawn_main" in line:
+            found.append(number)
+    return found
+
+
+@pytest.mark.slow
+def test_killed_worker_costs_nothing_but_time(tmp_path):
+    """Its runs begin again, those of the others too where the pool goes down."""
+    given = arguments(tmp_path, 20, 21, 22)[:-2]
+    process = started([*given, "--set", "settings.scheme=rk4", "--set", "settings.step=1e-4",
+                       "--until", "400", "--workers", "2"])
+    while not list(tmp_path.glob(".*.partial")):
+        time.sleep(0.05)
+    os.kill(children(process)[0], signal.SIGKILL)
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    assert set(os.listdir(tmp_path)) == {*LEFT, *(f"{COACH}_{CURVE}_{v}.h5" for v in (20, 21, 22))}
+    assert [row["status"] for row in rows(tmp_path)] == ["complete"] * 3
+
+
+@pytest.mark.slow
+def test_run_whose_process_dies_twice_is_given_up_and_the_others_go_on(tmp_path, monkeypatch):
+    """A vehicle's file may want more memory than there is; the others' runs are not lost."""
+    monkeypatch.setattr(execute, "_work", deadly_work)
+    outcome = railsim.study(COACH, CURVE, [20.0, 21.0, 22.0], until=10.0, out=tmp_path, workers=2)
+    assert [record["status"] for record in outcome.records] == ["complete", "failed", "complete"]
+    assert "its process died twice" in outcome.failed[0]["status_reason"]
+
+
+def deadly_work(index, batch):
+    from railsim.studies import execute  # in the process of the worker
+
+    if batch[0].case.speed == 21.0:
+        execute._shared[1][index] = os.getpid()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return execute._work(index, batch)

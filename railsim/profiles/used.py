@@ -1,0 +1,45 @@
+"""The profiles that a vehicle or a track names: whether they are there and of the right kind."""
+
+from collections.abc import Iterator
+
+from railsim.definitions.base import FileDefinition
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Assembly, Vehicle
+from railsim.errors import Fault, InputError
+from railsim.profiles import load_profile
+from railsim.profiles.profile import Kind
+
+
+def used_profiles(definition: FileDefinition) -> Iterator[tuple[str, str, Kind]]:
+    """Yield key, name and kind of every profile of a vehicle or track, each once."""
+    if isinstance(definition, Track):
+        for name in dict.fromkeys(definition.rail):
+            yield "rail", name, "rail"
+    elif isinstance(definition, Vehicle):
+        for key, name in dict.fromkeys(_wheel_profiles(definition, ())):
+            yield key, name, "wheel"
+
+
+def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:
+    """Return a fault with file and key for every profile that cannot be loaded."""
+    faults: list[Fault] = []
+    for key, name, kind in used_profiles(definition):
+        try:
+            load_profile(name, kind)
+        except InputError as error:
+            shown = name if len(name) < 60 else f"{name[:57]}..."
+            for fault in error.faults:
+                place = f", {fault.key}" if fault.key else ""
+                found = f"profile '{shown}'{place}: {fault.found}"
+                faults.append(Fault(file, key, found, fault.allowed))
+    return faults
+
+
+def _wheel_profiles(
+    group: Vehicle | Assembly, path: tuple[str, ...]
+) -> Iterator[tuple[str, str]]:
+    for name, wheelset in group.wheelsets.items():
+        for profile in wheelset.profile:
+            yield ".".join((*path, "wheelsets", name, "profile")), profile
+    for name, assembly in group.assemblies.items():
+        yield from _wheel_profiles(assembly, (*path, "assemblies", name))

@@ -1,0 +1,111 @@
+"""How a result file shows that it is as it was written.
+
+Three nets, from coarse to fine:
+
+- the **seal**, the last line of the file, behind what HDF5 itself uses: length and CRC-32 of all
+  bytes before it.  A file is checked against it before HDF5 looks at anything;
+- the **digest**, the root attribute ``digest``: SHA-256 over name, type, shape, CRC-32 of the
+  values and attributes of every dataset, and over the root attributes.  It outlives a copy by other
+  programs (``h5repack``), which drop the seal;
+- the checksum of every chunk (HDF5's filter ``fletcher32``), which every HDF5 reader looks at.
+
+They find accidents, not forgery: whoever changes a file on purpose can compute them anew.
+"""
+
+import hashlib
+import json
+import re
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from railsim.errors import Fault, InputError
+
+DIGEST = "digest"
+REMEDY = "it is damaged or was changed since it was written; run it again"
+# attributes that HDF5 and netCDF keep for themselves; and the digest is not part of itself
+_INTERNAL = ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", DIGEST)
+_SEAL = re.compile(rb"railsim-seal crc32 ([0-9a-f]{8}) of ([0-9]{20}) bytes\n")
+_SEAL_BYTES = 58
+_BLOCK = 2**20
+
+
+def seal(path: Path) -> None:
+    """Write the seal behind the last byte of a file."""
+    crc, length = _crc_of(path, path.stat().st_size)
+    with open(path, "ab") as file:
+        file.write(b"railsim-seal crc32 %08x of %020d bytes\n" % (crc, length))
+
+
+def sealed(path: Path) -> bool:
+    """Whether a file has a seal; then it is as it was written.
+
+    Raises
+    ------
+    InputError : what it holds is not what its seal says.
+    OSError : it cannot be read.
+    """
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        file.seek(max(0, size - _SEAL_BYTES))
+        found = _SEAL.fullmatch(file.read())
+    if not found:
+        return False
+    stated = int(found[1], 16), int(found[2])
+    if stated != _crc_of(path, size - _SEAL_BYTES):
+        raise InputError([Fault(str(path), "", "its bytes are not those of its seal", REMEDY)])
+    return True
+
+
+def _crc_of(path: Path, length: int) -> tuple[int, int]:
+    crc, done = 0, 0
+    with open(path, "rb") as file:
+        while done < length and (block := file.read(min(_BLOCK, length - done))):
+            crc = zlib.crc32(block, crc)
+            done += len(block)
+    return crc, done
+
+
+def content_digest(file: h5py.File, known: Mapping[str, int] = MappingProxyType({})) -> str:
+    """Return the digest of everything in a result file.
+
+    Parameters
+    ----------
+    file : h5py.File
+        An open result file, all of whose links are its own.
+    known : mapping of str to int
+        CRC-32 of datasets that need not be read.
+    """
+    digest = hashlib.sha256(_attributes(file).encode())
+    for name, dataset in sorted(_datasets(file)):
+        crc = known[name] if name in known else zlib.crc32(dataset[()].tobytes())
+        facts = [name, dataset.dtype.str, list(dataset.shape), f"{crc:08x}"]
+        digest.update(f"{json.dumps(facts)} {_attributes(dataset)}\n".encode())
+    return f"sha256:{digest.hexdigest()}"
+
+
+def _datasets(group: h5py.Group, above: str = "") -> Iterator[tuple[str, h5py.Dataset]]:
+    for name, member in group.items():
+        if isinstance(member, h5py.Dataset):
+            yield above + name, member
+        else:
+            yield from _datasets(member, f"{above}{name}/")
+
+
+def _attributes(thing: h5py.File | h5py.Dataset) -> str:
+    """Return attributes as text, the same before and after they were stored."""
+    facts = {
+        name: _plain(value)
+        for name, value in thing.attrs.items()
+        if not name.startswith(("_", *_INTERNAL))
+    }
+    return json.dumps(facts, sort_keys=True)
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, str) else np.asarray(value).tolist()

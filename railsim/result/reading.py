@@ -1,0 +1,396 @@
+"""Reading result files: everything that is wrong with one is an input error with file and dataset.
+
+A file is checked against its seal before HDF5 sees it (`railsim.result.integrity`), and against its
+digest where the seal is missing.  Then every link, type, shape and attribute is looked at before
+anything is read: a file from somebody else can lead to no other file, and takes no more memory than
+it has bytes on the disk.  Arrays are read when they are first asked for.
+"""
+
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import h5py
+import numpy as np
+
+from railsim.errors import Fault, InputError
+from railsim.files import is_file
+from railsim.notation import EXTREMES, QUANTITIES, Quantity
+from railsim.profiles.profile import Profile
+from railsim.result.data import Array, FrozenArrays, Result, frozen
+from railsim.result.integrity import DIGEST, REMEDY, content_digest, sealed
+from railsim.result.sinks import FORMAT
+
+# what the result of every run holds
+ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
+ARRAYS = ("time", "distance")
+DIMENSIONS = ("wheelset", "side", "body")
+NUMBERS = (
+    "speed", "start", "duration", "asked_duration", "asked_until", "step", "wall_time", "cpu_time",
+    "real_time_factor", "runs_together", "patches_evaluated", "patches_out_of_range",
+)  # fmt: skip
+STATES = ("complete", "derailed", "stopped")
+
+MOST_MEMBERS = 1000
+FILTERS = {h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
+DEFLATE_RATIO = 100  # what compression may save at most, over the whole file
+SPARE_BYTES = 64_000_000  # and what may be saved beyond, for constant quantities
+AS_WRITTEN = "a result as railsim wrote it"
+
+
+def open_result(path: str | Path) -> Result:
+    """Open a result file; its arrays are read when they are first asked for.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that `railsim run`, `railsim study` or `Result.to_hdf5` wrote.
+
+    Raises
+    ------
+    InputError : there is no such file, it is not a result of railsim, or it is damaged.
+    """
+    path = Path(path)
+    if not is_file(path):
+        found = "a folder" if os.path.isdir(path) else "there is no such file"
+        raise InputError([Fault(str(path), "", found, "give a result file (.h5)")])
+    try:
+        if path.stat().st_size == 0:
+            raise InputError([Fault(str(path), "", "the file is empty", AS_WRITTEN)])
+        whole = sealed(path)
+        with h5py.File(path, "r") as file:
+            return _Reader(file, path).result(whole=whole)
+    except InputError:
+        raise
+    except Exception as error:  # HDF5 and h5py raise every kind
+        raise _unreadable(path, "", error) from None
+
+
+def open_run(path: str | Path) -> Result:
+    """Open the result of a run, as `open_result`, and see that nothing is missing.
+
+    Raises
+    ------
+    InputError : as `open_result`; the file lacks what the result of every run holds.
+    """
+    result = open_result(path)
+    missing = [name for name in ATTRIBUTES if name not in result.attributes]
+    missing += [name for name in ARRAYS if name not in result.quantities]
+    missing += [name for name in DIMENSIONS if name not in result.coordinates]
+    if missing:
+        raise InputError([Fault(str(path), name, "missing", AS_WRITTEN) for name in missing])
+    if result.status not in STATES:
+        found = f"'{result.status}'"
+        raise InputError([Fault(str(path), "status", found, f"allowed: {', '.join(STATES)}")])
+    for name in ARRAYS:
+        if not np.all(np.isfinite(result[name])):
+            raise InputError([Fault(str(path), name, "holds what is not finite", REMEDY)])
+    if np.any(np.diff(result["time"]) <= 0.0):
+        raise InputError([Fault(str(path), "time", "does not increase", REMEDY)])
+    return result
+
+
+def check_result(path: str | Path) -> Result:
+    """Open the result of a run, as `open_run`, and read all of it.
+
+    Raises
+    ------
+    InputError : as `open_run`; every array and every input that cannot be used.
+    """
+    result = open_run(path)
+    faults: list[Fault] = []
+    reads: list[Callable[[], object]] = [result.vehicle, result.track, result.settings]
+    reads += [partial(result.__getitem__, name) for name in result]
+    for read in reads:
+        try:
+            read()
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    return result
+
+
+class StoredArrays(FrozenArrays):
+    """Arrays of a result file, each read when it is first asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The file; it is not kept open.
+    shapes : mapping of str to tuple of int
+        Shapes of the arrays by their names.
+    """
+
+    def __init__(self, path: Path, shapes: Mapping[str, tuple[int, ...]]) -> None:
+        super().__init__({})
+        self._path = path
+        self._absolute = path.absolute()
+        self._shapes = dict(shapes)
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._loaded:
+            if name not in self._shapes:
+                raise KeyError(name)
+            self._loaded[name] = self._read(name)
+        return self._loaded[name]
+
+    def _read(self, name: str) -> Array:
+        try:
+            with h5py.File(self._absolute, "r") as file:
+                dataset = file[name]
+                if dataset.shape == self._shapes[name]:
+                    return frozen(dataset[()])
+        except Exception as error:
+            raise _unreadable(self._path, name, error) from None
+        found = "is not the array that the file held when it was opened"
+        raise InputError([Fault(str(self._path), name, found, "open it again")])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._shapes)
+
+    def __len__(self) -> int:
+        return len(self._shapes)
+
+
+def _unreadable(path: Path, name: str, error: Exception) -> InputError:
+    words = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.errno is not None and error.strerror:
+        words = os.strerror(error.errno)
+    words = words if len(words) <= 160 else f"{words[:157]}..."
+    is_hdf5 = isinstance(error, OSError) and "signature not found" in words
+    found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
+    return InputError([Fault(str(path), name, found, "give a result of railsim; " + REMEDY)])
+
+
+class _Reader:
+    """Looks at every member of an open file before it is read."""
+
+    def __init__(self, file: h5py.File, path: Path) -> None:
+        self._file = file
+        self._path = path
+        self._declared = 0  # bytes that arrays say they have
+
+    def fault(self, name: str, found: str, allowed: str = AS_WRITTEN) -> InputError:
+        return InputError([Fault(str(self._path), name, found, allowed)])
+
+    def result(self, *, whole: bool) -> Result:
+        file = self._file
+        facts = self._attributes(file, "")
+        if facts.get("format") != FORMAT:
+            found = f"found {facts.get('format', 'nothing')}"
+            raise self.fault("format", found, f"a result says '{FORMAT}'")
+        members = dict(self._members(file, ""))
+        groups = {name: group for name, group in members.items() if isinstance(group, h5py.Group)}
+        inner = {name: dict(self._members(group, f"{name}/")) for name, group in groups.items()}
+        for name, some in inner.items():
+            for key, member in some.items():
+                if not isinstance(member, h5py.Dataset):
+                    raise self.fault(f"{name}/{key}", "a group within a group")
+        self._check_size(self._path.stat().st_size)
+        if not whole:
+            self._check_digest(facts)
+        facts.pop(DIGEST, None)
+        self._check_facts(facts)
+        datasets = {name: each for name, each in members.items() if name not in groups}
+        coordinates, quantities = self._described(datasets)
+        profiles = {
+            unquote(key): self._profile(f"profiles/{key}", dataset)
+            for key, dataset in inner.pop("profiles", {}).items()
+        }
+        arrays = {
+            group: {
+                key: self._floats(f"{group}/{key}", each)
+                for key, each in some.items()
+                if each.dtype.kind != "S"
+            }
+            for group, some in inner.items()
+        }
+        self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
+        shapes = {name: datasets[name].shape for name in quantities}
+        stored = StoredArrays(self._path, shapes)
+        return Result(
+            stored, quantities, coordinates, facts, profiles, arrays, source=str(self._path)
+        )
+
+    # -- before anything is read ------------------------------------------------------------------
+
+    def _members(self, group: h5py.Group, above: str) -> Iterator[tuple[str, Any]]:
+        if len(group) > MOST_MEMBERS:
+            raise self.fault(above, f"{len(group)} members", f"{MOST_MEMBERS} at most")
+        for name in group:
+            try:
+                link = group.get(name, getlink=True)
+                member = group[name] if isinstance(link, h5py.HardLink) else None
+            except Exception as error:
+                raise _unreadable(self._path, above + name, error) from None
+            if isinstance(member, h5py.Dataset):
+                self._check_dataset(above + name, member)
+            elif not isinstance(member, h5py.Group):
+                raise self.fault(above + name, "a link or a type in place of a dataset")
+            yield name, member
+
+    def _check_dataset(self, name: str, dataset: h5py.Dataset) -> None:
+        """See that a dataset is plain numbers or names, in this file, as large as it says."""
+        if dataset.is_virtual or dataset.external:
+            raise self.fault(name, "its values are in another file")
+        creation = dataset.id.get_create_plist()
+        filters = {creation.get_filter(index)[0] for index in range(creation.get_nfilters())}
+        if not filters <= FILTERS:
+            raise self.fault(name, "a filter that railsim does not use")
+        text = h5py.check_string_dtype(dataset.dtype)
+        if dataset.dtype.kind not in "fiu" and not (text and text.length):
+            raise self.fault(name, f"values of type {dataset.dtype}", "numbers or names")
+        if dataset.shape is None or not dataset.shape:
+            raise self.fault(name, "no array")
+        declared = math.prod(dataset.shape) * dataset.dtype.itemsize
+        held = dataset.id.get_storage_size()
+        if declared > held and h5py.h5z.FILTER_DEFLATE not in filters:
+            raise self.fault(name, f"says {declared} bytes and holds {held}", REMEDY)
+        self._declared += declared
+
+    def _check_size(self, size: int) -> None:
+        if self._declared > DEFLATE_RATIO * size + SPARE_BYTES:
+            found = f"its arrays say {self._declared / 1e9:.3g} GB, it has {size / 1e6:.3g} MB"
+            raise self.fault("", found, REMEDY)
+
+    def _check_digest(self, facts: Mapping[str, Any]) -> None:
+        if DIGEST not in facts:
+            raise self.fault(DIGEST, "missing", REMEDY)
+        if facts[DIGEST] != content_digest(self._file):
+            raise self.fault(DIGEST, "what it holds is not what its digest says", REMEDY)
+
+    def _attributes(self, thing: Any, name: str) -> dict[str, Any]:
+        """Return attributes as plain values; whole numbers come as numpy's."""
+        facts: dict[str, Any] = {}
+        for key in thing.attrs:
+            if key in ("DIMENSION_LIST", "REFERENCE_LIST"):
+                continue
+            place = f"{name}.{key}" if name else key
+            try:
+                value = thing.attrs[key]
+            except Exception as error:
+                raise _unreadable(self._path, place, error) from None
+            value = value.item() if isinstance(value, np.generic) else value
+            if isinstance(value, bytes):  # a text of fixed length
+                value = value.decode("utf-8", errors="replace")
+            if not isinstance(value, str | int | float):
+                words = f"found {str(value)[:60]}"
+                raise self.fault(place, words, "a text or a number")
+            facts[key] = value
+        return facts
+
+    def _check_facts(self, facts: Mapping[str, Any]) -> None:
+        for name, value in facts.items():
+            number = not isinstance(value, str)
+            if name in NUMBERS and (not number or math.isnan(value)):
+                raise self.fault(name, f"found {str(value)[:60]!r}", "a number")
+            if name in (*ATTRIBUTES, "status_reason", "remarks") and number:
+                raise self.fault(name, f"found {value}", "a text")
+
+    def _check_peaks(
+        self,
+        arrays: Mapping[str, Array],
+        quantities: Mapping[str, Quantity],
+        coordinates: Mapping[str, tuple[str, ...]],
+    ) -> None:
+        for name, array in arrays.items():
+            base = name.removesuffix("_time").removesuffix("_distance")
+            beside = {f"{base}{ending}" for ending in ("", "_time", "_distance")}
+            if base not in QUANTITIES or base not in quantities or not beside <= arrays.keys():
+                raise self.fault(f"peaks/{name}", "no such quantity, or not all of it is there")
+            inner = tuple(len(coordinates.get(dim, ())) for dim in QUANTITIES[base].dims[1:])
+            if array.shape != (len(EXTREMES), *inner):
+                raise self.fault(f"peaks/{name}", f"its shape is {array.shape}")
+
+    # -- what it holds ----------------------------------------------------------------------------
+
+    def _described(
+        self, datasets: Mapping[str, h5py.Dataset]
+    ) -> tuple[dict[str, tuple[str, ...]], dict[str, Quantity]]:
+        coordinates = {
+            name: self._labels(name, dataset)
+            for name, dataset in datasets.items()
+            if dataset.dtype.kind == "S"
+        }
+        numbers = {name: each for name, each in datasets.items() if name not in coordinates}
+        sizes = {name: len(labels) for name, labels in coordinates.items()}
+        if "time" in numbers:
+            sizes["time"] = numbers["time"].shape[0]
+        quantities = {name: self._quantity(name, dataset) for name, dataset in numbers.items()}
+        for name, quantity in quantities.items():
+            for dim in quantity.dims:
+                if dim not in sizes:
+                    raise self.fault(dim or name, "missing" if dim else "a dimension has no name")
+            lengths = tuple(sizes[dim] for dim in quantity.dims)
+            if numbers[name].shape != lengths:
+                found = f"its shape is {numbers[name].shape}"
+                raise self.fault(name, found, f"{lengths} along {', '.join(quantity.dims)}")
+        return coordinates, quantities
+
+    def _labels(self, name: str, dataset: h5py.Dataset) -> tuple[str, ...]:
+        if dataset.ndim != 1:
+            raise self.fault(name, f"its shape is {dataset.shape}", "a list of names")
+        try:
+            labels = tuple(text.decode("utf-8") for text in dataset[()].tolist())
+        except Exception as error:
+            raise _unreadable(self._path, name, error) from None
+        if len(set(labels)) < len(labels):
+            raise self.fault(name, "a name occurs twice", REMEDY)
+        return labels
+
+    def _quantity(self, name: str, dataset: h5py.Dataset) -> Quantity:
+        """Return the quantity of a dataset: from the notation, else from what the file says."""
+        if name in QUANTITIES:
+            return QUANTITIES[name]
+        facts = self._attributes(dataset, name)
+        try:
+            dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.dims)
+        except Exception as error:
+            raise _unreadable(self._path, name, error) from None
+        unit = str(facts.get("units", "1"))
+        scale = facts.get("shown_scale", 1.0)
+        if isinstance(scale, str) or not math.isfinite(scale):
+            raise self.fault(f"{name}.shown_scale", f"found {scale!r}", "a number")
+        return Quantity(
+            name=name,
+            long_name=str(facts.get("long_name", name)),
+            symbol=str(facts.get("symbol", "")),
+            unit=unit,
+            dims=dims,
+            shown_unit=str(facts.get("shown_units", unit)),
+            scale=float(scale),
+            sign=str(facts.get("comment", "")),
+        )
+
+    def _floats(self, name: str, dataset: h5py.Dataset) -> Array:
+        if dataset.dtype.kind == "S":
+            raise self.fault(name, "names in place of numbers")
+        try:
+            return frozen(dataset[()])
+        except Exception as error:
+            raise _unreadable(self._path, name, error) from None
+
+    def _profile(self, name: str, dataset: h5py.Dataset) -> Profile:
+        points, facts = self._floats(name, dataset), self._attributes(dataset, name)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
+            raise self.fault(name, f"its shape is {points.shape}", "finite points y, z")
+        kind, inclination = facts.get("kind"), facts.get("inclination")
+        if kind not in ("wheel", "rail"):
+            raise self.fault(f"{name}.kind", f"found {kind!r}", "wheel or rail")
+        if isinstance(inclination, str) or inclination is None or not math.isfinite(inclination):
+            raise self.fault(f"{name}.inclination", f"found {inclination!r}", "a number")
+        return Profile(
+            name=str(facts.get("name", "")),
+            kind=kind,
+            y=points[:, 0],
+            z=points[:, 1],
+            source=str(facts.get("source", "")),
+            inclination=float(inclination),
+            notes=tuple(str(facts.get("notes", "")).splitlines()),
+        )
+

@@ -1,0 +1,281 @@
+"""The journal of a study: one line for every run that is done, appended when it is.
+
+Nothing that stands in it is ever rewritten, so that a run costs the same after ten as after a
+hundred thousand others, and a process that is killed loses the line that it was writing at most.
+Each line holds the CRC-32 of the rest, a *head* with what is needed to go on, and a *body*, the
+whole record, both as JSON and parted by tabs; a damaged line is left out, and its run looked at
+anew.  The first line of a session holds the inputs of the study.  A study that is under way holds
+a lock on the file.
+
+Opening 100 000 runs reads the heads only; a record is read when it is asked for.
+"""
+
+import fcntl
+import json
+import os
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, overload
+
+from railsim.errors import Fault, InputError
+
+JOURNAL = "study.journal"
+FORMAT = "railsim-study-journal/1"
+
+RECORD = {"name", "file", "labels", "status"}  # what every record has
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the journal knows of a run without reading its record.
+
+    Attributes
+    ----------
+    name, status : str
+        Name of the run, and how it ended: as in its result, or ``failed``.
+    key : str
+        Hash of what the run was asked for, see `railsim.studies.points`.
+    size, changed : int
+        Size of its result file [bytes] and time of its last change [ns]; 0 without a file.
+    offset, length : int
+        Where its record stands in the journal [bytes].
+    """
+
+    name: str
+    status: str
+    key: str
+    size: int
+    changed: int
+    offset: int
+    length: int
+
+    def is_of(self, file: os.stat_result | None) -> bool:
+        """Whether a file is as it was when the run ended."""
+        found = (0, 0) if file is None else (file.st_size, file.st_mtime_ns)
+        return found == (self.size, self.changed)
+
+
+class Journal:
+    """The journal of a folder, open for reading and appending; it is locked for others.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study; it must exist.
+
+    Attributes
+    ----------
+    entries : dict of str to Entry
+        The last entry of every run, by its name.
+    inputs : mapping or None
+        Inputs of the study when it was started last; None in a new journal.
+    damaged : int
+        Lines that could not be read.
+
+    Raises
+    ------
+    InputError : another study is writing into the folder.
+    OSError : the journal cannot be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / JOURNAL
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+        self._handle = os.open(self.path, flags, 0o666)
+        try:
+            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.close()
+            found = f"another study is writing into {folder}"
+            fault = Fault("--out", "", found, "wait for it, or choose another folder")
+            raise InputError([fault]) from None
+        except OSError:  # a file system without locks
+            pass
+        self.entries: dict[str, Entry] = {}
+        self.inputs: Mapping[str, Any] | None = None
+        self.damaged = 0
+        self._end = 0
+        self._read()
+
+    def _read(self) -> None:
+        last = b"\n"
+        with open(self.path, "rb") as file:
+            for line in file:
+                self._take(line, self._end)
+                self._end += len(line)
+                last = line
+        if not last.endswith(b"\n"):
+            self._append(b"\n")  # the line that a killed process was writing ends here
+
+    def _take(self, line: bytes, offset: int) -> None:
+        if line == b"\n":
+            return
+        head, _, body = line[9:-1].partition(b"\t")
+        try:
+            if line[:9] != b"%08x\t" % zlib.crc32(line[9:-1]) or not line.endswith(b"\n"):
+                raise ValueError
+            facts = json.loads(head)
+            if "format" in facts:
+                self.inputs = json.loads(body) if facts["format"] == FORMAT else None
+                return
+            place = offset + 9 + len(head) + 1
+            entry = Entry(**facts, offset=place, length=len(body))
+        except (ValueError, TypeError, KeyError):
+            self.damaged += 1
+            return
+        self.entries[entry.name] = entry
+
+    def clear(self) -> None:
+        """Forget everything."""
+        os.ftruncate(self._handle, 0)
+        self.entries.clear()
+        self.inputs, self._end = None, 0
+
+    def begin(self, inputs: Mapping[str, Any]) -> None:
+        """Write the inputs of the study, unless they are those of the last time."""
+        if self.inputs != inputs:
+            self._line({"format": FORMAT}, _json(inputs))
+            self.inputs = inputs
+
+    def add(self, record: Record, key: str, file: os.stat_result | None) -> Entry:
+        """Append the record of a run; it is on the disk when this returns."""
+        facts = {
+            "name": record["name"],
+            "status": record["status"],
+            "key": key,
+            "size": 0 if file is None else file.st_size,
+            "changed": 0 if file is None else file.st_mtime_ns,
+        }
+        body = _json(record)
+        place = self._line(facts, body)
+        entry = Entry(**facts, offset=place, length=len(body))
+        self.entries[entry.name] = entry
+        return entry
+
+    def _line(self, head: Mapping[str, Any], body: bytes) -> int:
+        text = _json(head) + b"\t" + body
+        place = self._end + 9 + len(text) - len(body)
+        self._append(b"%08x\t%s\n" % (zlib.crc32(text), text))
+        os.fsync(self._handle)
+        return place
+
+    def _append(self, data: bytes) -> None:
+        """Append all of it or nothing: half a line would be the beginning of the next one."""
+        try:
+            written = os.write(self._handle, data)
+            while written < len(data):
+                written += os.write(self._handle, data[written:])
+        except OSError:
+            os.ftruncate(self._handle, self._end)
+            raise
+        self._end += len(data)
+
+    def body(self, entry: Entry) -> bytes:
+        """Return the record of an entry as JSON."""
+        return os.pread(self._handle, entry.length, entry.offset)
+
+    def close(self) -> None:
+        """Close the file and let go of the lock; may be repeated."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class Records(Sequence[Record]):
+    """Records of runs, each read from the journal when it is asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The journal.
+    entries : sequence of Entry or Record
+        Where each record stands, or the record itself of a run that has not been done.
+    """
+
+    def __init__(self, path: Path, entries: Sequence[Entry | Record]) -> None:
+        self._path = path
+        self._entries = tuple(entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    @overload
+    def __getitem__(self, place: int) -> Record: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[Record]: ...
+    def __getitem__(self, place: int | slice) -> Record | list[Record]:
+        if isinstance(place, slice):
+            return list(self._read(self._entries[place]))
+        return next(self._read([self._entries[place]]))
+
+    def __iter__(self) -> Iterator[Record]:
+        return self._read(self._entries)
+
+    def with_status(self, *statuses: str, but: Sequence[str] = ()) -> tuple[Record, ...]:
+        """Return the records of runs that ended in one of `statuses`, or in none of `but`."""
+        chosen = []
+        for entry in self._entries:
+            status = entry.status if isinstance(entry, Entry) else entry["status"]
+            if status in statuses or (but and status not in but):
+                chosen.append(entry)
+        return tuple(self._read(chosen))
+
+    def texts(self) -> Iterator[bytes]:
+        """Yield every record as JSON."""
+        with open(self._path, "rb") as file:
+            for entry in self._entries:
+                if isinstance(entry, Entry):
+                    file.seek(entry.offset)
+                    yield file.read(entry.length)
+                else:
+                    yield _json(entry)
+
+    def _read(self, entries: Sequence[Entry | Record]) -> Iterator[Record]:
+        if all(isinstance(entry, dict) for entry in entries):
+            yield from (dict(entry) for entry in entries if isinstance(entry, dict))
+            return
+        for entry, text in zip(entries, Records(self._path, entries).texts(), strict=True):
+            try:
+                record = json.loads(text)
+                if not record.keys() >= RECORD or not isinstance(record["labels"], dict):
+                    raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
+            except (ValueError, RecursionError, AttributeError) as error:
+                name = entry.name if isinstance(entry, Entry) else ""
+                fault = Fault(str(self._path), name, f"a record that cannot be used ({error})",
+                              "remove the journal: results that are there are kept")
+                raise InputError([fault]) from None
+            yield record
+
+
+def _json(data: Any) -> bytes:
+    """Return data as JSON in a line; numbers that JSON lacks become null."""
+    try:
+        return json.dumps(data, allow_nan=False).encode()
+    except ValueError:
+        return json.dumps(_finite(data)).encode()
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    if isinstance(data, float) and (data != data or data in (float("inf"), float("-inf"))):
+        return None
+    return data

@@ -1,0 +1,163 @@
+"""Points of a study: what each run is asked for, before anything of it is loaded.
+
+A study of a hundred thousand runs that goes on must know at once which of them are done.  A
+point's key is a hash of the texts that lead to the run: contents of the vehicle, track and settings
+files and of all that they name, assignments, speed, start and end.  Loading and checking the
+definitions is left to `railsim.studies.combine`, for the runs that are to be computed.
+"""
+
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from railsim.definitions import sources
+from railsim.errors import Fault, InputError
+from railsim.files import TABLE_BYTES, is_file, read_bytes
+from railsim.version import __version__
+
+Grid = Mapping[str, Sequence[str]]
+Overrides = tuple[str, ...]
+
+MOST_RUNS = 200_000
+# what a run takes at a rough guess: simulated seconds per second of one core, and seconds besides
+REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """What one run is asked for.
+
+    Attributes
+    ----------
+    name : str
+        Name of the run.
+    vehicle, track : str or Path
+        File or name.
+    speed : float or None
+        Speed at the start [m/s].
+    overrides : mapping of str to tuple of str
+        Assignments to the ``vehicle``, ``track`` and ``settings``.
+    labels : mapping
+        What tells the run apart.
+    key : str
+        Hash of all inputs; empty where a file cannot be read.
+    """
+
+    name: str
+    vehicle: str | Path
+    track: str | Path
+    speed: float | None
+    overrides: Mapping[str, Overrides]
+    labels: Mapping[str, str | float] = field(default_factory=dict)
+    key: str = ""
+
+
+class Fingerprints:
+    """Hashes of what files and assignments say, each file read once."""
+
+    def __init__(self) -> None:
+        self._base = cache(self._of_file)
+        self._of = cache(self._with_overrides)
+        self._content = cache(_content_hash)
+
+    def __call__(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
+        """Return the hash of a file with assignments; empty where it cannot be read."""
+        return self._of(kind, path, overrides)
+
+    def _of_file(self, kind: str, path: str | Path | None) -> str:
+        if path is None:
+            return "defaults"
+        try:
+            data = sources.read_source(sources.find_file(path, kind), kind).data
+        except InputError:
+            return ""
+        text = json.dumps(data, sort_keys=True, default=str)
+        files = [self._content(name) for name in _file_names(data)]
+        return _hashed([text, *files])
+
+    def _with_overrides(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
+        base = self._base(kind, path)
+        if not base:
+            return ""
+        named = [self._content(name) for text in overrides for name in _named_files(text)]
+        return _hashed([base, *overrides, *named])
+
+
+def _hashed(parts: Sequence[str]) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _content_hash(name: str) -> str:
+    try:
+        return hashlib.sha256(read_bytes(name, TABLE_BYTES)).hexdigest()
+    except InputError:
+        return "unreadable"
+
+
+def _file_names(node: Any, of_file: bool = False) -> Iterator[str]:
+    """Yield what stands under keys that name files, where it is a file."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _file_names(value, key in sources.FILE_KEYS)
+    elif isinstance(node, list):
+        for value in node:
+            yield from _file_names(value, of_file)
+    elif of_file and isinstance(node, str) and is_file(node):
+        yield node
+
+
+def _named_files(assignment: str) -> Iterator[str]:
+    """Yield the files that an assignment names."""
+    key, _, written = assignment.partition("=")
+    if not sources.FILE_KEYS & set(key.strip().split(".")):
+        return
+    try:
+        value: Any = tomllib.loads(f"v = {written}")["v"]
+    except (ValueError, RecursionError):
+        value = written.strip()
+    yield from _file_names({"file": value})
+
+
+def point_key(*parts: Any) -> str:
+    """Return the key of a point; empty if one of the hashes among `parts` is."""
+    return "" if "" in parts else _hashed([__version__, *map(repr, parts)])
+
+
+def check_number(
+    lists: Sequence[Sequence[object]], cores: int, seconds: Callable[[], float]
+) -> None:
+    """Refuse a study of more runs than anybody can want by mistake.
+
+    Parameters
+    ----------
+    lists : sequence of sequences
+        What is combined.
+    cores : int
+        Processes that do the runs.
+    seconds : callable
+        Returns a guess of the simulated time of a run [s]; called if there are too many.
+
+    Raises
+    ------
+    InputError : the number of combinations is above `MOST_RUNS`; with the time that they take.
+    """
+    number = math.prod(len(values) for values in lists)
+    if number <= MOST_RUNS:
+        return
+    each = seconds() / REAL_TIME_FACTOR + SECONDS_BESIDES
+    found = f"{number:,} runs, some {_words(number * each / cores)} on {cores} cores"
+    raise InputError([Fault("study", "", found, f"{MOST_RUNS:,} at most; give fewer values")])
+
+
+def _words(seconds: float) -> str:
+    """Return a duration in words: 3 days, 5 years."""
+    for unit, length in (("years", 3.16e7), ("days", 86400.0), ("hours", 3600.0)):
+        if seconds >= 2.0 * length:
+            return f"{seconds / length:,.0f} {unit}"
+    return f"{seconds / 60.0:.0f} minutes"

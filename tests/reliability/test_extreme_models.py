@@ -1,0 +1,53 @@
+"""Vehicles, tracks and settings far from all experience: a result with its status, or a reason."""
+
+import numpy as np
+import pytest
+from cases import number, outcome
+
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.result import check_result
+
+MODELS = (
+    ("coach_manchester", "curve_r250"),
+    ("coach_flexicoil", "straight"),
+    ("benchmark_vehicle1", "curve_r500"),
+)
+# what changes the contact table takes ten seconds to prepare: not of interest here
+LEFT = {"gauge", "inclination", "radius", "back_to_back", "tape_circle_distance", "name"}
+
+
+def numbers(node, path=()):
+    """Yield the paths of all numbers in nested tables."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key not in LEFT:
+                yield from numbers(value, (*path, key))
+    elif isinstance(node, list | tuple):
+        for index, value in enumerate(node):
+            yield from numbers(value, (*path, str(index)))
+    elif isinstance(node, float):
+        yield ".".join(path), node
+
+
+@pytest.mark.slow
+def test_extreme_models(tmp_path, capsys):
+    statuses = []
+    for seed in range(number(5)):
+        rng = np.random.default_rng(seed)
+        vehicle, track = MODELS[seed % len(MODELS)]
+        places = [("vehicle", *pair) for pair in numbers(load_vehicle(vehicle).model_dump())]
+        places += [("track", *pair) for pair in numbers(load_track(track).model_dump())]
+        given = ["run", vehicle, track, "--speed", f"{10 ** rng.uniform(-0.3, 2.17):.4g}"]
+        for at in rng.choice(len(places), rng.integers(1, 4), replace=False):
+            kind, path, value = places[at]
+            factor = rng.choice([-1.0, 0.0, 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-2, 2)])
+            given += ["--set", f"{kind}.{path}={float(value) * factor!r}"]
+        path = tmp_path / "run.h5"
+        given += ["--duration", "0.5", "--out", path, "--overwrite", "--quiet"]
+        status = outcome(given, capsys, f"model {seed}: {given}")
+        statuses.append(status)
+        if status != 2:
+            result = check_result(path)
+            assert (result.status == "complete") == (status == 0)
+        path.unlink(missing_ok=True)
+    assert 0 in statuses

@@ -1,0 +1,144 @@
+"""Streams, homes, users, locales, caches and names as the world has them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import matplotlib
+import pytest
+
+import railsim.cli.info
+from railsim.cli import main
+from railsim.kernels import cache
+
+sys.path.append(str(Path(__file__).parents[1] / "interface"))
+from example_result import ROOT, example_result
+
+HOSTILE_NAME = "$x^$ \\u001b[31m <b>=1+1</b> \\u202e %s {0}"
+
+
+def called(arguments, shell="", **environment):
+    """Run railsim in a shell; return status, output and errors."""
+    line = f'"{sys.executable}" -m railsim {" ".join(arguments)} {shell}'
+    variables = {key: value for key, value in (os.environ | environment).items() if value}
+    done = subprocess.run(["sh", "-c", line], env=variables, capture_output=True, text=True,
+                          errors="replace")
+    assert "Traceback" not in done.stderr, done.stderr
+    assert "Exception ignored" not in done.stderr, done.stderr
+    return done
+
+
+@pytest.mark.parametrize(
+    ("shell", "status"),
+    [("| head -1", 0), (">&-", 0), ("2>&-", 0), ("</dev/null >/dev/full", 1), ("<&- >&- 2>&-", 0)],
+)
+def test_closed_and_full_streams(shell, status):
+    assert called(["info", "coach_manchester"], shell).returncode == status
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"HOME": "", "XDG_CACHE_HOME": ""},
+        {"HOME": "/nonexistent", "XDG_CACHE_HOME": ""},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
+        {"LC_ALL": "tr_TR.UTF-8", "LANGUAGE": "tr"},
+        {"TERM": "", "COLUMNS": "1"},
+    ],
+    ids=["no home", "home is not there", "ascii", "Turkish", "no terminal"],
+)
+def test_odd_surroundings(environment, tmp_path):
+    vehicle = tmp_path / "coach.toml"
+    head = 'extends = "coach_manchester"\nformat = "railsim-vehicle/1"\n'
+    vehicle.write_text(f'{head}name = "Zürich"\n', encoding="utf-8")
+    done = called(["info", str(vehicle)], **environment)
+    assert done.returncode == 0, done.stderr
+    assert "rich" in done.stdout
+
+
+def test_user_without_a_name_or_home():
+    """As a container that is started with any number as its user."""
+    program = (
+        "import os, pwd, sys; os.environ.pop('HOME', 0); os.environ.pop('XDG_CACHE_HOME', 0);"
+        "pwd.getpwuid = pwd.getpwnam = lambda _: {}['no such user'];"
+        "from railsim.cli import main;"
+        "sys.exit(main(['info', 'coach_manchester', '--draw', os.devnull + '/x.png']))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 2, done.stderr  # for the picture's folder only
+    assert "Traceback" not in done.stderr
+    assert "unexpected" not in done.stderr
+
+
+def test_unforeseen_error_is_a_line_with_a_report(monkeypatch, capsys, tmp_path):
+    def trouble(*_):
+        raise ZeroDivisionError("trouble\x1b[31m")
+
+    monkeypatch.setattr(railsim.cli.info, "_description", trouble)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    mine = tmp_path / "mine.toml"
+    mine.write_text((ROOT / "vehicles" / "coach_manchester.toml").read_text(encoding="utf-8"))
+    assert main(["info", str(mine)]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "unexpected ZeroDivisionError: trouble\\x1b[31m" in error
+    (report,) = tmp_path.glob("railsim-report-*.txt")
+    assert str(report) in error
+    text = report.read_text(encoding="utf-8")
+    for part in ("ZeroDivisionError", "Traceback", "numba ", "'info'", "carbody"):
+        assert part in text
+    assert report.stat().st_mode & 0o077 == 0
+
+
+def test_names_are_shown_literally(tmp_path, capsys):
+    """In terminal, picture, page and table; each as its characters, doing nothing."""
+    vehicle, name = tmp_path / "coach.toml", "$x^$ \x1b[31m <b>=1+1</b> \u202e %s {0}"
+    vehicle.write_text(
+        f'extends = "coach_manchester"\nformat = "railsim-vehicle/1"\nname = "{HOSTILE_NAME}"\n'
+    )
+    assert main(["info", str(vehicle), "--draw", str(tmp_path / "coach.svg")]) == 0
+    printed = capsys.readouterr().out
+    assert "$x^$ \\x1b[31m <b>=1+1</b> \\u202e %s {0}" in printed
+    assert "\x1b" not in printed
+    result = example_result(duration=2.0)
+    path = result.to_hdf5(tmp_path / "=1+1$x^$.h5")
+    other = result.to_hdf5(tmp_path / "_b.h5")
+    with h5py.File(path) as file:
+        assert name not in file.attrs["vehicle_toml"]  # TOML writes it by its codes too
+    with matplotlib.rc_context({"svg.fonttype": "none"}):
+        given = ["compare", str(path), str(other), "--out", str(tmp_path / "out")]
+        assert main(given) == 0
+    rows = (tmp_path / "out" / "compare.csv").read_text(encoding="utf-8")
+    assert ",'=1+1$x^$," in rows
+
+
+def test_cache_is_for_its_user_only(tmp_path):
+    folder = cache.safe_folder(tmp_path / "railsim" / "kernels")
+    assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(0o755)
+    assert cache.safe_folder(folder).stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o702, 0o1777])
+def test_cache_that_others_may_write_to_is_refused(tmp_path, mode):
+    folder = cache.safe_folder(tmp_path / "cache")
+    folder.chmod(mode)
+    cache.notices.clear()
+    assert cache.safe_folder(folder) is None
+    assert [text for text in cache.notices if "other users may write" in text]
+    cache.notices.clear()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
+def test_cache_of_another_user_is_refused(tmp_path):
+    folder = cache.safe_folder(tmp_path / "cache")
+    cache.store(folder / "code", b"mine")
+    os.chown(folder / "code", 54321, 54321)
+    assert cache.stored(folder / "code") is None
+    os.chown(folder, 54321, 54321)
+    cache.notices.clear()
+    assert cache.safe_folder(folder) is None
+    cache.notices.clear()
