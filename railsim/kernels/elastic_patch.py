@@ -1,8 +1,8 @@
 """Elastic contact of one zone of a wheel on its rail: a foundation along the contour.
 
 The zone's candidates i lie `du` apart along the axle; h is their vertical gap, L = 1/cos(gamma)
-the mean of wheel's and rail's, v = z - h - theta L the vertical overlap that the foundation takes at
-the height z, theta the approach along the normal that goes into the bodies as a whole.  Equations
+the mean of wheel's and rail's, v = z - h - theta L the vertical overlap that the foundation takes
+at the height z, theta the approach along the normal that goes into the bodies as a whole.  Equations
 and sources: :mod:`railsim.contact.table`.
 """
 
