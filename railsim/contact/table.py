@@ -419,6 +419,7 @@ def _wheel_arrays(wheel: WheelCurve) -> kernel.Wheel:
     window = np.where(present, np.maximum(window, 1e-6), 0.0)
     first = np.array([int(np.argmax(row)) for row in present])
     last = np.array([row.size - int(np.argmax(row[::-1])) for row in present])
+    last[~present.any(axis=1)] = 0  # no such zone
     return kernel.Wheel(wheel.u, wheel.r, wheel.t, wheel.curvature, window, first, last)
 
 

@@ -2,8 +2,8 @@
 
 The zone's candidates i lie `du` apart along the axle; h is their vertical gap, L = 1/cos(gamma)
 the mean of wheel's and rail's, v = z - h - theta L the vertical overlap that the foundation takes
-at the height z, theta the approach along the normal that goes into the bodies as a whole.  Equations
-and sources: :mod:`railsim.contact.table`.
+at the height z, theta the approach along the normal that goes into the bodies as a whole.
+Equations and sources: :mod:`railsim.contact.table`.
 """
 
 import math

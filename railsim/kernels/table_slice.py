@@ -29,6 +29,7 @@ FIRST_THETA = 15e-6  # approach of the bodies as a whole, first guess [m]
 NEAR = 3e-4  # approach along the normal at which no candidate touches any more [m]
 MORE_LOAD = 1e-4  # approach that the greatest load adds to the reference's, at most [m]
 STRIDE = 4  # of the candidates in the search for the lowest one
+FAR_AWAY = 1.0  # height of a zone that never touches [m]
 OUT_OF_REACH = 2e-3  # a zone that touches so much later than another carries nothing [m]
 SMALL_AXIS = 1e-4  # of a zone out of reach [m/N^(1/3)]
 LEAST_AXIS = 0.3  # axes without and under endless load over those under the middle one
@@ -143,7 +144,7 @@ def fill_table_slice(
         y = y_nodes[i]
         for p in range(n_patch):
             lowest = wheel.first[p]
-            least[p] = 1e9
+            least[p] = FAR_AWAY
             for k in range(wheel.first[p], wheel.last[p], STRIDE):
                 if stretch[k] > 0.0:
                     gap = centre_height - c_z[k] + rail_height(
@@ -156,7 +157,7 @@ def fill_table_slice(
             out[A1] = out[B1] = SMALL_AXIS
         nearest = least.min()
         for p in range(n_patch):
-            if least[p] > nearest + OUT_OF_REACH:
+            if least[p] > nearest + OUT_OF_REACH or least[p] == FAR_AWAY:
                 continue
             start, end = near_candidates(y, p, least[p], c_y, c_z, stretch, centre_height, wheel,
                                          rail)

@@ -76,7 +76,9 @@ def pairs():
     exact = [exact_contact(wheel, rail, y, r, LOAD) for y, r in zip(lateral, roll, strict=True)]
     tables = {
         normal: build_contact_table(
-            wheel, rail, grid=TableGrid(s_min=-0.01, s_max=0.01, roll_max=0.006, n_w=2, normal=normal)
+            wheel,
+            rail,
+            grid=TableGrid(s_min=-0.01, s_max=0.01, roll_max=0.006, n_w=2, normal=normal),
         )
         for normal in ("hertz", "kik-piotrowski")
     }
@@ -143,7 +145,7 @@ def lateral_force(table, y, roll, load):
     return sum(patch.N_y for patch in right) - sum(patch.N_y for patch in left)
 
 
-@pytest.mark.parametrize("rail_name, inclination", [("60E1", 0.025), ("54E1", 0.025)])
+@pytest.mark.parametrize(("rail_name", "inclination"), [("60E1", 0.025), ("54E1", 0.025)])
 def test_lateral_stiffness_is_that_of_the_boundary_elements(rail_name, inclination):
     wheel, rail = load_profile("S1002"), load_profile(rail_name)
     grid = TableGrid(s_min=-0.005, s_max=0.005, roll_max=0.003, n_w=2)
@@ -166,7 +168,7 @@ def test_lateral_stiffness_is_that_of_the_boundary_elements(rail_name, inclinati
 @pytest.mark.parametrize("load", [10e3, 54.5e3, 100e3])
 def test_lateral_stiffness_of_cones_is_the_closed_form(cone, load):
     # W gamma/(b0 - r0 gamma) on rails that touch at one place of their crown
-    name = f"cone 1:{round(1 / cone)}"
+    name = f"cone_1in{round(1 / cone)}"
     wheel, rail = load_profile(name), load_profile("60E1")
     grid = TableGrid(s_min=-0.005, s_max=0.005, roll_max=0.003, n_w=2)
     table = build_contact_table(wheel, rail, inclination=0.025, grid=grid)
