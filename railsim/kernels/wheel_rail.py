@@ -254,7 +254,8 @@ def wheel_contact(system, work, w, side, speed, n):
         if p <= 0.0:
             p += ahead * (p_rate + max(p_change, 0.0))
             if p > 0.0:
-                swing = max(swing, t[k + 1] * p * sqrt(p) / ahead)
+                root = sqrt(p)
+                swing = max(swing, p * root * (t[k + 1] + root * t[k + 2]) / ahead)
             continue
         root = sqrt(p)
         change = max(abs(p_rate), abs(p_rate + p_change))
