@@ -219,10 +219,10 @@ def work_arrays(system: System) -> Work:
         plane=_smooth_planes(n_wheelsets),
         rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
         rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
-        above=aligned_zeros(8),
+        above=aligned_zeros(10),
         look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
         weights=aligned_zeros(N_WEIGHT),
-        stiffness=aligned_zeros(N_PATCH),
+        stiffness=aligned_zeros(2 * N_PATCH),
         approach=aligned_zeros(N_PATCH),
         patch_index=aligned_zeros((n_patches, 3), np.int64),
         patch=aligned_zeros((PATCH_ROWS, n_patches)),
@@ -347,6 +347,19 @@ def _body_row(body: FlatBody) -> tuple[float, ...]:
             float(body.wheelset is not None))
 
 
+def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]:
+    """First node and values of contact tables over the range that all of them cover."""
+    dy = tables[0].dy
+    first = max(round(t.y0 / dy) for t in tables)
+    last = min(round(t.y0 / dy) + t.values.shape[3] for t in tables)
+    starts = [first - round(t.y0 / dy) for t in tables]
+    parts = [
+        t.values[..., start : start + last - first, :]
+        for t, start in zip(tables, starts, strict=True)
+    ]
+    return tables[starts.index(0)].y0, parts
+
+
 def side_by_side(tables: Sequence[Floats]) -> Floats:
     """Contact tables as one array; a single one as it lies in memory (or on disk)."""
     values = tables[0][None] if len(tables) == 1 else np.stack(tables)
@@ -427,6 +440,7 @@ def _contact(
     if not tables:
         raise ModelError("a vehicle needs at least one wheelset")
     first = tables[0]
+    y0, values = on_common_grid(tables)
     falling = track.friction_falling
     law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
     names = _names(flat.bodies)
@@ -435,12 +449,12 @@ def _contact(
         body=np.array([names.index(body.name) for body in wheelsets], dtype=np.int64),
         table=which,
         load=np.full(len(wheelsets), weight / (2.0 * len(wheelsets))),
-        values=side_by_side([t.values for t in tables]),
+        values=side_by_side(values),
         shear=np.array([t.shear for t in tables]),
         coupling=np.array([
             coupling(t.values, settings.shear_modulus, settings.poisson) for t in tables
         ]),
-        y0=first.y0,
+        y0=y0,
         dy=first.dy,
         roll0=first.roll0,
         droll=first.droll,

@@ -22,7 +22,7 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.status import (
     DERAILED,
-    FELL_BETWEEN_RAILS,
+    INWARD_RANGE,
     NOT_FINITE,
     ROLL_RANGE,
     STRIKES,
@@ -49,7 +49,7 @@ Group = TypeVar("Group", bound=tuple[Any, ...])
 # the grid of the contact tables, which a system has but one of
 GRID = ("y0", "dy", "roll0", "droll", "dw")
 # statuses that concern a wheelset
-OF_WHEELSET = (DERAILED, FELL_BETWEEN_RAILS, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
+OF_WHEELSET = (DERAILED, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
 
 
 def contact_grid(model: Model) -> tuple[float | int, ...]:

@@ -20,6 +20,7 @@ from railsim.assembly import Model, level_track, work_arrays
 from railsim.element_arrays import vertical_support
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
+from railsim.kernels.contact_table import K2, K
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
@@ -293,7 +294,9 @@ def _first_guess(model: Model, level: System) -> Floats:
     for w, body in enumerate(contact.body):
         nodes = [contact.values[t, :, 0, iroll, iy] for t in contact.table[w]]
         gap = max(float(np.min(node[:, 0])) for node in nodes)
-        stiffness = sum(float(node[np.argmin(node[:, 0]), 1]) for node in nodes)
+        touching = [node[np.argmin(node[:, 0])] for node in nodes]
+        # at 60 um, what some 50 kN make
+        stiffness = sum(float(node[K] + 0.008 * node[K2]) for node in touching)
         state[6 * body + 2] = gap + (weight / stiffness) ** (2.0 / 3.0)
     _sink(level, state, weight)
     return state

@@ -6,7 +6,7 @@ predicted: the sum of the parts is a lower bound of what they take in the time l
 """
 
 from railsim.kernels import jit
-from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up
+from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up, stretched_roll
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, right_hand_side
@@ -142,10 +142,11 @@ def many_look_ups(system, work, state, derivative, n):
     done = 0
     for _ in range(n):
         yaw = state[6 * b + 5]
+        stretched, roll_slope = stretched_roll(state[6 * b + 3])
         where, iy, ir, iw, ty, tr, tw = locate(contact, table, state[6 * b + 1], state[6 * b + 3],
-                                               yaw * yaw)
+                                               stretched, yaw * yaw)
         if where == INSIDE:
-            cell_weights(contact, ty, tr, work.weights)
+            cell_weights(contact, ty, tr, roll_slope, work.weights)
             look_up(contact, table, 0, iy, ir, iw, tw, work.weights, work.look_up)
             done += 1
     return done

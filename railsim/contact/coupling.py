@@ -18,12 +18,13 @@ outwards (docs/validation/contact_geometry.md compares with the boundary-element
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.kernels.contact_table import N_PATCH, TAN_GAMMA
+from railsim.kernels import contact_table as fields
+from railsim.kernels.contact_table import HALF_LOAD, N_PATCH
 
 Floats = NDArray[np.float64]
 
-G_FIELD, K_FIELD, Y_FIELD, Z_FIELD, A_FIELD = 0, 1, 2, 3, 5
 REFERENCE_LOAD = 30e3  # N, half a wheel's load on each patch of a pair
+REFERENCE_ROOT = 8e-3  # sqrt(m), of the penetration there
 NEGLIGIBLE = 0.05  # share of its largest stiffness below which a patch is fading out
 
 
@@ -46,20 +47,29 @@ def coupling(values: Floats, G: float, nu: float) -> Floats:
         Loss of vertical penetration per vertical force on the neighbour [m/N].
     """
     line = values[:, 0, values.shape[2] // 2]
+    stiffness = line[..., fields.K] + REFERENCE_ROOT * line[..., fields.K2]
+    share = REFERENCE_LOAD / (REFERENCE_LOAD + HALF_LOAD)
+    y, z, tangent = (
+        line[..., value] + share * line[..., difference]
+        for value, difference in (
+            (fields.C_Y, fields.D_C_Y),
+            (fields.C_Z, fields.D_C_Z),
+            (fields.TAN_GAMMA, fields.D_TAN_GAMMA),
+        )
+    )
+    third = REFERENCE_LOAD ** (1.0 / 3.0)
     found = np.zeros(N_PATCH - 1)
     for i in range(N_PATCH - 1):
-        a, b = line[i], line[i + 1]
-        present = (a[:, K_FIELD] > NEGLIGIBLE * a[:, K_FIELD].max()) & (
-            b[:, K_FIELD] > NEGLIGIBLE * b[:, K_FIELD].max())
+        pair = [i, i + 1]
+        present = np.all(
+            stiffness[pair] > NEGLIGIBLE * stiffness[pair].max(axis=1, keepdims=True), axis=0)
         if not present.any():
             continue
-        apart = np.where(present, np.abs(a[:, G_FIELD] - b[:, G_FIELD]), np.inf)
+        apart = np.where(present, np.abs(np.diff(line[pair, :, fields.G], axis=0)[0]), np.inf)
         node = int(np.argmin(apart))
-        distance = np.hypot(a[node, Y_FIELD] - b[node, Y_FIELD],
-                            a[node, Z_FIELD] - b[node, Z_FIELD])
-        angle_a, angle_b = np.arctan(a[node, TAN_GAMMA]), np.arctan(b[node, TAN_GAMMA])
-        third = REFERENCE_LOAD ** (1.0 / 3.0)
-        reach = mean_inverse_distance(distance, third * 0.5 * (a[node, A_FIELD] + b[node, A_FIELD]))
+        distance = np.hypot(y[i, node] - y[i + 1, node], z[i, node] - z[i + 1, node])
+        angle_a, angle_b = np.arctan(tangent[pair, node])
+        reach = mean_inverse_distance(distance, third * float(line[pair, node, fields.A1].mean()))
         normal = (1.0 - nu) / (np.pi * G) * reach
         found[i] = normal * np.cos(angle_b - angle_a) / (np.cos(angle_a) * np.cos(angle_b))
     return found

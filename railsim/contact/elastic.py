@@ -17,15 +17,20 @@ from railsim.errors import ModelError
 from railsim.kernels.contact_table import (
     G_Y,
     INSIDE,
+    K2,
+    K2_Y,
     K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
     N_WEIGHT,
-    TAN_GAMMA,
+    G,
+    K,
     cell_weights,
     coupled_approaches,
     locate,
     look_up,
+    stretched_roll,
+    under_load,
 )
 
 Array = NDArray[np.float64]
@@ -124,27 +129,29 @@ def loaded_contact(
         table.droll,
         table.dw,
     )
-    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, yaw * yaw)
+    stretched, roll_slope = stretched_roll(roll)
+    where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, yaw * yaw)
     if where != INSIDE:
         raise ModelError(
             f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad and yaw {1e3 * yaw:.2f} mrad "
             "lies outside of the contact table"
         )
     weights, flat = np.empty(N_WEIGHT), np.empty(N_PATCH * LOOK_UP_SIZE)
-    cell_weights(arrays, ty, tr, weights)
+    cell_weights(arrays, ty, tr, roll_slope, weights)
     for patch in range(N_PATCH):
         look_up(arrays, 0, patch, iy, ir, iw, tw, weights, flat, patch * LOOK_UP_SIZE)
     fields = flat.reshape(N_PATCH, LOOK_UP_SIZE)
     compliance = coupling(table.values, table.G, table.nu)[None]
-    stiffness = np.ascontiguousarray(fields[:, 1])
+    stiffness = np.concatenate((fields[:, K], fields[:, K2]))
 
     def approaches(z: float) -> Array:
-        e = z - fields[:, 0]
+        e = z - fields[:, G]
         coupled_approaches(compliance, 0, stiffness, e)
         return e
 
     def vertical(z: float) -> Array:
-        force: Array = stiffness * np.maximum(approaches(z), 0.0) ** 1.5
+        e = np.maximum(approaches(z), 0.0)
+        force: Array = e**1.5 * (fields[:, K] + fields[:, K2] * np.sqrt(e))
         return force
 
     lowest = float(fields[:, 0].min())
@@ -159,18 +166,17 @@ def loaded_contact(
         if N_z < 1e-3 * load:
             continue
         field = fields[patch]
-        # lateral force from the potential; direction of the plane as the simulation takes it
-        slope = 0.4 * e * field[K_Y] / field[1] - field[G_Y]
-        tangent = float(0.5 * (field[TAN_GAMMA] + slope))
+        by_K = 0.4 * e * e * np.sqrt(e) * field[K_Y] + e**3 / 3.0 * field[K2_Y]
+        c_y, _, a1, b1, tangent = under_load(field, 0, float(N_z))
         N = float(N_z) * float(np.hypot(1.0, tangent))
-        a, b = (float(field[k]) * N ** (1.0 / 3.0) for k in (5, 6))
+        a, b = (float(axis) * N ** (1.0 / 3.0) for axis in (a1, b1))
         patches.append(
             Patch(
                 zone=PATCHES[patch],
                 N=N,
                 N_z=float(N_z),
-                N_y=float(N_z * slope),
-                y=y + float(field[2]),
+                N_y=float(by_K - N_z * field[G_Y]),
+                y=y + float(c_y),
                 angle=float(np.arctan(tangent)),
                 a=a,
                 b=b,

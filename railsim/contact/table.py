@@ -1,42 +1,53 @@
 """The contact table: what the time integration needs to know of a wheel on a rail.
 
 Over the lateral displacement, roll and squared yaw of the wheelset, for each of three patches
-(tread, flange root, flange), the table holds the height at which the patch touches, its stiffness,
-place and unit-load Hertz ellipse.  The normal force is the gradient of the potential
+(tread, flange root, flange), the table holds the height g at which the patch touches and two
+stiffnesses, of the potential
 
-    U(y, z, roll, yaw) = 2/5 K p^(5/2),   p = z - g,
+    U(y, z, roll, yaw) = 2/5 K e^(5/2) + 1/3 K2 e^3,   e = z - g,
 
-through the interpolating spline, hence conservative whatever the table holds.
+whose gradient through the interpolating spline is the normal force, hence conservative whatever the
+table holds; and place, direction and unit-load ellipse of the patch as functions of the load.
 
-Interpolation: uniform cubic B-splines in s and roll with the stored values as coefficients, linear
-in w = yaw^2, where
+Elastic contact of a zone.  With the vertical gap h(u) of rail and wheel over the place u along the
+axle, L = (1/cos(gamma_rail) + 1/cos(gamma_wheel))/2, the wheel is pressed down to z.  The bodies
+approach each other along the normal by theta as a whole, and the rest v = z - h - theta L of the
+overlap is taken by a foundation along the contour (Winkler; Johnson, Contact Mechanics (1985),
+4.3) of the stiffness k:
+
+    N = k integral v du,   N_z = k integral v/L du,   theta = kappa N^(2/3),
+    U = k/2 integral v^2/L du + 2/5 kappa N^(5/3).
+
+The lateral force is the pressure's mean of the rail's slope: the undeformed gap is averaged over
+the elastic patch, which grows with the load, and no softness is chosen.  Where the contact is an
+ellipse of the half relative curvatures A and B, with Hertz' unit-load semi-axis b1 and approach d1,
+the foundation's patch is as wide in proportion to it as
+
+    k = max(1.3 E*, 0.58 k_H),   k_H = 3/(4 B b1^3)   (a smooth maximum of the fourth power)
+
+gives (k_H would make it exactly as wide), and kappa = d1 - B^(1/3) (3/(4 k))^(2/3) makes the whole
+approach Hertz'.  1.3 is the one number that was fitted: to the lateral stiffness that boundary
+elements give (docs/validation/contact_geometry.md); B is averaged over the ellipse's width.  g, K
+and K2 are those that give the energies under three loads.
+
+Zones.  A contact on the border of two zones is shared: the integrals of N_z and U, and the means
+below, carry the zone's window, and the three windows add up to one.
+
+Patch.  Place, direction and ellipse at the three loads are the pressure's means and the ellipse of
+the parabola that the foundation would take for the patch, B = (4 k/(3 N))^2 v_max^3.  Between the
+loads each is v + dv N/(N + 35 kN).
+
+Interpolation: uniform cubic B-splines in s and roll, linear in w = yaw^2, where
 
     s = y - shear * roll
 
 is the lateral displacement of the wheel's foot: roll turns the wheelset about its centre and moves
 the foot sideways by 0.46 mm per milliradian, so that in (y, roll) every feature of the contact
-would run diagonally through the table and be smeared over several places.
-
-Soft minimum.  Over the candidates u of a zone with window omega (the three windows add up to one)
-
-    g = -eps ln( integral omega exp(-h/eps) du / l ),
-
-whose derivative is exactly the weighted mean of the slope; every other field is the mean with the
-same weights.  l makes g agree with the hard minimum in the zone's typical contact.  The zone's
-share W = <omega> multiplies the stiffness: a contact on the border of two zones is shared, not
-counted twice.
-
-Place of contact under load.  Pressed down by p, wheel and rail overlap, and the patch lies where
-the *normal* approach is greatest: between the points of rail and wheel with a common normal, p
-sin(gamma) apart.  Both move along their profiles; to first order their middle is where
-
-    h + delta_r L,   L = (1/cos(gamma_rail) + 1/cos(gamma_wheel))/2,
-
-is least, with the approach delta_r = 80 um under some 60 kN.  The minimum is taken of this, delta_r
-L is taken off g again, and p = delta L.  The common normal's angle follows from the rail's slope
-there and its change over half the distance, tan(gamma) = -z' (1 + delta_r kappa (1 + z'^2)/2): on a
-straight flank exactly the flank's.  At that approach it is the direction of the gradient of U where
-the ellipse does not change.
+would run diagonally through the table and be smeared over several places.  The roll's nodes lie
+close together near the middle (`railsim.kernels.contact_table.stretched_roll`): a milliradian moves
+the contact within the tread by millimetres.  The coefficients are c = f - f''/6 (second
+difference), which gives back cubic functions and smears nothing to fourth order (de Boor, A
+Practical Guide to Splines (1978), chapter XII).
 
 Frame: right wheel and rail, track axes (x forward, y right, z down), forces and places relative to
 the wheelset's centre.  The left wheel is the mirror image (y and roll change sign); where left and
@@ -58,6 +69,7 @@ from numpy.typing import NDArray
 
 from railsim.contact.curves import (
     HALF_WIDTHS,
+    RailCurve,
     WheelCurve,
     misfits,
     rail_curve,
@@ -65,16 +77,17 @@ from railsim.contact.curves import (
     wheel_curve,
 )
 from railsim.errors import InputError
-from railsim.kernels import cache
-from railsim.kernels import contact_geometry as kernel
+from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
+from railsim.kernels import hertz as hertz_kernel
+from railsim.kernels import table_slice as kernel
+from railsim.kernels.contact_table import A1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
 
 Array = NDArray[np.float64]
 
-FORMAT = "railsim-contact-table/1"
+FORMAT = "railsim-contact-table/2"
 PATCHES = ("tread", "flange root", "flange")
-FIELDS = ("g", "K", "c_y", "c_z", "c_x", "a1", "b1", "tan_gamma")
 
 
 Normal = Literal["hertz", "kik-piotrowski"]
@@ -86,41 +99,38 @@ class TableGrid:
 
     Attributes
     ----------
-    s_min, s_max, ds : float
-        Range and spacing of the sheared lateral displacement [m].
+    s_min, s_max : float, optional
+        Range of the sheared lateral displacement [m]; default `table_range`.
+    ds : float
+        Its spacing [m].
     roll_max, droll : float
-        Largest roll, both ways, and its spacing [rad].
+        Largest roll, both ways, and the spacing of its stretched coordinate, which is the roll's
+        own near the middle and four times as much at 20 mrad [rad].
     yaw_max : float
         Largest yaw [rad].
     n_w : int
         Number of nodes of w = yaw^2, from 0 to yaw_max^2.
-    eps : float
-        Softness of the minimum [m].  Geometry is averaged over places whose gap differs by about
-        this much, a tenth of the approach under a wheel's load: the middle third of the patch.
-        A sharp minimum (3 um) lets the place of contact jump where the patch itself spreads, and
-        a coach hunts with half a millimetre at any speed.
-    load : float
-        Wheel load for whose patch the curvatures are averaged [N].
+    spacing : float
+        Distance of the candidates on the wheel's tread [m].
+    reference : float
+        Load of the ellipse over which curvatures are averaged [N].
     floor_ratio : float
         Half relative curvature across is kept above about this share of that along [1].
-    approach : float
-        Normal approach at which the place of contact is sought [m].
     normal : "hertz" or "kik-piotrowski"
-        Stiffness and patch from the Hertz ellipse of the averaged curvatures, or from the
-        non-elliptic patch at `approach`, replaced by an ellipse of its area and proportions.
+        Patch as the ellipse of the foundation's patch, or the non-elliptic patch under each of
+        the three loads, replaced by an ellipse of its area and proportions.
     """
 
-    s_min: float = -0.020
-    s_max: float = 0.014
-    ds: float = 5e-5
+    s_min: float | None = None
+    s_max: float | None = None
+    ds: float = 1e-4
     roll_max: float = 0.030
-    droll: float = 3.0e-3
+    droll: float = 0.75e-3
     yaw_max: float = 0.040
     n_w: int = 17
-    eps: float = 10.0e-6
-    load: float = 60e3
+    spacing: float = 1e-4
+    reference: float = 60e3
     floor_ratio: float = 0.02
-    approach: float = 80e-6
     normal: Normal = "hertz"
 
 
@@ -131,12 +141,13 @@ class ContactTable:
     Attributes
     ----------
     values : ndarray, shape (n_patch, n_w, n_roll, n_y, n_field)
-        Spline coefficients; fields 0 g [m], 1 K [N/m^1.5], 2 c_y [m], 3 c_z [m], 4 c_x/yaw
-        [m/rad], 5 a1, 6 b1 [m/N^(1/3)], 7 tan of the contact angle [1].
+        Spline coefficients; fields 0 g [m], 1 K [N/m^1.5], 2 K2 [N/m^2], 3 a1 [m/N^(1/3)], 4 c_y,
+        5 c_z [m], 6 b1 [m/N^(1/3)], 7 tan of the contact angle [1]; 8 to 11 their differences
+        between no and endless load, those of 4 to 7.
     y0, dy : float
         First node and spacing of s = y - shear * roll [m].
     roll0, droll : float
-        First node and spacing of roll [rad].
+        First node and spacing of the stretched roll, see `stretched_roll` [rad].
     dw : float
         Spacing of w = yaw^2, from 0 [rad^2].
     shear : float
@@ -201,20 +212,17 @@ def zone_windows(wheel: WheelCurve) -> Array:
 
 
 @functools.cache
-def ellipse_functions(G: float, nu: float) -> tuple[float, float, Array]:
-    """Unit-load ellipses over ln(A/B), for the generator: start, spacing and logarithms.
-
-    Rows: a1 A^(1/3), b/a, d1 A^(-1/3).  Linear interpolation is within 2e-6.
-    """
+def ellipse_functions(G: float, nu: float) -> kernel.Hertz:
+    """Unit-load ellipses over ln(A/B), for the generator; linear interpolation is within 2e-6."""
     E_star = G / (1.0 - nu)
     x = np.linspace(-14.0, 14.0, 2801)
     rows = np.log([unit_load_ellipse(1.0, np.exp(-value), E_star) for value in x]).T
     rows[1] -= rows[0]
-    return float(x[0]), float(x[1] - x[0]), np.ascontiguousarray(rows)
+    return kernel.Hertz(float(x[0]), float(x[1] - x[0]), np.ascontiguousarray(rows))
 
 
 @functools.cache
-def strip_influence() -> tuple[float, float, Array, Array]:
+def strip_influence() -> kernel.Strips:
     """Influences for the non-elliptic patch, as logarithms over a logarithm.
 
     Returns
@@ -247,7 +255,7 @@ def strip_influence() -> tuple[float, float, Array, Array]:
     inner = np.where(distance > x[-1], 0.5 * np.pi * np.exp(-distance), inner)
     jacobian = np.cos(angle) ** 2 * 0.5 * np.pi * 3.0 * u**2 * 0.5
     whole = 2.0 * np.sum(weights * jacobian * inner, axis=1)
-    return float(x[0]), float(x[1] - x[0]), np.log(J), np.log(whole)
+    return kernel.Strips(float(x[0]), float(x[1] - x[0]), np.log(J), np.log(whole))
 
 
 def build_contact_table(
@@ -304,67 +312,52 @@ def build_contact_table(
     """
     grid = _chosen_grid(grid, normal)
     height = radius if centre_height is None else centre_height
-    wheel_points = wheel_curve(wheel, radius, tape_circle_place(back_to_back))
+    wheel_points = wheel_curve(wheel, radius, tape_circle_place(back_to_back), grid.spacing)
     rail_nodes = rail_curve(rail, gauge, inclination)
     if faults := misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
         raise InputError(faults)
-    window = zone_windows(wheel_points)
-    present = window > 1e-6
-    first = np.array([int(np.argmax(row)) for row in present])
-    last = np.array([row.size - int(np.argmax(row[::-1])) for row in present])
-    log_window = np.log(np.maximum(window, 1e-30))
-
-    n_y = round((grid.s_max - grid.s_min) / grid.ds) + 1
+    usual = table_range(wheel_points, rail_nodes)
+    s_min = usual[0] if grid.s_min is None else grid.s_min
+    s_max = usual[1] if grid.s_max is None else grid.s_max
+    n_y = round((s_max - s_min) / grid.ds) + 1
     # a cubic spline needs two nodes to each side of the middle
-    n_roll = 2 * max(round(grid.roll_max / grid.droll), 2) + 1
-    s_nodes = grid.s_min + grid.ds * np.arange(n_y)
-    roll_nodes = grid.droll * (np.arange(n_roll) - n_roll // 2)
+    half = max(int(np.ceil(stretched_roll(grid.roll_max)[0] / grid.droll)), 2)
+    stretched_nodes = grid.droll * np.arange(-half, half + 1, dtype=np.float64)
+    roll_nodes = unstretched_roll(stretched_nodes)
+    n_roll = roll_nodes.size
+    s_nodes = s_min + grid.ds * np.arange(n_y)
     w_nodes = np.linspace(0.0, grid.yaw_max**2, grid.n_w)
-    values = np.empty((3, grid.n_w, n_roll, n_y, kernel.N_FIELD))
-    ellipse_x0, ellipse_dx, ellipse = ellipse_functions(G, nu)
+    values = np.empty((3, grid.n_w, n_roll, n_y, N_FIELD))
+    arguments = (
+        height,
+        _wheel_arrays(wheel_points),
+        kernel.Rail(
+            rail_nodes.Y0, rail_nodes.dY, rail_nodes.z, rail_nodes.slope, rail_nodes.curvature
+        ),
+        kernel.Elastic(
+            G / (1.0 - nu),
+            HALF_WIDTHS,
+            grid.reference,
+            grid.floor_ratio,
+            grid.normal == "kik-piotrowski",
+        ),
+        ellipse_functions(G, nu),
+        strip_influence(),
+    )
 
     def fill(task: tuple[int, int]) -> None:
         i_w, i_roll = task
-        part = np.empty((3, n_y, kernel.N_FIELD))
-        kernel.fill_table_slice(
-            part,
-            s_nodes + radius * roll_nodes[i_roll],
-            roll_nodes[i_roll],
-            float(np.sqrt(w_nodes[i_w])),
-            height,
-            wheel_points.u,
-            wheel_points.r,
-            wheel_points.t,
-            wheel_points.du,
-            log_window,
-            window,
-            first,
-            last,
-            wheel_points.curvature,
-            rail_nodes.Y0,
-            rail_nodes.dY,
-            rail_nodes.z,
-            rail_nodes.slope,
-            rail_nodes.curvature,
-            HALF_WIDTHS,
-            ellipse_x0,
-            ellipse_dx,
-            ellipse,
-            grid.eps,
-            grid.load,
-            grid.floor_ratio,
-            grid.approach,
-            G / (1.0 - nu),
-            grid.normal == "kik-piotrowski",
-            *strip_influence(),
-        )
+        part = np.empty((3, n_y, N_FIELD))
+        places = s_nodes + radius * roll_nodes[i_roll]
+        yaw = float(np.sqrt(w_nodes[i_w]))
+        kernel.fill_table_slice(part, places, roll_nodes[i_roll], yaw, *arguments)
         values[:, i_w, i_roll] = part
 
     tasks = [(i_w, i_roll) for i_w in range(grid.n_w) for i_roll in range(n_roll)]
     fill(tasks[0])  # compile once, not in every thread
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         list(pool.map(fill, tasks[1:]))
-    values[..., kernel.G] -= gap_offsets(wheel_points, grid.eps)[:, None, None, None]
+    values = spline_coefficients(values, stretched_nodes)
     # as from the cache: the time loop is compiled once, not for both kinds of arrays
     values.setflags(write=False)
     description = {
@@ -379,9 +372,9 @@ def build_contact_table(
     }
     return ContactTable(
         values=values,
-        y0=grid.s_min,
+        y0=s_min,
         dy=grid.ds,
-        roll0=float(roll_nodes[0]),
+        roll0=float(stretched_nodes[0]),
         droll=grid.droll,
         dw=float(w_nodes[1]),
         shear=radius,
@@ -398,22 +391,75 @@ def _chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
     return replace(grid, normal=normal) if normal else grid
 
 
-TYPICAL_CURVATURES = (3.0, 30.0, 77.0)
-"""Relative curvature across in an everyday contact of each zone [1/m]: R 300 to 80 mm on the
-tread less a hollow wheel, the gauge corner of R 13 mm in the root, and against a straight flank.
-They only place the zones' heights against each other, within some micrometres."""
+CROWN_SLOPE = 0.3
+"""Slope of a rail up to which its surface counts as its top, the tangent of 17 degrees [1]."""
+
+MORE_INWARDS = 0.010
+"""Room of a table beyond where the other wheel has climbed its rail, for widened track [m]."""
 
 
-def gap_offsets(wheel: WheelCurve, eps: float) -> Array:
-    """What the soft minimum says too much in each zone's typical contact [m], shape (3,).
+def table_range(wheel: WheelCurve, rail: RailCurve) -> tuple[float, float]:
+    """Range of the lateral place that a table covers, in whole millimetres [m].
 
-    For a gap h = h'' u^2/2 the integral is sqrt(2 pi eps/h''), with h'' = kappa (1 + t^2)^(3/2)
-    at the slope t in the zone's middle.
+    Outwards to where the tip of the flange stands over the top of the rail: beyond, the wheelset is
+    derailed.  Inwards as far as the other wheel's climbing lets this one go, and `MORE_INWARDS`.
     """
-    angles = np.radians([3.0, 25.0, np.degrees(np.arctan(-wheel.t)).max()])
-    second = np.array(TYPICAL_CURVATURES) / np.cos(angles) ** 3
-    offsets: Array = -eps * np.log(np.sqrt(2.0 * np.pi * eps / second))
-    return offsets
+    tip = float(wheel.u[int(np.argmax(wheel.r))])
+    top = float(rail.Y[int(np.argmax(rail.slope > -CROWN_SLOPE))])
+    climbed = np.ceil(1e3 * (top - tip)) / 1e3
+    return -float(climbed) - MORE_INWARDS, float(climbed)
+
+
+def _wheel_arrays(wheel: WheelCurve) -> kernel.Wheel:
+    """A wheel as the generator takes it, with its zones."""
+    window = zone_windows(wheel)
+    present = window > 1e-6
+    # what touches with the zone's edge only has a share too small to feel, but a place
+    window = np.where(present, np.maximum(window, 1e-6), 0.0)
+    first = np.array([int(np.argmax(row)) for row in present])
+    last = np.array([row.size - int(np.argmax(row[::-1])) for row in present])
+    last[~present.any(axis=1)] = 0  # no such zone
+    return kernel.Wheel(wheel.u, wheel.r, wheel.t, wheel.curvature, window, first, last)
+
+
+def unstretched_roll(stretched: Array) -> Array:
+    """Roll of which `railsim.kernels.contact_table.stretched_roll` makes the given values [rad]."""
+    # q = x^2/sqrt(1 + x^2) with x = roll/FINE_ROLL: x^4 - q^2 x^2 - q^2 = 0
+    q = (stretched / FINE_ROLL) ** 2
+    roll: Array = np.sign(stretched) * FINE_ROLL * np.sqrt(0.5 * q * (q + np.sqrt(q * q + 4.0)))
+    return roll
+
+
+def spline_coefficients(values: Array, stretched: Array) -> Array:
+    """Coefficients of the splines over s and roll that give back cubic functions of both.
+
+    Over the roll only near the middle: farther out, where the nodes lie too far apart to follow the
+    contact from place to place, a spline through the values would swing; there they are the
+    coefficients themselves.  Stiffnesses and axes are kept from falling below nothing.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_patch, n_w, n_roll, n_y, n_field)
+        Values at the nodes; those at the ends of an axis are taken as they are.
+    stretched : ndarray, shape (n_roll,)
+        Stretched roll of the nodes [rad].
+    """
+    result = values.copy()
+    near = 1.0 / (1.0 + (stretched / FINE_ROLL) ** 4)
+    for axis, share in ((2, near[:, None, None, None, None]), (3, np.ones(1))):
+        source = np.moveaxis(result, axis, 0)
+        second = np.zeros_like(source)
+        second[1:-1] = source[2:] - 2.0 * source[1:-1] + source[:-2]
+        source -= share * second / 6.0
+    np.maximum(result[..., A1], 0.5 * values[..., A1], out=result[..., A1])
+    # K and K + K2 sqrt(e) at e = 0.1 mm
+    low = np.zeros(values.shape[:-1], dtype=bool)
+    for root in (0.0, 0.01):
+        before = values[..., K] + root * values[..., K2]
+        low |= result[..., K] + root * result[..., K2] < 0.2 * before
+    for stiffness in (K, K2):
+        result[low, stiffness] = values[low, stiffness]
+    return result
 
 
 def cache_folder() -> Path | None:
@@ -425,13 +471,10 @@ def cache_folder() -> Path | None:
 def generator_hash() -> str:
     """Hash of the sources that decide what a table holds."""
     digest = hashlib.sha256()
-    here, kernels = Path(__file__).parent, Path(kernel.__file__).parent
-    for path in (
-        here / "table.py",
-        here / "curves.py",
-        kernels / "contact_geometry.py",
-        kernels / "hertz.py",
-    ):
+    here = Path(__file__).parent
+    modules = (kernel, contact_geometry, elastic_patch, non_elliptic, hertz_kernel)
+    sources = [Path(str(module.__file__)) for module in modules]
+    for path in (here / "table.py", here / "curves.py", *sources):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

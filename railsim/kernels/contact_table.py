@@ -1,19 +1,20 @@
 """Look-up of a contact table: gap and stiffness of one patch with their exact gradients.
 
 A table holds, for the right wheel and over the wheelset's lateral displacement y, roll and
-w = yaw^2, eight fields per patch (tread, flange root, flange):
+w = yaw^2, twelve fields per patch (tread, flange root, flange):
 
     0 g      vertical displacement of the wheelset at which the patch touches (m)
-    1 K      vertical stiffness: N_z = K p^(3/2) at the penetration p = z - g (N/m^1.5)
-    2, 3     c_y, c_z of the contact point from the wheelset's centre, track axes (m)
-    4        c_x / yaw (m/rad)
-    5, 6     Hertz semi-axes at unit load, a = a1 N^(1/3) (m/N^(1/3))
+    1, 2     K, K2: N_z = K e^(3/2) + K2 e^2 at the penetration e = z - g (N/m^1.5, N/m^2)
+    3 a1     Hertz semi-axis along at unit load, a = a1 N^(1/3), under the middle load (m/N^(1/3))
+    4, 5     c_y, c_z of the contact point from the wheelset's centre, track axes (m)
+    6 b1     semi-axis across at unit load (m/N^(1/3))
     7        tan gamma, slope of the rail at the place of contact (1)
+    8 to 11  what 4 to 7 gain under endless load: v + dv N/(N + HALF_LOAD)
 
 The table's values are the coefficients of uniform cubic B-splines in y and roll (twice
-continuously differentiable, without overshoot) and are interpolated linearly in w.  The contact
-force is the gradient of U = 2/5 K p^(5/2) *through this spline*, hence conservative by
-construction, whatever the table holds.
+continuously differentiable) and are interpolated linearly in w.  The contact force is the gradient
+of U = 2/5 K e^(5/2) + 1/3 K2 e^3 *through this spline*, hence conservative by construction,
+whatever the table holds.  Only the first four fields, those of the force, have gradients.
 
 The first axis of the grid is s = y - shear * roll, the lateral displacement of the wheel's foot,
 see `railsim.contact.table`.
@@ -29,25 +30,31 @@ from railsim.kernels.contact_table_simd import sum_of_nodes
 
 TREAD, FLANGE_ROOT, FLANGE = range(3)
 N_PATCH = 3
-N_FIELD = 8
+N_FIELD = 12
+N_GRADIENT = 4  # the first so many have gradients
 
-TAN_GAMMA = 7
+G, K, K2, A1, C_Y, C_Z, B1, TAN_GAMMA, D_C_Y, D_C_Z, D_B1, D_TAN_GAMMA = range(N_FIELD)
 
-# results of `look_up`: the eight fields, then the gradients of all of them over y, roll and w
-_Y, _ROLL, _W = N_FIELD, 2 * N_FIELD, 3 * N_FIELD
-G_Y, K_Y = _Y, _Y + 1
-G_ROLL, K_ROLL = _ROLL, _ROLL + 1
-G_W, K_W = _W, _W + 1
-LOOK_UP_SIZE = 4 * N_FIELD
+# results of `look_up`: the fields, then the gradients of the first four over y, roll and w
+_Y = N_FIELD
+_ROLL, _W = _Y + N_GRADIENT, _Y + 2 * N_GRADIENT
+G_Y, K_Y, K2_Y = _Y, _Y + 1, _Y + 2
+G_ROLL, K_ROLL, K2_ROLL = _ROLL, _ROLL + 1, _ROLL + 2
+G_W, K_W, K2_W = _W, _W + 1, _W + 2
+LOOK_UP_SIZE = N_FIELD + 3 * N_GRADIENT
 N_WEIGHT = 16
 
 # outside of the table
 INSIDE, BELOW_Y, ABOVE_Y, OUTSIDE_ROLL, OUTSIDE_W = range(5)
 
-# A patch whose gap at the nearest node exceeds the wheel's height by more than this is skipped:
-# the node differs from the exact place by less (half a cell in y at a slope of 3).
+# A patch whose gap exceeds the wheel's height by more than this is skipped; it is taken at a node
+# in y and between two in roll, which differs from the exact place by less (a cell at a slope of 3).
 FAR = 4.0e-4
-LEVER = 0.75
+FINE_ROLL = 4e-3  # up to about this roll the nodes lie as close as in the middle [rad]
+
+LOADS = (14e3, 45e3, 110e3)  # normal loads whose energies the table meets [N]
+HALF_LOAD = 35e3  # half of the differences over the load have come [N]
+MIDDLE_SHARE = LOADS[1] / (LOADS[1] + HALF_LOAD)
 
 MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
@@ -55,10 +62,28 @@ SETTLED = 1e-8
 
 
 @jit
-def locate(contact, table, y, roll, w):
+def stretched_roll(roll):
+    """Coordinate of the roll on which the tables' nodes are evenly spaced, and its slope.
+
+    roll/(1 + (roll/FINE_ROLL)^2)^(1/4): the roll itself near the middle, where a wheelset runs and
+    a milliradian moves the contact by millimetres; its root far away.
+
+    Returns
+    -------
+    float, float
+        Coordinate [rad] and its derivative over the roll [1].
+    """
+    x = roll / FINE_ROLL
+    square = 1.0 + x * x
+    root = sqrt(sqrt(square))
+    return roll / root, (1.0 - 0.5 * x * x / square) / root
+
+
+@jit
+def locate(contact, table, y, roll, stretched, w):
     """Cell and local coordinate in the three directions; a code if outside (see above)."""
     ty = (y - contact.shear[table] * roll - contact.y0) / contact.dy
-    tr = (roll - contact.roll0) / contact.droll
+    tr = (stretched - contact.roll0) / contact.droll
     tw = w / contact.dw
     shape = contact.values.shape
     # comparisons are written so that NaN falls out of range
@@ -79,8 +104,9 @@ def locate(contact, table, y, roll, w):
 @jit
 def is_far(contact, table, patch, iy, ir, iw, tr, z):
     """Whether a patch is so far from touching that its look-up can be skipped."""
-    node = contact.values[table, patch, iw, ir, iy, 0]
-    return z - (node - LEVER * contact.droll * tr) < -FAR
+    values = contact.values
+    node, following = values[table, patch, iw, ir, iy, 0], values[table, patch, iw, ir + 1, iy, 0]
+    return z - node - tr * (following - node) < -FAR
 
 
 @jit
@@ -102,10 +128,13 @@ def spline_weights(t, per_step, weights, first):
 
 
 @jit
-def cell_weights(contact, ty, tr, weights):
-    """Weights of a cell's nodes, the same for all patches of a wheel, into ``weights[16]``."""
+def cell_weights(contact, ty, tr, roll_slope, weights):
+    """Weights of a cell's nodes, the same for all patches of a wheel, into ``weights[16]``.
+
+    `roll_slope` as from `stretched_roll`.
+    """
     spline_weights(ty, 1.0 / contact.dy, weights, 0)
-    spline_weights(tr, 1.0 / contact.droll, weights, 8)
+    spline_weights(tr, roll_slope / contact.droll, weights, 8)
 
 
 def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, place):
@@ -117,9 +146,10 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, place):
     here = np.einsum("k,wrkf->wrf", weights[:4], nodes)
     slope = np.einsum("k,wrkf->wrf", weights[4:8], nodes)
     value = np.einsum("r,wrf->wf", weights[8:12], here)
-    parts = (value, np.einsum("r,wrf->wf", weights[8:12], slope),
-             np.einsum("r,wrf->wf", weights[12:16], here))
-    sums = [*((1.0 - tw) * part[0] + tw * part[1] for part in parts), value[1] - value[0]]
+    parts = (value, np.einsum("r,wrf->wf", weights[8:12], slope)[:, :N_GRADIENT],
+             np.einsum("r,wrf->wf", weights[12:16], here)[:, :N_GRADIENT])
+    sums = [*((1.0 - tw) * part[0] + tw * part[1] for part in parts),
+            (value[1] - value[0])[:N_GRADIENT]]
     out[place:place + LOOK_UP_SIZE] = np.concatenate(sums)
 
 
@@ -130,8 +160,7 @@ _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_node
 def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     """Fields of one patch and their gradients into ``out[first:first + LOOK_UP_SIZE]``.
 
-    `weights` as from `cell_weights`; gradients of fields other than g and K are those of the
-    table's own coordinates.
+    `weights` as from `cell_weights`; the gradient of a1 is that of the table's own coordinates.
     """
     shape = contact.values.shape
     row = shape[4] * N_FIELD
@@ -141,25 +170,48 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     shear = contact.shear[table]
     out[first + G_ROLL] -= shear * out[first + G_Y]
     out[first + K_ROLL] -= shear * out[first + K_Y]
-    out[first + G_W] /= contact.dw
-    out[first + K_W] /= contact.dw
+    out[first + K2_ROLL] -= shear * out[first + K2_Y]
+    per_step = 1.0 / contact.dw
+    out[first + G_W] *= per_step
+    out[first + K_W] *= per_step
+    out[first + K2_W] *= per_step
+
+
+@jit
+def under_load(t, first, vertical):
+    """Place, direction and ellipse of a patch under a load, from a look-up at `t[first:]`.
+
+    The ellipse of a given curvature along the rail is the longer the narrower it is, about as
+    b^-0.39: the fraction is that power of the width over that under the middle load, within 2 %
+    from 0.4 to 2.5 of it.
+
+    Returns
+    -------
+    c_y, c_z, a1, b1, tangent : float
+    """
+    share = vertical / (vertical + HALF_LOAD)
+    b1 = t[first + B1] + share * t[first + D_B1]
+    middle = t[first + B1] + MIDDLE_SHARE * t[first + D_B1]
+    a1 = t[first + A1] * (1.39 * middle + 0.61 * b1) / (0.61 * middle + 1.39 * b1)
+    return (t[first + C_Y] + share * t[first + D_C_Y], t[first + C_Z] + share * t[first + D_C_Z],
+            a1, b1, t[first + TAN_GAMMA] + share * t[first + D_TAN_GAMMA])
 
 
 @jit
 def coupled_approaches(coupling, table, stiffness, approach):
     """Take from the penetrations what the neighbours' loads bend the surfaces.
 
-    With e_i the patches' own approaches and N_i = K_i e_i^(3/2),
+    With e_i the patches' own approaches and N_i = K_i e_i^(3/2) + K2_i e_i^2,
 
         e_i = p_i - sum_j kappa_ij N_j,
-        U = sum_i 2/5 K_i e_i^(5/2) + sum_{i<j} kappa_ij N_i N_j
+        U = sum_i U_i(e_i) + sum_{i<j} kappa_ij N_i N_j,   dU_i/de_i = N_i,
 
-    and dU/dp_i = N_i, dU/dK_i = 2/5 e_i^(5/2): the forces stay the gradient of a potential.
-    Newton's method on the three patches in a row; a patch that lifts off drops out.
+    and dU/dp_i = N_i, dU/dK_i and dU/dK2_i are those of U_i alone: the forces stay the gradient of
+    a potential.  Newton's method on the three patches in a row; a patch that lifts off drops out.
 
     Parameters
     ----------
-    stiffness : float64[3]   K, 0 for a patch that is not near
+    stiffness : float64[6]   K, then K2, of the patches; 0 for a patch that is not near
     approach : float64[3]    p (negative: apart) on entry, e on return, never below 0
     """
     p0, p1, p2 = approach[0], approach[1], approach[2]
@@ -167,27 +219,31 @@ def coupled_approaches(coupling, table, stiffness, approach):
     a, b = coupling[table, 0], coupling[table, 1]
     if e1 > 0.0 and (e0 > 0.0 or e2 > 0.0):
         k0, k1, k2 = stiffness[0], stiffness[1], stiffness[2]
+        c0, c1, c2 = stiffness[3], stiffness[4], stiffness[5]
         for _ in range(MOST_ITERATIONS):
             s0, s1, s2 = sqrt(e0), sqrt(e1), sqrt(e2)
-            d0, d1, d2 = 1.5 * k0 * s0, 1.5 * k1 * s1, 1.5 * k2 * s2
-            r0 = e0 - p0 + a * k1 * e1 * s1
-            r1 = e1 - p1 + a * k0 * e0 * s0 + b * k2 * e2 * s2
-            r2 = e2 - p2 + b * k1 * e1 * s1
+            n0, n1, n2 = k0 + c0 * s0, k1 + c1 * s1, k2 + c2 * s2
+            d0 = s0 * (1.5 * n0 + 0.5 * c0 * s0)
+            d1 = s1 * (1.5 * n1 + 0.5 * c1 * s1)
+            d2 = s2 * (1.5 * n2 + 0.5 * c2 * s2)
+            r0 = e0 - p0 + a * n1 * e1 * s1
+            r1 = e1 - p1 + a * n0 * e0 * s0 + b * n2 * e2 * s2
+            r2 = e2 - p2 + b * n1 * e1 * s1
             # rows 0 and 2 eliminated into row 1; one that has lifted off stays at zero
             on0 = 1.0 if e0 > 0.0 or r0 < 0.0 else 0.0
             on2 = 1.0 if e2 > 0.0 or r2 < 0.0 else 0.0
             pivot = 1.0 - on0 * a * a * d0 * d1 - on2 * b * b * d2 * d1
-            c1 = (r1 - on0 * a * d0 * r0 - on2 * b * d2 * r2) / max(pivot, 0.1)
-            c0 = on0 * (r0 - a * d1 * c1)
-            c2 = on2 * (r2 - b * d1 * c1)
-            e0, e1, e2 = max(e0 - c0, 0.0), max(e1 - c1, 0.0), max(e2 - c2, 0.0)
-            if abs(c0) + abs(c1) + abs(c2) < SETTLED * (e0 + e1 + e2):
+            x1 = (r1 - on0 * a * d0 * r0 - on2 * b * d2 * r2) / max(pivot, 0.1)
+            x0 = on0 * (r0 - a * d1 * x1)
+            x2 = on2 * (r2 - b * d1 * x1)
+            e0, e1, e2 = max(e0 - x0, 0.0), max(e1 - x1, 0.0), max(e2 - x2, 0.0)
+            if abs(x0) + abs(x1) + abs(x2) < SETTLED * (e0 + e1 + e2):
                 break
     approach[0], approach[1], approach[2] = e0, e1, e2
 
 
 def bounds(contact) -> np.ndarray:
-    """Usable range of the tables, [[y], [roll], [w]] lower and upper."""
+    """Usable range of the tables, [[s], [stretched roll], [w]] lower and upper."""
     shape = contact.values.shape
     return np.array([
         [contact.y0 + contact.dy, contact.y0 + (shape[4] - 2) * contact.dy],

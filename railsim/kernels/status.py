@@ -2,7 +2,7 @@
 
 RUNNING = 0
 DERAILED = 1
-FELL_BETWEEN_RAILS = 2
+INWARD_RANGE = 2
 WHEEL_LIFT = 3
 ROLL_RANGE = 4
 YAW_RANGE = 5
@@ -14,9 +14,9 @@ STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; it g
 # code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
 STATUS = {
     RUNNING: ("complete", "the run reached its end"),
-    DERAILED: ("derailed", "{where} climbed over the rail: the flange left the contact table"),
-    FELL_BETWEEN_RAILS: ("derailed", "{where} fell between the rails: a tread left its rail"),
-    WHEEL_LIFT: ("derailed", "{where} lifted a wheel beyond the range of the model"),
+    DERAILED: ("derailed", "{where} climbed over the rail: a flange's tip stands over its top"),
+    INWARD_RANGE: ("stopped", "{where} moved a wheel inwards beyond the range of the table"),
+    WHEEL_LIFT: ("stopped", "{where} lifted a wheel beyond the range of the model"),
     ROLL_RANGE: ("stopped", "{where} rolled beyond the range of the contact table"),
     YAW_RANGE: ("stopped", "{where} yawed beyond the range of the contact table"),
     NOT_FINITE: ("stopped", "the state of {where} is not finite: the step is too long or the "

@@ -348,8 +348,8 @@ class Work(NamedTuple):
     contact_jacobian : float64[n, 8]  see `wheel_rail`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
     rail_motion : float64[w, 2, MOTION_SIZE]   the rails under each wheelset, see `rails`
-    above : float64[8]          the wheelset at hand in the plane of its rails: y, z, roll, yaw and
-                                their rates, see `wheel_rail`
+    above : float64[10]         the wheelset at hand in the plane of its rails: y, z, roll, yaw,
+                                their rates, stretched roll and slope, see `wheel_rail`
     look_up, weights, stiffness, approach : of the wheel at hand, see `contact_table`
     patch_index : int64[p, 3]   wheelset, side and patch of each active contact patch
     patch : float64[PATCH_ROWS, p]  see `wheel_rail`

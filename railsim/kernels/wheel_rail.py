@@ -3,9 +3,10 @@
 Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`):
 
 - penetration p = z - g, less what the loads of neighbouring patches bend the surfaces; elastic
-  normal force as the gradient of the potential U, which includes the small terms from the change
-  of K along the profile (`coupled_approaches`); y, z, roll of the wheelset in the plane of the
-  rails, yaw against each rail's own direction (see `rails`);
+  normal force as the gradient of the potential U, which includes the terms from the change of the
+  stiffnesses along the profile (`coupled_approaches`); place, direction and ellipse of the patch
+  under its load (`under_load`); y, z, roll of the wheelset in the plane of the rails, yaw against
+  each rail's own direction (see `rails`);
 - contact damping c_N on the *geometric* rate of approach, faded in over 30 um, the sum never
   pulling;
 - the rail at the patch has the direction d = (1, t_y, t_z), from the turn of the frame at that
@@ -33,18 +34,22 @@ from railsim.kernels.contact_table import (
     G_W,
     G_Y,
     INSIDE,
+    K2_ROLL,
+    K2_W,
+    K2_Y,
     K_ROLL,
     K_W,
     K_Y,
     LOOK_UP_SIZE,
     N_PATCH,
     OUTSIDE_ROLL,
-    TAN_GAMMA,
     cell_weights,
     coupled_approaches,
     is_far,
     locate,
     look_up,
+    stretched_roll,
+    under_load,
 )
 from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.cube_root import cube_root
@@ -76,7 +81,7 @@ from railsim.kernels.rails import (
 )
 from railsim.kernels.status import (
     DERAILED,
-    FELL_BETWEEN_RAILS,
+    INWARD_RANGE,
     ROLL_RANGE,
     RUNNING,
     WHEEL_LIFT,
@@ -172,6 +177,7 @@ def normal_contact(system, work, speed, state):
         above[4], above[5] = y_rate, z_rate
         above[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
         above[7] = yaw_rate
+        above[8], above[9] = stretched_roll(above[2])
         work.swing[w] = 0.0
         if ahead > 0.0 and system.track.has_irregularity:
             own = smoothed + 6 * b
@@ -222,21 +228,23 @@ def wheel_contact(system, work, w, side, speed, n):
     roll_rate = sign * above[6]
     yaw_rate = above[7] - speed * bend
     table = contact.table[w, side]
-    where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, yaw * yaw)
+    where, iy, ir, iw, ty, tr, tw = locate(contact, table, y, roll, sign * above[8], yaw * yaw)
     if where != INSIDE:
         return outside(where), n
-    cell_weights(contact, ty, tr, weights)
+    cell_weights(contact, ty, tr, above[9], weights)
     normal = 0.0
     lateral = 0.0
     lift = 1.0
     for patch in range(N_PATCH):
         stiffness[patch] = 0.0
+        stiffness[N_PATCH + patch] = 0.0
         approach[patch] = -1.0
         if is_far(contact, table, patch, iy, ir, iw, tr, z):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, weights, t, first)
         stiffness[patch] = t[first + 1]
+        stiffness[N_PATCH + patch] = t[first + 2]
         approach[patch] = z - t[first]
         lift = min(lift, -approach[patch])
     coupled_approaches(contact.coupling, table, stiffness, approach)
@@ -252,17 +260,14 @@ def wheel_contact(system, work, w, side, speed, n):
         if p <= 0.0:
             p += ahead * (p_rate + max(p_change, 0.0))
             if p > 0.0:
-                swing = max(swing, t[k + 1] * p * sqrt(p) / ahead)
+                root = sqrt(p)
+                swing = max(swing, p * root * (t[k + 1] + root * t[k + 2]) / ahead)
             continue
         root = sqrt(p)
         change = max(abs(p_rate), abs(p_rate + p_change))
-        swing = max(swing, 1.5 * t[k + 1] * root * change)
-        elastic = t[k + 1] * p * root
-        # contact plane: the slope at the place of contact and the direction of the elastic
-        # force differ where the normal turns over the patch, in opposite senses from the
-        # boundary-element solution; their mean is within 3 % of it
-        of_force = 0.4 * p * t[k + K_Y] / t[k + 1] - t[k + G_Y]
-        tangent = 0.5 * (t[k + TAN_GAMMA] + of_force)
+        swing = max(swing, root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change)
+        elastic = p * root * (t[k + 1] + root * t[k + 2])
+        c_y, c_z, a1, b1, tangent = under_load(t, k, elastic)
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
@@ -271,13 +276,14 @@ def wheel_contact(system, work, w, side, speed, n):
             jacobian[b, J_Z] += damping
             jacobian[b, J_Y] += damping * t[k + G_Y] * t[k + G_Y]
             jacobian[b, J_ROLL] += damping * t[k + G_ROLL] * t[k + G_ROLL]
-        stretch = 0.4 * p * p * root
-        q_y = sign * (vertical * t[k + G_Y] - stretch * t[k + K_Y])
-        q_yaw = (vertical * t[k + G_W] - stretch * t[k + K_W]) * 2.0 * yaw
+        per_K, per_K2 = 0.4 * p * p * root, p * p * p / 3.0
+        q_y = sign * (vertical * t[k + G_Y] - per_K * t[k + K_Y] - per_K2 * t[k + K2_Y])
+        q_yaw = (vertical * t[k + G_W] - per_K * t[k + K_W] - per_K2 * t[k + K2_W]) * 2.0 * yaw
         force[b, 0] -= q_y * aside_slope + q_yaw * bend
         force[b, 1] += q_y
         force[b, 2] -= vertical
-        force[b, 3] += sign * (vertical * t[k + G_ROLL] - stretch * t[k + K_ROLL])
+        force[b, 3] += sign * (vertical * t[k + G_ROLL] - per_K * t[k + K_ROLL]
+                               - per_K2 * t[k + K2_ROLL])
         force[b, 5] += q_yaw
         normal += vertical
         lateral -= q_y
@@ -286,18 +292,20 @@ def wheel_contact(system, work, w, side, speed, n):
         if N <= 0.0:
             continue
         column = work.patch
-        column[A, n] = t[k + 5]
-        column[B, n] = t[k + 6]
+        column[A, n] = a1
+        column[B, n] = b1
         column[NORMAL, n] = N
         column[MU_N, n] = rail[w, side, FRICTION] * N
         column[ANGLE_COS, n] = cos_g
         column[ANGLE_SIN, n] = sign * tangent * cos_g
-        column[LEAD, n] = sign * t[k + 4]
-        column[FOOT_X, n] = sign * yaw * t[k + 4]
-        column[FOOT_Y, n] = sign * t[k + 2]
-        column[FOOT_Z, n] = t[k + 3]
+        # the normal meets the axle: c + lambda n lies on it, and n does not point along
+        lead = sign * (c_z * tangent - c_y)
+        column[LEAD, n] = lead
+        column[FOOT_X, n] = yaw * lead
+        column[FOOT_Y, n] = sign * c_y
+        column[FOOT_Z, n] = c_z
         column[PENETRATION, n] = p
-        column[NORMAL_STIFFNESS, n] = 1.5 * t[k + 1] * root / cos_2
+        column[NORMAL_STIFFNESS, n] = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) / cos_2
         column[NORMAL_DAMPING, n] = contact.damping * fade
         work.patch_index[n, 0] = w
         work.patch_index[n, 1] = side
@@ -333,7 +341,7 @@ def outside(where):
     if where == ABOVE_Y:
         return DERAILED
     if where == BELOW_Y:
-        return FELL_BETWEEN_RAILS
+        return INWARD_RANGE
     if where == OUTSIDE_ROLL:
         return ROLL_RANGE
     return YAW_RANGE

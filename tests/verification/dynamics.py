@@ -7,7 +7,14 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
-from railsim.kernels.contact_table import LOOK_UP_SIZE, N_WEIGHT, cell_weights, locate, look_up
+from railsim.kernels.contact_table import (
+    LOOK_UP_SIZE,
+    N_WEIGHT,
+    cell_weights,
+    locate,
+    look_up,
+    stretched_roll,
+)
 from railsim.kernels.rhs import locate_frames, right_hand_side
 from railsim.kernels.system import AXLEBOX, WHEELSET
 from railsim.kernels.time_loop import time_loop
@@ -169,13 +176,16 @@ def _contact_energy(system, work, state):
         for side, sign in ((0, -1.0), (1, 1.0)):
             y, z, roll, yaw = _over_rail(system, state, b, side)
             table = contact.table[w, side]
-            _, iy, ir, iw, ty, tr, tw = locate(contact, table, sign * y, sign * roll, yaw**2)
-            cell_weights(contact, ty, tr, weights)
-            p, K = np.zeros(3), np.zeros(3)
+            stretched, slope = stretched_roll(sign * roll)
+            _, iy, ir, iw, ty, tr, tw = locate(
+                contact, table, sign * y, sign * roll, stretched, yaw**2
+            )
+            cell_weights(contact, ty, tr, slope, weights)
+            p, K, K2 = np.zeros(3), np.zeros(3), np.zeros(3)
             for patch in range(3):
                 look_up(contact, table, patch, iy, ir, iw, tw, weights, out)
-                p[patch], K[patch] = z - out[0], out[1]
-            total += _patch_energy(p, K, contact.coupling[table])
+                p[patch], K[patch], K2[patch] = z - out[0], out[1], out[2]
+            total += _patch_energy(p, K, K2, contact.coupling[table])
     return total
 
 
@@ -198,14 +208,14 @@ def _over_rail(system, state, b, side):
     return y - aside, z - height, roll, yaw - slopes[2 * side]
 
 
-def _patch_energy(p, K, kappa):
-    """sum 2/5 K e^2.5 + kappa N N with e = p - kappa N, by a damped fixed-point iteration."""
+def _patch_energy(p, K, K2, kappa):
+    """sum 2/5 K e^2.5 + K2/3 e^3 + kappa N N with e = p - kappa N, by a damped iteration."""
     coupling = np.array([[0.0, kappa[0], 0.0], [kappa[0], 0.0, kappa[1]], [0.0, kappa[1], 0.0]])
     e = np.maximum(p, 0.0)
     for _ in range(400):
-        e = 0.5 * (e + np.maximum(p - coupling @ (K * e**1.5), 0.0))
-    N = K * e**1.5
-    return np.sum(0.4 * K * e**2.5) + 0.5 * N @ coupling @ N
+        e = 0.5 * (e + np.maximum(p - coupling @ (K * e**1.5 + K2 * e**2), 0.0))
+    N = K * e**1.5 + K2 * e**2
+    return np.sum(0.4 * K * e**2.5 + K2 * e**3 / 3.0) + 0.5 * N @ coupling @ N
 
 
 __all__ = ["Settings", "load_track", "load_vehicle"]

@@ -11,9 +11,12 @@ def spline_basis(t):
 
 
 def evaluate(table, y, roll, w=0.0):
-    """Fields (3, 8) of a contact table and their derivatives by y, roll and w."""
+    """Fields (3, 12) of a contact table and their derivatives by y, roll and w."""
     a = (y - table.shear * roll - table.y0) / table.dy
-    b = (roll - table.roll0) / table.droll
+    # the roll's coordinate, roll/(1 + (roll/4 mrad)^2)^(1/4), and its slope
+    x = roll / 4e-3
+    slope = (1 + x**2) ** -0.25 - 0.5 * x**2 * (1 + x**2) ** -1.25
+    b = (roll * (1 + x**2) ** -0.25 - table.roll0) / table.droll
     c = w / table.dw
     i, j, k = int(a), int(b), min(int(c), table.values.shape[1] - 2)
     in_s, by_s = spline_basis(a - i)
@@ -28,31 +31,33 @@ def evaluate(table, y, roll, w=0.0):
     return (
         total(in_w, in_roll, in_s),
         d_s,
-        total(in_w, by_roll, in_s) / table.droll - table.shear * d_s,
+        total(in_w, by_roll, in_s) * slope / table.droll - table.shear * d_s,
         total(by_w, in_roll, in_s),
     )
 
 
+def under_load(fields, load):
+    """c_y, c_z, b1 and tan(gamma) of every patch under a load, shape (3, 4)."""
+    return fields[:, 4:8] + fields[:, 8:12] * load / (load + 35e3)
+
+
 def potential(table, y, z, roll, w=0.0):
-    """Energy of the elastic contacts, 2/5 sum K p^(5/2)."""
+    """Energy of the elastic contacts, sum of 2/5 K e^(5/2) + K2/3 e^3."""
     fields = evaluate(table, y, roll, w)[0]
-    p = np.maximum(z - fields[:, 0], 0.0)
-    return 0.4 * np.sum(fields[:, 1] * p**2.5)
+    e = np.maximum(z - fields[:, 0], 0.0)
+    return np.sum(0.4 * fields[:, 1] * e**2.5 + fields[:, 2] * e**3 / 3.0)
 
 
 def forces(table, y, z, roll, w=0.0):
     """Gradient of `potential` by y, z, roll, w from the splines' own derivatives."""
     fields, d_y, d_roll, d_w = evaluate(table, y, roll, w)
-    p = np.maximum(z - fields[:, 0], 0.0)
-    normal = fields[:, 1] * p**1.5
-    return np.array(
-        [
-            np.sum(0.4 * d_y[:, 1] * p**2.5 - normal * d_y[:, 0]),
-            np.sum(normal),
-            np.sum(0.4 * d_roll[:, 1] * p**2.5 - normal * d_roll[:, 0]),
-            np.sum(0.4 * d_w[:, 1] * p**2.5 - normal * d_w[:, 0]),
-        ]
-    )
+    e = np.maximum(z - fields[:, 0], 0.0)
+    normal = fields[:, 1] * e**1.5 + fields[:, 2] * e**2
+
+    def along(d):
+        return np.sum(0.4 * d[:, 1] * e**2.5 + d[:, 2] * e**3 / 3.0 - normal * d[:, 0])
+
+    return np.array([along(d_y), np.sum(normal), along(d_roll), along(d_w)])
 
 
 def lowest_gap(
