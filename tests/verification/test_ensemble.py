@@ -125,14 +125,15 @@ def test_the_one_that_overturns_while_speeds_and_intervals_change():
 def test_the_one_that_finds_no_step_on_the_way_fails_by_itself(monkeypatch):
     """Preparation goes well; at a lower speed one vehicle has no stable step."""
     drive = {"mode": "table", "speed_table": [[0.0, 20.0], [5.0, 20.0], [15.0, 15.0]]}
-    vehicles, chosen = [coach(), with_mass(35e3)], pace.choose_step
+    vehicles = [coach(), with_mass(35e3)]
 
-    def no_step_for_the_second(model, system, state, *how):
-        if state[-1] < 17.0 and model.system.bodies.mass[0] == 35e3:
-            raise ModelError("no stable step")
-        return chosen(model, system, state, *how)
+    class NoStepForTheSecond(pace.Stability):
+        def __init__(self, model, system, state, *how):
+            if state[-1] < 17.0 and model.system.bodies.mass[0] == 35e3:
+                raise ModelError("no stable step")
+            super().__init__(model, system, state, *how)
 
-    monkeypatch.setattr(pace, "choose_step", no_step_for_the_second)
+    monkeypatch.setattr(pace, "Stability", NoStepForTheSecond)
     fine, failure = outcomes(vehicles, load_track("straight"), until=20.0,
                              settings=Settings(drive=drive))  # fmt: skip
     assert fine.status == "complete"
