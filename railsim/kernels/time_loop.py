@@ -299,7 +299,7 @@ def balanced_mechanics(system, work, state, derivative):
     status, where, patches = mechanics(system, work, state, derivative)
     if system.support.elastic and system.support.massless:
         for _ in range(MOST_CORRECTIONS):
-            if status != RUNNING or settle_rates(system, work, state) < BALANCED:
+            if status != RUNNING or settle_rates(system, work, state, BALANCED) < BALANCED:
                 break
             status, where, patches = mechanics(system, work, state, derivative)
     return status, where, patches
