@@ -18,7 +18,7 @@ PAGES = (DOCS.parent / "README.md", DOCS / "notation.md", DOCS / "validation" / 
 TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
-from curving_study import COACHES, measured, published  # noqa: E402
+from curving_study import COACHES, RIGID, measured, published  # noqa: E402
 
 
 def tables() -> dict[str, str]:
@@ -45,16 +45,20 @@ def _quantity_row(quantity: Quantity) -> tuple[str, ...]:
 
 
 def curving_table(coach: str) -> str:
-    """Comparison of one coach with the published curving study."""
-    result = simulate(load_vehicle(f"coach_{coach}"), load_track("curve_r250"), speed=20.0)
+    """Comparison of one coach with the published curving study, on rigid and on elastic rails."""
+    track, vehicle = load_track("curve_r250"), load_vehicle(f"coach_{coach}")
+    rigid = simulate(vehicle, track.replace(support=RIGID), speed=20.0)
+    elastic = simulate(vehicle, track, speed=20.0)
     rows = []
     for name, expected in published(coach).items():
-        quantity, found = QUANTITIES[name], measured(result, name)
+        quantity, found = QUANTITIES[name], measured(rigid, name)
         where = "largest" if name == "dQ_over_Q0" else "mid-curve"
         difference = f"{100.0 * (found / expected - 1.0):+.1f} %"
-        numbers = (_digits(quantity.scale * value) for value in (expected, found))
-        rows.append((f"{quantity.words}, {where}", *numbers, difference))
-    return table(("leading wheelset", "published", "railsim", "difference"), rows)
+        values = (expected, found, measured(elastic, name))
+        numbers = [_digits(quantity.scale * value) for value in values]
+        rows.append((f"{quantity.words}, {where}", *numbers[:2], difference, numbers[2]))
+    head = ("leading wheelset", "published", "rigid rails", "difference", "elastic rails")
+    return table(head, rows)
 
 
 def _digits(value: float) -> str:

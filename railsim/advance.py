@@ -25,6 +25,7 @@ from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import time_loop
+from railsim.kernels.vibration import VIBRATION
 from railsim.outputs import OutputPlan
 from railsim.pace import Pace, duration
 from railsim.result import Sink
@@ -37,8 +38,9 @@ Progress = Callable[[float], None]
 # computing by the fast scheme, and below a second by the other one
 ROWS, STEPS = 500, 64_000
 
-# state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes
-_Before = tuple[Floats, bool, bool, NDArray[np.int64], Floats, Floats]
+# state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes,
+# times without load, vibrations
+_Before = tuple[Floats, bool, bool, NDArray[np.int64], Floats, Floats, Floats]
 
 
 @dataclass
@@ -97,6 +99,8 @@ class Run:
         Time during which each wheel has carried nothing [s].
     divided : int
         Steps that were divided because a wheel lifted or struck.
+    vibration : float64[w, 2, VIBRATION]
+        Vibrations of the wheel loads, see `railsim.kernels.vibration`; empty at its begin.
     cpu_time, wall_time : float
         Its share of what the time loop, and all of the run, took [s].
     together : int
@@ -117,6 +121,7 @@ class Run:
     where: int = 0
     events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, dtype=np.int64))
     divided: int = 0
+    vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
     cpu_time: float = 0.0
     wall_time: float = 0.0
     together: int = 1
@@ -186,6 +191,9 @@ class _Convoy:
         self._system = self._ensemble.system
         self._work = work_arrays(self._system)
         self._state = self._ensemble.state([run.state for run in runs])
+        for run, part in zip(runs, self._ensemble.parts, strict=True):
+            if len(run.vibration):
+                self._work.vibration[part.wheelsets] = run.vibration
         self._derivative = np.zeros_like(self._state)
         self._stages = np.zeros((3, len(self._state)))
         self._fresh, self._due = runs[0].fresh, runs[0].due
@@ -200,7 +208,8 @@ class _Convoy:
         while self._left() > 1e-9 or self._due:
             begin = time.perf_counter()
             before = (self._state.copy(), self._fresh, self._due, self._work.events.copy(),
-                      self._work.extremes.copy(), self._work.unloaded.copy())
+                      self._work.extremes.copy(), self._work.unloaded.copy(),
+                      self._work.vibration.copy())
             paces = self._paces()
             if len(set(paces)) > 1 or self._errors():
                 return self._parted(paces, before)
@@ -307,7 +316,7 @@ class _Convoy:
         if before is not None:
             work = self._work
             self._state, self._fresh, self._due = before[:3]
-            work.events[:], work.extremes[:], work.unloaded[:] = before[3:]
+            work.events[:], work.extremes[:], work.unloaded[:], work.vibration[:] = before[3:]
         self._give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [
@@ -325,6 +334,7 @@ class _Convoy:
             _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
             run.unloaded += self._work.unloaded[part.wheelsets]
             run.divided += int(self._work.parts[1])
+            run.vibration = self._work.vibration[part.wheelsets].copy()
 
 
 def _take_extremes(before: Floats, later: Floats) -> None:

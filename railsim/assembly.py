@@ -55,6 +55,7 @@ from railsim.kernels.system import (
     Work,
 )
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
+from railsim.kernels.vibration import VIBRATION
 from railsim.kernels.wheel_rail import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
@@ -231,6 +232,7 @@ def work_arrays(system: System) -> Work:
         support=aligned_zeros((n_tracks, 2, SUPPORT_COLUMNS)),
         support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
         compliance=aligned_zeros(2),
+        vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
         events=aligned_zeros((n_wheelsets, 2), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         swing=aligned_zeros(n_wheelsets),

@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from railsim.assembly import Model, level_track_with_friction
 from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError
+from railsim.flange import in_flange_contact
 from railsim.kernels.rhs import STANDSTILL_SPEED
-from railsim.time_step import choose_step
+from railsim.time_step import Stability
 
 Floats = NDArray[np.float64]
 
@@ -23,8 +25,11 @@ class Pace:
 
     CLASS = 1.2  # ratio of a class's speeds
 
-    def __init__(self, model: Model, settings: Settings, states: dict[float, Floats]) -> None:
+    def __init__(
+        self, model: Model, settings: Settings, track: Track, states: dict[float, Floats]
+    ) -> None:
         self._model = model
+        self._track = track
         self._settings = settings
         self._known: dict[tuple[float, float], float] = {}
         self._states = states
@@ -49,17 +54,29 @@ class Pace:
     def _choose(self, speed: float, interval: float) -> float:
         given = self._settings.step
         if given is None:
-            state = self._states.get(speed)
-            if state is None:
-                state = equilibrium(self._model, speed).state
-            level = level_track_with_friction(self._model.system)
-            return choose_step(self._model, level, state, self._settings.scheme, interval)
+            return self._stability(speed).choose(interval)
         if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
             raise InputError([Fault(
                 "settings", "step", f"found {given:g} s",
                 f"a whole part of the output interval {interval:g} s",
             )])
+        stability = self._stability(speed)
+        if not stability.holds(given):
+            raise InputError([Fault(
+                "settings", "step", f"found {given:g} s, unstable at {speed:g} m/s",
+                f"at most {stability.choose(interval):g} s",
+            )])
         return given
+
+    def _stability(self, speed: float) -> Stability:
+        state = self._states.get(speed)
+        if state is None:
+            state = equilibrium(self._model, speed).state
+        level = level_track_with_friction(self._model.system)
+        return Stability(
+            self._model, level, state, self._settings.scheme,
+            lambda step: in_flange_contact(self._model, self._track, state, step),
+        )
 
 
 def duration(distance: float, speed: float, rate: float) -> float:

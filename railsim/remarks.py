@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.advance import Run
+from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, PLACE
 from railsim.notation import SIDES
 from railsim.outputs import run_extremes
 
@@ -21,17 +22,22 @@ Floats = NDArray[np.float64]
 MOST_Q = 5.0  # times the static wheel load
 # Track shifting forces: this many times the limit 10 kN + P0/3 of EN 14363, P0 the axle load
 MOST_SUM_Y = 3.0
+VIBRATES = 0.05  # amplitude of a wheel load over the static one
 
 
 def run_remarks(run: Run) -> tuple[str, ...]:
     """Return the remarks on a run that has ended, each once."""
-    wheelsets = run.prepared.model.index.wheelsets
+    model = run.prepared.model
+    wheelsets = model.index.wheelsets
     Q0 = run.prepared.balance.Q0
     extremes = run_extremes(run.extremes, Q0)
     found = [
         *run.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
         *lifted_wheels(extremes, run.unloaded, wheelsets),
+        *vibration(run.vibration, Q0, wheelsets,
+                   irregular=bool(model.system.track.has_irregularity),
+                   elastic=bool(model.system.support.elastic)),
         *creep_range(int(run.events[1]), int(run.events[0])),
     ]
     return tuple(dict.fromkeys(found))
@@ -119,4 +125,45 @@ def creep_range(outside: int, patches: int) -> tuple[str, ...]:
     return (
         f"{outside} of {patches} contact patches in the time loop ({outside / patches:.1e}) were "
         "narrower or wider than the creep law's range of a/b; they got the force of its end.",
+    )
+
+
+def vibration(
+    measured: NDArray[np.float64],
+    Q0: NDArray[np.float64],
+    wheelsets: Sequence[str],
+    *,
+    irregular: bool,
+    elastic: bool,
+) -> tuple[str, ...]:
+    """Remark on wheel loads that vibrate above 40 Hz.
+
+    Parameters
+    ----------
+    measured : float64[w, 2, VIBRATION]
+        See `railsim.kernels.vibration`.
+    Q0 : float64[w, 2]
+        Static wheel loads [N].
+    wheelsets : sequence of str
+        Their names.
+    irregular, elastic : bool
+        Whether the rails are irregular, and elastic.
+    """
+    if not len(measured):
+        return ()
+    share = measured[..., AMPLITUDE] / Q0
+    w, side = (int(index) for index in np.unravel_index(np.argmax(share), share.shape))
+    if not share[w, side] > VIBRATES:
+        return ()
+    frequency, place = measured[w, side, FREQUENCY], measured[w, side, PLACE]
+    if irregular:
+        cause = "excited by the irregularities of the rails"
+    else:
+        cause = "self-excited by sliding friction in flange contact, on smooth rails"
+    if not elastic:
+        cause += "; the rails are rigid, [support] of the track makes them elastic"
+    return (
+        f"The wheel loads vibrate above {CUT_OFF:g} Hz: {100.0 * share[w, side]:.0f} % of Q0 at "
+        f"{frequency:.0f} Hz on the {('left', 'right')[side]} wheel of {wheelsets[w]}, vehicle at "
+        f"s = {place:.0f} m; {cause}.",
     )

@@ -360,7 +360,7 @@ def prepare(
     """Assemble, balance, choose the step and set the initial state."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
     model = balance.model
-    pace = Pace(model, settings, {speed: balance.state})
+    pace = Pace(model, settings, track, {speed: balance.state})
     step, _ = pace.at(speed)
     state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
     _disturb(model, settings, state)

@@ -1,11 +1,13 @@
 """The time step: as long as the scheme stays stable for this vehicle at this speed.
 
-The linearised map of one step is formed by differences about steady rolling; the step is stable
-where no mode of the map grows faster than the vehicle itself does (a vehicle beyond its critical
-speed grows, and may).  The margin leaves room for the stiffer contacts of flange and curve.
+The linearised map of one step is formed by differences about steady rolling, and in flange contact
+in the tightest curve (`railsim.flange`); the step is stable where no mode of the map grows faster
+than the vehicle itself does (a vehicle beyond its critical speed grows, and may).  The margin
+leaves room for higher wheel loads.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,7 @@ from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
 from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
 
 Floats = NDArray[np.float64]
+Situation = tuple[System, Floats]
 
 SCHEMES = {"fast": FAST, "rk4": RK4}
 # s; beyond them accuracy, not stability, decides
@@ -37,7 +40,9 @@ PART = {FAST: 1e-4, RK4: 2.5e-4}
 # share of the static wheel load by which a contact force may change in a step that is not divided:
 # on smooth curves and on ERRI B176 track at 40 m/s no step is
 SWING = 0.1
-GROWTH = 5.0  # 1/s, growth beyond that of the vehicle that counts as instability of the scheme
+# 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
+# and in flange contact, which lasts as long as a curve
+GROWTH, GROWTH_IN_FLANGE = 5.0, 1.0
 _NEVER = 1 << 40
 
 
@@ -82,41 +87,65 @@ def divide_strikes(work: Work, scheme: int, step: float) -> None:
     work.watch[1] = SWING
 
 
-def choose_step(
-    model: Model, system: System, state: Floats, scheme: str, interval: float
-) -> float:
-    """Longest stable step that divides the output interval.
+class Stability:
+    """Judges steps of a model on straight track and in flange contact.
 
     Parameters
     ----------
-    system : System
-        The model on the track on which stability is judged (straight and level).
-    state : float64[n_state]
-        Steady rolling.
+    model : Model
+    system, state : System, float64[n_state]
+        The model on straight and level track; steady rolling there.
     scheme : str
         Key of `SCHEMES`.
-    interval : float
-        Time between outputs [s].
-
-    Raises
-    ------
-    ModelError
-        No step longer than `SHORTEST_STEP` is stable.
+    curving : callable
+        Takes a step that is stable on straight track; returns system and settled state in the
+        tightest curve, or None where there is no flange contact.
     """
-    allowed: float | None = None
-    longest = min(LONGEST_STEP[scheme], LONGEST_TRAVEL / float(state[-1]))
-    n = max(1, int(np.ceil(interval / longest * (1.0 - 1e-9))))
-    while interval / n >= SHORTEST_STEP:
-        growth = _step_growth(model, system, state, scheme, MARGIN * interval / n)
-        if growth > GROWTH and allowed is None:  # for most vehicles the question does not arise
-            allowed = max(0.0, _vehicle_growth(model, system, state)) + GROWTH
-        if growth <= (allowed or GROWTH):
-            return interval / n
-        n = max(n + 1, int(n * 1.1))
-    raise ModelError(
-        f"no stable step longer than {SHORTEST_STEP:g} s: an element is too stiff for the masses "
-        "it connects"
-    )
+
+    def __init__(
+        self, model: Model, system: System, state: Floats, scheme: str,
+        curving: Callable[[float], Situation | None],
+    ) -> None:
+        self._model, self._scheme, self._curving = model, scheme, curving
+        self._straight = system, state
+        self._flange: Situation | None = None
+        self._settled = False
+        self._allowed: dict[bool, float] = {}
+        self.longest = min(LONGEST_STEP[scheme], LONGEST_TRAVEL / float(state[-1]))
+
+    def choose(self, interval: float) -> float:
+        """Longest stable step that divides the output interval, with the margin.
+
+        Raises
+        ------
+        ModelError
+            No step longer than `SHORTEST_STEP` is stable.
+        """
+        n = max(1, int(np.ceil(interval / self.longest * (1.0 - 1e-9))))
+        while interval / n >= SHORTEST_STEP:
+            if self.holds(interval / n, MARGIN):
+                return interval / n
+            n = max(n + 1, int(n * 1.1))
+        raise ModelError(
+            f"no stable step longer than {SHORTEST_STEP:g} s: an element is too stiff for the "
+            "masses it connects"
+        )
+
+    def holds(self, h: float, margin: float = 1.0) -> bool:
+        """Whether a step `margin` times as long as `h` is stable, in flange contact too."""
+        if not self._within(False, *self._straight, margin * h):
+            return False
+        if not self._settled:
+            self._flange, self._settled = self._curving(min(h, self.longest)), True
+        return self._flange is None or self._within(True, *self._flange, margin * h)
+
+    def _within(self, flange: bool, system: System, state: Floats, h: float) -> bool:
+        more = GROWTH_IN_FLANGE if flange else GROWTH
+        growth = _step_growth(self._model, system, state, self._scheme, h)
+        if growth > more and flange not in self._allowed:  # for most the question does not arise
+            own = _vehicle_growth(self._model, system, state)
+            self._allowed[flange] = max(0.0, own) + more
+        return growth <= self._allowed.get(flange, more)
 
 
 def _vehicle_growth(model: Model, system: System, state: Floats) -> float:

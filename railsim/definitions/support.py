@@ -144,7 +144,7 @@ PRESETS: dict[str, SupportValues | None] = {
 class Support(Definition):
     """Support of the rails: rails on pads and sleepers on ballast, moving with each wheelset."""
 
-    preset: Preset = "rigid"
+    preset: Preset = "ballasted"
     """Set of values that the other keys replace one by one: `rigid`, `ballasted` (without masses),
     `co-running` (the same with masses), `p2`, `slab`"""
     rail_mass: NonNegative | None = None

@@ -264,10 +264,11 @@ def support_rates(system, work, state, derivative):
 
 
 @jit_merged
-def settle_rates(system, work, state):
+def settle_rates(system, work, state, tolerance):
     """One Newton step for the rates of a massless track, with the forces just evaluated.
 
-    The slopes are those of `Work.support`, an estimate for the creep forces.
+    The slopes are those of `Work.support`, an estimate for the creep forces.  A wheelset whose
+    forces balance to `tolerance` [N, N m] is left alone: it does not depend on the others.
 
     Returns
     -------
@@ -278,8 +279,12 @@ def settle_rates(system, work, state):
         first = support_begin(system) + SUPPORT_SIZE * w
         imbalance(system, work, state, w)
         track = work.support_step[w]
+        own = 0.0
         for k in range(DOF):
-            worst = max(worst, abs(track[k]))
+            own = max(own, abs(track[k]))
+        worst = max(worst, own)
+        if own < tolerance:
+            continue
         solve_track(system.support, track, work.support[w], 0.0, 1.0, 0.0)
         for k in range(DOF):
             state[first + RATE + k] += track[k]

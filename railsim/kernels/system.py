@@ -345,7 +345,7 @@ class Work(NamedTuple):
     drive : float64[m, 2]       what drives each internal state, and its limit
     laws : float64[9 * LANES]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
-    contact_jacobian : float64[n, 8]  see `wheel_rail`
+    contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
     rail_motion : float64[w, 2, MOTION_SIZE]   the rails under each wheelset, see `rails`
     above : float64[10]         the wheelset at hand in the plane of its rails: y, z, roll, yaw,
@@ -359,6 +359,7 @@ class Work(NamedTuple):
                                 of each wheelset's track, see `support`; w = 0 on rigid rails
     compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
                                 [m/(N s)]
+    vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
     events : int64[w, 2]        of each wheelset: loaded patches so far, and how many of them were
                                 outside the range of the creep law
     swing : float64[w]          largest rate of the contact forces of each wheelset [N/s]
@@ -399,6 +400,7 @@ class Work(NamedTuple):
     support: np.ndarray
     support_step: np.ndarray
     compliance: np.ndarray
+    vibration: np.ndarray
     events: np.ndarray
     wheel: np.ndarray
     swing: np.ndarray

@@ -46,16 +46,8 @@ from railsim.kernels.system import (
     WHEELSET,
 )
 from railsim.kernels.track_frame import OMEGA_S
-from railsim.kernels.wheel_rail import (
-    J_ACROSS,
-    J_ACROSS_LEVER,
-    J_ALONG,
-    J_ALONG_LEVER,
-    J_ROLL,
-    J_Y,
-    J_YAW,
-    J_Z,
-)
+from railsim.kernels.vibration import high_pass, watch
+from railsim.kernels.wheel_rail import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
 
 FAST, RK4 = range(2)
 # Weight of the last acceleration in the smoothed one, by which speeds are extrapolated: high enough
@@ -154,28 +146,57 @@ def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
 
 
 @jit_inline
+def soften_across(jacobian, b, rate, before, v, mass, roll, h):
+    """Take what the contact takes from the speeds in y, z and roll linearly implicit.
+
+    `mass`, `roll`: inverse mass and moment of inertia.  The creep forces may be too fast to be
+    followed; the contact damping is not, but it holds or feeds vibrations of a sliding flange.
+    """
+    J = jacobian
+    t = J_SLIP
+    z = h * ((J[b, t] + J[b, t + 3]) * mass + J[b, t + 5] * roll)
+    f = implicitness(z) * h
+    g = 0.5 * h
+    i = J_NORMAL
+    a11 = 1.0 + mass * (f * J[b, t] + g * J[b, i])
+    a12 = mass * (f * J[b, t + 1] + g * J[b, i + 1])
+    a13 = mass * (f * J[b, t + 2] + g * J[b, i + 2])
+    a21 = mass * (f * J[b, t + 1] + g * J[b, i + 3])
+    a22 = 1.0 + mass * (f * J[b, t + 3] + g * J[b, i + 4])
+    a23 = mass * (f * J[b, t + 4] + g * J[b, i + 5])
+    a31 = roll * (f * J[b, t + 2] + g * J[b, i + 6])
+    a32 = roll * (f * J[b, t + 4] + g * J[b, i + 7])
+    a33 = 1.0 + roll * (f * J[b, t + 5] + g * J[b, i + 8])
+    d1 = rate[v + 1] - before[v + 1]
+    d2 = rate[v + 2] - before[v + 2]
+    d3 = rate[v + 3] - before[v + 3]
+    c11, c12, c13 = a22 * a33 - a23 * a32, a13 * a32 - a12 * a33, a12 * a23 - a13 * a22
+    inverse = 1.0 / (a11 * c11 + a21 * c12 + a31 * c13)
+    rate[v + 1] = before[v + 1] + inverse * (c11 * d1 + c12 * d2 + c13 * d3)
+    rate[v + 2] = before[v + 2] + inverse * (
+        (a23 * a31 - a21 * a33) * d1 + (a11 * a33 - a13 * a31) * d2 + (a13 * a21 - a11 * a23) * d3)
+    rate[v + 3] = before[v + 3] + inverse * (
+        (a21 * a32 - a22 * a31) * d1 + (a12 * a31 - a11 * a32) * d2 + (a11 * a22 - a12 * a21) * d3)
+
+
+@jit_inline
 def soften_contact(bodies, jacobian, b, rate, before, h):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
     The explicit acceleration a is evaluated with the extrapolated velocity; the acceleration a_n of
     the step solves a_n + theta h M^-1 D (a_n - b) = a, b as in `step_fast`, D an estimate of that
     damping (linearly implicit methods: Hairer and Wanner, Solving ODE II, IV.7): exact D gives the
-    trapezoidal rule, and an error of D counts with h^2.  D of rank one for each of: slip along the
-    track, of x and spin; slip across, of y and roll; yaw; contact damping in z, y, roll.
+    trapezoidal rule, and an error of D counts with h^2.  D of rank one for the slip along the
+    track, of x and spin; one matrix for y, z and roll; one number for yaw.
     """
     v = 6 * b
-    mass, roll = 1.0 / bodies.row[b, MASS], 1.0 / bodies.row[b, I_1]
-    along, across = jacobian[b, J_ALONG], jacobian[b, J_ACROSS]
+    mass = 1.0 / bodies.row[b, MASS]
+    along = jacobian[b, J_ALONG]
     if along > 0.0:
         soften_slip(rate, before, v, v + 4, jacobian[b, J_ALONG_LEVER] / along, along, mass,
                     1.0 / bodies.row[b, I_2], h)
-    if across > 0.0:
-        soften_slip(rate, before, v + 1, v + 3, -jacobian[b, J_ACROSS_LEVER] / across, across, mass,
-                    roll, h)
+    soften_across(jacobian, b, rate, before, v, mass, 1.0 / bodies.row[b, I_1], h)
     soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
-    soften(rate, before, v + 1, jacobian[b, J_Y], mass, h)
-    soften(rate, before, v + 2, jacobian[b, J_Z], mass, h)
-    soften(rate, before, v + 3, jacobian[b, J_ROLL], roll, h)
 
 
 @jit_inline
@@ -286,7 +307,7 @@ def balanced_mechanics(system, work, state, derivative):
     status, where, patches = mechanics(system, work, state, derivative)
     if system.support.elastic and system.support.massless:
         for _ in range(MOST_CORRECTIONS):
-            if status != RUNNING or settle_rates(system, work, state) < BALANCED:
+            if status != RUNNING or settle_rates(system, work, state, BALANCED) < BALANCED:
                 break
             status, where, patches = mechanics(system, work, state, derivative)
     return status, where, patches
@@ -370,6 +391,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
         constant_decays(system.internal, h / parts, work.decay_part)
     if system.support.elastic:
         step_compliance(system.support, h, work.compliance)
+    b0, a1, a2, fading = high_pass(h)
     rows = np.int64(0)
     step, end = first_step, first_step + n_steps
     left = np.int64(0)  # parts of a divided step that are still to be taken
@@ -390,6 +412,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, firs
                     rows += 1
                 if step == end:
                     return RUNNING, 0, n_steps, rows
+                watch(work.wheel, work.vibration, b0, a1, a2, fading, h, state[-2])
                 if scheme == FAST and fresh and step == first_step:
                     remember(system, work, state, derivative, h)
                 decay, length = work.decay, h

@@ -124,10 +124,11 @@ WHEEL_COLUMNS = 9
 
 # columns of Work.contact_jacobian[b], what the contact takes from the wheelset's speeds, for the
 # implicit part of the step: creep forces along the track [N s/m], the same times the lever c_z
-# [N s], across [N s/m], times c_z [N s], in yaw [N m s]; normal forces in y, z [N s/m] and roll
-# [N m s]
-J_ALONG, J_ALONG_LEVER, J_ACROSS, J_ACROSS_LEVER, J_YAW, J_Y, J_Z, J_ROLL = range(8)
-CONTACT_JACOBIAN = 8
+# [N s], in yaw [N m s]; then in y, z and roll [N s/m, N s, N m s] the upper half of the symmetric
+# matrix of the creep forces across, and row by row that of the normal forces with the friction that
+# follows them
+J_ALONG, J_ALONG_LEVER, J_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 9
+CONTACT_JACOBIAN = 18
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
@@ -213,7 +214,6 @@ def wheel_contact(system, work, w, side, speed, n):
     force, wheel, t = work.rail_force, work.wheel, work.look_up
     stiffness, approach, weights = work.stiffness, work.approach, work.weights
     b = contact.body[w]
-    jacobian = work.contact_jacobian
     sign = 2.0 * side - 1.0
     motion, coming, ahead = work.rail_motion, work.coming, work.watch[0]
     swing = 0.0
@@ -271,11 +271,6 @@ def wheel_contact(system, work, w, side, speed, n):
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
-        if vertical > 0.0:
-            damping = contact.damping * cos_2 * fade
-            jacobian[b, J_Z] += damping
-            jacobian[b, J_Y] += damping * t[k + G_Y] * t[k + G_Y]
-            jacobian[b, J_ROLL] += damping * t[k + G_ROLL] * t[k + G_ROLL]
         per_K, per_K2 = 0.4 * p * p * root, p * p * p / 3.0
         q_y = sign * (vertical * t[k + G_Y] - per_K * t[k + K_Y] - per_K2 * t[k + K2_Y])
         q_yaw = (vertical * t[k + G_W] - per_K * t[k + K_W] - per_K2 * t[k + K2_W]) * 2.0 * yaw
@@ -465,6 +460,38 @@ def add_slopes(support, w, side, patch, k, across):
 
 
 @jit_inline
+def add_damping(jacobian, b, patch, k, across):
+    """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
+
+    Across, -T_y t with the slope `across` of the creep law; along the normal, -(N n + T_y t) with
+    the contact damping, the creep force being nearly proportional to N.
+    """
+    s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
+    cy, cz = patch[C_Y, k], patch[C_Z, k]
+    arm = -c * cz - s * cy
+    lever = c * cy - s * cz
+    jacobian[b, J_SLIP] += across * c * c
+    jacobian[b, J_SLIP + 1] -= across * c * s
+    jacobian[b, J_SLIP + 2] += across * c * arm
+    jacobian[b, J_SLIP + 3] += across * s * s
+    jacobian[b, J_SLIP + 4] -= across * s * arm
+    jacobian[b, J_SLIP + 5] += across * arm * arm
+    damping = patch[NORMAL_DAMPING, k]
+    share = patch[T_Y, k] / patch[NORMAL, k]
+    f_y, f_z, f_roll = (damping * (s + share * c), damping * (c - share * s),
+                        damping * (lever + share * arm))
+    jacobian[b, J_NORMAL] += f_y * s
+    jacobian[b, J_NORMAL + 1] += f_y * c
+    jacobian[b, J_NORMAL + 2] += f_y * lever
+    jacobian[b, J_NORMAL + 3] += f_z * s
+    jacobian[b, J_NORMAL + 4] += f_z * c
+    jacobian[b, J_NORMAL + 5] += f_z * lever
+    jacobian[b, J_NORMAL + 6] += f_roll * s
+    jacobian[b, J_NORMAL + 7] += f_roll * c
+    jacobian[b, J_NORMAL + 8] += f_roll * lever
+
+
+@jit_inline
 def add_creep_forces(system, work, n, speed):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
@@ -499,22 +526,21 @@ def add_creep_forces(system, work, n, speed):
             wheel[w, side, W_XI_X] = scale * patch[XI_X, k]
             wheel[w, side, W_XI_Y] = scale * patch[XI_Y, k]
             wheel[w, side, W_PHI] = scale * patch[PHI, k]
+        along, across = 0.0, 0.0
         if patch[MU_N, k] > 0.0:
             along, across = creep_slopes(
                 patch[A, k] * patch[B, k], patch[C11, k], patch[C22, k], patch[C23, k],
                 contact.reduction * contact.shear_modulus, patch[MU_N, k], patch[XI_X, k],
                 patch[XI_Y, k], patch[PHI, k])
             along, across = along / speed, across / speed
-            if system.support.elastic:
-                add_slopes(work.support, w, side, patch, k, across)
-                # a rail that gives way is in series with the creep force
-                across /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
-            across *= c * c
-            work.contact_jacobian[b, J_ALONG] += along
-            work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
-            work.contact_jacobian[b, J_ACROSS] += across
-            work.contact_jacobian[b, J_ACROSS_LEVER] += across * cz
-            work.contact_jacobian[b, J_YAW] += along * cy * cy
+        if system.support.elastic:
+            add_slopes(work.support, w, side, patch, k, across)
+            # a rail that gives way is in series with the creep force
+            across /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
+        work.contact_jacobian[b, J_ALONG] += along
+        work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
+        work.contact_jacobian[b, J_YAW] += along * cy * cy
+        add_damping(work.contact_jacobian, b, patch, k, across)
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
     if system.support.elastic:

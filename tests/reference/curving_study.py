@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 NUMBERS = Path(__file__).parents[1] / "data" / "curving_study_r250.csv"
+RIGID = {"preset": "rigid"}  # the study's rails, as far as known
 COACHES = ("manchester", "flexicoil")
 MID_CURVE = 19.8  # s from the start of the track, where the study reads its values
 

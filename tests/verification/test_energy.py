@@ -76,6 +76,22 @@ def test_energy_is_constant_on_irregular_rails_when_the_coach_runs_free():
     assert abs(drift(model, state, 0.125e-3, duration=2.0)) < 5.0
 
 
+def test_energy_is_constant_on_undamped_elastic_rails():
+    """Rails, pads, sleepers and ballast with masses and without damping take part in it.
+
+    The rails ring at 700 to 1500 Hz, which RK4 damps with the fifth power of the step.
+    """
+    support = {"preset": "co-running", "pad_vertical": [150e6, 0.0], "pad_lateral": [30e6, 0.0],
+               "ballast_vertical": [140e6, 0.0], "ballast_lateral": [70e6, 0.0]}
+    vehicle = undamped(load_vehicle("coach_manchester"))
+    track = load_track("straight").replace(**FRICTIONLESS, support=support)
+    balance = steady(vehicle, track, FREE, 20.0)
+    model, state = balance.model, disturbed(balance.model, balance.state)
+    coarse, fine = (abs(drift(model, state, h, duration=0.25)) for h in (0.0625e-3, 0.03125e-3))
+    assert fine < 0.5
+    assert fine < coarse / 20.0
+
+
 def test_forces_are_gradients_of_the_energy(setting):
     """Power of all forces = rate of kinetic energy: dE/dt = 0 by central difference of E."""
     model, state = setting

@@ -1,0 +1,100 @@
+"""The vehicle in the tightest curve of its track, for judging the time step in flange contact.
+
+In a flange the contact is stiff laterally, and its damping and its friction couple the motions of a
+wheelset in another way than on the treads.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.definitions.layout import curvature_sections
+from railsim.definitions.track import Track
+from railsim.kernels.status import RUNNING
+from railsim.kernels.system import System
+from railsim.kernels.time_loop import FAST, time_loop
+from railsim.time_step import empty_recorder
+from railsim.track.alignment import Alignment
+from railsim.track.tables import track_tables
+
+Floats = NDArray[np.float64]
+
+WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
+STRAIGHT, TRANSITION_TIME, SETTLING_TIME = 20.0, 3.0, 3.0  # m, s, s
+# The state sought is one of rest and does not depend on the contact damping: with more of it, it is
+# reached also where the wheelset would vibrate.
+MORE_DAMPING = 4.0
+
+
+def tightest_curve(track: Track) -> tuple[float, float] | None:
+    """Curvature [1/m] and cant [m] in the tightest curve; None where all are wide."""
+    sections = curvature_sections(track)
+    ends = [
+        (abs(value), value, place)
+        for section in sections
+        for value, place in ((section.start_value, section.begin), (section.end_value, section.end))
+    ]
+    size, curvature, place = max(ends)
+    if size < 1.0 / WIDEST:
+        return None
+    for section in sections:
+        if section.start_value == section.end_value == curvature:
+            place = 0.5 * (section.begin + section.end)
+            break
+    return curvature, float(Alignment(track).cant(place))
+
+
+def in_flange_contact(
+    model: Model, track: Track, rolling: Floats, step: float
+) -> tuple[System, Floats] | None:
+    """System on a curve as tight as the tightest one of the track, and the settled vehicle there.
+
+    Parameters
+    ----------
+    rolling : float64[n_state]
+        Steady rolling on straight track at the speed in question.
+    step : float
+        Step of the fast scheme, stable on straight track [s].
+
+    Returns
+    -------
+    tuple or None
+        None where all curves are wide, or the vehicle does not stay on the track at this speed.
+    """
+    curve = tightest_curve(track)
+    if curve is None:
+        return None
+    system = model.system
+    speed = float(rolling[-1])
+    rail = system.track.rail
+    auxiliary = track.replace(
+        plan=[
+            {"type": "STR", "length": STRAIGHT},
+            {"type": "CLO", "length": speed * TRANSITION_TIME, "radius_end": 1.0 / curve[0]},
+            {"type": "CIR", "length": speed * SETTLING_TIME, "radius": 1.0 / curve[0]},
+        ],
+        cant=[
+            {"type": "CST", "length": STRAIGHT, "cant": 0.0},
+            {"type": "LIR", "length": speed * TRANSITION_TIME},
+            {"type": "CST", "length": speed * SETTLING_TIME, "cant": curve[1]},
+        ],
+        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
+        friction=tuple(float(np.max(rail[:, row, 0])) for row in (4, 5)),
+    )
+    smooth = system._replace(
+        track=track_tables(auxiliary), drive=CONSTANT_SPEED,
+        support=system.support._replace(variation=system.support.variation[:0]),
+        loads=system.loads._replace(body=system.loads.body[:0]),
+    )
+    contact = smooth.contact
+    damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))
+    state = rolling.copy()
+    short = 0.5 * step
+    steps = math.floor(auxiliary.length / speed / short)
+    status, *_ = time_loop(
+        damped, work_arrays(damped), state, np.zeros_like(state), np.zeros((3, len(state))),
+        empty_recorder(model, 1), FAST, short, 1, steps, steps + 2, 1, 0,
+    )
+    return (smooth, state) if status == RUNNING else None

@@ -1,0 +1,55 @@
+"""Vibrations of the wheel loads above 40 Hz: how much, how fast, where.
+
+Each wheel load passes a Butterworth high-pass filter of order two at 40 Hz (bilinear transform,
+Oppenheim and Schafer, Discrete-Time Signal Processing, 7.2); its mean square and that of its
+differences fade with a time constant of 0.1 s, so that a single blow counts little.  Of a harmonic
+vibration of the angular frequency w they are A^2/2 and A^2 (1 - cos w h).
+"""
+
+from math import acos, exp, pi, sqrt, tan
+
+from railsim.kernels import jit, jit_merged
+
+CUT_OFF = 40.0  # Hz
+MEMORY = 0.1  # s
+
+# columns of Work.vibration[w, side]: 1 once begun, memory of the filter, last value, mean squares
+# of value and difference; then of the largest vibration so far its amplitude [N], where it was [m]
+# and its frequency [Hz]
+BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, PLACE, FREQUENCY = range(9)
+VIBRATION = 9
+
+
+@jit
+def high_pass(h):
+    """Coefficients of the filter at the step `h` [s]: b0 = -b1/2 = b2, a1, a2; fading in a step."""
+    k = tan(pi * min(CUT_OFF * h, 0.4))
+    scale = 1.0 / (1.0 + sqrt(2.0) * k + k * k)
+    return (scale, 2.0 * (k * k - 1.0) * scale, (1.0 - sqrt(2.0) * k + k * k) * scale,
+            exp(-h / MEMORY))
+
+
+@jit_merged
+def watch(wheel, vibration, b0, a1, a2, fading, h, s):
+    """Take up the wheel loads of a step of length `h` that begins at arc length `s`."""
+    for w in range(wheel.shape[0]):
+        for side in range(2):
+            load = wheel[w, side, 0]
+            if vibration[w, side, BEGUN] == 0.0:  # as after a long time at this load
+                vibration[w, side, BEGUN] = 1.0
+                vibration[w, side, Z_1] = -b0 * load
+                vibration[w, side, Z_2] = b0 * load
+            value = b0 * load + vibration[w, side, Z_1]
+            vibration[w, side, Z_1] = vibration[w, side, Z_2] - 2.0 * b0 * load - a1 * value
+            vibration[w, side, Z_2] = b0 * load - a2 * value
+            change = value - vibration[w, side, LAST]
+            vibration[w, side, LAST] = value
+            square = value * value + fading * (vibration[w, side, SQUARE] - value * value)
+            changes = change * change + fading * (vibration[w, side, CHANGE] - change * change)
+            vibration[w, side, SQUARE] = square
+            vibration[w, side, CHANGE] = changes
+            if 2.0 * square > vibration[w, side, AMPLITUDE] * vibration[w, side, AMPLITUDE]:
+                vibration[w, side, AMPLITUDE] = sqrt(2.0 * square)
+                vibration[w, side, PLACE] = s
+                cosine = max(-1.0, 1.0 - 0.5 * changes / square)
+                vibration[w, side, FREQUENCY] = acos(cosine) / (2.0 * pi * h)

@@ -1,0 +1,38 @@
+"""Curves on elastic rails do not depend on how they are computed: twenty cases out of the grid.
+
+All 280 are run by ``python docs/generate_robustness.py grid``.
+"""
+
+import pytest
+from robustness import CASES, peaks, run, ways
+
+# every thirteenth case: both coaches, all radii, frictions and cant deficiencies
+CHOSEN = CASES[2:260:13]
+REFERRED = CHOSEN[::5]  # compared with the reference scheme as well
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CHOSEN, ids=lambda case: "-".join(map(str, case)))
+def test_step_and_contact_damping_move_no_peak(case):
+    differences, _ = ways(case)
+    assert max(differences) < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", REFERRED, ids=lambda case: "-".join(map(str, case)))
+def test_the_reference_scheme_moves_no_peak(case):
+    differences, _ = ways(case, reference=True)
+    assert max(differences) < 1.0
+
+
+@pytest.mark.parametrize(("radius", "friction", "dQ", "quotient"), [
+    (150.0, 0.50, 0.395, 0.561), (100.0, 0.60, 0.443, 0.691),
+])
+@pytest.mark.parametrize("damping", [1e5, 4e5])
+def test_peaks_of_an_independent_computation(radius, friction, dQ, quotient, damping):
+    """The same coach on the same support by another program: 1 % of Q0, 0.005 in Y/Q."""
+    result = run(("coach_manchester", radius, friction, 0.10), {"preset": "co-running"},
+                 contact_damping=damping)
+    found = peaks(result)
+    assert result.dQ_over_Q0.max() == pytest.approx(dQ, abs=0.01)
+    assert found[3] == pytest.approx(quotient, abs=0.005)
