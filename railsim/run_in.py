@@ -6,6 +6,8 @@ the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
 - into a curve over an auxiliary track, which begins straight, takes up curvature and cant of the
   place over a transition, and keeps them until the vehicle has settled; the state at its end,
   relative to the track frames, is the state at the place;
+- into a transition, a ramp or a vertical curve over the real track, from the last place before it
+  where nothing changes under the vehicle: there it stands on a twist that it came over;
 - onto irregular rails over the last seconds of the real track before the start.
 """
 
@@ -44,6 +46,8 @@ STRAIGHT = 20.0  # m
 TRANSITION_TIME, SETTLING_TIME = 4.0, 6.0  # s; several periods of the car body
 NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that need no run-in
 APPROACH_TIME, APPROACH = 4.0, 30.0  # s and m at least of irregular rails before the start
+LONGEST_APPROACH_TIME, LONGEST_APPROACH = 30.0, 500.0  # s and m at least of changing alignment
+UNCHANGING = 1e-9  # change of curvature (1/m2), cant and grade angle (1/m) below which it is none
 SMOOTH = 10.0  # m before the track's beginning where the approach may begin, beside the vehicle
 
 
@@ -72,7 +76,7 @@ def start_state(
         The vehicle is longer than the track's table.
     """
     speed = float(balance.state[-1])
-    steps = _approach(model, start, speed, step)
+    steps = _approach(model, track, start, speed, step)
     place = start - steps * speed * step
     state = settled(model, balance, track, place, step)
     if state is None:
@@ -85,7 +89,7 @@ def start_state(
             drive=CONSTANT_SPEED, loads=model.system.loads._replace(
                 body=model.system.loads.body[:0]),
         )
-        _run(model, system, state, step, steps, scheme, start, "irregular rails")
+        _run(model, system, state, step, steps, scheme, start, "on its way there")
     state[-3:] = 0.0, start, speed
     return state
 
@@ -99,18 +103,43 @@ def _friction(track: Track, place: float) -> tuple[float, float]:
     return left, right
 
 
-def _approach(model: Model, start: float, speed: float, step: float) -> int:
-    """Steps to drive on irregular rails before the start, 0 on smooth ones."""
+def _approach(model: Model, track: Track, start: float, speed: float, step: float) -> int:
+    """Steps to drive on the real track before the start.
+
+    Irregular rails under the wheelsets need their time.  A transition, a ramp or a vertical curve
+    is entered as the run does that comes along: from the last place before it where curvature, cant
+    and gradient under the whole vehicle are constant.
+    """
     system = model.system
-    if not system.track.has_irregularity:
-        return 0
+    room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH
+    way = _way_from_constant(Alignment(track), start, system.frame_offset, room, speed)
+    if _displaced(model, start):
+        way = max(way, APPROACH_TIME * speed, APPROACH)
+    return max(0, math.floor(min(way, room) / (speed * step)))
+
+
+def _displaced(model: Model, start: float) -> bool:
+    """Whether an irregularity moves the rails under the wheelsets."""
     work = _located(model, start)
-    resting = np.abs(work.plane[:, [MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, SINE, ROLL_SLOPE]])
-    if not resting.any() and not work.rail[:, :, ASIDE : ASIDE_SLOPE + 1].any():
-        return 0
-    behind = -float(np.min(system.frame_offset))
-    room = start - system.track.s_start - behind - SMOOTH
-    return max(0, math.floor(min(max(APPROACH_TIME * speed, APPROACH), room) / (speed * step)))
+    moved = [MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, SINE, ROLL_SLOPE]
+    return bool(work.plane[:, moved].any() or work.rail[:, :, ASIDE : ASIDE_SLOPE + 1].any())
+
+
+def _way_from_constant(
+    alignment: Alignment, start: float, offsets: Floats, room: float, speed: float
+) -> float:
+    """Way to the start from where the track under the vehicle does not change [m].
+
+    0 where it is such a place; where there is none, as far as one goes back at most.
+    """
+    farthest = min(max(LONGEST_APPROACH_TIME * speed, LONGEST_APPROACH), room)
+    ways = np.arange(0.0, max(farthest, 0.0) + 0.5, 0.5)
+    under = np.arange(float(np.min(offsets)), float(np.max(offsets)) + 0.5, 0.5)
+    s = start - ways[:, None] + under
+    changes = [alignment.curvature_rate(s), alignment.cant_angle_rate(s),
+               alignment.grade_angle_rate(s)]
+    constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
+    return float(ways[int(np.argmax(constant))] if constant.any() else farthest)
 
 
 def _located(model: Model, place: float) -> Work:

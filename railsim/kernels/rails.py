@@ -34,9 +34,9 @@ from railsim.kernels.track_frame import (
 CANT_BASE = 1.5  # m, 2 b_0
 
 # columns of Work.plane[w]: middle of the rails, their slopes; roll of the plane, its sine, cosine
-# and rate along the track
-MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, ROLL, SINE, COSINE, ROLL_SLOPE = range(8)
-PLANE_SIZE = 8
+# and rate along the track; change of the vertical slope along the track
+MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, ROLL, SINE, COSINE, ROLL_SLOPE, BEND_Z = range(9)
+PLANE_SIZE = 16  # whole cache lines
 
 # columns of Work.rail[w, side]: friction; distance of the rail to the right of its nominal place in
 # the plane, its slope; slope of the rail in the frame's lateral direction, and that slope's change
@@ -83,12 +83,12 @@ def locate_displaced(c, i, u, w, plane, rail):
     """Plane and rails of wheelset `w` from the displacements in cell `i` of the tables `c`."""
     y_l, y_l1, y_l2 = polynomial(c[i, Y_LEFT, 0], c[i, Y_LEFT, 1], c[i, Y_LEFT, 2],
                                  c[i, Y_LEFT, 3], u)
-    z_l, z_l1, _ = polynomial(c[i, Z_LEFT, 0], c[i, Z_LEFT, 1], c[i, Z_LEFT, 2],
-                              c[i, Z_LEFT, 3], u)
+    z_l, z_l1, z_l2 = polynomial(c[i, Z_LEFT, 0], c[i, Z_LEFT, 1], c[i, Z_LEFT, 2],
+                                 c[i, Z_LEFT, 3], u)
     y_r, y_r1, y_r2 = polynomial(c[i, Y_RIGHT, 0], c[i, Y_RIGHT, 1], c[i, Y_RIGHT, 2],
                                  c[i, Y_RIGHT, 3], u)
-    z_r, z_r1, _ = polynomial(c[i, Z_RIGHT, 0], c[i, Z_RIGHT, 1], c[i, Z_RIGHT, 2],
-                              c[i, Z_RIGHT, 3], u)
+    z_r, z_r1, z_r2 = polynomial(c[i, Z_RIGHT, 0], c[i, Z_RIGHT, 1], c[i, Z_RIGHT, 2],
+                                 c[i, Z_RIGHT, 3], u)
     sine = (z_r - z_l) / CANT_BASE
     cosine = sqrt(1.0 - sine * sine)
     plane[w, MIDDLE_Y] = 0.5 * (y_l + y_r)
@@ -98,6 +98,7 @@ def locate_displaced(c, i, u, w, plane, rail):
     plane[w, ROLL] = asin(sine)
     plane[w, SINE] = sine
     plane[w, COSINE] = cosine
+    plane[w, BEND_Z] = 0.5 * (z_l2 + z_r2)
     plane[w, ROLL_SLOPE] = (z_r1 - z_l1) / (CANT_BASE * cosine)
     wider, widening = 0.5 * (y_r - y_l), 0.5 * (y_r1 - y_l1)
     rail[w, 0, ASIDE], rail[w, 0, ASIDE_SLOPE] = -wider, -widening

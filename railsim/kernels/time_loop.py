@@ -45,6 +45,7 @@ from railsim.kernels.system import (
     TABLE,
     WHEELSET,
 )
+from railsim.kernels.track_frame import OMEGA_S
 from railsim.kernels.wheel_rail import (
     J_ACROSS,
     J_ACROSS_LEVER,
@@ -211,6 +212,7 @@ def step_fast(system, work, state, derivative, decay, h):
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
     rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
+    frames, half = work.frames, 0.5 * h * state[-1] * state[-1]
     if system.support.elastic:
         note_wheelsets(system, work, state)
     last = state[-4] if state[-4] > 0.0 else h
@@ -225,6 +227,12 @@ def step_fast(system, work, state, derivative, decay, h):
         d2 = (h + shift) * rate[q + 4] - (0.5 * h + shift) * before[q + 4]
         d3 = (h + shift) * rate[q + 5] - (0.5 * h + shift) * before[q + 5]
         if kind != AXLEBOX:
+            # the angles are those against the frame, whose own turn changes over the step
+            f = bodies.frame[b]
+            e1, e2, e3 = frames[f, OMEGA_S], frames[f, OMEGA_S + 1], frames[f, OMEGA_S + 2]
+            d1 -= half * (C[b, 0] * e1 + C[b, 3] * e2 + C[b, 6] * e3)
+            d2 -= half * (C[b, 1] * e1 + C[b, 4] * e2 + C[b, 7] * e3)
+            d3 -= half * (C[b, 2] * e1 + C[b, 5] * e2 + C[b, 8] * e3)
             d1, d2, d3 = euler_rates(C[b, SIN_ROLL], C[b, COS_ROLL], C[b, SIN_PITCH],
                                      C[b, COS_PITCH], d1, d2, d3)
         for k in range(3):

@@ -52,6 +52,7 @@ from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
+    BEND_Z,
     COMING_ROLL,
     COMING_Y,
     COMING_Z,
@@ -162,11 +163,15 @@ def normal_contact(system, work, speed, state):
         turn = speed * plane[w, ROLL_SLOPE]
         y_rate, z_rate = (cosine * y_rate + sine * z_rate + turn * z,
                           cosine * z_rate - sine * y_rate - turn * y)
-        above[0], above[1] = y, z - height
-        above[2], above[3] = state[6 * b + 3] - plane[w, ROLL], state[6 * b + 5]
-        above[4], above[5] = y_rate, z_rate
         # rates of the Euler angles were left here by the kinematics
-        above[6], above[7] = work.acceleration[b, 3] - turn, work.acceleration[b, 5]
+        yaw, yaw_rate = state[6 * b + 5], work.acceleration[b, 5]
+        # a yawed axle on sloping rails is rolled against their plane
+        slope, bend = plane[w, SLOPE_Z], plane[w, BEND_Z]
+        above[0], above[1] = y, z - height
+        above[2], above[3] = state[6 * b + 3] - plane[w, ROLL] + slope * yaw, yaw
+        above[4], above[5] = y_rate, z_rate
+        above[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
+        above[7] = yaw_rate
         work.swing[w] = 0.0
         if ahead > 0.0 and system.track.has_irregularity:
             own = smoothed + 6 * b
@@ -181,9 +186,10 @@ def normal_contact(system, work, speed, state):
         f_y, f_z = force[b, 1], force[b, 2]
         along = plane[w, ROLL_SLOPE] * (f_y * z - f_z * y - force[b, 3])
         f_y, f_z = cosine * f_y - sine * f_z, sine * f_y + cosine * f_z
-        force[b, 0] += along - f_y * plane[w, SLOPE_Y] - f_z * plane[w, SLOPE_Z]
+        force[b, 0] += along - f_y * plane[w, SLOPE_Y] - f_z * slope - force[b, 3] * bend * yaw
         force[b, 1] = f_y
         force[b, 2] = f_z
+        force[b, 5] += slope * force[b, 3]
     return RUNNING, 0, n
 
 
@@ -361,11 +367,12 @@ def creepages(system, work, n, speed, state):
         slope = work.rail[w, side, RAIL_SLOPE]
         cx = patch[FOOT_X, k] - slope * cy
         roll_slope = plane[w, ROLL_SLOPE]
-        more = (w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z]))
-        turn_y = slope + more
         turn_z = (w1 * (y + cy) - w2 * (x + cx) + plane[w, SLOPE_Z]
                   + roll_slope * (y + cy - plane[w, MIDDLE_Y]))
-        cx -= (patch[LEAD, k] + cy) * more + turn_z * cz
+        cx -= turn_z * cz
+        more = w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z])
+        turn_y = slope + more
+        cx -= (patch[LEAD, k] + cy) * more
         # velocity of the wheel's material against that of the rail, along the rail and across it
         rail_y, rail_z = (work.rail_motion[w, side, MOTION_Y_RATE],
                           work.rail_motion[w, side, MOTION_Z_RATE])

@@ -167,7 +167,7 @@ def _contact_energy(system, work, state):
     out, weights = np.zeros(LOOK_UP_SIZE), np.zeros(N_WEIGHT)
     for w, b in enumerate(contact.body):
         for side, sign in ((0, -1.0), (1, 1.0)):
-            y, z, roll, _, yaw = state[6 * b + 1 : 6 * b + 6]
+            y, z, roll, yaw = _over_rail(system, state, b, side)
             table = contact.table[w, side]
             _, iy, ir, iw, ty, tr, tw = locate(contact, table, sign * y, sign * roll, yaw**2)
             cell_weights(contact, ty, tr, weights)
@@ -177,6 +177,25 @@ def _contact_energy(system, work, state):
                 p[patch], K[patch] = z - out[0], out[1]
             total += _patch_energy(p, K, contact.coupling[table])
     return total
+
+
+def _over_rail(system, state, b, side):
+    """Lateral place, height, roll and yaw of a wheelset over one of its rails."""
+    track = system.track
+    s = state[-2] + system.frame_offset[system.bodies.frame[b]] - track.s_start
+    cell = int(s / track.ds)
+    powers = (s - cell * track.ds) ** np.arange(4)
+    y_l, z_l, y_r, z_r = track.rail[cell, :4] @ powers
+    slopes = track.rail[cell, :4, 1:] @ (np.arange(1, 4) * powers[:3])
+    y, z, roll, _, yaw = state[6 * b + 1 : 6 * b + 6]
+    tilt = np.arcsin((z_r - z_l) / 1.5)
+    height = system.bodies.nominal[b, 1]
+    middle = np.array([0.5 * (y_l + y_r), 0.5 * (z_l + z_r)])
+    turn = np.array([[np.cos(tilt), np.sin(tilt)], [-np.sin(tilt), np.cos(tilt)]])
+    y, z = turn @ ([y, z + height] - middle)
+    aside = 0.5 * (y_r - y_l) * (2 * side - 1)
+    roll += 0.5 * (slopes[1] + slopes[3]) * yaw - tilt
+    return y - aside, z - height, roll, yaw - slopes[2 * side]
 
 
 def _patch_energy(p, K, kappa):

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from dynamics import Settings, advance, energy, load_track, load_vehicle, steady, undamped
 
+from railsim.run_in import follow_rails
+
 FRICTIONLESS = {"friction": (0.0, 0.0)}
 FREE = Settings(contact_damping=0.0, drive={"mode": "free"})
 
@@ -58,6 +60,19 @@ def test_energy_is_constant_through_a_curve_when_the_coach_runs_free():
     model = balance.model
     state = disturbed(model, balance.state)
     state[-2] = 285.0
+    assert abs(drift(model, state, 0.125e-3, duration=2.0)) < 5.0
+
+
+def test_energy_is_constant_on_irregular_rails_when_the_coach_runs_free():
+    """All four displacements of the rails do work through the force along the track alone."""
+    vehicle = undamped(load_vehicle("coach_manchester"))
+    rough = {"type": "random", "spectrum": "erri_b176_high", "seed": 3, "fade": 0.0}
+    track = load_track("curve_r250").replace(**FRICTIONLESS, irregularities=[rough])
+    balance = steady(vehicle, track, FREE, 20.0)
+    model = balance.model
+    state = disturbed(model, balance.state)
+    state[-2] = 285.0
+    follow_rails(model, state)
     assert abs(drift(model, state, 0.125e-3, duration=2.0)) < 5.0
 
 

@@ -101,6 +101,22 @@ def test_start_anywhere(start):
     assert np.max(np.abs(result.Q / result.Q[0] - 1.0)) < 0.02
 
 
+@pytest.mark.parametrize("start", [330.0, 355.0, 425.0])
+def test_start_on_a_transition_is_the_state_on_the_way(start):
+    """In the transitions of R 250 m the vehicle stands on the twist that it came over.
+
+    0.5 kN: the run from the beginning of the track has other steps to the place.
+    """
+    coach, track = load_vehicle("coach_manchester"), load_track("curve_r250")
+    here = simulate(coach, track, speed=20.0, start=start, duration=0.5)
+    way = simulate(coach, track, speed=20.0, until=start + 10.0)
+    row = int(np.argmin(np.abs(way.distance - start)))
+    rows = slice(row, row + len(here.time))
+    assert way.distance[row] == pytest.approx(start, abs=1e-6)
+    assert np.max(np.abs(here.Q - way.Q[rows])) < 500.0
+    assert np.max(np.abs(here.Y - way.Y[rows])) < 500.0
+
+
 @pytest.mark.parametrize("start", [0.0, 100.0])
 def test_start_on_irregular_rails_makes_no_shock(straight, start):
     """The vehicle comes over the irregular rails before: loads change no more than on the way.

@@ -18,8 +18,8 @@ from railsim.track.irregularity import displacement
 from railsim.track.tables import track_tables
 
 BEGIN, WAVES, AFTER = 40.0, 4, 60.0  # m, -, m
-PIECE = 0.25  # m, length of an element
-ROUNDING = 0.25  # m
+PIECE = 0.1  # m, length of an element
+ROUNDING = 0.2  # m
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _lateral(waved, smooth, wave):
 
 def _stations(wave):
     """Where the displacements of the rails are given; they go on beyond the vehicle's way."""
-    return np.arange(BEGIN - 10.0, wave.end + AFTER + 50.0, 0.125)
+    return np.arange(BEGIN - 10.0, wave.end + AFTER + 50.0, 0.05)
 
 
 def level(wave, curvature=0.0):
