@@ -36,25 +36,35 @@ def assert_same(coach, tracks, length, settings=EXACT, **more):
 
 
 @pytest.mark.parametrize(("length", "height"), LATERAL)
-@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0)])
-def test_alignment_is_a_wave_of_the_plan(coach, length, height, curvature, cant):
-    assert_same(coach, alignment(Wave(length, height), curvature, cant), length)
+def test_alignment_is_a_wave_of_the_plan(coach, length, height):
+    assert_same(coach, alignment(Wave(length, height)), length)
+
+
+@pytest.mark.parametrize(("length", "height"), LATERAL)
+def test_alignment_is_a_wave_of_the_plan_in_a_curve(coach, length, height):
+    """In free running: a constant speed along one line is none along the other."""
+    assert_same(coach, alignment(Wave(length, height), R300, 0.10), length, FREE)
 
 
 @pytest.mark.parametrize(("length", "height"), HEIGHT)
-@pytest.mark.parametrize("curvature", [0.0])
+@pytest.mark.parametrize("curvature", [0.0, R300])
 def test_longitudinal_level_is_a_wave_of_the_gradient(coach, length, height, curvature):
     assert_same(coach, level(Wave(length, height), curvature), length, FREE)
 
 
 @pytest.mark.parametrize(("length", "height"), HEIGHT)
-@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0)])
+@pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0), (R300, 0.10)])
 def test_cross_level_is_a_wave_of_the_cant(coach, length, height, curvature, cant):
     assert_same(coach, cross_level(Wave(length, height), curvature, cant), length)
 
 
 def test_widening_of_one_rail_is_a_wider_track_beside_its_place(coach):
     assert_same(coach, widening(0.005), 5.0)
+
+
+@pytest.mark.parametrize("write", [alignment, cross_level])
+def test_chosen_step_and_scheme_find_the_same_too(coach, write):
+    assert_same(coach, write(Wave(20.0, 0.004)), 20.0, Settings())
 
 
 def test_gauge_widening_gives_little_lateral_force(coach):
