@@ -51,14 +51,15 @@ def with_load(assignments: Sequence[str], load: str | None, prefix: str = "") ->
 
 def print_json(data: Any) -> None:
     """Print data as JSON; numbers that JSON lacks become null."""
-    click.echo(json.dumps(_plain(data), indent=2, allow_nan=False))
+    click.echo(json.dumps(plain(data), indent=2, allow_nan=False))
 
 
-def _plain(data: Any) -> Any:
+def plain(data: Any) -> Any:
+    """Return data with numbers that JSON lacks as None."""
     if isinstance(data, dict):
-        return {str(key): _plain(value) for key, value in data.items()}
+        return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
-        return [_plain(value) for value in data]
+        return [plain(value) for value in data]
     if isinstance(data, float):
         return data if abs(data) < float("inf") else None
     return data

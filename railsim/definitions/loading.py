@@ -16,6 +16,12 @@ from railsim.definitions.base import FileDefinition, Remark
 from railsim.definitions.faults import validation_faults
 from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
+from railsim.definitions.limits import (
+    COMFORT_LIMITS_FORMAT,
+    LIMITS_FORMAT,
+    ComfortLimits,
+    RunningLimits,
+)
 from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
@@ -94,6 +100,8 @@ FORMATS: dict[str, Format] = {
         faults=mechanism_faults,
         remarks=mechanism_remarks,
     ),
+    LIMITS_FORMAT: Format("limits", RunningLimits),
+    COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
 }
 
 
@@ -167,6 +175,16 @@ def _find_reference(source: Source) -> None:
         beside = Path(source.file_of(("optimise", "reference"))).parent / name
         if beside.is_file():
             optimise["reference"] = str(beside.resolve())
+
+
+def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> RunningLimits:
+    """Load the limits of running tests, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(RunningLimits, _file_source(path, "limits"), overrides)
+
+
+def load_comfort_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> ComfortLimits:
+    """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(ComfortLimits, _file_source(path, "limits"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -87,8 +87,25 @@ class Drive(Definition):
         return self
 
 
+class LowPass(Definition):
+    """Filter between the time loop and the result, so that slow sampling folds nothing back."""
+
+    frequency: Positive
+    """End of the pass band (`zero`), -3 dB (`causal`) [Hz]"""
+    phase: Literal["zero", "causal"] = "zero"
+    """`zero`: without phase, flat to `frequency` and nothing above `output_rate` - `frequency`;
+    `causal`: Butterworth of order 4, as a measuring amplifier"""
+
+
 class Outputs(Definition):
-    """What a run puts out beyond the usual quantities."""
+    """What a run puts out."""
+
+    quantities: tuple[Text, ...] = ()
+    """Names of the quantities to keep, `*` standing for any letters; by default all"""
+    low_pass: LowPass | None = None
+    """Low pass of all quantities before they are stored at `output_rate`"""
+    sensors: Flag = False
+    """Readings of accelerometers on the floor, the bogie frames and the vehicle's own points"""
 
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""

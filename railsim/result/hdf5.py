@@ -268,6 +268,13 @@ class StoredArrays(FrozenArrays):
                 self._loaded[name] = frozen(file[name][()])
         return self._loaded[name]
 
+    def part(self, name: str, rows: slice) -> Array:
+        """Return some rows of an array; only these are read."""
+        if name in self._loaded:
+            return self._loaded[name][rows]
+        with h5py.File(self._path, "r") as file:
+            return frozen(file[name][rows])
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 
