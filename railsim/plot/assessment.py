@@ -67,7 +67,7 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
             colour = DISTINCT[number % len(DISTINCT)]
             mean.plot(x, [p.mean.N_MV for p in ordered], "o-", color=colour, label=run)
             for way, line in (("lateral", "-"), ("vertical", "--")):
-                values = [p.sperling[way] for p in ordered]  # type: ignore[index]
+                values = [p.sperling[way] for p in ordered]
                 index.plot(x, values, "o", ls=line, color=colour)
             number += 1
     mean.set(xlabel="along the car, forwards (m)", ylabel="mean comfort $N_{MV}$")
