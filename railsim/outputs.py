@@ -188,7 +188,8 @@ class OutputPlan:
             raise InputError(faults)
         return tuple(
             q for q in every
-            if q.name in NEEDED or q.name not in QUANTITIES or any(fnmatchcase(q.name, pattern) for pattern in patterns)
+            if q.name in NEEDED or q.name not in QUANTITIES
+            or any(fnmatchcase(q.name, pattern) for pattern in patterns)
         )
 
     def _known(self) -> tuple[Quantity, ...]:

@@ -85,7 +85,7 @@ def command(
         check_folder(folder, FILES, overwrite=overwrite)
     service = _service(results, admissible_speed, cant_deficiency, category)
     assessments = assess(results, standard, service=service, **how)
-    written = _write(folder, assessments) if folder else []
+    written = write_assessments(folder, assessments) if folder else []
     if as_json:
         print_json([assessment.record() for assessment in assessments])
     else:
@@ -155,7 +155,8 @@ def _service(
         ]) from None  # fmt: skip
 
 
-def _write(folder: Path, assessments: "Sequence[Assessment]") -> list[Path]:
+def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list[Path]:
+    """Write the record, the table and the picture; return their paths."""
     import json
 
     from railsim.cli.common import plain

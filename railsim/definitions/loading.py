@@ -26,6 +26,7 @@ from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
 from railsim.definitions.overrides import apply_overrides
+from railsim.definitions.scenario import SCENARIO_FORMAT, Scenario
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
 from railsim.definitions.spring import (
@@ -101,6 +102,7 @@ FORMATS: dict[str, Format] = {
         remarks=mechanism_remarks,
     ),
     LIMITS_FORMAT: Format("limits", RunningLimits),
+    SCENARIO_FORMAT: Format("scenario", Scenario),
     COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
 }
 
@@ -175,6 +177,11 @@ def _find_reference(source: Source) -> None:
         beside = Path(source.file_of(("optimise", "reference"))).parent / name
         if beside.is_file():
             optimise["reference"] = str(beside.resolve())
+
+
+def load_scenario(path: str | Path, overrides: Iterable[str] | str = ()) -> Scenario:
+    """Load a scenario, or a shipped one by its name; as `load_vehicle`."""
+    return _loaded(Scenario, _file_source(path, "scenario"), overrides)
 
 
 def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> RunningLimits:
