@@ -27,7 +27,7 @@ def write_movie(
     scene: Scene,
     path: str | Path,
     *,
-    frames_per_second: float = 20.0,
+    frames_per_second: int = 20,
     gain: float = 1.0,
     overwrite: bool = False,
 ) -> Path:
@@ -39,7 +39,7 @@ def write_movie(
         One picture for each of its frames.
     path : str or Path
         ``.gif`` or ``.mp4``.
-    frames_per_second : float
+    frames_per_second : int
         Pictures a second when it is played.
     gain : float
         Factor on the motion of the bodies against their nominal places.

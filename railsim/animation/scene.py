@@ -265,7 +265,7 @@ def _sections(result: Result, flat: FlatVehicle) -> tuple[Mapping[str, Array], .
 
 def _thinned(values: Array, points: int = 150) -> Array:
     rows = np.unique(np.linspace(0, len(values) - 1, min(points, len(values))).astype(int))
-    return np.asarray(values)[rows]
+    return np.asarray(values[rows], dtype=np.float64)
 
 
 def chosen_mode(modes: Sequence[Mapping[str, Any]], wanted: str | None) -> Mapping[str, Any]:

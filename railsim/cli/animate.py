@@ -23,7 +23,7 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
     "--between", nargs=2, type=float, metavar="S1 S2", help="Part of the run, distance in m."
 )
 @click.option("--frames", type=click.IntRange(2, 20_000), metavar="N", help="Frames at most.")
-@click.option("--fps", type=click.FloatRange(1.0, 100.0), default=20.0, show_default=True,
+@click.option("--fps", type=click.IntRange(1, 100), default=20, show_default=True,
               help="Frames a second of a film.")  # fmt: skip
 @click.option("--gain", type=click.FloatRange(0.0, 1000.0), default=1.0, show_default=True,
               help="Factor on the motion of the bodies in a film.")  # fmt: skip
@@ -31,7 +31,7 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 @json_option
 @quiet_option
 def command(
-    file: str, out: str | None, fps: float, gain: float, overwrite: bool, as_json: bool,
+    file: str, out: str | None, fps: int, gain: float, overwrite: bool, as_json: bool,
     quiet: bool, **how: Any,
 ) -> None:
     """Write a run, or a mode, as one page that plays, or as a film.
