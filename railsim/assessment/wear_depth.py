@@ -25,7 +25,7 @@ NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", 
 def grid() -> Floats:
     """Places on the profile from the tape circle, field side positive [m]."""
     count = round((RANGE[1] - RANGE[0]) / SPACING)
-    return RANGE[0] + SPACING * (np.arange(count) + 0.5)
+    return np.asarray(RANGE[0] + SPACING * (np.arange(count) + 0.5), dtype=np.float64)
 
 
 def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
