@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from railsim.version import __version__
 
 if TYPE_CHECKING:
+    from railsim.assessment import assess
     from railsim.definitions.loading import (
         load_mechanism,
         load_settings,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from railsim.studies import study
 
 _HOMES = {
+    "assess": "railsim.assessment",
     "InputError": "railsim.errors",
     "ModelError": "railsim.errors",
     "Result": "railsim.result",
@@ -53,6 +55,7 @@ __all__ = [
     "ModelError",
     "Result",
     "__version__",
+    "assess",
     "critical_speed",
     "curving",
     "load_mechanism",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from railsim.assembly import Model
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
@@ -25,7 +26,8 @@ from railsim.kernels.wheel_rail import (
     W_XI_Y,
     W_Y,
 )
-from railsim.notation import PATCHES, QUANTITIES, REQUESTED, Quantity
+from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
+from railsim.result.sensors import readings, sensors
 from railsim.time_step import empty_recorder
 from railsim.track.alignment import CANT_BASE, Alignment
 from railsim.track.irregularity import displacement
@@ -33,6 +35,7 @@ from railsim.track.irregularity import displacement
 Floats = NDArray[np.float64]
 
 ROLL, YAW, LATERAL = 3, 5, 1
+NEEDED = ("time", "distance", "Q0")
 
 
 def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
@@ -142,16 +145,19 @@ class OutputPlan:
 
     Parameters
     ----------
-    model, settings, track : Model, Settings, Track
+    model, settings, track, vehicle : Model, Settings, Track, Vehicle
 
     Raises
     ------
     InputError
-        The settings name an element that the vehicle does not have.
+        The settings name an element that the vehicle does not have, or no quantity.
     """
 
-    def __init__(self, model: Model, settings: Settings, track: Track) -> None:
+    def __init__(
+        self, model: Model, settings: Settings, track: Track, vehicle: Vehicle
+    ) -> None:
         self._model = model
+        self._sensors = sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
         self._alignment = Alignment(track)
         self._irregularity = displacement(track)
@@ -163,13 +169,34 @@ class OutputPlan:
         }
         self.elements = _matching(self._asked.elements, list(known))
         self._chosen = np.array([known[name] for name in self.elements], dtype=np.int64)
+        self.quantities = self._kept()
 
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """All quantities of the result."""
+    def _kept(self) -> tuple[Quantity, ...]:
+        """All quantities of the result: of the usual ones those that are asked for."""
+        every = self._known()
+        patterns = self._asked.quantities
+        if not patterns:
+            return every
+        names = list(QUANTITIES)
+        faults = [
+            Fault("settings", "outputs.quantities", f"no quantity is called '{pattern}'",
+                  nearest(pattern, names))
+            for pattern in patterns
+            if not any(fnmatchcase(name, pattern) for name in names)
+        ]
+        if faults:
+            raise InputError(faults)
+        return tuple(
+            q for q in every
+            if q.name in NEEDED or q.name not in QUANTITIES
+            or any(fnmatchcase(q.name, pattern) for pattern in patterns)
+        )
+
+    def _known(self) -> tuple[Quantity, ...]:
         prefixes = ["element_"] * bool(self.elements)
         prefixes += ["patch_"] * self._asked.contact_patches
         prefixes += ["track_", "rail_"] * self._asked.track
+        prefixes += ["sensor_"] * bool(self._sensors)
         more = [q for name, q in REQUESTED.items() if name.startswith(tuple(prefixes))]
         return (*QUANTITIES.values(), *(more if prefixes else ()))
 
@@ -183,6 +210,8 @@ class OutputPlan:
             names["element"] = self.elements
         if self._asked.contact_patches:
             names["patch"] = PATCHES
+        if self._sensors:
+            names |= {"sensor": tuple(self._sensors), "axis": COMPONENTS[:3]}
         return names
 
     def recorder(self, rows: int) -> Recorder:
@@ -195,6 +224,11 @@ class OutputPlan:
         values = dict(quantities(self._model, recorder, rows, Q0))
         if self.elements:
             values |= _elements(recorder.element[:rows])
+        if self._sensors:
+            values["sensor_acceleration"], values["sensor_roll_rate"] = readings(
+                self._sensors, values, self._model.index.bodies, self._alignment,
+                recorder.state[:rows, -1],
+            )
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows])
         if self._asked.track:

@@ -28,6 +28,7 @@ from railsim.pace import Pace
 from railsim.profiles import Profile
 from railsim.remarks import run_remarks
 from railsim.result import MemorySink, Result, Sink
+from railsim.right_samples import filtering, low_pass_remark, sampled
 from railsim.run_in import start_state
 from railsim.time_step import SCHEMES
 
@@ -252,10 +253,13 @@ def _begun(
                        inputs.duration, inputs.until, profiles, shared)
     if before is not None:
         take_up(prepared, before, inputs.duration)
-    plan = OutputPlan(prepared.model, settings, inputs.track)
+    plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
+    sink = filtering(sink, settings)
     sink.begin(plan.coordinates, plan.quantities)
-    return Run(prepared, plan, sink, prepared.state.copy(), prepared.fresh,
-               wall_time=time.perf_counter() - began)
+    run = Run(prepared, plan, sink, prepared.state.copy(), prepared.fresh,
+              wall_time=time.perf_counter() - began)
+    run.remarks.extend(filter(None, [low_pass_remark(settings)]))
+    return run
 
 
 def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -> Result:
@@ -360,7 +364,7 @@ def prepare(
     """Assemble, balance, choose the step and set the initial state."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
     model = balance.model
-    pace = Pace(model, settings, track, {speed: balance.state})
+    pace = Pace(model, sampled(settings), track, {speed: balance.state})
     step, _ = pace.at(speed)
     state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
     _disturb(model, settings, state)

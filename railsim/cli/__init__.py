@@ -23,7 +23,7 @@ from railsim.version import __version__
 
 use_one_thread()
 
-DONE, FAILED, WRONG_INPUT, ENDED_EARLY = 0, 1, 2, 3
+DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 
 # name of a command: its module in this package, and what it does
 COMMANDS = {
@@ -105,9 +105,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 2 wrong input, 3 ended early for a physical reason, 130 interrupted by Ctrl-C (143
-        by SIGTERM), 1 anything else, such as a full disk.  An error that nobody foresaw is one
-        line too, with the path of a report (`railsim.cli.fault_report`).
+        0 done, 2 wrong input, 3 ended early for a physical reason, 4 a limit is exceeded where
+        that was asked for, 130 interrupted by Ctrl-C (143 by SIGTERM), 1 anything else, such as a
+        full disk.  An error that nobody foresaw is one line too, with the path of a report
+        (`railsim.cli.fault_report`).
     """
     # the commands print themselves what the library logs
     logging.getLogger("railsim").addHandler(logging.NullHandler())
@@ -170,7 +171,7 @@ def _called(arguments: list[str]) -> int:
     except Exception:
         obey()
         raise
-    if status not in (DONE, ENDED_EARLY):
+    if status not in (DONE, ENDED_EARLY, LIMIT_EXCEEDED):
         obey()
     return status
 

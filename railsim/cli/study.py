@@ -73,6 +73,7 @@ def _is_number(text: str) -> bool:
     metavar="KEY.PATH=A,B,C...",
     help="Values of further keys; paths begin with vehicle., track. or settings.",
 )
+@click.option("--scenario", metavar="F", help="Scenario in place of tracks and speeds.")
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
 @click.option("--start", type=float, default=0.0, metavar="S", help="Start of all runs in m.")
 @click.option("--duration", type=float, metavar="T", help="End of all runs in s.")
@@ -101,6 +102,7 @@ def command(
     tracks: tuple[str, ...],
     speeds: tuple[float, ...],
     grids: tuple[str, ...],
+    scenario: str | None,
     out: str,
     load: str | None,
     assignments: tuple[str, ...],
@@ -123,7 +125,11 @@ def command(
           --grid track.friction=0.3,0.4,0.5 --out friction
       railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \\
           --grid vehicle.bodies.carbody.mass=36e3,40e3,44e3,48e3 --together 8 --out mass
+      railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """  # noqa: D301 - click reads the escape
+    if scenario is not None:
+        return _campaign(scenario, vehicles, (tracks, speeds, grids), out, assignments, how,
+                         as_json=as_json, quiet=quiet)
     from railsim.studies import study
 
     inputs: dict[str, Any] = {
@@ -159,6 +165,36 @@ def command(
     else:
         _print_end(outcome)
     return _status(outcome)
+
+
+def _campaign(
+    scenario: str,
+    vehicles: tuple[str, ...],
+    others: tuple[tuple[Any, ...], ...],
+    out: str,
+    assignments: tuple[str, ...],
+    how: dict[str, Any],
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Run a scenario, which knows its tracks and speeds itself."""
+    from railsim.cli.campaign import run_campaign
+    from railsim.errors import Fault, InputError
+
+    taken = {"--tracks, --speeds, --grid": any(others)}
+    taken |= {f"--{n}": bool(how[n]) for n in ("start", "duration", "until", "settings", "plots")}
+    faults = [
+        Fault(option, "", "given together with --scenario", "the scenario's file holds it")
+        for option, given in taken.items()
+        if given
+    ]
+    if faults:
+        raise InputError(faults)
+    return run_campaign(
+        scenario, vehicles, out, assignments=assignments, workers=how["workers"],
+        scheduler=how["scheduler"], overwrite=how["overwrite"], as_json=as_json, quiet=quiet,
+    )  # fmt: skip
 
 
 def _grid(texts: tuple[str, ...]) -> dict[str, list[str]]:

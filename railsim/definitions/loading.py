@@ -17,10 +17,17 @@ from railsim.definitions.base import FileDefinition, Remark
 from railsim.definitions.faults import validation_faults
 from railsim.definitions.flatten import position_faults
 from railsim.definitions.layout import track_faults, track_remarks
+from railsim.definitions.limits import (
+    COMFORT_LIMITS_FORMAT,
+    LIMITS_FORMAT,
+    ComfortLimits,
+    RunningLimits,
+)
 from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
 from railsim.definitions.overrides import apply_overrides
+from railsim.definitions.scenario import SCENARIO_FORMAT, Scenario
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
 from railsim.definitions.spring import (
@@ -95,6 +102,9 @@ FORMATS: dict[str, Format] = {
         faults=mechanism_faults,
         remarks=mechanism_remarks,
     ),
+    LIMITS_FORMAT: Format("limits", RunningLimits),
+    SCENARIO_FORMAT: Format("scenario", Scenario),
+    COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
 }
 
 
@@ -168,6 +178,21 @@ def _find_reference(source: Source) -> None:
         beside = Path(source.file_of(("optimise", "reference"))).parent / name
         if beside.is_file():
             optimise["reference"] = str(beside.resolve())
+
+
+def load_scenario(path: str | Path, overrides: Iterable[str] | str = ()) -> Scenario:
+    """Load a scenario, or a shipped one by its name; as `load_vehicle`."""
+    return _loaded(Scenario, _file_source(path, "scenario"), overrides)
+
+
+def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> RunningLimits:
+    """Load the limits of running tests, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(RunningLimits, _file_source(path, "limits"), overrides)
+
+
+def load_comfort_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> ComfortLimits:
+    """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(ComfortLimits, _file_source(path, "limits"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -183,11 +183,18 @@ def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
 
 
 def _reference_faults(parts: Mapping[str, Any], known: Mapping[str, str]) -> list[Fault]:
-    name = parts.get("reference")
+    """Faults of names outside assemblies: the reference body and the points of the service."""
     candidates = [full for full, kind in known.items() if kind != "axlebox"]
-    if not isinstance(name, str) or name in candidates:
-        return []
-    return [Fault("", "reference", f"no body '{name}'", nearest(name, candidates))]
+    named = {"reference": parts.get("reference")}
+    service = parts.get("service")
+    if isinstance(service, Mapping):
+        for point, table in _members(service, "points").items():
+            named[f"service.points.{point}.body"] = table.get("body")
+    return [
+        Fault("", key, f"no body '{name}'", nearest(name, candidates))
+        for key, name in named.items()
+        if isinstance(name, str) and name not in candidates
+    ]
 
 
 def _element_faults(

@@ -87,8 +87,30 @@ class Drive(Definition):
         return self
 
 
+# Smallest output rate over the filter's frequency: room for the transition (zero); 1/1000 of what
+# is folded back to the corner (causal: order 4).
+LEAST_RATE = {"zero": 2.5, "causal": 6.7}
+
+
+class LowPass(Definition):
+    """Filter between the time loop and the result, so that slow sampling folds nothing back."""
+
+    frequency: Positive
+    """End of the pass band (`zero`), -3 dB (`causal`) [Hz]"""
+    phase: Literal["zero", "causal"] = "zero"
+    """`zero`: without phase, flat to `frequency` and nothing above `output_rate` - `frequency`;
+    `causal`: Butterworth of order 4, as a measuring amplifier"""
+
+
 class Outputs(Definition):
-    """What a run puts out beyond the usual quantities."""
+    """What a run puts out."""
+
+    quantities: tuple[Text, ...] = ()
+    """Which of the usual quantities to keep, `*` standing for any letters; by default all"""
+    low_pass: LowPass | None = None
+    """Low pass of all quantities before they are stored at `output_rate`"""
+    sensors: Flag = False
+    """Readings of accelerometers on the floor, the bogie frames and the vehicle's own points"""
 
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""
@@ -134,4 +156,14 @@ class Settings(FileDefinition):
     def _physical(self) -> Self:
         if self.poisson >= 0.5:
             raise ValueError("'poisson' must be below 0.5")
+        asked = self.outputs.low_pass
+        if asked is not None:
+            least = LEAST_RATE[asked.phase] * asked.frequency
+            if self.output_spacing is not None or self.drive.mode != "constant":
+                raise ValueError("'outputs.low_pass' needs a constant speed and 'output_rate'")
+            if self.output_rate < least * (1.0 - 1e-9):
+                raise ValueError(
+                    f"'output_rate' must be {least:g} at least with 'outputs.low_pass' of "
+                    f"{asked.frequency:g} Hz"
+                )
         return self

@@ -23,6 +23,8 @@ FOLDERS = {
     "track": "tracks",
     "spring": "vehicles/springs",
     "mechanism": "vehicles/mechanisms",
+    "limits": "limits",
+    "scenario": "scenarios",
 }
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}

@@ -99,6 +99,30 @@ class Assembly(Definition):
     """Assemblies within this one, by name"""
 
 
+class Point(Definition):
+    """A point that is fixed to a body."""
+
+    body: Text
+    """Full name of the body"""
+    position: Vector
+    """Place in the nominal vehicle [m]"""
+
+
+class Service(Definition):
+    """What the vehicle is admitted for: the base of its assessment."""
+
+    admissible_speed: Positive
+    """Highest speed in service [m/s]"""
+    cant_deficiency: Positive
+    """Admissible cant deficiency [m]"""
+    category: Literal["passenger", "freight", "locomotive", "multiple_unit"] = "passenger"
+    """Category, which decides on limits"""
+    floor_height: Positive = 1.2
+    """Height of the floor above the rails, where accelerations are taken [m]"""
+    points: dict[Name, Point] = Field(default_factory=dict)
+    """Further points at which accelerations are taken, by name"""
+
+
 class Vehicle(FileDefinition):
     """A vehicle: everything that its file says."""
 
@@ -115,6 +139,8 @@ class Vehicle(FileDefinition):
     reference: Text | None = None
     """Full name of the body whose way is the vehicle's `distance`; by default the first body,
     else the first wheelset"""
+    service: Service | None = None
+    """What the vehicle is admitted for; assessments need it"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
     """Bodies by name"""
     wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)

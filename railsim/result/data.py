@@ -123,6 +123,20 @@ class Result:
     def _names(self) -> tuple[str, ...]:
         return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
 
+    def part(self, name: str, rows: slice) -> Array:
+        """Return some instants of a quantity; of a file that is not read yet only these are read.
+
+        Parameters
+        ----------
+        name : str
+            Quantity with time as its first dimension.
+        rows : slice
+            Instants, a step of 1.
+        """
+        if name not in self._arrays:
+            raise KeyError(f"no quantity '{name}'; {nearest(name, self._arrays)}")
+        return self._arrays.part(name, rows)
+
     def series(self, name: str, **labels: str | int) -> Array:
         """Return one quantity at named places along its dimensions.
 
@@ -304,6 +318,10 @@ class FrozenArrays(Mapping[str, Array]):
 
     def __getitem__(self, name: str) -> Array:
         return self._loaded[name]
+
+    def part(self, name: str, rows: slice) -> Array:
+        """Return some rows of an array."""
+        return self[name][rows]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._loaded)

@@ -139,12 +139,16 @@ class StoredArrays(FrozenArrays):
             self._loaded[name] = self._read(name)
         return self._loaded[name]
 
-    def _read(self, name: str) -> Array:
+    def part(self, name: str, rows: slice) -> Array:
+        """Return some rows of an array; only these are read."""
+        return self._loaded[name][rows] if name in self._loaded else self._read(name, rows)
+
+    def _read(self, name: str, rows: slice | tuple[()] = ()) -> Array:
         try:
             with h5py.File(self._absolute, "r") as file:
                 dataset = file[name]
                 if dataset.shape == self._shapes[name]:
-                    return frozen(dataset[()])
+                    return frozen(dataset[rows])
         except Exception as error:
             raise _unreadable(self._path, name, error) from None
         found = "is not the array that the file held when it was opened"

@@ -12,7 +12,7 @@ from railsim.definitions.loading import FORMATS, load_any, load_vehicle
 from railsim.definitions.schema import filled, json_schema, schema_name
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"vehicle_file.md", "track_file.md", "settings.md"}
+PAGES = {"assess.md", "vehicle_file.md", "track_file.md", "settings.md"}
 MENDED_BY = "python -m railsim.definitions.schema docs"
 SHIPPED = [(kind, name) for kind in sources.FOLDERS for name in sources.shipped_names(kind)]
 

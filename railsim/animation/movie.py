@@ -1,0 +1,198 @@
+"""A scene as GIF (Pillow) or MP4 (ffmpeg): the vehicle, and its leading wheelset's contacts."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from railsim.animation.scene import Drawn, Scene
+from railsim.errors import Fault, InputError
+from railsim.files import check_file, whole_file
+from railsim.result.data import Array
+
+AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
+FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+COLOURS = {"car": ((0.34, 0.66, 0.88, 0.22), "#004a80"), "frame": ((0.94, 0.63, 0.24, 0.8),
+           "#b8450a"), "wheelset": ((0.28, 0.3, 0.32, 0.85), "#222222")}  # fmt: skip
+ENDINGS = (".gif", ".mp4")
+
+
+def write_movie(
+    scene: Scene,
+    path: str | Path,
+    *,
+    frames_per_second: int = 20,
+    gain: float = 1.0,
+    overwrite: bool = False,
+) -> Path:
+    """Write a scene as a film; the ending of the name says which kind.
+
+    Parameters
+    ----------
+    scene : Scene
+        One picture for each of its frames.
+    path : str or Path
+        ``.gif`` or ``.mp4``.
+    frames_per_second : int
+        Pictures a second when it is played.
+    gain : float
+        Factor on the motion of the bodies against their nominal places.
+
+    Raises
+    ------
+    InputError : the name or the place; MP4 without ffmpeg.
+    """
+    path = Path(path)
+    check_file(path, overwrite=overwrite, endings=ENDINGS)
+    writer: Any
+    if path.suffix.lower() == ".mp4":
+        if shutil.which("ffmpeg") is None:
+            allowed = "install ffmpeg, or write a .gif or .html"
+            raise InputError([Fault("--out", path.name, "MP4 needs ffmpeg", allowed)])
+        writer = FFMpegWriter(fps=frames_per_second)
+    else:
+        writer = PillowWriter(fps=frames_per_second)
+    figure = Figure(figsize=(8.0, 4.5 if scene.sections else 3.6), dpi=100)
+    FigureCanvasAgg(figure)
+    view, sections = _axes(figure, scene)
+    with whole_file(path) as partial:
+        # the writers choose their format by the ending
+        named = partial.with_name(partial.name + path.suffix.lower())
+        try:
+            with writer.saving(figure, str(named), dpi=100):
+                for frame in range(len(scene.time)):
+                    draw(view, sections, scene, frame, gain)
+                    writer.grab_frame()
+            named.replace(partial)
+        finally:
+            named.unlink(missing_ok=True)
+    return path
+
+
+def _axes(figure: Figure, scene: Scene) -> tuple[Axes, list[Axes]]:
+    if not scene.sections:
+        return figure.add_axes((0.0, 0.0, 1.0, 0.9)), []
+    view = figure.add_axes((0.0, 0.36, 1.0, 0.56))
+    return view, [figure.add_axes((0.06 + 0.48 * k, 0.06, 0.42, 0.27)) for k in range(2)]
+
+
+def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float = 1.0) -> None:
+    """Draw one frame of a scene."""
+    view.clear()
+    polygons = _polygons(scene, frame, gain)
+    polygons.sort(key=lambda item: -item[0])
+    view.add_collection(PolyCollection(
+        [points for _, points, _, _ in polygons],
+        facecolors=[face for _, _, face, _ in polygons],
+        edgecolors=[edge for _, _, _, edge in polygons], linewidths=0.7,
+    ))  # fmt: skip
+    view.set(xlim=(-15.0, 15.0), ylim=(4.5, -4.5), aspect="equal")
+    view.set_axis_off()
+    place = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"
+    view.set_title(f"{scene.title}\nt {scene.time[frame]:.2f} s{place}", fontsize=8, loc="left")
+    for side, axes in enumerate(sections):
+        _draw_section(axes, scene, frame, side)
+
+
+def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Array, Any, Any]]:
+    s0 = float(scene.distance[frame])
+    found: list[tuple[float, Array, Any, Any]] = []
+    at = _track(scene, s0)
+    for side in (-0.75, 0.75):
+        for s in np.arange(s0 - 22.0, s0 + 22.0, 2.0):
+            ends = [_space(_track(scene, s + d), np.array([[0.0, side - w, 0.0]]))
+                    for d, w in ((0.0, 0.04), (0.0, -0.04), (2.0, -0.04), (2.0, 0.04))]  # fmt: skip
+            points, depth = _seen(np.concatenate(ends), at)
+            found.append((depth, points, "#8a8a8a", "#6b6b6b"))
+    for k, body in enumerate(scene.bodies):
+        q = scene.pose[frame, k]
+        place = _track(scene, s0 + body.offset + q[0])
+        face, edge = COLOURS[body.kind]
+        for points in _shape(body):
+            moved = _turned(points, gain * q[3], 0.0 if body.kind == "wheelset" else gain * q[4],
+                            gain * q[5])  # fmt: skip
+            moved += np.array([(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]])
+            seen, depth = _seen(_space(place, moved), at)
+            found.append((depth, seen, face, edge))
+    return found
+
+
+def _shape(body: Drawn) -> list[Array]:
+    """Polygons of a body in its own axes."""
+    a, b, c, down = body.box
+    if body.kind == "wheelset":
+        t = np.linspace(0.0, 2.0 * np.pi, 25)
+        rims = [np.column_stack([a * np.cos(t), np.full(25, y), a * np.sin(t)]) for y in (-b, b)]
+        return [*rims, np.array([[0.0, -b, 0.0], [0.0, b, 0.0], [0.0, b, 0.02], [0.0, -b, 0.02]])]
+    corners = np.array(
+        [[x, y, z + down] for x in (-a, a) for y in (-b, b) for z in (-c, c)]
+    )  # fmt: skip
+    return [corners[list(face)] for face in FACES]
+
+
+def _track(scene: Scene, s: float) -> tuple[float, float, float, float]:
+    track = scene.track
+    x, y, heading, cant = (
+        float(np.interp(s, track["s"], track[name])) for name in ("x", "y", "heading", "cant")
+    )
+    return x, y, heading, cant
+
+
+def _space(at: tuple[float, float, float, float], points: Array) -> Array:
+    """Points of the track frame in space."""
+    x, y, heading, cant = at
+    across = np.cos(cant) * points[:, 1] - np.sin(cant) * points[:, 2]
+    down = np.sin(cant) * points[:, 1] + np.cos(cant) * points[:, 2]
+    ahead = points[:, 0]
+    return np.column_stack([
+        x + np.cos(heading) * ahead - np.sin(heading) * across,
+        y + np.sin(heading) * ahead + np.cos(heading) * across, down,
+    ])  # fmt: skip
+
+
+def _turned(points: Array, roll: float, pitch: float, yaw: float) -> Array:
+    """Rz(yaw) Rx(roll) Ry(pitch)."""
+    x, y, z = points.T
+    x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
+    y, z = np.cos(roll) * y - np.sin(roll) * z, np.sin(roll) * y + np.cos(roll) * z
+    x, y = np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y
+    return np.column_stack([x, y, z])
+
+
+def _seen(points: Array, at: tuple[float, float, float, float]) -> tuple[Array, float]:
+    """Points on the screen, right and down [m], and their mean depth."""
+    turn = at[2] + AZIMUTH
+    x, y, z = points[:, 0] - at[0], points[:, 1] - at[1], points[:, 2] + 1.4
+    forward = np.cos(turn) * x + np.sin(turn) * y
+    right = np.cos(turn) * y - np.sin(turn) * x
+    down = np.cos(ELEVATION) * z - np.sin(ELEVATION) * forward
+    depth = np.cos(ELEVATION) * forward + np.sin(ELEVATION) * z
+    return np.column_stack([right, down]), float(np.mean(depth))
+
+
+def _draw_section(axes: Axes, scene: Scene, frame: int, side: int) -> None:
+    axes.clear()
+    section = scene.sections[side]
+    k = next(i for i, body in enumerate(scene.bodies) if body.kind == "wheelset")
+    body, q = scene.bodies[k], scene.pose[frame, k]
+    wheel_y = q[1] + section["wheel_y"] - q[3] * section["wheel_z"]
+    wheel_z = body.z + q[2] + section["wheel_z"] + q[3] * section["wheel_y"]
+    axes.plot(1e3 * section["rail_y"], 1e3 * section["rail_z"], color="#8a7a5c", lw=1.4)
+    axes.plot(1e3 * wheel_y, 1e3 * wheel_z, color="#004a80", lw=1.4)
+    middle = -750.0 if side == 0 else 750.0
+    axes.set(xlim=(middle - 80.0, middle + 80.0), ylim=(45.0, -35.0), aspect="equal")
+    axes.tick_params(labelsize=6)
+    if scene.Q is None or scene.Y is None:
+        return
+    Q, Y = 1e-3 * scene.Q[frame, 0, side], 1e-3 * scene.Y[frame, 0, side]
+    start = (middle, 0.0)
+    for end, colour in (((middle, 0.35 * Q), "#004a80"), ((middle + 0.9 * Y, 0.0), "#b8450a")):
+        axes.annotate("", xy=end, xytext=start,
+                      arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4})  # fmt: skip
+    axes.set_title(f"{('left', 'right')[side]} wheel 1: Q {Q:.1f} kN, Y {Y:.1f} kN", fontsize=7)

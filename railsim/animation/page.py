@@ -1,0 +1,61 @@
+"""A scene as one HTML page without anything from elsewhere: plays, scrubs, zooms, turns."""
+
+import html
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from railsim.animation.scene import Scene
+from railsim.files import check_file, whole_file
+
+
+def write_page(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a scene as an HTML page.
+
+    Raises
+    ------
+    InputError : the file exists and may not be overwritten, or cannot be written.
+    """
+    path = Path(path)
+    check_file(path, overwrite=overwrite, endings=(".html", ".htm"))
+    template = files("railsim.animation").joinpath("page.html").read_text(encoding="utf-8")
+    # "</" would end the script
+    data = json.dumps(scene_data(scene), separators=(",", ":"), allow_nan=False)
+    text = template.replace("@TITLE@", html.escape(scene.title))
+    text = text.replace("@SCENE@", data.replace("</", "<\\/"))
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+    return path
+
+
+def scene_data(scene: Scene) -> dict[str, Any]:
+    """Return a scene as plain lists, rounded to what a screen shows (0.01 mm, 0.01 mrad)."""
+    forces = None
+    if scene.Q is not None and scene.Y is not None:
+        forces = {"Q": _list(scene.Q * 1e-3, 2), "Y": _list(scene.Y * 1e-3, 2)}
+    patches = None
+    if scene.patches is not None:
+        patches = {"y": _list(scene.patches["y"], 5), "z": _list(scene.patches["z"], 5),
+                   "N": _list(scene.patches["N"] * 1e-3, 2)}  # fmt: skip
+    return {
+        "title": scene.title,
+        "bodies": [
+            {"name": b.name, "kind": b.kind, "offset": b.offset, "y": b.y, "z": b.z,
+             "box": list(b.box)}
+            for b in scene.bodies
+        ],
+        "time": _list(scene.time, 4),
+        "distance": _list(scene.distance, 3),
+        "pose": _list(scene.pose, 5),
+        "track": {name: _list(values, 5) for name, values in scene.track.items()},
+        "forces": forces,
+        "sections": [{k: _list(v, 5) for k, v in section.items()} for section in scene.sections],
+        "patches": patches,
+    }  # fmt: skip
+
+
+def _list(values: Any, decimals: int) -> Any:
+    return np.round(np.nan_to_num(np.asarray(values)), decimals).tolist()

@@ -1,0 +1,285 @@
+"""What an animation shows: bodies with their shapes, poses over time, the track, wheel forces.
+
+Shapes are boxes made from the vehicle file: the car body spans its wheelsets and an overhang, a
+bogie frame its wheelsets; wheels have their radii.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from railsim.contact.curves import rail_curve, tape_circle_place
+from railsim.definitions.flatten import FlatVehicle, flatten
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, nearest
+from railsim.result import Result
+from railsim.result.data import Array
+from railsim.track.alignment import Alignment
+
+FRAMES = 600
+TRACK_STEP = 1.0  # m
+AROUND = 60.0  # m of track ahead and behind
+NEEDED = ("body_position", "Q", "Y")
+OVERHANG, WIDTH, ROOF = 3.2, 2.8, 3.9  # m, of a car body that says nothing of its shape
+LARGEST = 0.05  # displacement of a mode over the vehicle's length
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A body to draw.
+
+    Attributes
+    ----------
+    name, kind : str
+        Kind ``car``, ``frame`` or ``wheelset``.
+    offset : float
+        Arc length of its frame beyond that of the reference body [m].
+    y, z : float
+        Nominal place of its centre of gravity in the track frame [m].
+    box : tuple of float
+        Half length, half width, half height and height of the box's middle below the centre of
+        gravity [m]; of a wheelset its radius, half the wheels' distance, 0, 0.
+    """
+
+    name: str
+    kind: str
+    offset: float
+    y: float
+    z: float
+    box: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that a page or a film shows.
+
+    Attributes
+    ----------
+    title : str
+    bodies : tuple of Drawn
+    time, distance : float64[frame]
+        [s], [m]
+    pose : float64[frame, body, 6]
+        Against the nominal place, as `body_position` [m], [rad].
+    track : dict
+        ``s``, ``x``, ``y``, ``heading``, ``cant`` along the track [m], [rad].
+    Q, Y : float64[frame, wheelset, 2] or None
+        Wheel forces on the rail [N]; None for a mode.
+    sections : tuple of dict
+        Wheel and rail profiles of the leading wheelset, left and right, track axes [m].
+    patches : dict or None
+        ``y``, ``z`` [m] and ``N`` [N] of the patches of the leading wheelset, [frame, side, patch].
+    """
+
+    title: str
+    bodies: tuple[Drawn, ...]
+    time: Array
+    distance: Array
+    pose: Array
+    track: Mapping[str, Array]
+    Q: Array | None
+    Y: Array | None
+    sections: tuple[Mapping[str, Array], ...]
+    patches: Mapping[str, Array] | None
+
+
+def result_scene(
+    result: Result, *, frames: int = FRAMES, between: tuple[float, float] | None = None
+) -> Scene:
+    """Scene of a run.
+
+    Parameters
+    ----------
+    result : Result
+        With `body_position`, Q and Y.
+    frames : int
+        Number of frames at most.
+    between : (float, float), optional
+        Distances of the reference body between which the run is shown [m].
+
+    Raises
+    ------
+    InputError : the result lacks something; nothing lies between.
+    """
+    missing = [name for name in NEEDED if name not in result]
+    if missing:
+        allowed = f"run it with settings.outputs.quantities with {', '.join(NEEDED)}"
+        raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
+    distance = result["distance"]
+    low, high = between or (float(distance[0]), float(distance[-1]))
+    first, last = np.searchsorted(distance, [low, high])
+    if last - first < 2:
+        found = f"nothing between {low:g} and {high:g} m"
+        allowed = f"the run goes from {distance[0]:.6g} to {distance[-1]:.6g} m"
+        raise InputError([Fault("--between", "", found, allowed)])
+    rows = np.unique(np.linspace(first, last - 1, min(frames, last - first)).astype(int))
+    vehicle = result.vehicle()
+    flat = flatten(vehicle)
+    drawn = _drawn(flat)
+    columns = [result.bodies.index(body.name) for body in drawn]
+    speed = f"{result.speed:.4g} m/s ({3.6 * result.speed:.4g} km/h)"
+    patches = None
+    if "patch_N" in result:
+        patches = {
+            "y": result["patch_y"][rows, 0], "z": result["patch_z"][rows, 0],
+            "N": result["patch_N"][rows, 0],
+        }  # fmt: skip
+    return Scene(
+        title=f"{vehicle.name} · {result.track().name} · {speed}",
+        bodies=drawn,
+        time=result["time"][rows],
+        distance=distance[rows],
+        pose=result["body_position"][rows][:, columns],
+        track=_track(Alignment(result.track()), distance[rows]),
+        Q=result["Q"][rows],
+        Y=result["Y"][rows],
+        sections=_sections(result, flat),
+        patches=patches,
+    )
+
+
+def mode_scene(
+    vehicle: Vehicle, mode: Mapping[str, Any], *, frames: int = 90, cycles: int = 3
+) -> Scene:
+    """Scene of a mode of ``railsim modes``: its shape through some cycles, standing still.
+
+    The largest displacement is 5 % of the vehicle's length.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    mode : mapping
+        With ``name``, ``frequency``, ``damping_ratio`` and ``shape`` {"body.component": [re, im]}.
+
+    Raises
+    ------
+    InputError : the shape names bodies that the vehicle does not have.
+    """
+    flat = flatten(vehicle)
+    drawn = _drawn(flat)
+    names = [body.name for body in drawn]
+    components = ("x", "y", "z", "roll", "pitch", "yaw")
+    shape = np.zeros((len(drawn), 6), dtype=complex)
+    known = {body.name for body in flat.bodies}
+    for key, (real, imaginary) in mode["shape"].items():
+        body, _, component = key.rpartition(".")
+        if body not in known or component not in components:
+            raise InputError([Fault("modes", key, "not of this vehicle", nearest(body, known))])
+        if body in names and not (component == "pitch" and drawn[names.index(body)].kind ==
+                                  "wheelset"):  # fmt: skip
+            shape[names.index(body), components.index(component)] = complex(real, imaginary)
+    length = max(body.offset for body in drawn) - min(body.offset for body in drawn)
+    largest = max(_largest(body, own) for body, own in zip(drawn, shape, strict=True))
+    if largest == 0.0:
+        raise InputError([Fault("modes", "shape", "nothing moves", "another mode")])
+    shape = shape * LARGEST * length / largest
+    phase = np.linspace(0.0, 2.0 * np.pi * cycles, frames * cycles)
+    frequency = float(mode["frequency"])
+    time = phase / (2.0 * np.pi * max(frequency, 1e-3))
+    s = np.arange(-AROUND, AROUND + 1.0, TRACK_STEP)
+    flat_track = {"s": s, "x": s, "y": 0.0 * s, "heading": 0.0 * s, "cant": 0.0 * s}
+    return Scene(
+        title=f"{vehicle.name} · {mode['name']} · {frequency:.3g} Hz, "
+              f"damping {100.0 * float(mode['damping_ratio']):.3g} %",
+        bodies=drawn, time=time, distance=np.zeros(len(time)),
+        pose=np.real(shape[None] * np.exp(1j * phase)[:, None, None]),
+        track=flat_track, Q=None, Y=None, sections=(), patches=None,
+    )  # fmt: skip
+
+
+def _largest(body: Drawn, shape: np.ndarray) -> float:
+    """Largest displacement of a body's corners in a mode, over all phases along each axis [m]."""
+    a, b, c, down = body.box
+    half, low = (c, down) if body.kind != "wheelset" else (a, 0.0)
+    corners = np.array([
+        [x, y, low + z] for x in (-a, a) for y in (-b, b) for z in (-half, half)
+    ])  # fmt: skip
+    moved = shape[:3] + np.cross(shape[3:], corners)
+    return float(np.max(np.abs(moved)))
+
+
+def _drawn(flat: FlatVehicle) -> tuple[Drawn, ...]:
+    """Bodies with boxes; axleboxes are not drawn."""
+    wheelsets = flat.of_kind("wheelset")
+    reference = next(b for b in flat.bodies if b.name == flat.reference)
+    xs = [w.position[0] for w in wheelsets]
+    found = []
+    for body in flat.bodies:
+        x, y, z = body.position
+        offset = x - reference.position[0]
+        if body.kind == "wheelset" and body.wheelset:
+            radius = float(np.mean(body.wheelset.radius))
+            box = (radius, 0.5 * body.wheelset.tape_circle_distance, 0.0, 0.0)
+            found.append(Drawn(body.name, "wheelset", offset, y, z, box))
+        elif body.kind == "body" and body is reference:
+            half = 0.5 * (max(xs) - min(xs)) + OVERHANG
+            floor = 1.1
+            box = (half, 0.5 * WIDTH, 0.5 * (ROOF - floor), -0.5 * (ROOF + floor) - z)
+            found.append(Drawn(body.name, "car", offset, y, z, box))
+        elif body.kind == "body":
+            own = [v for v in xs if abs(v - x) < 3.0]
+            half = 0.5 * (max(own) - min(own)) + 0.35 if own else 0.5
+            found.append(Drawn(body.name, "frame", offset, y, z, (half, 1.0, 0.12, 0.0)))
+    return tuple(found)
+
+
+def _track(alignment: Alignment, distance: Array) -> dict[str, Array]:
+    """Centre line in plan and cant angle around the way of a run; gradients are left out."""
+    s = np.arange(distance[0] - AROUND, distance[-1] + AROUND + TRACK_STEP, TRACK_STEP)
+    heading = alignment.heading(s)
+    middle = alignment.heading(0.5 * (s[1:] + s[:-1]))
+    # Simpson's rule for the integral of the direction
+    x = TRACK_STEP / 6.0 * (np.cos(heading[1:]) + 4.0 * np.cos(middle) + np.cos(heading[:-1]))
+    y = TRACK_STEP / 6.0 * (np.sin(heading[1:]) + 4.0 * np.sin(middle) + np.sin(heading[:-1]))
+    return {
+        "s": s, "x": np.concatenate([[0.0], np.cumsum(x)]),
+        "y": np.concatenate([[0.0], np.cumsum(y)]), "heading": heading,
+        "cant": alignment.cant_angle(s),
+    }  # fmt: skip
+
+
+def _sections(result: Result, flat: FlatVehicle) -> tuple[Mapping[str, Array], ...]:
+    """Profiles of the leading wheelset on their rails.
+
+    Wheels in the wheelset's axes (y from its middle, z from its axis), rails in track axes.
+    """
+    wheelset = flat.of_kind("wheelset")[0].wheelset
+    track = result.track()
+    found: list[Mapping[str, Array]] = []
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        if wheelset is None:
+            continue
+        wheel = result.profiles[wheelset.profile[side]]
+        rail = rail_curve(result.profiles[track.rail[side]], track.gauge, track.inclination)
+        tape = tape_circle_place(wheelset.back_to_back)
+        thin = slice(None, None, max(1, rail.z.size // 150))
+        found.append({
+            "wheel_y": sign * (tape + _thinned(wheel.y)),
+            "wheel_z": wheelset.radius[side] + _thinned(wheel.z),
+            "rail_y": sign * rail.Y[thin], "rail_z": rail.z[thin],
+        })  # fmt: skip
+    return tuple(found)
+
+
+def _thinned(values: Array, points: int = 150) -> Array:
+    rows = np.unique(np.linspace(0, len(values) - 1, min(points, len(values))).astype(int))
+    return np.asarray(values[rows], dtype=np.float64)
+
+
+def chosen_mode(modes: Sequence[Mapping[str, Any]], wanted: str | None) -> Mapping[str, Any]:
+    """Mode by name or number (from 1); the first one by default.
+
+    Raises
+    ------
+    InputError : there is none of this name.
+    """
+    names = [str(mode["name"]) for mode in modes]
+    if wanted is None:
+        return modes[0]
+    if wanted.isdigit() and 1 <= int(wanted) <= len(modes):
+        return modes[int(wanted) - 1]
+    if wanted not in names:
+        raise InputError([Fault("--mode", wanted, "no such mode", nearest(wanted, names))])
+    return modes[names.index(wanted)]

@@ -1,0 +1,319 @@
+"""Ride comfort from accelerations on the car body's floor: EN 12299 and ISO 2631-1.
+
+Mean comfort (EN 12299): weighted accelerations, root mean squares over 5 s, of these the 50 or 95 %
+values over 60 blocks.  Comfort on curve transitions P_CT and on discrete events P_DE: from lateral
+acceleration, its change within 1 s and the roll velocity, without phase below 2 Hz.
+
+Lateral accelerations are what an accelerometer reads: without the part of gravity.
+
+Sources: EN 12299:2009 (replaced by EN 12299:2024) and ISO 2631-1:1997; formulas and constants of
+P_CT and P_DE recalled (equal to the older form in per cent of g), of the others read in re-entries.
+None has been compared with the printed standards.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.assessment.weighting import WB, WC, WD, WK
+from railsim.result.filters import Floats, integral, low_passed
+
+BLOCK = 5.0  # s
+BLOCKS = 60
+
+
+def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
+    """Root mean squares of whole blocks one behind the other.
+
+    Parameters
+    ----------
+    a : float64[time, ...]
+        Weighted acceleration [m/s2].
+    rate : float
+        Samples per second [1/s].
+    length : float
+        Length of a block [s].
+
+    Returns
+    -------
+    float64[block, ...]
+    """
+    size = round(length * rate)
+    whole = len(a) // size
+    parts = a[: whole * size].reshape(whole, size, *a.shape[1:])
+    return np.asarray(np.sqrt(np.mean(parts**2, axis=1)))
+
+
+@dataclass(frozen=True)
+class MeanComfort:
+    """Mean comfort of one point.
+
+    Attributes
+    ----------
+    N_MV, N_VA, N_VD : float
+        Index on the floor, seated, standing [1].
+    continuous : float64[block, 3]
+        Continuous comfort: the root mean squares over 5 s with Wd, Wd, Wb along x, y, z [m/s2].
+    blocks : int
+        Number of blocks of 5 s; the standard wants 60.
+    """
+
+    N_MV: float
+    N_VA: float
+    N_VD: float
+    continuous: Floats
+    blocks: int
+
+
+def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
+    """Mean comfort on the floor, of passengers seated and standing (EN 12299).
+
+    N_MV = 6 sqrt(axP95^2 + ayP95^2 + azP95^2);
+    N_VA = 4 azP95 + 2 sqrt(ayA95^2 + azA95^2) + 4 axD95;
+    N_VD = 3 sqrt(16 axP50^2 + 4 ayP50^2 + azP50^2) + 5 ayP95.
+
+    The accelerations of the seat's surface (A) and back (D) are taken as those of the floor: there
+    is no seat in the model.
+
+    Parameters
+    ----------
+    a : float64[time, 3]
+        Acceleration along x, y, z [m/s2].
+    rate : float
+        Samples per second [1/s].
+
+    Returns
+    -------
+    MeanComfort
+        With nan where the record is shorter than a block.
+    """
+    floor, back = weighted_for_comfort(a, rate)
+    return mean_comfort(block_rms(floor, rate), block_rms(back, rate))
+
+
+def weighted_for_comfort(a: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Accelerations along x, y, z with Wd, Wd, Wb, and along x with Wc (seat back) [m/s2]."""
+    floor = np.stack(
+        [weighting.weighted(a[:, k], rate) for k, weighting in enumerate((WD, WD, WB))], axis=-1
+    )
+    return floor, WC.weighted(a[:, 0], rate)
+
+
+def mean_comfort(rms: Floats, back: Floats) -> MeanComfort:
+    """Indices from the root mean squares of blocks, see `en12299_mean_comfort`.
+
+    Parameters
+    ----------
+    rms : float64[block, 3]
+        On the floor, weighted [m/s2].
+    back : float64[block]
+        Along x with Wc [m/s2].
+    """
+    if not len(rms):
+        return MeanComfort(math.nan, math.nan, math.nan, rms, 0)
+    x95, y95, z95 = np.percentile(rms, 95.0, axis=0)
+    x50, y50, z50 = np.percentile(rms, 50.0, axis=0)
+    back95 = np.percentile(back, 95.0)
+    return MeanComfort(
+        N_MV=float(6.0 * math.sqrt(x95**2 + y95**2 + z95**2)),
+        N_VA=float(4.0 * z95 + 2.0 * math.sqrt(y95**2 + z95**2) + 4.0 * back95),
+        N_VD=float(3.0 * math.sqrt(16.0 * x50**2 + 4.0 * y50**2 + z50**2) + 5.0 * y95),
+        continuous=rms,
+        blocks=len(rms),
+    )
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """Evaluation after ISO 2631-1.
+
+    Attributes
+    ----------
+    rms : float64[3]
+        Weighted root mean squares along x, y, z [m/s2].
+    total : float
+        Vibration total value a_v [m/s2].
+    MTVV : float64[3]
+        Largest running root mean square over 1 s [m/s2].
+    VDV : float64[3]
+        Fourth power vibration dose value [m/s1.75].
+    """
+
+    rms: Floats
+    total: float
+    MTVV: Floats
+    VDV: Floats
+
+
+def iso2631_vibration(a: Floats, rate: float) -> Vibration:
+    """Weighted accelerations of a seated person: Wd, Wd, Wk, factors 1 (ISO 2631-1:1997).
+
+    a_v = sqrt(awx^2 + awy^2 + awz^2); VDV = (integral of aw^4 dt)^(1/4).
+
+    Parameters
+    ----------
+    a : float64[time, 3]
+        Acceleration along x, y, z [m/s2].
+    rate : float
+        Samples per second [1/s].
+    """
+    weighted = np.stack(
+        [weighting.weighted(a[:, k], rate) for k, weighting in enumerate((WD, WD, WK))], axis=-1
+    )
+    rms = np.sqrt(np.mean(weighted**2, axis=0))
+    running = running_mean(weighted**2, rate, 1.0)
+    largest = np.sqrt(np.max(running, axis=0)) if len(running) else np.full(3, math.nan)
+    dose = (np.sum(weighted**4, axis=0) / rate) ** 0.25
+    return Vibration(rms, float(np.sqrt(np.sum(rms**2))), largest, dose)
+
+
+def running_mean(x: Floats, rate: float, length: float) -> Floats:
+    """Means over `length` [s], one for each position of the window within the record.
+
+    The record is linear between its samples; value i is the mean from sample i on.
+    """
+    size = round(length * rate)
+    if len(x) <= size:
+        return np.zeros((0, *x.shape[1:]))
+    summed = integral(np.arange(len(x)) / rate, x)
+    return np.asarray((summed[size:] - summed[:-size]) * (rate / size))
+
+
+TRANSITION: Mapping[str, tuple[float, float, float, float, float]] = {
+    "standing": (28.54, 20.69, 11.1, 0.185, 2.283),
+    "seated": (8.97, 9.68, 5.9, 0.120, 1.626),
+}
+EVENT: Mapping[str, tuple[float, float, float]] = {
+    "standing": (16.62, 27.01, 37.0),
+    "seated": (8.46, 13.05, 21.7),
+}
+
+
+def p_ct(acceleration: float, jerk: float, roll_rate: float, posture: str) -> float:
+    """Percentage of dissatisfied passengers on a curve transition, P_CT (EN 12299).
+
+    P_CT = max(A y'' + B y''' - C, 0) + D r^E.
+
+    Parameters
+    ----------
+    acceleration, jerk : float
+        Largest lateral acceleration [m/s2] and its largest change within 1 s [m/s3].
+    roll_rate : float
+        Largest roll velocity [deg/s].
+    posture : {'standing', 'seated'}
+
+    Returns
+    -------
+    float
+        [%].
+
+    Examples
+    --------
+    >>> round(p_ct(1.0, 0.5, 2.0, "standing"), 2)
+    28.69
+    """
+    A, B, C, D, E = TRANSITION[posture]
+    return float(max(A * acceleration + B * jerk - C, 0.0) + D * roll_rate**E)
+
+
+def p_de(peak_to_peak: float, mean: float, posture: str) -> float:
+    """Percentage of dissatisfied passengers on a discrete event, P_DE (EN 12299).
+
+    P_DE = max(a yp + b ym - c, 0), yp and ym over 2 s.
+
+    Examples
+    --------
+    >>> round(p_de(1.2, 1.0, "seated"), 2)
+    1.5
+    """
+    a, b, c = EVENT[posture]
+    return max(a * peak_to_peak + b * mean - c, 0.0)
+
+
+@dataclass(frozen=True)
+class TransitionComfort:
+    """Comfort on one curve transition.
+
+    Attributes
+    ----------
+    begin, end : float
+        When the point is at its beginning and end [s].
+    acceleration, jerk, roll_rate : float
+        What P_CT is made of [m/s2], [m/s3], [deg/s].
+    standing, seated : float
+        P_CT [%].
+    """
+
+    begin: float
+    end: float
+    acceleration: float
+    jerk: float
+    roll_rate: float
+    standing: float
+    seated: float
+
+
+def transition_comfort(
+    time: Floats, lateral: Floats, roll_rate: Floats, begin: float, end: float
+) -> TransitionComfort | None:
+    """P_CT of a transition passed between two times.
+
+    The acceleration is the largest 1 s mean from the beginning to 1.6 s after the end, the jerk the
+    largest difference of two such means 1 s apart from 1 s before the beginning on, both after a
+    low pass of 2 Hz; the roll velocity the largest 1 s mean within the transition.
+
+    Parameters
+    ----------
+    time : float64[time]
+        Equal steps [s].
+    lateral, roll_rate : float64[time]
+        Lateral acceleration [m/s2], roll velocity of the body [rad/s].
+    begin, end : float
+        Times [s].
+
+    Returns
+    -------
+    TransitionComfort or None
+        None where the record does not reach from 2 s before to 2.1 s behind.
+    """
+    if time[0] > begin - 2.0 or time[-1] < end + 2.1:
+        return None
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    size = round(rate)
+    middles = time[: len(time) - size] + 0.5
+    means = running_mean(low_passed(lateral, rate, 2.0), rate, 1.0)
+    rolls = running_mean(low_passed(roll_rate, rate, 2.0), rate, 1.0)
+    there = (middles >= begin) & (middles <= end + 1.6)
+    acceleration = float(np.max(np.abs(means[there])))
+    changes = np.abs(means[size:] - means[:-size])
+    first = middles[: len(changes)]
+    of_jerk = (first >= begin - 1.0) & (first + 1.0 <= end + 1.6)
+    jerk = float(np.max(changes[of_jerk]))
+    inside = (middles >= begin) & (middles <= end)
+    rolling = float(np.degrees(np.max(np.abs(rolls[inside])))) if inside.any() else 0.0
+    return TransitionComfort(
+        begin, end, acceleration, jerk, rolling,
+        standing=p_ct(acceleration, jerk, rolling, "standing"),
+        seated=p_ct(acceleration, jerk, rolling, "seated"),
+    )  # fmt: skip
+
+
+def event_comfort(lateral: Floats, rate: float) -> dict[str, float]:
+    """Largest P_DE of a record by posture [%]: over all windows of 2 s, below 2 Hz."""
+    low = low_passed(lateral, rate, 2.0)
+    size = round(2.0 * rate)
+    if len(low) <= size:
+        return dict.fromkeys(EVENT, math.nan)
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    # windows centred on each sample; those that reach beyond the ends are left out
+    half = size // 2
+    whole = slice(half, len(low) - half)
+    spread = maximum_filter1d(low, 2 * half + 1)[whole] - minimum_filter1d(low, 2 * half + 1)[whole]
+    mean = np.abs(running_mean(low, rate, 2 * half / rate))
+    return {
+        posture: float(np.max(np.maximum(a * spread + b * mean - c, 0.0)))
+        for posture, (a, b, c) in EVENT.items()
+    }

@@ -1,0 +1,184 @@
+"""Comfort at every point of the car body's floor of a run, read part by part."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.assessment.comfort import (
+    BLOCKS,
+    MeanComfort,
+    TransitionComfort,
+    block_rms,
+    event_comfort,
+    mean_comfort,
+    transition_comfort,
+    weighted_for_comfort,
+)
+from railsim.assessment.record import PIECE, Record
+from railsim.assessment.sperling import Direction, index_of_rms, sperling_mean_square
+from railsim.assessment.weighting import WK
+from railsim.definitions.layout import curvature_sections
+from railsim.definitions.limits import Classes, ComfortLimits
+from railsim.errors import Fault, InputError
+from railsim.result.filters import Floats
+
+MARGIN = 16.0  # s around a part, for the weightings' lower limit of 0.4 Hz
+
+
+@dataclass(frozen=True)
+class PointComfort:
+    """Comfort at one point.
+
+    Attributes
+    ----------
+    sensor : str
+    place : float
+        Along the vehicle, from the reference body forwards [m].
+    mean : MeanComfort
+        N_MV, N_VA, N_VD and the root mean squares of 5 s.
+    iso_rms : float64[3]
+        Weighted root mean squares after ISO 2631-1 along x, y, z [m/s2].
+    sperling : dict
+        Wz ``lateral`` and ``vertical``.
+    transitions : tuple of TransitionComfort
+    events : dict
+        Largest P_DE by posture [%].
+    """
+
+    sensor: str
+    place: float
+    mean: MeanComfort
+    iso_rms: Floats
+    sperling: dict[str, float]
+    transitions: tuple[TransitionComfort, ...]
+    events: dict[str, float]
+
+    def record(self, limits: ComfortLimits) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI but for the indices in per cent."""
+        continuous = self.mean.continuous
+        return {
+            "place": self.sensor,
+            "x": self.place,
+            "N_MV": self.mean.N_MV,
+            "N_VA": self.mean.N_VA,
+            "N_VD": self.mean.N_VD,
+            "class": class_of(limits.mean_comfort, self.mean.N_MV),
+            "blocks": self.mean.blocks,
+            "continuous_largest": [float(v) for v in np.max(continuous, axis=0)],
+            "iso2631_rms": [float(v) for v in self.iso_rms],
+            "iso2631_total": float(np.sqrt(np.sum(self.iso_rms**2))),
+            "sperling": self.sperling,
+            "P_CT": {
+                posture: max((getattr(t, posture) for t in self.transitions), default=None)
+                for posture in ("standing", "seated")
+            },
+            "P_DE": self.events,
+            "source": limits.mean_comfort.source,
+            "checked": limits.mean_comfort.checked,
+        }
+
+
+def class_of(classes: Classes, value: float) -> str:
+    """Name of the class that a value falls into; empty for nan."""
+    if np.isnan(value):
+        return ""
+    return next((name for end, name in classes.values if value < end), classes.above)
+
+
+def comfort_report(record: Record) -> list[PointComfort]:
+    """Comfort at all points but those on bogie frames.
+
+    Parameters
+    ----------
+    record : Record
+        Run with readings of sensors, or the motion of the bodies.
+
+    Raises
+    ------
+    InputError : there are none, or the run is shorter than one block of 5 s.
+    """
+    names = [name for name in record.sensors if not name.startswith("frame_")]
+    if not names:
+        raise InputError([Fault(
+            record.name, "sensor_acceleration", "is not in the result",
+            "run it with settings.outputs.sensors=true",
+        )])  # fmt: skip
+    columns = [list(record.sensors).index(name) for name in names]
+    gathered = [_Gathered() for _ in names]
+    for rows, counted in record.pieces(MARGIN):
+        a = record.readings(rows)[0]
+        for column, into in zip(columns, gathered, strict=True):
+            into.add(a[:, column], counted, record.rate)
+    if not gathered[0].blocks:
+        allowed = "5 s at least after the first 3 s"
+        raise InputError([Fault(record.name, "time", "too short for one block of 5 s", allowed)])
+    transitions = _transitions(record, columns)
+    return [
+        PointComfort(
+            name,
+            record.place(name),
+            mean_comfort(np.concatenate(into.blocks), np.concatenate(into.back)),
+            np.sqrt(into.iso / into.count),
+            {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
+            tuple(transitions[number]),
+            into.events,
+        )
+        for number, (name, into) in enumerate(zip(names, gathered, strict=True))
+    ]
+
+
+class _Gathered:
+    """Sums and blocks of one point over the parts of a run."""
+
+    def __init__(self) -> None:
+        self.blocks: list[Floats] = []
+        self.back: list[Floats] = []
+        self.iso = np.zeros(3)
+        self.sperling: dict[Direction, float] = {"lateral": 0.0, "vertical": 0.0}
+        self.events = {"standing": 0.0, "seated": 0.0}
+        self.count = 0
+
+    def add(self, a: Floats, counted: slice, rate: float) -> None:
+        """Take a part: accelerations with margins, and which of them count."""
+        floor, back = weighted_for_comfort(a, rate)
+        blocks = block_rms(floor[counted], rate)
+        if len(blocks):
+            self.blocks.append(blocks)
+            self.back.append(block_rms(back[counted], rate))
+        size = counted.stop - counted.start
+        iso = np.column_stack([floor[:, 0], floor[:, 1], WK.weighted(a[:, 2], rate)])
+        self.iso += np.sum(iso[counted] ** 2, axis=0)
+        self.count += size
+        for axis, direction in ((1, "lateral"), (2, "vertical")):
+            way: Direction = "lateral" if direction == "lateral" else "vertical"
+            self.sperling[way] += size * sperling_mean_square(a[counted, axis], rate, way)
+        for posture, value in event_comfort(a[counted, 1], rate).items():
+            self.events[posture] = max(self.events[posture], np.nan_to_num(value))
+
+
+def _transitions(record: Record, columns: list[int]) -> list[list[TransitionComfort]]:
+    found: list[list[TransitionComfort]] = [[] for _ in columns]
+    names = list(record.sensors)
+    for section in curvature_sections(record.result.track()):
+        if section.type != "CLO":
+            continue
+        rows = record.rows_between(section.begin, section.end, 4.0)
+        time = record.time[rows]
+        if len(time) < 2 or time[-1] - time[0] > 10.0 * PIECE:
+            continue
+        a, roll = record.readings(rows)
+        for number, column in enumerate(columns):
+            s = record.distance[rows] + record.place(names[column])
+            if s[0] > section.begin or s[-1] < section.end:
+                continue
+            begin, end = np.interp([section.begin, section.end], s, time)
+            one = transition_comfort(time, a[:, column, 1], roll[:, column], begin, end)
+            if one is not None:
+                found[number].append(one)
+    return found
+
+
+def short_of_blocks(points: list[PointComfort]) -> str:
+    """Sentence where there are fewer blocks than the standard wants; empty if not."""
+    blocks = points[0].mean.blocks
+    return "" if blocks >= BLOCKS else f"{blocks} blocks of 5 s, EN 12299 wants {BLOCKS}"

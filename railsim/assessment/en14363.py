@@ -1,0 +1,299 @@
+"""Running tests after EN 14363 (2016 with A2:2022) and UIC 518: section values of a run.
+
+Filters and section values (order 4, without phase by default):
+
+====================================  ================  ==============  =====================
+quantity                              filter            then            value of a section
+====================================  ================  ==============  =====================
+``sum_Y``, ``Y_over_Q``               low pass 20 Hz    2 m mean        0.15 and 99.85 %
+``Q``                                 low pass 20 Hz                    99.85 %
+``Y_qst``, ``Q_qst``, ``body_y_qst``  low pass 20 Hz                    50 %
+``body_y``, ``body_z``, ``..._rms``   0.4 to 10 Hz                      0.15, 99.85 %; rms
+``body_y_safety``                     low pass 6 Hz                     0.15, 99.85 %
+``body_z_safety``                     0.4 to 4 Hz                       0.15, 99.85 %
+``frame_y``                           low pass 10 Hz                    0.15, 99.85 %
+``instability``                       f0 +- 2 Hz        rms over 100 m  largest
+====================================  ================  ==============  =====================
+
+Y/Q: both are filtered, divided, then averaged; where the filtered Q <= 0 the wheel is lifted, and
+the metres are reported.  Signs: in curves a force outwards and an acceleration of a curve taken too
+fast are positive; the outer wheel counts; left and right curves are pooled.  On straight track both
+percentiles of a signed quantity are values.  A window of 2 m lies within its section; that of the
+instability is as long as the section where this is shorter than 100 m.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from railsim.assessment.record import Record
+from railsim.assessment.sections import TestSection
+from railsim.result.filters import (
+    Floats,
+    band_passed,
+    distance_means,
+    low_passed,
+    window_centres,
+)
+
+LOW, HIGH = 0.15, 99.85
+FORCE_FILTER = 20.0  # Hz
+MEAN, STEP = 2.0, 0.5  # m
+RIDE = (0.4, 10.0)  # Hz
+SAFETY_Y, SAFETY_Z, FRAME = 6.0, (0.4, 4.0), 10.0  # Hz
+HALF_BAND, LOWEST = 2.0, 0.4  # Hz, of the instability filter
+HUNTING = (0.4, 20.0)  # Hz, where the dominant frequency is looked for
+RMS_LENGTH, RMS_STEP = 100.0, 10.0  # m
+MARGIN = 16.0  # s around a part, for the filter of 0.4 Hz
+LONGEST = 60.0  # s of sections that are evaluated at once
+
+Key = tuple[str, str]
+
+
+@dataclass
+class SectionValues:
+    """Values of one section.
+
+    Attributes
+    ----------
+    section : TestSection
+    values : dict
+        By quantity and place, one or two values (both percentiles on straight track) [SI].
+    lifted : dict
+        Metres without load by wheel.
+    frequencies : dict
+        Dominant frequency of the track shifting force by wheelset [Hz].
+    """
+
+    section: TestSection
+    values: dict[Key, list[float]] = field(default_factory=dict)
+    lifted: dict[str, float] = field(default_factory=dict)
+    frequencies: dict[str, float] = field(default_factory=dict)
+
+
+def section_values(
+    record: Record, sections: Sequence[TestSection], *, causal: bool = False
+) -> list[SectionValues]:
+    """Values of all given sections of a run.
+
+    Parameters
+    ----------
+    record : Record
+        Run with Q, Y and wheelset distances, and accelerations or body motions.
+    sections : sequence of TestSection
+        In the order of the track.
+    causal : bool
+        Filters as amplifiers have them, instead of without phase.
+    """
+    needed = ["Q", "Y", "wheelset_distance"]
+    record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
+    found = []
+    for group in _stretches(sections):
+        part = _Part(record, group[0].begin, group[-1].end, causal=causal)
+        for section in group:
+            values = SectionValues(section)
+            _forces(part, values)
+            _instability(part, values)
+            _accelerations(part, values)
+            found.append(values)
+    return found
+
+
+def _stretches(sections: Sequence[TestSection]) -> list[list[TestSection]]:
+    """Neighbouring sections that are read and filtered at once."""
+    groups: list[list[TestSection]] = []
+    for section in sections:
+        last = groups[-1] if groups else None
+        if (
+            last
+            and section.begin - last[-1].end < 1.0
+            and section.turn == last[-1].turn
+            and (section.end - last[0].begin) / section.speed <= LONGEST
+        ):
+            last.append(section)
+        else:
+            groups.append([section])
+    return groups
+
+
+class _Part:
+    """Filtered signals of a part of a run."""
+
+    def __init__(self, record: Record, begin: float, end: float, *, causal: bool) -> None:
+        self.record, self.causal = record, causal
+        rows = record.rows_between(begin, end, MARGIN)
+        rate = self.rate = record.rate
+        self.wheelsets = range(len(record.offsets))
+        self.s_wheelset = record.result.part("wheelset_distance", rows)
+        inner = self._near(record, begin, end, rows)
+        Q = record.result.part("Q", rows)
+        Y = record.result.part("Y", rows)
+        self.sum_Y_raw = Y.sum(axis=-1)
+        n = Q.shape[1]
+        both = np.concatenate([Q.reshape(len(Q), -1), Y.reshape(len(Y), -1)], axis=1)[inner]
+        both = low_passed(both, rate, FORCE_FILTER, causal=causal)
+        self.Q = both[:, : 2 * n].reshape(-1, n, 2)
+        self.Y = both[:, 2 * n :].reshape(-1, n, 2)
+        self.s_forces = self.s_wheelset[inner]
+        self.sum_Y = self.Y.sum(axis=-1)
+        self._accelerations(record, rows, inner)
+
+    def _near(self, record: Record, begin: float, end: float, rows: slice) -> slice:
+        """Rows of this part with a margin that is enough for 20 Hz."""
+        near = record.rows_between(begin, end, 0.5)
+        return slice(near.start - rows.start, near.stop - rows.start)
+
+    def _accelerations(self, record: Record, rows: slice, inner: slice) -> None:
+        names = list(record.sensors)
+        self.floor = [k for k, name in enumerate(names) if not name.startswith("frame_")]
+        self.frames = [k for k, name in enumerate(names) if name.startswith("frame_")]
+        self.names = names
+        self.s_sensor = {k: record.distance[rows] + record.place(name)
+                         for k, name in enumerate(names)}  # fmt: skip
+        self.inner = inner
+        if not names:
+            return
+        a = record.readings(rows)[0]
+        rate, causal = self.rate, self.causal
+        y, z = a[:, self.floor, 1], a[:, self.floor, 2]
+        self.ride_y = band_passed(y, rate, *RIDE, causal=causal)
+        self.ride_z = band_passed(z, rate, *RIDE, causal=causal)
+        self.safety_z = band_passed(z, rate, *SAFETY_Z, causal=causal)
+        self.qst_y = low_passed(y[inner], rate, FORCE_FILTER, causal=causal)
+        near = slice(max(0, inner.start - round(rate)), inner.stop + round(rate))
+        short = slice(inner.start - near.start, inner.stop - near.start)
+        self.safety_y = low_passed(y[near], rate, SAFETY_Y, causal=causal)[short]
+        self.frame_y = low_passed(a[near][:, self.frames, 1], rate, FRAME, causal=causal)[short]
+
+
+def _between(s: Floats, begin: float, end: float) -> slice:
+    return slice(int(np.searchsorted(s, begin)), int(np.searchsorted(s, end, side="right")))
+
+
+def _around(s: Floats, begin: float, end: float) -> slice:
+    """Rows from the last before `begin` to the first behind `end`, for means over distance."""
+    inside = _between(s, begin, end)
+    return slice(max(0, inside.start - 1), min(len(s), inside.stop + 1))
+
+
+def _signed(values: Floats, sign: int, percentiles: Sequence[float] = (LOW, HIGH)) -> list[float]:
+    """Values of a signed quantity: outwards in curves, both ways on straight track."""
+    if sign:
+        return [float(np.percentile(sign * values, HIGH))]
+    low, high = np.percentile(values, percentiles)
+    return [float(-low), float(high)]
+
+
+def _forces(part: _Part, found: SectionValues) -> None:
+    section = found.section
+    begin, end, turn = section.begin, section.end, section.turn
+    centres = window_centres(begin, end, MEAN, STEP)
+    for w in part.wheelsets:
+        place = f"wheelset {w + 1}"
+        s = part.s_forces[:, w]
+        around, inside = _around(s, begin, end), _between(s, begin, end)
+        means = distance_means(s[around], part.sum_Y[around, w], centres, MEAN)
+        # the force on the rails points outwards where it points away from the curve's centre
+        found.values["sum_Y", place] = _signed(means, -turn)
+        sides = (0, 1) if turn == 0 else ((0,) if turn > 0 else (1,))
+        for side in sides:
+            wheel = place + (" outer" if turn else (" left", " right")[side])
+            Q = part.Q[inside, w, side]
+            found.values["Q", wheel] = [float(np.percentile(Q, HIGH))]
+            _quotient(part, found, w, side, centres, wheel)
+        if turn:
+            _quasi_static(part, found, w, inside, place)
+
+
+def _quotient(
+    part: _Part, found: SectionValues, w: int, side: int, centres: Floats, wheel: str
+) -> None:
+    """Y/Q of one wheel: its 2 m means, and the metres without load."""
+    s = part.s_forces[:, w]
+    around = _around(s, found.section.begin, found.section.end)
+    Q, Y, s = part.Q[around, w, side], part.Y[around, w, side], s[around]
+    loaded = Q > 0.0
+    quotient = np.where(loaded, (1.0, -1.0)[side == 0] * Y / np.where(loaded, Q, 1.0), 0.0)
+    means = distance_means(s, quotient, centres, MEAN)
+    if not loaded.all():
+        found.lifted[wheel] = float(np.sum(np.gradient(s)[~loaded]))
+        share = distance_means(s, np.where(loaded, 0.0, 1.0), centres, MEAN)
+        means = means[share <= 0.0]
+    if found.section.turn and len(means):
+        found.values["Y_over_Q", wheel] = [float(np.percentile(means, HIGH))]
+
+
+def _quasi_static(
+    part: _Part, found: SectionValues, w: int, inside: slice, place: str
+) -> None:
+    turn = found.section.turn
+    outer = 0 if turn > 0 else 1
+    Q, Y = part.Q[inside, w], part.Y[inside, w]
+    outwards = (-1.0, 1.0)
+    guiding = float(np.percentile(outwards[outer] * Y[:, outer], 50.0))
+    inner = 1 - outer
+    loaded = Q[:, inner] > 0.0
+    quotient = outwards[inner] * Y[loaded, inner] / Q[loaded, inner]
+    found.values["Y_qst", f"{place} outer"] = [guiding]
+    found.values["Q_qst", f"{place} outer"] = [float(np.percentile(Q[:, outer], 50.0))]
+    inner_mean = float(np.mean(quotient)) if len(quotient) else math.nan
+    found.values["Y_over_Q_inner", f"{place} inner"] = [inner_mean]
+
+
+def _instability(part: _Part, found: SectionValues) -> None:
+    section = found.section
+    begin, end = section.begin, section.end
+    length = min(RMS_LENGTH, end - begin)
+    centres = window_centres(begin, end, length, RMS_STEP)
+    for w in part.wheelsets:
+        s = part.s_wheelset[:, w]
+        # two seconds on either side, for a band of 4 Hz
+        near = _between(s, begin - 2.0 * section.speed, end + 2.0 * section.speed)
+        force = part.sum_Y_raw[near, w]
+        f0 = dominant_frequency(force, part.rate)
+        band = band_passed(
+            force, part.rate, max(f0 - HALF_BAND, LOWEST), f0 + HALF_BAND, causal=part.causal
+        )
+        around = _around(s[near], begin, end)
+        square = distance_means(s[near][around], np.square(band[around]), centres, length)
+        place = f"wheelset {w + 1}"
+        found.values["instability", place] = [float(np.sqrt(np.max(np.maximum(square, 0.0))))]
+        found.frequencies[place] = f0
+
+
+def dominant_frequency(x: Floats, rate: float) -> float:
+    """Frequency of the largest part of a record's spectrum between 0.4 and 20 Hz [Hz].
+
+    Hann window over the whole record, four times as many points as the record has.
+    """
+    n = len(x)
+    power = np.abs(np.fft.rfft((x - np.mean(x)) * np.hanning(n), 4 * n)) ** 2
+    f = np.fft.rfftfreq(4 * n, 1.0 / rate)
+    searched = np.flatnonzero((f >= HUNTING[0]) & (f <= HUNTING[1]))
+    peak = int(searched[np.argmax(power[searched])])
+    return float(f[peak])
+
+
+def _accelerations(part: _Part, found: SectionValues) -> None:
+    section = found.section
+    begin, end, turn = section.begin, section.end, section.turn
+    for column, k in enumerate(part.floor if part.names else []):
+        name = part.names[k]
+        whole = _between(part.s_sensor[k], begin, end)
+        near = _between(part.s_sensor[k][part.inner], begin, end)
+        y, z = part.ride_y[whole, column], part.ride_z[whole, column]
+        found.values["body_y", name] = _signed(y, 0)
+        found.values["body_z", name] = _signed(z, 0)
+        found.values["body_y_rms", name] = [float(np.sqrt(np.mean(y**2)))]
+        found.values["body_z_rms", name] = [float(np.sqrt(np.mean(z**2)))]
+        if turn:
+            middle = float(np.percentile(turn * part.qst_y[near, column], 50.0))
+            found.values["body_y_qst", name] = [middle]
+        found.values["body_y_safety", name] = _signed(part.safety_y[near, column], turn)
+        found.values["body_z_safety", name] = _signed(part.safety_z[whole, column], 0)
+    for column, k in enumerate(part.frames if part.names else []):
+        near = _between(part.s_sensor[k][part.inner], begin, end)
+        values = _signed(part.frame_y[near, column], turn)
+        found.values["frame_y", part.names[k]] = values

@@ -1,0 +1,158 @@
+"""What an assessment reads of a result: equal time steps, fine enough, with what it needs.
+
+A result is read part by part: a record of 100 km needs no more memory than one of a kilometre.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from railsim.errors import Fault, InputError
+from railsim.result import Result
+from railsim.result.filters import Floats
+from railsim.result.sensors import Sensor, readings, sensors
+from railsim.track.alignment import Alignment
+
+FINE_ENOUGH = 1000.0  # samples a second of instantaneous values
+START = 3.0  # s after the start that are left out
+MOTION = ("body_position", "body_velocity", "body_acceleration")
+PIECE = 60.0  # s that are read at once where nothing else says so
+
+
+class Record:
+    """A result as a measured record.
+
+    Parameters
+    ----------
+    result : Result
+    name : str
+        What the user knows it by, for messages.
+    coarse : bool
+        Take also what is sampled too coarsely.
+
+    Raises
+    ------
+    InputError : unequal time steps, too few samples a second, too short.
+    """
+
+    def __init__(self, result: Result, name: str, *, coarse: bool = False) -> None:
+        self.result, self.name = result, name
+        self.time, self.distance = result["time"], result["distance"]
+        steps = np.diff(self.time)
+        if len(steps) < 10:
+            raise self._fault("time", f"{len(self.time)} instants", "a longer run")
+        # the last step of a run is shorter where its end falls between two outputs
+        self.rows = len(self.time) - 1
+        step = float(np.median(steps))
+        self.rate = 1.0 / step
+        if float(np.max(np.abs(steps[:-1] - step))) > 1e-3 * step:
+            allowed = "a run with settings.output_rate, not output_spacing"
+            raise self._fault("time", "unequal time steps", allowed)
+        self.low_pass = result.settings().outputs.low_pass
+        self.coarse = self.low_pass is None and self.rate < FINE_ENOUGH * (1.0 - 1e-3)
+        if self.coarse and not coarse:
+            allowed = (
+                f"{FINE_ENOUGH:g} at least (settings.output_rate=1000), or values low-passed by "
+                "the run (settings.outputs.low_pass); --coarse assesses it all the same"
+            )
+            raise self._fault("time", f"{self.rate:.4g} samples a second", allowed)
+
+    def _fault(self, key: str, found: str, allowed: str) -> InputError:
+        return InputError([Fault(self.name, key, found, allowed)])
+
+    def need(self, names: Sequence[str], output: str) -> None:
+        """Refuse a result that lacks quantities.
+
+        Raises
+        ------
+        InputError : some of `names` are missing; says that `output` has to be asked for.
+        """
+        missing = [name for name in names if name not in self.result]
+        if missing:
+            raise InputError(
+                [Fault(self.name, name, "is not in the result", f"run it with {output}")
+                 for name in missing]
+            )  # fmt: skip
+
+    @cached_property
+    def alignment(self) -> Alignment:
+        """Geometry of the track."""
+        return Alignment(self.result.track())
+
+    @cached_property
+    def offsets(self) -> Floats:
+        """Arc length of each wheelset beyond that of the reference body [m]."""
+        return np.asarray(self.result.part("wheelset_distance", slice(0, 1))[0] - self.distance[0])
+
+    @cached_property
+    def sensors(self) -> Mapping[str, Sensor]:
+        """Sensors whose readings can be had, by name."""
+        known = sensors(self.result.vehicle())
+        if "sensor_acceleration" in self.result:
+            return {n: known[n] for n in self.result.coordinates["sensor"] if n in known}
+        bodies = self.result.bodies if all(name in self.result for name in MOTION) else ()
+        return {name: sensor for name, sensor in known.items() if sensor.body in bodies}
+
+    def place(self, sensor: str) -> float:
+        """Arc length of a sensor beyond that of the reference body [m]."""
+        return self.sensors[sensor].offset + self.sensors[sensor].arm[0]
+
+    def readings(self, rows: slice) -> tuple[Floats, Floats]:
+        """Accelerations [m/s2] and roll velocities [rad/s] of all sensors, see `readings`."""
+        if "sensor_acceleration" in self.result:
+            names = self.result.coordinates["sensor"]
+            order = [names.index(name) for name in self.sensors]
+            acceleration = self.result.part("sensor_acceleration", rows)[:, order]
+            return acceleration, self.result.part("sensor_roll_rate", rows)[:, order]
+        motion = {name: self.result.part(name, rows) for name in MOTION}
+        motion["distance"] = self.distance[rows]
+        speed = np.gradient(self.distance[rows], self.time[rows])
+        return readings(self.sensors, motion, self.result.bodies, self.alignment, speed)
+
+    def covered(self) -> tuple[float, float]:
+        """Arc lengths between which every place was recorded after the start [m]."""
+        places = [*self.offsets, *(self.place(name) for name in self.sensors)]
+        ahead, behind = max(0.0, *places), min(0.0, *places)
+        first = int(np.searchsorted(self.time, self.time[0] + START))
+        first = min(first, self.rows - 1)
+        started = max(float(self.distance[first]), float(self.distance[0]) + ahead - behind)
+        return started + ahead, float(self.distance[self.rows - 1]) + behind
+
+    def speed_at(self, s: float) -> float:
+        """Speed of the reference body at an arc length [m/s]."""
+        i = int(np.clip(np.searchsorted(self.distance, s), 1, self.rows - 1))
+        low, high = max(i - 5, 0), min(i + 5, self.rows - 1)
+        return float(
+            (self.distance[high] - self.distance[low]) / (self.time[high] - self.time[low])
+        )
+
+    def rows_between(self, begin: float, end: float, margin: float) -> slice:
+        """Rows in which any place is between two arc lengths, and `margin` seconds around."""
+        places = [0.0, *self.offsets, *(self.place(name) for name in self.sensors)]
+        extra = math.ceil(margin * self.rate)
+        first = int(np.searchsorted(self.distance, begin - max(places))) - extra
+        last = int(np.searchsorted(self.distance, end - min(places))) + extra
+        return slice(max(0, first), min(self.rows, last + 1))
+
+    def pieces(self, margin: float) -> list[tuple[slice, slice]]:
+        """Parts of the whole record after the start: rows to read, and which of them count."""
+        first = int(np.searchsorted(self.time, self.time[0] + START))
+        size, extra = math.ceil(PIECE * self.rate), math.ceil(margin * self.rate)
+        found = []
+        for begin in range(first, self.rows, size):
+            end = min(begin + size, self.rows)
+            low, high = max(0, begin - extra), min(self.rows, end + extra)
+            found.append((slice(low, high), slice(begin - low, end - low)))
+        return found
+
+    def remarks(self) -> list[str]:
+        """What a reader of the assessment must know about the record."""
+        found = list(self.result.remarks)
+        if self.coarse:
+            found.append(
+                f"{self.name}: {self.rate:.4g} samples a second are too few for instantaneous "
+                "values: what the filters would have taken out may be folded into the result"
+            )
+        return found

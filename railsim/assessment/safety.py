@@ -1,0 +1,116 @@
+"""Safety against derailment and overturning from single numbers and records.
+
+Nadal (1896): a wheel climbs where Y/Q exceeds (tan b - mu)/(1 + mu tan b), b the flange angle.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.profiles import Profile
+from railsim.result.filters import Floats
+
+
+def nadal(flange_angle: float, mu: float) -> float:
+    """Limit of Y/Q (Nadal 1896, Annales des Mines).
+
+    Parameters
+    ----------
+    flange_angle : float
+        Largest contact angle of the flange [rad].
+    mu : float
+        Coefficient of friction [1].
+
+    Examples
+    --------
+    >>> round(nadal(math.radians(70.0), 0.36), 3)
+    1.2
+    """
+    slope = math.tan(flange_angle)
+    return (slope - mu) / (1.0 + mu * slope)
+
+
+def flange_angle(profile: Profile) -> float:
+    """Largest angle of a wheel profile on its flange [rad].
+
+    The slope of the profile over a millimetre of its length, so that single rounded points of a
+    measured profile do not count as an angle.
+    """
+    y, z = np.asarray(profile.y), np.asarray(profile.z)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
+    at = np.arange(0.0, along[-1], 0.25e-3)
+    py, pz = np.interp(at, along, y), np.interp(at, along, z)
+    span = 4  # of 0.25 mm
+    angles = np.arctan2(np.abs(pz[span:] - pz[:-span]), np.abs(py[span:] - py[:-span]))
+    # the flange's back is as steep as can be: the flange lies between its tip and the tread
+    tip = int(np.argmax(pz))
+    middle = 0.5 * (at[span:] + at[:-span])
+    order = np.argsort(y)
+    tread = float(np.interp(0.0, y[order], along[order]))
+    face = (middle > min(at[tip], tread)) & (middle < max(at[tip], tread))
+    return float(np.max(angles[face]))
+
+
+@dataclass(frozen=True)
+class Climb:
+    """Longest stretch over which one wheel's Y/Q exceeds a limit.
+
+    Attributes
+    ----------
+    length : float
+        Its length [m]; 0 where the limit is not exceeded.
+    begin : float
+        Where it begins [m].
+    rise : float
+        Largest rise of the wheel over its rail since the beginning of the stretch [m].
+    """
+
+    length: float
+    begin: float
+    rise: float
+
+
+def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) -> Climb:
+    """Longest stretch with Y/Q of one wheel above a limit, unfiltered.
+
+    A wheel without load (nan) counts as above the limit.
+
+    Parameters
+    ----------
+    s : float64[time]
+        Distance of the wheel, increasing [m].
+    Y_over_Q : float64[time]
+        Derailment quotient of one wheel [1].
+    limit : float
+        Such as that of Nadal [1].
+    height : float64[time]
+        Height of the wheel over its rail [m].
+
+    Examples
+    --------
+    >>> s = np.arange(6.0)
+    >>> climb_distance(s, np.array([0.5, 1.3, 1.4, 1.3, 0.9, 0.2]), 1.2, 1e-3 * s)
+    Climb(length=2.0, begin=1.0, rise=0.002)
+    """
+    above = np.concatenate([[False], ~(Y_over_Q <= limit), [False]])
+    edges = np.flatnonzero(np.diff(above.astype(int)))
+    best = Climb(0.0, math.nan, 0.0)
+    for first, behind in zip(edges[::2], edges[1::2], strict=True):
+        length = float(s[behind - 1] - s[first])
+        if length > best.length:
+            rise = float(np.max(height[first:behind]) - height[first])
+            best = Climb(length, float(s[first]), rise)
+    return best
+
+
+def overturning(Q: Floats) -> Floats:
+    """Overturning coefficient of a bogie, (sum Q_left - sum Q_right)/(sum Q) [1].
+
+    Parameters
+    ----------
+    Q : float64[time, wheelset, side]
+        Vertical wheel forces of the bogie [N].
+    """
+    left, right = np.sum(Q[..., 0], axis=-1), np.sum(Q[..., 1], axis=-1)
+    return np.asarray((left - right) / (left + right))

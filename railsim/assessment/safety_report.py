@@ -1,0 +1,112 @@
+"""Derailment and overturning over a whole run, wheel by wheel and bogie by bogie, unfiltered."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.assessment.record import Record
+from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
+from railsim.definitions.flatten import flatten
+from railsim.notation import SIDES
+
+HALF_BASE = 0.75  # m, from the middle of the axle to a wheel's tape circle
+
+
+@dataclass(frozen=True)
+class WheelSafety:
+    """Nadal's limit and the climb of one wheel.
+
+    Attributes
+    ----------
+    place : str
+        Wheelset, from 1, and side.
+    limit : float
+        Nadal's limit of Y/Q with the profile's largest angle and the track's friction [1].
+    Y_over_Q : float
+        Largest quotient, unfiltered [1]; nan where the wheel was without load.
+    climb_distance, climb_begin, rise : float
+        Longest stretch above the limit, where it begins, rise of the wheel on it [m].
+    """
+
+    place: str
+    limit: float
+    Y_over_Q: float
+    climb_distance: float
+    climb_begin: float
+    rise: float
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI."""
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True)
+class SafetyReport:
+    """Derailment and overturning of a run.
+
+    Attributes
+    ----------
+    wheels : tuple of WheelSafety
+    overturning : dict
+        Largest magnitude of (sum Q_left - sum Q_right)/(sum Q) by bogie [1].
+    """
+
+    wheels: tuple[WheelSafety, ...]
+    overturning: dict[str, float]
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI."""
+        wheels = [wheel.record() for wheel in self.wheels]
+        return {"wheels": wheels, "overturning": self.overturning}
+
+
+def safety_report(record: Record) -> SafetyReport:
+    """Nadal, climb distance and overturning over a run.
+
+    Parameters
+    ----------
+    record : Record
+        Run with Q, Y_over_Q, wheelset_distance and body_position.
+    """
+    needed = ["Q", "Y_over_Q", "wheelset_distance"]
+    record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
+    result = record.result
+    track, names = result.track(), result.wheelsets
+    flat = flatten(result.vehicle())
+    wheelsets = [w.wheelset for w in flat.of_kind("wheelset") if w.wheelset]
+    wheels = []
+    quotient, s = result["Y_over_Q"], result["wheelset_distance"]
+    for w, wheelset in enumerate(wheelsets):
+        for k, side in enumerate(SIDES):
+            angle = flange_angle(result.profiles[wheelset.profile[k]])
+            limit = nadal(angle, track.friction[k])
+            climb = climb_distance(s[:, w], quotient[:, w, k], limit, _height(record, w, k))
+            lifted = bool(np.isnan(quotient[:, w, k]).any())
+            largest = float("nan") if lifted else float(np.max(quotient[:, w, k]))
+            wheels.append(WheelSafety(
+                f"wheelset {w + 1} {side}", limit, largest, climb.length, climb.begin, climb.rise
+            ))  # fmt: skip
+    bogies: dict[str, list[int]] = {}
+    for w, name in enumerate(names):
+        bogies.setdefault(name.split(".")[0], []).append(w)
+    Q = result["Q"]
+    largest_of = {
+        bogie: float(np.max(np.abs(overturning(Q[:, own])))) for bogie, own in bogies.items()
+    }
+    return SafetyReport(tuple(wheels), largest_of)
+
+
+def _height(record: Record, w: int, side: int) -> np.ndarray:
+    """Height of a wheel over its rail, from the wheelset's place and roll [m].
+
+    Against the rails' irregularities where the result has them.
+    """
+    result = record.result
+    if "body_position" not in result:
+        return np.zeros(len(record.time))
+    position = result["body_position"][:, result.bodies.index(result.wheelsets[w])]
+    outwards = (-1.0, 1.0)[side]
+    height = -(position[:, 2] + outwards * HALF_BASE * position[:, 3])
+    if "rail_vertical" in result:
+        height = height + result["rail_vertical"][:, w, side]
+    return np.asarray(height)

@@ -1,0 +1,208 @@
+"""Test sections found from the track under a run.
+
+A section is a full length of one plan element of constant curvature and constant cant, away from
+the rounded kinks; transitions are apart.  Its zone follows from its radius; sections outside a
+zone's conditions are kept with the reason why they do not count.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from railsim.definitions.layout import Section, cant_sections, curvature_sections
+from railsim.definitions.limits import RunningLimits, Zone
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Service
+
+GRAVITY, CANT_BASE = 9.81, 1.5
+
+
+@dataclass(frozen=True)
+class TestSection:
+    """A section of the track that a run passed.
+
+    Attributes
+    ----------
+    zone : str
+        1 to 4; empty where no zone has this radius.
+    begin, end : float
+        Arc lengths [m].
+    radius : float
+        Signed radius, infinite on straight track [m].
+    cant_deficiency : float
+        Signed so that a curve taken too fast is positive [m].
+    speed : float
+        Speed in its middle [m/s].
+    reason : str
+        Why it does not count; empty if it does.
+    """
+
+    __test__ = False  # pytest: not a test
+
+    zone: str
+    begin: float
+    end: float
+    radius: float
+    cant_deficiency: float
+    speed: float
+    reason: str = ""
+
+    @property
+    def turn(self) -> int:
+        """1 in a right-hand curve, -1 in a left-hand one, 0 on straight track."""
+        return 0 if math.isinf(self.radius) else int(math.copysign(1.0, self.radius))
+
+
+def cant_deficiency(speed: float, radius: float, cant: float) -> float:
+    """Cant deficiency V^2 2b0/(g R) - h, positive where the curve is taken too fast [m].
+
+    Parameters
+    ----------
+    speed : float
+        [m/s]
+    radius, cant : float
+        Signed: positive to the right, positive = left rail higher [m].
+
+    Examples
+    --------
+    >>> round(cant_deficiency(20.0, 250.0, 0.15), 4)
+    0.0946
+    """
+    if math.isinf(radius):
+        return abs(cant)
+    return speed**2 * CANT_BASE / (GRAVITY * abs(radius)) - math.copysign(1.0, radius) * cant
+
+
+def track_sections(
+    track: Track,
+    limits: RunningLimits,
+    service: Service,
+    covered: tuple[float, float],
+    speed_at: Callable[[float], float],
+) -> list[TestSection]:
+    """All full sections of the part of a track that a run covered.
+
+    Parameters
+    ----------
+    track : Track
+    limits : RunningLimits
+        Zones and lengths of sections.
+    service : Service
+        Admissible speed and cant deficiency.
+    covered : (float, float)
+        Arc lengths between which all places of the vehicle were recorded [m].
+    speed_at : callable
+        Arc length to speed [m/s].
+    """
+    found: list[TestSection] = []
+    for begin, end, radius, cant in _constant(track):
+        begin, end = max(begin, covered[0]), min(end, covered[1])
+        if begin >= end:
+            continue
+        speed = speed_at(0.5 * (begin + end))
+        deficiency = cant_deficiency(speed, radius, cant)
+        zone = zone_of(radius, deficiency, limits)
+        length = section_length(limits.zones[zone], speed) if zone else end - begin
+        reason = "" if zone else f"no zone has the radius {abs(radius):.6g} m"
+        whole = math.floor((end - begin) / length + 1e-9)
+        if not whole:
+            shape = "straight" if math.isinf(radius) else f"curve of {abs(radius):.6g} m"
+            reason = f"{end - begin:.0f} m of a {shape}, a section needs {length:.0f} m"
+            found.append(TestSection(zone, begin, end, radius, deficiency, speed, reason))
+        for number in range(whole):
+            first = begin + number * length
+            speed = speed_at(first + 0.5 * length)
+            deficiency = cant_deficiency(speed, radius, cant)
+            why = reason or _outside(limits.zones[zone], radius, deficiency, speed, service)
+            found.append(
+                TestSection(zone, first, first + length, radius, deficiency, speed, why)
+            )
+    return found
+
+
+def _constant(track: Track) -> list[tuple[float, float, float, float]]:
+    """Parts with constant curvature and cant: begin, end, radius, cant."""
+    plan, cants = curvature_sections(track), cant_sections(track)
+    last = plan[-1].end
+    if not cants:
+        cants = [Section("", "CST", 0.0, last, 0.0, 0.0)]
+    elif cants[-1].end < last:
+        value = cants[-1].end_value
+        cants = [*cants, Section("", "CST", cants[-1].end, last, value, value)]
+    found = []
+    for element in _joined(plan):
+        for cant in _joined(cants):
+            begin = max(_inner(element, track.rounding)[0], _inner(cant, track.rounding)[0])
+            end = min(_inner(element, track.rounding)[1], _inner(cant, track.rounding)[1], last)
+            if begin < end:
+                kappa = element.start_value
+                radius = 1.0 / kappa if kappa else math.inf
+                found.append((max(begin, 0.0), end, radius, cant.start_value))
+    return sorted(found)
+
+
+def _joined(sections: Sequence[Section]) -> list[Section]:
+    """Sections of constant value; neighbours of one value are one."""
+    constant: list[Section] = []
+    for section in sections:
+        if section.slope != 0.0:
+            continue
+        before = constant[-1] if constant else None
+        if before and before.end == section.begin and before.end_value == section.start_value:
+            constant[-1] = Section(
+                before.key, before.type, before.begin, section.end, before.start_value,
+                section.end_value,
+            )  # fmt: skip
+        else:
+            constant.append(section)
+    return constant
+
+
+def _inner(section: Section, rounding: float) -> tuple[float, float]:
+    return section.begin + 0.5 * rounding, section.end - 0.5 * rounding
+
+
+def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
+    """Zone of a radius; empty where there is none.
+
+    Very large radii with little cant deficiency belong to zone 1.
+    """
+    straight = next((n for n, z in limits.zones.items() if z.radius is None), "")
+    if math.isinf(radius):
+        return straight
+    for name, zone in sorted(limits.zones.items(), reverse=True):
+        if zone.radius is not None and zone.radius[0] <= abs(radius) <= zone.radius[1]:
+            most = limits.zones[straight].cant_deficiency[1] if straight else -math.inf
+            return straight if zone.speed is not None and abs(deficiency) <= most else name
+    return ""
+
+
+def section_length(zone: Zone, speed: float) -> float:
+    """Length of a section at a speed [m]."""
+    return next((length for most, length in zone.section if speed <= most), zone.section_above)
+
+
+def _outside(
+    zone: Zone, radius: float, deficiency: float, speed: float, service: Service
+) -> str:
+    """Why a section is outside its zone's conditions; empty if it is not."""
+    low, high = zone.cant_deficiency
+    unit = 1.0 if zone.radius is None else service.cant_deficiency
+    reasons = []
+    if not low * unit - 1e-6 <= deficiency <= high * unit + 1e-6:
+        reasons.append(
+            f"cant deficiency {1e3 * deficiency:.0f} mm, wanted {1e3 * low * unit:.0f} to "
+            f"{1e3 * high * unit:.0f} mm"
+        )
+    if zone.speed is not None:
+        slow, fast = (share * service.admissible_speed for share in zone.speed)
+        if not slow - 1e-6 <= speed <= fast + 1e-6:
+            reasons.append(f"speed {speed:.1f} m/s, wanted {slow:.1f} to {fast:.1f} m/s")
+    return "; ".join(reasons)
+
+
+def reasons(sections: Sequence[TestSection]) -> list[str]:
+    """Sentences on sections that do not count, equal ones together."""
+    counted = Counter(section.reason for section in sections if section.reason)
+    return [f"{n} section{'s' * (n > 1)} left out: {why}" for why, n in counted.items()]

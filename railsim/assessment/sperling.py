@@ -1,0 +1,72 @@
+"""Sperling's ride index Wz (Sperling 1941; Garg and Dukkipati 1984, chapter 3).
+
+Wz = (100 sqrt(2) a_w)^0.3 with the root mean square a_w [m/s2] of the acceleration after
+
+    B(f) = k sqrt((1.911 f^2 + (0.25 f^2)^2) / ((1 - 0.277 f^2)^2 + (1.563 f - 0.0368 f^3)^2)),
+
+k 0.588 vertical, 0.735 lateral.  The index was made for amplitudes in cm/s2: sqrt(2) a_w is that of
+a tone.  Several tones add as the 20/3rd powers of their indices do, which is the same as adding
+their squares in a_w.
+
+2: good; 2.5: limit of freight and passenger comfort ...: see the handbook; the classes are recalled
+and not printed as a verdict.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from railsim.result.filters import Floats
+
+FACTOR = {"vertical": 0.588, "lateral": 0.735}
+BAND = (0.5, 30.0)
+"""Frequencies that count [Hz]."""
+Direction = Literal["vertical", "lateral"]
+
+
+def sperling_gain(f: Floats, direction: Direction) -> Floats:
+    """Weighting B at the frequencies `f` [Hz]."""
+    square = np.asarray(f, dtype=np.float64) ** 2
+    above = 1.911 * square + (0.25 * square) ** 2
+    below = (1.0 - 0.277 * square) ** 2 + square * (1.563 - 0.0368 * square) ** 2
+    return np.asarray(FACTOR[direction] * np.sqrt(above / below))
+
+
+def sperling_index(a: Floats, rate: float, direction: Direction) -> float:
+    """Ride index of a record from 0.5 to 30 Hz.
+
+    Parameters
+    ----------
+    a : float64[time]
+        Acceleration [m/s2].
+    rate : float
+        Samples per second [1/s].
+    direction : {'vertical', 'lateral'}
+
+    Returns
+    -------
+    float
+        Wz [1].
+    """
+    return index_of_rms(float(np.sqrt(sperling_mean_square(a, rate, direction))))
+
+
+def sperling_mean_square(a: Floats, rate: float, direction: Direction) -> float:
+    """Mean square of the weighted acceleration of a record from 0.5 to 30 Hz [m2/s4]."""
+    n = len(a)
+    power = np.abs(np.fft.rfft(a - np.mean(a)) / n) ** 2  # half the mean square of each tone
+    f = np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64)
+    counted = (f >= BAND[0]) & (f <= BAND[1])
+    return float(2.0 * np.sum(power[counted] * sperling_gain(f[counted], direction) ** 2))
+
+
+def index_of_rms(a_w: float) -> float:
+    """Wz of a weighted root mean square [m/s2].
+
+    Examples
+    --------
+    >>> B = float(sperling_gain(np.array(5.0), "vertical"))
+    >>> round(index_of_rms(0.5 / np.sqrt(2.0) * B), 3)
+    3.039
+    """
+    return float((100.0 * np.sqrt(2.0) * a_w) ** 0.3)

@@ -1,0 +1,94 @@
+"""Estimates of largest values from samples of sections (EN 14363, annex on statistics).
+
+One-dimensional: mean + k s.  Two-dimensional: straight line over an influence such as the cant
+deficiency, with the upper bound of a further observation at the target condition.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from railsim.result.filters import Floats
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimate of a quantity's largest value from its values in sections.
+
+    Attributes
+    ----------
+    N : int
+        Number of values.
+    mean, deviation : float
+        Mean and standard deviation (N - 1) of the values; of the two-dimensional method the line at
+        the target and the standard error about the line.
+    value : float
+        The estimate; nan where there are too few values.
+    method : {'one', 'two'}
+        Dimensions.
+    """
+
+    N: int
+    mean: float
+    deviation: float
+    value: float
+    method: str
+
+
+def one_dimensional(x: Floats, k: float) -> Estimate:
+    """Mean + k s of the values.
+
+    Parameters
+    ----------
+    x : float64[section]
+        Values.
+    k : float
+        Factor of the standard deviation: 3 safety, 2.2 loading and ride, 0 quasi-static.
+
+    Examples
+    --------
+    >>> values = np.array([31.2, 29.8, 33.5, 30.4, 32.1, 34.0, 28.9, 31.7, 30.9, 32.6])
+    >>> round(one_dimensional(values, 3.0).value, 3), round(one_dimensional(values, 2.2).value, 3)
+    (36.323, 35.04)
+    """
+    n = len(x)
+    mean = float(np.mean(x)) if n else math.nan
+    deviation = float(np.std(x, ddof=1)) if n > 1 else math.nan
+    value = mean if k == 0.0 else mean + k * deviation
+    return Estimate(n, mean, deviation, value, "one")
+
+
+def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Estimate:
+    """Upper bound of y at x0 by linear regression.
+
+    a + b x0 + t(N - 2, P) s_e sqrt(1 + 1/N + (x0 - mean)^2/sum (x - mean)^2) with the one-sided
+    quantile t of Student's distribution.
+
+    Parameters
+    ----------
+    x, y : float64[section]
+        Influence, such as the cant deficiency, and values.
+    x0 : float
+        Target of the influence.
+    probability : float
+        P, 0.99 safety, 0.95 else; 0.5 gives the line itself.
+
+    Examples
+    --------
+    >>> x = np.array([70, 85, 95, 100, 110, 120, 125, 135, 145, 150.0])
+    >>> y = np.array([24.1, 26.0, 28.2, 27.5, 30.1, 31.0, 32.9, 33.1, 36.0, 35.4])
+    >>> [round(two_dimensional(x, y, 150.0, P).value, 3) for P in (0.95, 0.99)]
+    [37.254, 38.007]
+    """
+    n = len(x)
+    if n < 3 or float(np.ptp(x)) == 0.0:
+        return Estimate(n, math.nan, math.nan, math.nan, "two")
+    slope, level = np.polynomial.polynomial.polyfit(x, y, 1)[::-1]
+    error = float(np.sqrt(np.sum((y - level - slope * x) ** 2) / (n - 2)))
+    middle = float(np.mean(x))
+    spread = 1.0 + 1.0 / n + (x0 - middle) ** 2 / float(np.sum((x - middle) ** 2))
+    line = float(level + slope * x0)
+    t = float(stats.t.ppf(probability, n - 2))
+    return Estimate(n, line, error, line + t * error * math.sqrt(spread), "two")

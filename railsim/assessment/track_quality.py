@@ -1,0 +1,88 @@
+"""Geometric quality of the rails under a run: standard deviations of alignment and level.
+
+Order 4 Butterworth band pass without phase over wavelengths D1 = 3 to 25 m, D2 = 25 to 70 m,
+D3 = 70 to 150 m (EN 13848-1; EN 14363 annex M); per section, the worse of the two rails.
+"""
+
+import numpy as np
+
+from railsim.definitions.track import Track
+from railsim.result.filters import Floats, butterworth, filtered
+from railsim.track.irregularity import displacement
+
+RANGES = {"D1": (3.0, 25.0), "D2": (25.0, 70.0), "D3": (70.0, 150.0)}
+SPACING = 0.25  # m
+
+# UIC 518 (2009): speed up to [km/h], QN1 and QN2 of alignment and level, standard deviations [mm],
+# from public re-entries
+QN = (
+    (80.0, (1.5, 1.8), (2.3, 2.6)),
+    (120.0, (1.2, 1.5), (1.8, 2.1)),
+    (160.0, (1.0, 1.3), (1.4, 1.7)),
+    (200.0, (0.8, 1.1), (1.2, 1.5)),
+    (300.0, (0.7, 1.0), (1.0, 1.3)),
+)
+# EN 14363:2016 table M.3, TL90: speed up to [km/h], ranges of alignment and level [mm], the same
+TL90 = (
+    (120.0, (1.05, 1.45), (1.80, 2.50)),
+    (160.0, (0.75, 1.00), (1.40, 1.85)),
+    (200.0, (0.70, 0.90), (1.15, 1.60)),
+    (230.0, (0.65, 0.80), (1.05, 1.45)),
+    (300.0, (0.50, 0.65), (0.85, 1.10)),
+)
+
+
+class TrackQuality:
+    """Standard deviations over any stretch of a track.
+
+    Parameters
+    ----------
+    track : Track
+    begin, end : float
+        Part of the track that is looked at [m].
+    ranges : sequence of str
+        Of `RANGES`.
+    """
+
+    def __init__(
+        self, track: Track, begin: float, end: float, ranges: tuple[str, ...] = ("D1",)
+    ) -> None:
+        function = displacement(track)
+        margin = 6.0 * max(RANGES[name][1] for name in ranges)
+        self._s = np.arange(begin - margin, end + margin, SPACING)
+        self._bands: dict[str, Floats] = {}
+        if function is None:
+            return
+        rails = np.asarray(function(self._s)[0]).reshape(4, -1).T
+        for name in ranges:
+            short, long = RANGES[name]
+            response = butterworth(1.0 / long, 1.0 / short)
+            self._bands[name] = filtered(rails, 1.0 / SPACING, response, margin)
+
+    def deviations(self, begin: float, end: float, name: str = "D1") -> tuple[float, float]:
+        """Standard deviations of alignment and level between two arc lengths, worse rail [m]."""
+        if name not in self._bands:
+            return 0.0, 0.0
+        there = self._bands[name][(self._s >= begin) & (self._s <= end)]
+        left_y, left_z, right_y, right_z = np.std(there, axis=0)
+        return float(max(left_y, right_y)), float(max(left_z, right_z))
+
+
+def quality_class(speed: float, alignment: float, level: float) -> str:
+    """Class of a section after UIC 518: better than QN1, between QN1 and QN2, worse than QN2.
+
+    Parameters
+    ----------
+    speed : float
+        Admissible speed of the line [m/s].
+    alignment, level : float
+        Standard deviations in D1 [m].
+
+    Examples
+    --------
+    >>> quality_class(40.0, 0.71e-3, 0.98e-3), quality_class(40.0, 1.21e-3, 1.61e-3)
+    ('better than QN1', 'between QN1 and QN2')
+    """
+    row = next((row for row in QN if 3.6 * speed <= row[0] + 1e-3), QN[-1])
+    over = [(1e3 * alignment > row[1][k]) or (1e3 * level > row[2][k]) for k in (0, 1)]
+    return ("better than QN1", "between QN1 and QN2", "worse than QN2")[sum(over)]

@@ -1,0 +1,139 @@
+"""Wear and rolling contact fatigue from the wear number and the forces of the patches.
+
+Laws of single numbers, each with its source; `assessment/wear_table.py` applies them to results.
+The wear number T_gamma = T_x xi_x + T_y xi_y [N] is the energy lost per metre; spin is left out.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.result.filters import Floats
+
+YIELD_IN_SHEAR = 300e6
+"""Yield stress in shear k of rail steel unless told otherwise [Pa]."""
+
+
+def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
+    """Area worn off a wheel's profile per distance (Pearce and Sherratt 1991, Wear 144; recalled).
+
+    In mm2/km, D in mm: 0.25 T/D below 100 N, 25/D to 200 N, (1.19 T - 154)/D above.  The last
+    branch begins at 84/D: the law jumps at 200 N.
+
+    Parameters
+    ----------
+    T_gamma : ndarray
+        Wear number [N].
+    diameter : float
+        Wheel diameter [m].
+
+    Returns
+    -------
+    ndarray, shape of T_gamma
+        Worn area per distance [m2/m].
+
+    Examples
+    --------
+    >>> worn = pearce_sherratt_1991(np.array([50.0, 150.0, 250.0]), 0.92)
+    >>> (1e9 * worn).round(5).tolist()  # mm2/km
+    [0.01359, 0.02717, 0.15598]
+    """
+    T = np.asarray(T_gamma, dtype=np.float64)
+    per_km = np.where(T < 100.0, 0.25 * T, np.where(T <= 200.0, 25.0, 1.19 * T - 154.0))
+    return np.asarray(per_km / (diameter * 1e3) * 1e-9)
+
+
+def usfd(T_gamma_over_A: Floats) -> Floats:
+    """Mass worn off a wheel, R8T on 900A (University of Sheffield; Braghin et al. 2006, Wear 261).
+
+    In ug/(m mm2) over x = T_gamma/A in N/mm2: 5.3 x to 10.4; 55.0 to 77.2; 55.0 + 61.9 (x - 77.2).
+
+    Parameters
+    ----------
+    T_gamma_over_A : ndarray
+        Wear number over the area of the patch [N/m2].
+
+    Returns
+    -------
+    ndarray
+        Mass lost per metre rolled and square metre of patch [kg/m/m2].
+
+    Examples
+    --------
+    >>> (1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0]))).round(1).tolist()  # ug/(m mm2)
+    [26.5, 55.0, 1466.3]
+    """
+    x = np.asarray(T_gamma_over_A, dtype=np.float64) * 1e-6
+    rate = np.where(x <= 10.4, 5.3 * x, np.where(x <= 77.2, 55.0, 55.0 + 61.9 * (x - 77.2)))
+    return np.asarray(rate * 1e-3)
+
+
+@dataclass(frozen=True)
+class WholeLifeRailModel:
+    """Fatigue damage of a rail per axle that passes (Burstow 2004, RSSB T115), R220 rail.
+
+    0 up to `threshold`, straight to 10e-6 at 65 N, straight to 0 at 175 N, negative beyond on the
+    same line: there wear is faster than cracks.
+
+    Attributes
+    ----------
+    threshold : float
+        Wear number below which nothing happens [N]: 15 (recalled), 20 in a later use.
+    """
+
+    threshold: float = 15.0
+    peak: float = 65.0
+    balance: float = 175.0
+    damage: float = 10e-6
+
+    def __call__(self, T_gamma: Floats) -> Floats:
+        """Damage of one pass [1].
+
+        Examples
+        --------
+        >>> (1e6 * WholeLifeRailModel()(np.array([10.0, 40.0, 65.0, 120.0, 230.0]))).tolist()
+        [0.0, 5.0, 10.0, 5.0, -5.0]
+        """
+        T = np.asarray(T_gamma, dtype=np.float64)
+        rising = (T - self.threshold) / (self.peak - self.threshold)
+        falling = (self.balance - T) / (self.balance - self.peak)
+        return np.asarray(self.damage * np.maximum(np.minimum(rising, falling), 0.0)
+                          + self.damage * np.minimum(falling, 0.0))
+
+
+def surface_fatigue_index(
+    traction: Floats, N: Floats, a: Floats, b: Floats, k: float = YIELD_IN_SHEAR
+) -> Floats:
+    """Fatigue index of the surface (Ekberg, Kabo and Andersson 2002).
+
+    FI_surf = mu_u - 2 pi a b k/(3 N) = mu_u - k/p0, mu_u = T/N: above zero the shakedown limit of
+    the surface is exceeded (Johnson 1989).
+
+    Parameters
+    ----------
+    traction, N : ndarray
+        Tangential and normal force of the patch [N].
+    a, b : ndarray
+        Semi-axes [m].
+    k : float
+        Yield stress in shear [Pa].
+    """
+    return np.asarray(traction / N - 2.0 * np.pi * a * b * k / (3.0 * N))
+
+
+def shakedown_limit(mu_u: Floats) -> Floats:
+    """Elastic shakedown limit p0/k over the utilised friction, as the shakedown map draws it.
+
+    The smaller of 4 (yield below the surface: line contact without friction) and 1/mu_u (on the
+    surface; Johnson 1989).
+    """
+    mu = np.asarray(mu_u, dtype=np.float64)
+    return np.minimum(4.0, 1.0 / np.maximum(mu, 1e-9))
+
+
+def mean_damage(T_gamma: Floats, counted: Floats, model: WholeLifeRailModel) -> float:
+    """Mean over time of the damage of one pass where `counted`, zero elsewhere [1]."""
+    if not np.size(T_gamma):
+        return math.nan
+    return float(np.mean(np.where(counted, model(T_gamma), 0.0)))

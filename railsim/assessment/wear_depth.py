@@ -1,0 +1,127 @@
+"""Depth of wear over a wheel's profile, and the profile after some distance.
+
+Each instant's worn area (Pearce and Sherratt 1991) is shared among the wheel's patches by their
+tangential forces and spread over each as a half ellipse across, at the patch's place on the
+profile.  The wheel stays round: the depth is that of the whole circumference.
+"""
+
+import numpy as np
+
+from railsim.assessment.wear import pearce_sherratt_1991
+from railsim.contact.curves import tape_circle_place
+from railsim.definitions.flatten import flatten
+from railsim.errors import Fault, InputError
+from railsim.profiles import Profile
+from railsim.result import Result
+from railsim.result.filters import Floats
+
+SPACING = 0.25e-3  # m
+RANGE = (-0.070, 0.070)  # m from the tape circle
+SMOOTHING = 2e-3  # m, width of the smoothing of the worn profile
+NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", "patch_T_x",
+          "patch_T_y", "wheelset_roll")  # fmt: skip
+
+
+def grid() -> Floats:
+    """Places on the profile from the tape circle, field side positive [m]."""
+    count = round((RANGE[1] - RANGE[0]) / SPACING)
+    return np.asarray(RANGE[0] + SPACING * (np.arange(count) + 0.5), dtype=np.float64)
+
+
+def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
+    """Depth worn off a wheel's profile per distance, over `grid`.
+
+    Parameters
+    ----------
+    result : Result
+        Run with `outputs.contact_patches`.
+    wheelset, side : int
+        From 0; side 0 left, 1 right.
+
+    Returns
+    -------
+    float64[place]
+        Mean depth per metre of way, in the direction of the profile's z [m/m].  Its integral over
+        the grid is the worn area per distance.
+
+    Raises
+    ------
+    InputError : the result lacks something.
+    """
+    missing = [name for name in NEEDED if name not in result]
+    if missing:
+        allowed = "run it with settings.outputs.contact_patches=true"
+        raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
+    wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
+    if wheel is None:  # a body of this kind has its definition
+        raise InputError([Fault("result", "wheelset", f"no wheelset {wheelset}", "")])
+    tape = tape_circle_place(wheel.back_to_back)
+    at = (slice(None), wheelset, side)
+    ways = np.gradient(result["distance"])
+    area = pearce_sherratt_1991(result["T_gamma"][at], 2.0 * wheel.radius[side]) * ways
+    forces = np.hypot(result["patch_T_x"][at], result["patch_T_y"][at])
+    total = forces.sum(axis=-1, keepdims=True)
+    shares = np.where(total > 0.0, forces / np.where(total > 0.0, total, 1.0), 0.0)
+    roll = result["wheelset_roll"][:, wheelset, None]
+    # back into the axes of the wheelset
+    across = result["patch_y"][at] + roll * result["patch_z"][at]
+    places = (-1.0, 1.0)[side] * across - tape
+    widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))
+    return spread(places, widths, shares * area[:, None]) / float(np.sum(ways))
+
+
+def spread(places: Floats, widths: Floats, areas: Floats) -> Floats:
+    """Half ellipses of given areas over `grid`, added up.
+
+    Parameters
+    ----------
+    places, widths, areas : ndarray, one shape
+        Middles, half widths [m] and areas [m2].
+
+    Returns
+    -------
+    float64[place]
+        Heights [m], exact in their integral over each cell.
+    """
+    counted = areas > 0.0
+    y, b, A = places[counted], np.maximum(widths[counted], 1e-5), areas[counted]
+    edges = np.concatenate([grid() - 0.5 * SPACING, [RANGE[1]]])
+    inside = np.zeros(len(edges))
+    for start in range(0, len(y), 2000):  # in parts: not every patch beside every place at once
+        part = slice(start, start + 2000)
+        u = np.clip((edges[:, None] - y[part]) / b[part], -1.0, 1.0)
+        share = 0.5 + (u * np.sqrt(1.0 - u**2) + np.arcsin(u)) / np.pi
+        inside += share @ A[part]
+    return np.asarray(np.diff(inside) / SPACING)
+
+
+def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
+    """Profile after some distance at a constant rate of wear.
+
+    Parameters
+    ----------
+    profile : Profile
+        A wheel.
+    depth : float64[place]
+        Depth per distance over `grid` [m/m].
+    distance : float
+        [m]
+
+    Returns
+    -------
+    Profile
+        Smoothed over 2 mm; the worn area is that of `depth` times `distance`.
+    """
+    y = grid()
+    worn = depth * distance
+    kernel = np.exp(-0.5 * ((np.arange(-24, 25) * SPACING) / (0.5 * SMOOTHING)) ** 2)
+    smooth = np.convolve(worn, kernel / kernel.sum(), mode="same")
+    lost = float(np.sum(smooth))
+    if lost > 0.0:
+        smooth *= float(np.sum(worn)) / lost
+    z = np.asarray(profile.z) - np.interp(np.asarray(profile.y), y, smooth, left=0.0, right=0.0)
+    words = f"worn by {1e6 * SPACING * float(np.sum(worn)):.2f} mm2"
+    return Profile(
+        f"{profile.name} worn", profile.kind, np.asarray(profile.y), z,
+        f"{profile.source}; {words}", profile.inclination, (*profile.notes, words),
+    )  # fmt: skip

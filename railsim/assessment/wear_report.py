@@ -1,0 +1,140 @@
+"""Wear and fatigue of wheels and rails over a run, wheel by wheel, read part by part."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.assessment.record import Record
+from railsim.assessment.wear import (
+    YIELD_IN_SHEAR,
+    WholeLifeRailModel,
+    pearce_sherratt_1991,
+    surface_fatigue_index,
+    usfd,
+)
+from railsim.definitions.flatten import flatten
+from railsim.notation import SIDES
+from railsim.result.filters import Floats, StreamingPercentiles
+
+CELL = 0.5  # N, first width of the cells that percentiles of the wear number are counted in
+PATCHES = ("patch_N", "patch_a", "patch_b", "patch_T_x", "patch_T_y")
+
+
+@dataclass(frozen=True)
+class WheelWear:
+    """Wear and fatigue at one wheel.
+
+    Attributes
+    ----------
+    place : str
+        Wheelset, from 1, and side.
+    T_gamma : float
+        Mean wear number over the distance [N].
+    percentiles : dict
+        Of the wear number over time [N], by per cent.
+    bound : float
+        No percentile is further than this from one of the whole record [N].
+    pearce_sherratt : float
+        Worn area of the wheel's profile per distance [m2/m].
+    usfd : float or None
+        Worn area of the wheel's profile per distance [m2/m]; None without contact patches.
+    rail_damage : float
+        Whole Life Rail Model, mean over the distance, forces on the rail against travel only [1].
+    fatigue_index : float or None
+        Largest FI_surf [1]; None without contact patches.
+    """
+
+    place: str
+    T_gamma: float
+    percentiles: dict[str, float]
+    bound: float
+    pearce_sherratt: float
+    usfd: float | None
+    rail_damage: float
+    fatigue_index: float | None
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI."""
+        return dict(self.__dict__)
+
+
+DENSITY = 7850.0  # kg/m3, of wheel steel
+
+
+def wear_report(
+    record: Record,
+    *,
+    model: WholeLifeRailModel | None = None,
+    all_forces: bool = False,
+    yield_in_shear: float = YIELD_IN_SHEAR,
+) -> list[WheelWear]:
+    """Wear and fatigue at all wheels.
+
+    Parameters
+    ----------
+    record : Record
+        Run with `T_gamma`, `xi_x`; with `contact_patches` also USFD and the fatigue index.
+    model : WholeLifeRailModel, optional
+    all_forces : bool
+        Count also where the force on the rail points forwards.
+    yield_in_shear : float
+        k [Pa].
+    """
+    record.need(["T_gamma", "xi_x"], "settings.outputs.quantities with T_gamma, xi_x")
+    model = model or WholeLifeRailModel()
+    flat = flatten(record.result.vehicle())
+    radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])
+    shape = radii.shape
+    streams = [[StreamingPercentiles(CELL) for _ in SIDES] for _ in radii]
+    sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "damage", "usfd")}
+    worst, length = np.full(shape, -np.inf), 0.0
+    patches = all(name in record.result for name in PATCHES)
+    for rows, counted in record.pieces(0.0):
+        rows = slice(rows.start + counted.start, rows.start + counted.stop)
+        T_gamma = record.result.part("T_gamma", rows)
+        ways = np.gradient(record.distance[rows])[:, None, None]
+        # the force on the rail has the sign of the creepage
+        against = np.ones(T_gamma.shape, dtype=bool)
+        if not all_forces:
+            against = record.result.part("xi_x", rows) < 0.0
+        sums["T_gamma"] += np.sum(T_gamma * ways, axis=0)
+        sums["pearce"] += np.sum(pearce_sherratt_1991(T_gamma, 1.0) / (2 * radii) * ways, axis=0)
+        sums["damage"] += np.sum(np.where(against, model(T_gamma), 0.0) * ways, axis=0)
+        length += float(np.sum(ways))
+        for w, sides in enumerate(streams):
+            for side, stream in enumerate(sides):
+                stream.add(T_gamma[:, w, side])
+        if patches:
+            area, index = _patches(record, rows, yield_in_shear)
+            mass = np.where(area > 0.0, usfd(T_gamma / np.where(area > 0.0, area, 1.0)) * area, 0.0)
+            sums["usfd"] += np.sum(mass * ways, axis=0)
+            worst = np.maximum(worst, index)
+    return [
+        WheelWear(
+            place=f"wheelset {w + 1} {side}",
+            T_gamma=float(sums["T_gamma"][w, k] / length),
+            percentiles={f"{p:g}": streams[w][k].percentile(p) for p in (50.0, 95.0, 99.85)},
+            bound=streams[w][k].width,
+            pearce_sherratt=float(sums["pearce"][w, k] / length),
+            usfd=_area_per_distance(sums["usfd"][w, k] / length, radii[w, k]) if patches else None,
+            rail_damage=float(sums["damage"][w, k] / length),
+            fatigue_index=float(worst[w, k]) if patches else None,
+        )
+        for w in range(len(radii))
+        for k, side in enumerate(SIDES)
+    ]
+
+
+def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
+    """Area of all patches of each wheel [m2], and its largest fatigue index."""
+    N, a, b, T_x, T_y = (record.result.part(name, rows) for name in PATCHES)
+    loaded = N > 0.0
+    safe = np.where(loaded, N, 1.0)
+    index = surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b, k)
+    worst = np.where(loaded, index, -np.inf).max(axis=(0, 3))
+    return np.sum(np.where(loaded, np.pi * a * b, 0.0), axis=-1), worst
+
+
+def _area_per_distance(mass_per_metre: float, radius: float) -> float:
+    """Area worn off the profile per distance: mass per metre over density and circumference."""
+    return float(mass_per_metre / (DENSITY * 2.0 * np.pi * radius))

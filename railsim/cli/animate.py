@@ -1,0 +1,116 @@
+"""``railsim animate``: a run or a mode as a page that plays, a GIF or a film."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option
+from railsim.files import check_file
+
+if TYPE_CHECKING:
+    from railsim.animation import Scene
+
+ENDINGS = (".html", ".htm", ".gif", ".mp4")
+
+
+@click.command()
+@click.argument("file", metavar="R.h5|modes.json")
+@click.option("--out", metavar="F", help="Page (.html), .gif or .mp4; default beside the input.")
+@click.option("--vehicle", metavar="F", help="Vehicle of the modes: a file or a name.")
+@click.option("--mode", metavar="NAME", help="Mode by name or number; default the first.")
+@click.option(
+    "--between", nargs=2, type=float, metavar="S1 S2", help="Part of the run, distance in m."
+)
+@click.option("--frames", type=click.IntRange(2, 20_000), metavar="N", help="Frames at most.")
+@click.option("--fps", type=click.IntRange(1, 100), default=20, show_default=True,
+              help="Frames a second of a film.")  # fmt: skip
+@click.option("--gain", type=click.FloatRange(0.0, 1000.0), default=1.0, show_default=True,
+              help="Factor on the motion of the bodies in a film.")  # fmt: skip
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    file: str, out: str | None, fps: int, gain: float, overwrite: bool, as_json: bool,
+    quiet: bool, **how: Any,
+) -> None:
+    """Write a run, or a mode, as one page that plays, or as a film.
+
+    The page needs nothing else: it plays, scrubs, zooms and turns in any browser, also without a
+    network.  Films show the same from one side; MP4 needs ffmpeg.
+
+    \b
+    Example:
+      railsim run coach_manchester curve_r250 --speed 20 --out run.h5
+      railsim animate run.h5 --out run.html
+    """  # noqa: D301 - click reads the escape  # fmt: skip
+    from railsim.animation import write_movie, write_page
+
+    path = Path(out) if out else Path(file).with_suffix(".html")
+    check_file(path, overwrite=overwrite, endings=ENDINGS)
+    film = path.suffix.lower() in (".gif", ".mp4")
+    scene = _scene(Path(file), film=film, **how)
+    if film:
+        write_movie(scene, path, frames_per_second=fps, gain=gain, overwrite=overwrite)
+    else:
+        write_page(scene, path, overwrite=overwrite)
+    if as_json:
+        print_json({"file": str(path), "frames": len(scene.time), "title": scene.title})
+    elif not quiet:
+        click.echo(str(path))
+
+
+def _scene(
+    file: Path,
+    *,
+    film: bool,
+    vehicle: str | None,
+    mode: str | None,
+    between: tuple[float, float] | None,
+    frames: int | None,
+) -> "Scene":
+    from railsim.animation import mode_scene, result_scene
+    from railsim.animation.scene import FRAMES, chosen_mode
+    from railsim.errors import Fault, InputError
+
+    if file.suffix.lower() != ".json":
+        from railsim.result import open_run
+
+        wrong = [Fault(option, "", "belongs to a mode", "give the JSON of railsim modes")
+                 for option, value in (("--vehicle", vehicle), ("--mode", mode)) if value]
+        if wrong:
+            raise InputError(wrong)
+        return result_scene(open_run(file), frames=frames or (200 if film else FRAMES),
+                            between=between)
+    from railsim.definitions.loading import load_vehicle
+
+    data = _read(file)
+    name = vehicle or data.get("vehicle")
+    if not isinstance(name, str):
+        raise InputError([Fault("--vehicle", "", "not given", "the vehicle of the modes")])
+    found = chosen_mode(data["modes"], mode)
+    how = {"frames": frames} if frames else ({"frames": 30, "cycles": 2} if film else {})
+    return mode_scene(load_vehicle(name), found, **how)
+
+
+def _read(file: Path) -> dict[str, Any]:
+    """Read what ``railsim modes --json`` printed; of several speeds the first."""
+    import json
+
+    from railsim.errors import Fault, InputError
+
+    try:
+        data: Any = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError([Fault(str(file), "", f"cannot be read ({error})", "")]) from None
+    if isinstance(data, list) and data:
+        data = data[0]
+    modes = data.get("modes") if isinstance(data, dict) else None
+    if not isinstance(modes, list) or not modes or not all(
+        isinstance(m, dict) and {"name", "frequency", "damping_ratio", "shape"} <= set(m)
+        for m in modes
+    ):  # fmt: skip
+        allowed = "the JSON of railsim modes"
+        raise InputError([Fault(str(file), "modes", "missing or incomplete", allowed)])
+    checked: dict[str, Any] = data
+    return checked

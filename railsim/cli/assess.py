@@ -1,0 +1,301 @@
+"""``railsim assess``: results against the limits of a standard."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import (
+    json_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    table,
+)
+from railsim.files import check_folder, make_folder, whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from railsim.assessment import Assessment
+    from railsim.assessment.verdict import Assessed
+    from railsim.definitions.vehicle import Service
+    from railsim.result import Result
+
+STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
+FILES = ("assessment.json", "assessment.csv", "assessment.png")
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="R.h5|DIR ...")
+@click.option(
+    "--standard", type=click.Choice(STANDARDS), default="en14363", show_default=True,
+    help="What to assess.",
+)  # fmt: skip
+@click.option("--limits", metavar="F", help="Limits file, or the name of a shipped one.")
+@click.option(
+    "--method", type=click.Choice(["normal", "simplified"]), default="normal", show_default=True,
+    help="With wheel forces, or with accelerations only.",
+)  # fmt: skip
+@click.option("--admissible-speed", type=float, metavar="V", help="In place of the vehicle's, m/s.")
+@click.option("--cant-deficiency", type=float, metavar="I", help="Admissible one, m.")
+@click.option(
+    "--category", type=click.Choice(["passenger", "freight", "locomotive", "multiple_unit"]),
+    help="In place of the vehicle's.",
+)  # fmt: skip
+@click.option("--causal", is_flag=True, help="Filters as amplifiers have them, with phase.")
+@click.option("--coarse", is_flag=True, help="Take fewer than 1000 samples a second too.")
+@click.option("--all-sections", is_flag=True, help="Count sections outside a zone's conditions.")
+@click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
+@click.option("--out", metavar="DIR", help="Folder for assessment.json, .csv and .png.")
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    files: tuple[str, ...],
+    standard: str,
+    out: str | None,
+    fail: bool,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+    admissible_speed: float | None,
+    cant_deficiency: float | None,
+    category: str | None,
+    **how: Any,
+) -> int:
+    """Assess results: running behaviour, comfort, wear or derailment.
+
+    Runs of one vehicle are assessed together, those of several vehicles one after the other; a
+    folder stands for all results in it.  The verdict is "pass" only where all zones have enough
+    sections within the standard's conditions.
+
+    \b
+    Example:
+      railsim run coach_manchester curve_r500 --speed 29 --set settings.output_rate=1000
+      railsim assess coach_manchester_curve_r500_29.h5
+      railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
+    """  # noqa: D301 - click reads the escape
+    from railsim.assessment import assess
+    from railsim.cli import DONE, LIMIT_EXCEEDED
+
+    results = _opened(files)
+    folder = Path(out) if out else None
+    if folder:
+        check_folder(folder, FILES, overwrite=overwrite)
+    service = _service(results, admissible_speed, cant_deficiency, category)
+    assessments = assess(results, standard, service=service, **how)
+    written = write_assessments(folder, assessments) if folder else []
+    if as_json:
+        print_json([assessment.record() for assessment in assessments])
+    else:
+        for assessment in assessments:
+            click.echo("\n".join(assessment_lines(assessment, quiet=quiet)))
+        for path in written:
+            click.echo(str(path))
+    return LIMIT_EXCEEDED if fail and any(a.exceeded for a in assessments) else DONE
+
+
+def _opened(files: "Sequence[str]") -> "dict[str, Result]":
+    """Open results by their names; a folder stands for those in it."""
+    from railsim.errors import Fault, InputError
+    from railsim.result import open_run
+
+    faults: list[Fault] = []
+    paths: list[Path] = []
+    for file in files:
+        inside = sorted(Path(file).glob("*.h5")) if Path(file).is_dir() else [Path(file)]
+        if not inside:
+            faults.append(Fault(file, "", "no results in this folder", "a folder with .h5 files"))
+        paths += inside
+    stems = [path.stem for path in paths]
+    results: dict[str, Result] = {}
+    for path in paths:
+        label = path.stem if stems.count(path.stem) == 1 else str(path)
+        if label in results:
+            faults.append(Fault(str(path), "", "given twice", "give each result once"))
+            continue
+        try:
+            results[label] = open_run(path)
+        except InputError as error:
+            faults.extend(error.faults)
+    if faults:
+        raise InputError(faults)
+    return results
+
+
+def _service(
+    results: "dict[str, Result]",
+    speed: float | None,
+    deficiency: float | None,
+    category: str | None,
+) -> "Service | None":
+    """Service table with options in place of the vehicles' values; None where there are none."""
+    given = {
+        name: value
+        for name, value in (
+            ("admissible_speed", speed), ("cant_deficiency", deficiency), ("category", category),
+        )
+        if value is not None
+    }  # fmt: skip
+    if not given:
+        return None
+    from pydantic import ValidationError
+
+    from railsim.definitions.vehicle import Service
+    from railsim.errors import Fault, InputError
+
+    own = next(iter(results.values())).vehicle().service
+    try:
+        return Service.model_validate({**(own.model_dump() if own else {}), **given})
+    except ValidationError as error:
+        raise InputError([
+            Fault(f"--{str(e['loc'][0]).replace('_', '-')}", "", e["msg"].lower(), "in SI units")
+            for e in error.errors()
+        ]) from None  # fmt: skip
+
+
+def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list[Path]:
+    """Write the record, the table and the picture; return their paths."""
+    import json
+
+    from railsim.cli.common import plain
+    from railsim.plot.assessment import assessment_figure
+    from railsim.plot.style import save
+
+    make_folder(folder)
+    record, rows, picture = (folder / name for name in FILES)
+    with whole_file(record) as partial:
+        data = plain([assessment.record() for assessment in assessments])
+        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    with whole_file(rows) as partial:
+        partial.write_text(assessment_csv(assessments), encoding="utf-8")
+    figure = assessment_figure(assessments)
+    if figure is None:
+        return [record, rows]
+    save(figure, picture, overwrite=True)
+    return [record, rows, picture]
+
+
+def assessment_csv(assessments: "Sequence[Assessment]") -> str:
+    """Return one line for each zone, quantity and place, for spreadsheets; SI."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    rows: list[dict[str, Any]] = []
+    for assessment in assessments:
+        head = {"vehicle": assessment.vehicle, "standard": assessment.standard}
+        rows += [{**head, "zone": zone.zone, **row.record()}
+                 for zone in assessment.zones for row in zone.rows]  # fmt: skip
+        data = assessment.record()
+        for kind in ("comfort", "wear"):
+            table_of: Any = data[kind]
+            rows += [{**head, "run": run, **_flat(point)}
+                     for run, points in table_of.items() for point in points]  # fmt: skip
+        safety: Any = data["safety"]
+        rows += [{**head, "run": run, **wheel}
+                 for run, report in safety.items() for wheel in report["wheels"]]  # fmt: skip
+    columns = list(dict.fromkeys(column for row in rows for column in row))
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, dict):
+            found |= {f"{name}_{key}": member for key, member in value.items()}
+        elif isinstance(value, list):
+            found |= {f"{name}_{index}": member for index, member in enumerate(value)}
+        else:
+            found[name] = value
+    return found
+
+
+def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[str]:
+    """Return an assessment as lines for a screen."""
+    edition = f", {assessment.limits.edition}" if assessment.limits else ""
+    runs = f"{len(assessment.runs)} run{'s' * (len(assessment.runs) > 1)}"
+    lines = [f"{assessment.vehicle}{edition}, {runs}"]
+    if assessment.verdict:
+        lines.append(f"verdict: {assessment.verdict}")
+        lines += [f"  {reason}" for reason in assessment.reasons]
+    for zone in assessment.zones:
+        header = [
+            f"zone {zone.zone}: {len(zone.values)} of {zone.needed} sections", "place", "unit",
+            "N", "mean", "s", "estimate", "limit", "% of limit",
+        ]  # fmt: skip
+        rows = [_row(row) for row in assessment.worst if row in zone.rows]
+        lines += ["", *table(header, rows, numbers=3)]
+    lines += _comfort_lines(assessment) + _wear_lines(assessment) + _safety_lines(assessment)
+    if not quiet:
+        lines += ["", *(f"note: {remark}" for remark in assessment.remarks)]
+    return lines
+
+
+def _row(row: "Assessed") -> list[str]:
+    scale, estimate = row.rule.scale, row.estimate
+
+    def shown(value: float) -> str:
+        return f"{scale * value:.3f}" if scale == 1.0 else f"{scale * value:.2f}"
+
+    return [
+        row.rule.words, row.place, row.rule.unit, str(estimate.N), shown(estimate.mean),
+        shown(estimate.deviation), shown(estimate.value), shown(row.limit),
+        f"{100.0 * row.share:.1f}",
+    ]  # fmt: skip
+
+
+def _comfort_lines(assessment: "Assessment") -> list[str]:
+    lines: list[str] = []
+    for run, points in assessment.comfort.items():
+        header = [run, "x (m)", "N_MV", "N_VA", "N_VD", "ISO a_v (m/s2)", "Wz lateral",
+                  "Wz vertical", "P_CT standing (%)", "P_DE standing (%)"]  # fmt: skip
+        rows = []
+        for point in points:
+            most = max((t.standing for t in point.transitions), default=None)
+            total = float((point.iso_rms**2).sum() ** 0.5)
+            rows.append([
+                point.sensor, f"{point.place:.2f}", f"{point.mean.N_MV:.2f}",
+                f"{point.mean.N_VA:.2f}", f"{point.mean.N_VD:.2f}", f"{total:.3f}",
+                f"{point.sperling['lateral']:.2f}", f"{point.sperling['vertical']:.2f}",
+                "" if most is None else f"{most:.1f}", f"{point.events['standing']:.1f}",
+            ])  # fmt: skip
+        lines += ["", *table(header, rows)]
+    return lines
+
+
+def _wear_lines(assessment: "Assessment") -> list[str]:
+    lines: list[str] = []
+    for run, wheels in assessment.wear.items():
+        header = [run, "T_gamma (N)", "95 %", "99.85 %", "Pearce (mm2/1000 km)",
+                  "USFD (mm2/1000 km)", "WLRM (1e-6)", "FI_surf"]  # fmt: skip
+        rows = [
+            [
+                w.place, f"{w.T_gamma:.1f}", f"{w.percentiles['95']:.0f}",
+                f"{w.percentiles['99.85']:.0f}", f"{1e12 * w.pearce_sherratt:.2f}",
+                "" if w.usfd is None else f"{1e12 * w.usfd:.2f}", f"{1e6 * w.rail_damage:.2f}",
+                "" if w.fatigue_index is None else f"{w.fatigue_index:.3f}",
+            ]
+            for w in wheels
+        ]  # fmt: skip
+        lines += ["", *table(header, rows)]
+    return lines
+
+
+def _safety_lines(assessment: "Assessment") -> list[str]:
+    lines: list[str] = []
+    for run, report in assessment.safety.items():
+        header = [run, "Nadal", "largest Y/Q", "climb (m)", "rise (mm)"]
+        rows = [
+            [w.place, f"{w.limit:.3f}", "lifted" if w.Y_over_Q != w.Y_over_Q else
+             f"{w.Y_over_Q:.3f}", f"{w.climb_distance:.2f}", f"{1e3 * w.rise:.2f}"]
+            for w in report.wheels
+        ]  # fmt: skip
+        lines += ["", *table(header, rows), ""]
+        lines += table(["bogie", "overturning"],
+                       [[name, f"{value:.3f}"] for name, value in report.overturning.items()])
+    return lines

@@ -1,0 +1,56 @@
+"""``railsim study --scenario``: a campaign of runs that ends in its assessment."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from railsim.cli.common import print_json
+from railsim.cli.progress import progress_bar
+
+
+def run_campaign(
+    scenario: str,
+    vehicles: tuple[str, ...],
+    out: str,
+    *,
+    assignments: tuple[str, ...],
+    workers: int | None,
+    scheduler: str | None,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Run a scenario for vehicles, print and write its assessment; return the exit status."""
+    from railsim.cli import DONE
+    from railsim.cli.assess import assessment_lines, write_assessments
+    from railsim.errors import Fault, InputError
+    from railsim.studies.campaign import campaign
+
+    if not vehicles:
+        raise InputError([Fault("--vehicles", "", "not given", "give one vehicle at least")])
+
+    def tell(record: dict[str, Any]) -> None:
+        from tqdm import tqdm
+
+        with tqdm.external_write_mode():
+            click.echo(f"{record['name']}  {record['status']}")
+
+    with progress_bar(scenario, quiet=quiet) as progress:
+        done = campaign(
+            scenario, list(vehicles), out=out, assignments=assignments, workers=workers,
+            scheduler=scheduler, overwrite=overwrite, progress=progress,
+            on_record=None if quiet or as_json else tell,
+        )  # fmt: skip
+    written = write_assessments(Path(out), done.assessments)
+    if as_json:
+        print_json({
+            "folder": str(done.folder),
+            "assessments": [assessment.record() for assessment in done.assessments],
+        })  # fmt: skip
+        return DONE
+    for assessment in done.assessments:
+        click.echo("\n".join(["", *assessment_lines(assessment, quiet=quiet)]))
+    for path in written:
+        click.echo(str(path))
+    return DONE

@@ -1,0 +1,75 @@
+"""Scenario files, `railsim-scenario/1`: a campaign of runs for any vehicle, and how it ends.
+
+Each part is a track and a speed that follows from the vehicle's service table.
+"""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import (
+    Definition,
+    FileDefinition,
+    Finite,
+    Name,
+    Positive,
+    Text,
+)
+
+SCENARIO_FORMAT = "railsim-scenario/1"
+
+
+class Speed(Definition):
+    """Speed of a part: fixed, a share of the admissible one, or from the cant deficiency."""
+
+    fixed: Positive | None = None
+    """[m/s]"""
+    admissible: Positive | None = None
+    """Of the admissible speed [1]"""
+    cant_deficiency: Positive | None = None
+    """Of the admissible cant deficiency, in a curve of `radius` and `cant` [1]"""
+    radius: Positive | None = None
+    """[m]"""
+    cant: Finite = 0.0
+    """[m]"""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        given = [self.fixed, self.admissible, self.cant_deficiency]
+        if sum(value is not None for value in given) != 1:
+            raise ValueError("one of 'fixed', 'admissible' and 'cant_deficiency' is needed")
+        if (self.cant_deficiency is None) != (self.radius is None):
+            raise ValueError("'radius' belongs to 'cant_deficiency' and only to it")
+        return self
+
+
+class Part(Definition):
+    """Runs on one track."""
+
+    track: Text
+    """Track: a file or the name of a shipped one"""
+    speed: Speed
+    """Speed"""
+    until: Positive | None = None
+    """Where the run ends [m]; by default at the end of the track's plan"""
+
+
+class Scenario(FileDefinition):
+    """A campaign: everything that its file says."""
+
+    format: Literal["railsim-scenario/1"]
+    """Kind and version of the file"""
+    name: Text
+    """What the campaign is called"""
+    purpose: Text | None = None
+    """What it is for"""
+    standard: Literal["en14363", "uic518", "comfort", "wear", "safety"]
+    """How it is assessed"""
+    method: Literal["normal", "simplified"] = "normal"
+    """With wheel forces, or with accelerations only"""
+    assignments: tuple[Text, ...] = ()
+    """`key.path=value` for all runs, the paths beginning with `vehicle.`, `track.`, `settings.`"""
+    grid: dict[Text, tuple[Text, ...]] = Field(default_factory=dict)
+    """Values of further keys: every part is run with each combination"""
+    parts: dict[Name, Part] = Field(min_length=1)
+    """Parts by name"""

@@ -1,0 +1,107 @@
+"""Assessments as pictures: estimates in per cent of their limits, comfort along the car, wear."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from railsim.assessment import Assessment
+from railsim.plot.style import DISTINCT, LIMIT, styled
+
+
+def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
+    """Draw assessments of one standard, vehicles side by side; None where nothing is to draw."""
+    with styled():
+        if any(a.zones for a in assessments):
+            return _limits_figure(assessments)
+        if any(a.comfort for a in assessments):
+            return _comfort_figure(assessments)
+        if any(a.wear for a in assessments):
+            return _wear_figure(assessments)
+    return None
+
+
+def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
+    """Bars of the worst place of each quantity, zone by zone, in per cent of the limit."""
+    zones = sorted({zone.zone for a in assessments for zone in a.zones})
+    rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
+    height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
+    figure = Figure(figsize=(2.4 + 2.6 * len(zones), height), layout="constrained")
+    axes = figure.subplots(1, len(zones), sharey=True, squeeze=False)[0]
+    width = 0.8 / len(assessments)
+    most = 110.0
+    for zone, ax in zip(zones, axes, strict=True):
+        for k, assessment in enumerate(assessments):
+            report = next((z for z in assessment.zones if z.zone == zone), None)
+            worst = {r.rule.name: r for r in assessment.worst if report and r in report.rows}
+            shares = [100.0 * worst[name].share if name in worst else np.nan for name in rules]
+            rows = np.arange(len(rules)) + (k - 0.5 * (len(assessments) - 1)) * width
+            label = assessment.vehicle if ax is axes[0] else None
+            ax.barh(rows, shares, 0.9 * width, color=DISTINCT[k % len(DISTINCT)], label=label)
+            most = max(most, 1.1 * float(np.nanmax([0.0, *shares])))
+        ax.axvline(100.0, color=LIMIT, lw=1.0)
+        ax.set_title(f"Zone {zone}")
+        ax.set_xlabel("estimate / limit (%)")
+        ax.grid(axis="y", visible=False)
+    axes[0].set_yticks(range(len(rules)), [rule.words for rule in rules.values()])
+    axes[0].invert_yaxis()
+    for ax in axes:
+        ax.set_xlim(0.0, min(most, 250.0))
+    verdicts = "; ".join(f"{a.vehicle}: {a.verdict}" for a in assessments)
+    edition = next((a.limits.edition for a in assessments if a.limits), "")
+    figure.suptitle(f"{edition}\n{verdicts}", x=0.012, ha="left", fontsize=10)
+    figure.legend(loc="outside lower left", ncols=2)
+    return figure
+
+
+def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
+    """Mean comfort and Sperling's index along the car, a line for each run."""
+    figure = Figure(figsize=(7.6, 3.4), layout="constrained")
+    mean, index = figure.subplots(1, 2)
+    number = 0
+    for assessment in assessments:
+        for run, points in assessment.comfort.items():
+            ordered = sorted(points, key=lambda point: point.place)
+            x = [point.place for point in ordered]
+            colour = DISTINCT[number % len(DISTINCT)]
+            mean.plot(x, [p.mean.N_MV for p in ordered], "o-", color=colour, label=run)
+            for way, line in (("lateral", "-"), ("vertical", "--")):
+                values = [p.sperling[way] for p in ordered]
+                index.plot(x, values, "o", ls=line, color=colour)
+            number += 1
+    mean.set(xlabel="along the car, forwards (m)", ylabel="mean comfort $N_{MV}$")
+    index.set(xlabel="along the car, forwards (m)", ylabel="Sperling $W_z$")
+    index.plot([], [], "-", color="0.3", label="lateral")
+    index.plot([], [], "--", color="0.3", label="vertical")
+    for ax in (mean, index):
+        ax.set_ylim(bottom=0.0)
+        ax.margins(y=0.15)
+        _legend(ax)
+    return figure
+
+
+def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
+    """Mean wear number and rail damage of every wheel, runs side by side."""
+    runs = [(run, wheels) for a in assessments for run, wheels in a.wear.items()]
+    figure = Figure(figsize=(7.6, 3.6), layout="constrained")
+    energy, damage = figure.subplots(1, 2, sharey=True)
+    width = 0.8 / len(runs)
+    for k, (run, wheels) in enumerate(runs):
+        rows = np.arange(len(wheels)) + (k - 0.5 * (len(runs) - 1)) * width
+        colour = DISTINCT[k % len(DISTINCT)]
+        energy.barh(rows, [w.T_gamma for w in wheels], 0.9 * width, color=colour, label=run)
+        damage.barh(rows, [1e6 * w.rail_damage for w in wheels], 0.9 * width, color=colour)
+    energy.set_yticks(range(len(runs[0][1])), [wheel.place for wheel in runs[0][1]])
+    energy.invert_yaxis()
+    energy.set_xlabel(r"mean wear number $T\gamma$ (N)")
+    damage.set_xlabel("rail damage a pass, WLRM ($10^{-6}$)")
+    for ax in (energy, damage):
+        ax.grid(axis="y", visible=False)
+    figure.legend(loc="outside lower left", ncols=2)
+    return figure
+
+
+def _legend(axes: Axes) -> None:
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="best")

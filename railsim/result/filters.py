@@ -1,0 +1,281 @@
+"""Filters over time and means over distance for records with equal time steps.
+
+Filters act along the first axis.  Two forms of each:
+
+- without phase: the spectrum times a real or complex response, in overlapping blocks, so that the
+  memory needed does not grow with the record.  A Butterworth response of order n has the magnitude
+  1/sqrt(1 + (f/f_c)^(2n)) (Butterworth 1930, Experimental Wireless 7), -3 dB at the corner.  The
+  filter run forwards and backwards is another one, with the square of it.
+- causal: the digital filter of the same order (bilinear transformation), as a measuring amplifier
+  has it, started in the steady state of the first value.
+
+Means over distance integrate the record, taken as linear between its samples, exactly.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, signal
+
+Floats = NDArray[np.float64]
+Response = Callable[[Floats], NDArray[np.complex128] | Floats]
+
+BLOCK = 2**16
+"""Samples of a block at least."""
+REACH = 6.0
+"""Periods of the lowest corner after which a Butterworth filter of order 4 has forgotten
+(its slowest part has fallen to exp(-2 pi 0.383 6) = 5e-7)."""
+
+
+def butterworth(low: float = 0.0, high: float = math.inf, order: int = 4) -> Response:
+    """Magnitude of a Butterworth low pass, high pass or band pass.
+
+    Parameters
+    ----------
+    low, high : float
+        Lower and upper corner [Hz]; 0 and infinity: none.
+    order : int
+        Order; a band pass has it on either side, as the transformation of the low pass gives it.
+
+    Returns
+    -------
+    callable
+        Frequencies [Hz] to 1/sqrt(1 + x^(2 order)), x = f/high, low/f or, of a band pass,
+        (f^2 - low high)/(f (high - low)).
+
+    Examples
+    --------
+    >>> [round(float(g), 3) for g in butterworth(high=20.0)(np.array([10.0, 20.0, 30.0]))]
+    [0.998, 0.707, 0.194]
+    """
+
+    def gain(f: Floats) -> Floats:
+        f = np.asarray(f, dtype=np.float64)
+        above, below = f / high, np.ones_like(f)
+        if low > 0.0 and high < math.inf:
+            above, below = f**2 - low * high, f * (high - low)
+        elif low > 0.0:
+            above, below = np.full_like(f, low), f
+        # 1/sqrt(1 + (above/below)^2n) written for f = 0 too
+        top = np.maximum(np.abs(above), np.abs(below))
+        above, below = (above / top) ** order, (below / top) ** order
+        return np.abs(below) / np.hypot(above, below)
+
+    return gain
+
+
+def reach(low: float = 0.0, high: float = math.inf) -> float:
+    """Time that a Butterworth filter with these corners looks around itself [s]."""
+    lowest = low if low > 0.0 else high
+    return REACH / lowest if lowest < math.inf else 0.0
+
+
+def filtered(x: Floats, rate: float, response: Response, margin: float) -> Floats:
+    """Filter a record in the frequency domain, in overlapping blocks.
+
+    Parameters
+    ----------
+    x : float64[time, ...]
+        Record.
+    rate : float
+        Samples per second [1/s].
+    response : callable
+        Frequencies [Hz] to the factor of the spectrum.
+    margin : float
+        Time that the filter looks around itself [s]; the record is continued at both ends by its
+        odd mirror image over this time.
+
+    Returns
+    -------
+    float64[time, ...]
+        Filtered record; within `margin` of its ends it depends on the continuation.
+    """
+    n = len(x)
+    if n < 2:
+        return np.array(x, dtype=np.float64)
+    edge = max(1, math.ceil(margin * rate))
+    size = fft.next_fast_len(min(max(BLOCK, 4 * edge), n + 2 * edge), real=True)
+    factor = np.asarray(response(fft.rfftfreq(size, 1.0 / rate)))
+    factor = factor.reshape(-1, *(1 for _ in x.shape[1:]))
+    out = np.empty_like(x, dtype=np.float64)
+    kept = size - 2 * edge
+    for begin in range(0, n, kept):
+        end = min(begin + kept, n)
+        block = _continued(x, begin - edge, begin - edge + size)
+        spectrum = fft.rfft(block, axis=0)
+        spectrum *= factor
+        out[begin:end] = fft.irfft(spectrum, size, axis=0)[edge : edge + end - begin]
+    return out
+
+
+def _continued(x: Floats, begin: int, end: int) -> Floats:
+    """Rows of a record that goes on beyond its ends as its odd mirror image, then constant."""
+    last = len(x) - 1
+    rows = np.arange(begin, end)
+    inner = np.clip(rows, 0, last)
+    if begin >= 0 and end <= last + 1:
+        return x[begin:end]
+    mirrored = np.clip(np.where(rows < 0, -rows, 2 * last - rows), 0, last)
+    found: Floats = x[inner].astype(np.float64)
+    outside = rows != inner
+    found[outside] = 2.0 * found[outside] - x[mirrored[outside]]
+    return found
+
+
+def low_passed(x: Floats, rate: float, corner: float, *, causal: bool = False) -> Floats:
+    """Butterworth low pass of order 4 without phase, or causal."""
+    return band_passed(x, rate, 0.0, corner, causal=causal)
+
+
+def band_passed(
+    x: Floats, rate: float, low: float, high: float, *, causal: bool = False
+) -> Floats:
+    """Butterworth band pass of order 4.
+
+    Parameters
+    ----------
+    x : float64[time, ...]
+        Record.
+    rate : float
+        Samples per second [1/s].
+    low, high : float
+        Corners [Hz]; `low` 0: a low pass.
+    causal : bool
+        As an amplifier does it, instead of without phase.
+    """
+    if not causal:
+        return filtered(x, rate, butterworth(low, high), reach(low, high))
+    if low > 0.0:
+        sections = signal.butter(4, [low, high], "bandpass", fs=rate, output="sos")
+    else:
+        sections = signal.butter(4, high, "lowpass", fs=rate, output="sos")
+    x = np.asarray(x, dtype=np.float64)
+    start = signal.sosfilt_zi(sections)
+    start = start.reshape(*start.shape, *(1 for _ in x.shape[1:])) * x[0]
+    return np.asarray(signal.sosfilt(sections, x, axis=0, zi=start)[0])
+
+
+def integral(s: Floats, x: Floats) -> Floats:
+    """Integral of a record over s, linear between its samples, from its first sample on."""
+    steps = np.diff(s).reshape(-1, *(1 for _ in x.shape[1:]))
+    parts = 0.5 * steps * (x[1:] + x[:-1])
+    return np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(parts, axis=0)])
+
+
+def _integral_at(s: Floats, x: Floats, summed: Floats, at: Floats) -> Floats:
+    i = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
+    shape = (-1, *(1 for _ in x.shape[1:]))
+    d = (at - s[i]).reshape(shape)
+    slope = (x[i + 1] - x[i]) / (s[i + 1] - s[i]).reshape(shape)
+    found: Floats = summed[i] + x[i] * d + 0.5 * slope * d**2
+    return found
+
+
+def distance_means(s: Floats, x: Floats, centres: Floats, length: float) -> Floats:
+    """Means of a record over windows of a given length of the distance.
+
+    Parameters
+    ----------
+    s : float64[time]
+        Distance, increasing [m].
+    x : float64[time, ...]
+        Record.
+    centres : float64[window]
+        Middles of the windows [m]; the windows lie within `s`.
+    length : float
+        Length of a window [m].
+
+    Returns
+    -------
+    float64[window, ...]
+
+    Examples
+    --------
+    >>> s = np.array([0.0, 3.0, 4.0])
+    >>> distance_means(s, 2.0 * s, np.array([1.0, 2.5]), 2.0).tolist()
+    [2.0, 5.0]
+    """
+    summed = integral(s, x)
+    high = _integral_at(s, x, summed, centres + 0.5 * length)
+    low = _integral_at(s, x, summed, centres - 0.5 * length)
+    return (high - low) / length
+
+
+def window_centres(begin: float, end: float, length: float, step: float) -> Floats:
+    """Middles of windows that lie within begin and end, a step apart [m].
+
+    Examples
+    --------
+    >>> window_centres(10.0, 13.0, 2.0, 0.5).tolist()
+    [11.0, 11.5, 12.0]
+    """
+    room = end - begin - length
+    if room < -1e-9:
+        return np.zeros(0)
+    count = math.floor(room / step + 1e-9) + 1
+    return np.asarray(begin + 0.5 * length + step * np.arange(count), dtype=np.float64)
+
+
+class StreamingPercentiles:
+    """Percentiles of a stream of any length within a stated bound.
+
+    Counts values in cells of equal width; where a value falls outside, the cells are made twice as
+    wide, so that there are never more than `cells` of them.
+
+    Parameters
+    ----------
+    width : float
+        Width of the cells at the start.
+    cells : int
+        Number of cells, even.
+
+    Attributes
+    ----------
+    width : float
+        Present width: no percentile is further than this from one of the whole record.
+
+    Examples
+    --------
+    >>> stream = StreamingPercentiles(0.01)
+    >>> for part in np.array_split(np.arange(1001.0), 7):
+    ...     stream.add(part)
+    >>> abs(stream.percentile(95.0) - 950.0) <= stream.width
+    True
+    """
+
+    def __init__(self, width: float, cells: int = 2**14) -> None:
+        self.width = width
+        self._counts = np.zeros(cells, dtype=np.int64)
+        self.count = 0
+
+    def add(self, values: Floats) -> None:
+        """Take further values; those that are not a number are left out."""
+        values = np.ravel(values)
+        values = values[np.isfinite(values)]
+        if not len(values):
+            return
+        half = len(self._counts) // 2
+        while float(np.max(np.abs(values))) >= half * self.width:
+            self._widen()
+        place = np.floor(values / self.width).astype(np.int64) + half
+        self._counts += np.bincount(place, minlength=2 * half)
+        self.count += len(values)
+
+    def _widen(self) -> None:
+        """Join neighbours: cells 2k and 2k + 1 counted from the middle."""
+        half = len(self._counts) // 2
+        pairs = self._counts.reshape(-1, 2).sum(axis=1)
+        self._counts = np.zeros_like(self._counts)
+        self._counts[half // 2 : half // 2 + half] = pairs
+        self.width *= 2.0
+
+    def percentile(self, per_cent: float) -> float:
+        """Value below which `per_cent` of all values lie; nan without values."""
+        if not self.count:
+            return math.nan
+        below = np.cumsum(self._counts)
+        wanted = per_cent / 100.0 * (self.count - 1) + 1.0
+        cell = int(np.searchsorted(below, wanted - 1e-9))
+        return (cell - len(self._counts) // 2 + 0.5) * self.width

@@ -1,0 +1,214 @@
+"""Low pass between the time loop and the result, so that slow sampling folds nothing back.
+
+The loop's output comes at a higher rate, a whole multiple of the stored one.  Without phase: a
+symmetric filter of finite length (Kaiser window, ripple and stop band 80 dB), flat up to the pass
+band's end f_p and zero from output_rate - f_p on, so that what is folded back lies above f_p.
+Causal: Butterworth of order 4 with -3 dB at f_p.
+
+Time and distance are taken as they are.  `Y_over_Q` is made of the filtered Y and Q.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from railsim.notation import Quantity
+from railsim.profiles.profile import Profile
+from railsim.result.data import Array, Attributes, Result
+from railsim.result.sinks import ALWAYS, NOTHING, Sink, SinkContext
+
+ATTENUATION = 80.0  # dB
+UNFILTERED = ("time", "distance")
+
+
+class LowPassSink(SinkContext):
+    """Filters chunks at equal time steps and hands on every n-th instant.
+
+    Parameters
+    ----------
+    sink : Sink
+        Where the filtered chunks go.
+    every : int
+        Instants of the input for each one of the output.
+    output_rate : float
+        Instants of the output per second [1/s].
+    frequency : float
+        End of the pass band, or the corner of the causal filter [Hz].
+    causal : bool
+        Butterworth of order 4 instead of the filter without phase.
+    """
+
+    def __init__(
+        self, sink: Sink, every: int, output_rate: float, frequency: float, *, causal: bool
+    ) -> None:
+        self._sink, self._every = sink, every
+        self._rate = every * output_rate
+        self._filter: _Symmetric | _Causal
+        if causal:
+            self._filter = _Causal(self._rate, frequency, every)
+        else:
+            self._filter = _Symmetric(self._rate, frequency, output_rate - frequency, every)
+        self._names: tuple[str, ...] = ()
+        self._last: float | None = None
+
+    def begin(
+        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+    ) -> None:
+        """See `Sink.begin`."""
+        wanted = tuple(quantities)
+        self._names = tuple(q.name for q in wanted if "time" in q.dims)
+        self._sink.begin(coordinates, wanted)
+
+    def append(self, chunk: Mapping[str, Array]) -> None:
+        """See `Sink.append`."""
+        time = chunk["time"]
+        if self._last is not None and time[-1] - (time[-2] if len(time) > 1 else self._last) < (
+            0.999 / self._rate
+        ):
+            # the end of the run, between two instants
+            chunk = {name: array[:-1] for name, array in chunk.items() if name != "Q0"}
+        if not len(chunk["time"]):
+            return
+        self._last = float(chunk["time"][-1])
+        self._hand_on(self._filter.take(self._needed(chunk)))
+
+    def close(
+        self,
+        attributes: Attributes,
+        statics: Mapping[str, Any] = NOTHING,
+        profiles: Mapping[str, Profile] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+    ) -> Result:
+        """See `Sink.close`."""
+        self._hand_on(self._filter.end())
+        return self._sink.close(attributes, statics, profiles, groups)
+
+    def abort(self) -> None:
+        """See `Sink.abort`."""
+        self._sink.abort()
+
+    def _needed(self, chunk: Mapping[str, Array]) -> dict[str, Array]:
+        names = set(self._names)
+        if "Y_over_Q" in names:
+            names = names - {"Y_over_Q"} | {"Y", "Q"}
+        return {name: np.asarray(chunk[name]) for name in names}
+
+    def _hand_on(self, filtered: dict[str, Array]) -> None:
+        if not filtered or not len(filtered["time"]):
+            return
+        if "Y_over_Q" in self._names:
+            Q = filtered["Q"]
+            loaded = np.where(Q > 0.0, Q, np.nan)
+            filtered["Y_over_Q"] = np.array([-1.0, 1.0]) * filtered["Y"] / loaded
+        self._sink.append(filtered)
+
+
+class _Symmetric:
+    """Symmetric filter over a stream; at both ends it goes on as its odd mirror image."""
+
+    def __init__(self, rate: float, end_of_pass: float, begin_of_stop: float, every: int) -> None:
+        length, beta = signal.kaiserord(
+            ATTENUATION, (begin_of_stop - end_of_pass) / (0.5 * rate)
+        )
+        self._half = max(1, length // 2)
+        corner = 0.5 * (end_of_pass + begin_of_stop)
+        taps = signal.firwin(2 * self._half + 1, corner, window=("kaiser", beta), fs=rate)
+        self._taps = np.asarray(taps)
+        self._every = every
+        self._kept: dict[str, Array] = {}
+        self._started = False
+        self._skip = 0  # rows before the middle of the next window
+
+    def take(self, chunk: dict[str, Array]) -> dict[str, Array]:
+        """Filtered instants that are known with a further chunk."""
+        self._kept = {
+            name: np.concatenate([self._kept[name], array]) if self._kept else array
+            for name, array in chunk.items()
+        }
+        if not self._started:
+            if len(self._kept["time"]) <= self._half:
+                return {}
+            self._kept = {name: self._before(array) for name, array in self._kept.items()}
+            self._started = True
+        return self._windows()
+
+    def end(self) -> dict[str, Array]:
+        """Filtered instants up to the end of the stream."""
+        if not self._kept or len(self._kept["time"]) < 2:
+            return {}
+        if not self._started:
+            self._kept = {name: self._before(array) for name, array in self._kept.items()}
+        last = self._kept
+        self._kept = {name: self._before(array[::-1])[::-1] for name, array in last.items()}
+        return self._windows()
+
+    def _before(self, array: Array) -> Array:
+        rows = np.minimum(np.arange(self._half, 0, -1), len(array) - 1)
+        return np.concatenate([2.0 * array[0] - array[rows], array])
+
+    def _windows(self) -> dict[str, Array]:
+        """Filter all whole windows and forget what no later one needs."""
+        length = len(self._kept["time"])
+        count = (length - self._skip - 2 * self._half - 1) // self._every + 1
+        if count <= 0:
+            return {}
+        matrix = _banded(self._taps.tobytes(), count, self._every)
+        span = slice(self._skip, self._skip + matrix.shape[1])
+        found = {}
+        for name, array in self._kept.items():
+            part = array[span]
+            if name in UNFILTERED:
+                found[name] = part[self._half :: self._every][:count]
+            else:
+                flat = matrix @ part.reshape(len(part), -1)
+                found[name] = flat.reshape(count, *part.shape[1:])
+        used = self._skip + count * self._every
+        drop = min(used, length)
+        self._kept = {name: array[drop:] for name, array in self._kept.items()}
+        self._skip = used - drop
+        return found
+
+
+@cache
+def _banded(taps: bytes, count: int, every: int) -> Array:
+    """Matrix that filters and thins out: row k holds the taps from column k `every` on."""
+    values = np.frombuffer(taps)
+    matrix = np.zeros((count, (count - 1) * every + len(values)))
+    for row in range(count):
+        matrix[row, row * every : row * every + len(values)] = values
+    return matrix
+
+
+class _Causal:
+    """Butterworth of order 4 over a stream, started in the steady state of its first values."""
+
+    def __init__(self, rate: float, corner: float, every: int) -> None:
+        self._sections = signal.butter(4, corner, fs=rate, output="sos")
+        self._every = every
+        self._states: dict[str, Array] = {}
+        self._skip = 0
+
+    def take(self, chunk: dict[str, Array]) -> dict[str, Array]:
+        """Filtered instants of a further chunk."""
+        found = {}
+        for name, array in chunk.items():
+            passed = array
+            if name not in UNFILTERED:
+                if name not in self._states:
+                    start = signal.sosfilt_zi(self._sections)
+                    start = start.reshape(*start.shape, *(1 for _ in array.shape[1:]))
+                    self._states[name] = start * array[0]
+                passed, self._states[name] = signal.sosfilt(
+                    self._sections, array, axis=0, zi=self._states[name]
+                )
+            found[name] = passed[self._skip :: self._every]
+        rows = len(chunk["time"])
+        self._skip = (self._skip - rows) % self._every
+        return found
+
+    def end(self) -> dict[str, Array]:
+        """Nothing is held back."""
+        return {}

@@ -1,0 +1,164 @@
+"""Accelerometers on bodies: what they read at chosen points.
+
+An accelerometer reads the acceleration of its point minus gravity, in the axes of the body it is
+fixed to; the rest value of its z axis, -g, is taken out.  On canted track, or when the body rolls,
+its y axis so reads a_y - g sin(cant angle + roll): the uncompensated lateral acceleration.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle import Vehicle
+from railsim.track.alignment import Alignment
+
+Floats = NDArray[np.float64]
+GRAVITY = 9.81
+NEAR = 3.0
+"""A frame above a wheelset lies no further from it than this along the vehicle [m]."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A point of a body.
+
+    Attributes
+    ----------
+    body : str
+        Full name of the body.
+    offset : float
+        Arc length of the body's frame beyond that of the reference body [m].
+    arm : tuple of float
+        Point from the centre of gravity, body axes [m].
+    """
+
+    body: str
+    offset: float
+    arm: tuple[float, float, float]
+
+
+def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
+    """Sensors of a running test: on the floor and on the bogie frames, and the vehicle's own.
+
+    ``floor_front``, ``floor_middle`` and ``floor_rear`` on the reference body above the bogies
+    (means of the wheelsets in the front and rear half) and in the middle between them, at the
+    service table's height of the floor; ``frame_1``, ... above each wheelset, on the body between
+    the wheelset and the reference body; and the points of the service table.
+    """
+    flat = flatten(vehicle)
+    bodies = {body.name: body for body in flat.bodies}
+    wheelsets = flat.of_kind("wheelset")
+    reference = bodies[flat.reference]
+    found: dict[str, tuple[str, tuple[float, float, float]]] = {}
+    if reference.kind != "wheelset":
+        middle = float(np.mean([w.position[0] for w in wheelsets]))
+        front = [w.position[0] for w in wheelsets if w.position[0] >= middle]
+        rear = [w.position[0] for w in wheelsets if w.position[0] <= middle]
+        height = -(vehicle.service.floor_height if vehicle.service else 1.2)
+        for name, x in (("front", np.mean(front)), ("middle", middle), ("rear", np.mean(rear))):
+            found[f"floor_{name}"] = (reference.name, (float(x), 0.0, height))
+    frames = [b for b in flat.bodies if b.kind == "body" and b is not reference]
+    for number, wheelset in enumerate(wheelsets, start=1):
+        x = wheelset.position[0]
+        distances = [abs(frame.position[0] - x) for frame in frames]
+        if distances and min(distances) <= NEAR:
+            frame = frames[distances.index(min(distances))]
+            found[f"frame_{number}"] = (frame.name, (x, 0.0, frame.position[2]))
+    for name, point in (vehicle.service.points if vehicle.service else {}).items():
+        found[name] = (point.body, point.position)
+    origin = reference.position[0]
+    placed: dict[str, Sensor] = {}
+    for name, (body, place) in found.items():
+        cg = bodies[body].position
+        arm = (place[0] - cg[0], place[1] - cg[1], place[2] - cg[2])
+        placed[name] = Sensor(body, cg[0] - origin, arm)
+    return placed
+
+
+def readings(
+    chosen: Mapping[str, Sensor],
+    motion: Mapping[str, Floats],
+    bodies: tuple[str, ...],
+    alignment: Alignment,
+    speed: Floats,
+) -> tuple[Floats, Floats]:
+    """Readings of sensors over time.
+
+    Parameters
+    ----------
+    chosen : mapping of str to Sensor
+        Which sensors.
+    motion : mapping of str to float64[time, ...]
+        ``distance``, ``body_position``, ``body_velocity``, ``body_acceleration`` of a result.
+    bodies : tuple of str
+        Names along the dimension ``body``.
+    alignment : Alignment
+        Of the track.
+    speed : float64[time]
+        Speed of the reference body along the track [m/s].
+
+    Returns
+    -------
+    acceleration : float64[time, sensor, 3]
+        Reading along x, y, z of the body [m/s2].
+    roll_rate : float64[time, sensor]
+        Absolute roll velocity of the body [rad/s].
+    """
+    n = len(motion["distance"])
+    acceleration = np.zeros((n, len(chosen), 3))
+    roll_rate = np.zeros((n, len(chosen)))
+    known: dict[str, tuple[Floats, Floats, Floats]] = {}
+    for number, sensor in enumerate(chosen.values()):
+        if sensor.body not in known:
+            known[sensor.body] = _of_body(sensor, motion, bodies, alignment, speed)
+        linear, omega, angular = known[sensor.body]
+        arm = np.array(sensor.arm)
+        of_point = np.cross(angular, arm) + np.cross(omega, np.cross(omega, arm))
+        acceleration[:, number] = linear + of_point
+        roll_rate[:, number] = omega[:, 0]
+    return acceleration, roll_rate
+
+
+def _of_body(
+    sensor: Sensor,
+    motion: Mapping[str, Floats],
+    bodies: tuple[str, ...],
+    alignment: Alignment,
+    speed: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """Reading at the centre of gravity, angular velocity and acceleration, all in body axes."""
+    b = bodies.index(sensor.body)
+    position = motion["body_position"][:, b]
+    rates = motion["body_velocity"][:, b]
+    absolute = motion["body_acceleration"][:, b]
+    s = motion["distance"] + sensor.offset + position[:, 0]
+    cant, grade = alignment.cant_angle(s), alignment.grade_angle(s)
+    kappa = alignment.curvature(s)
+    down = np.stack(
+        [-np.sin(grade), np.sin(cant) * np.cos(grade), np.cos(cant) * np.cos(grade)], axis=-1
+    )
+    turning = speed[:, None] * np.stack(
+        [
+            alignment.cant_angle_rate(s),
+            alignment.grade_angle_rate(s) + kappa * np.sin(cant),
+            kappa * np.cos(cant),
+        ],
+        axis=-1,
+    )
+    roll, pitch, yaw = position[:, 3], position[:, 4], position[:, 5]
+    linear = absolute[:, :3] - GRAVITY * _into_body(down, roll, pitch, yaw)
+    linear[:, 2] += GRAVITY
+    omega = rates[:, 3:] + _into_body(turning, roll, pitch, yaw)
+    return linear, omega, absolute[:, 3:]
+
+
+def _into_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
+    """Components in body axes of a vector in track axes: C^T v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
+    x, y, z = vector.T
+    x, y = np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
+    y, z = np.cos(roll) * y + np.sin(roll) * z, np.cos(roll) * z - np.sin(roll) * y
+    x, z = np.cos(pitch) * x - np.sin(pitch) * z, np.cos(pitch) * z + np.sin(pitch) * x
+    return np.stack([x, y, z], axis=-1)

@@ -1,0 +1,122 @@
+"""Animations: scenes of runs and modes, the page, the film, the command."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from example_result import example_result
+
+import railsim
+from railsim.animation import mode_scene, result_scene, write_movie, write_page
+from railsim.animation.page import scene_data
+from railsim.cli import main
+from railsim.errors import InputError
+from railsim.profiles import load_profile
+
+PROFILES = {name: load_profile(name) for name in ("S1002", "60E1")}
+
+
+@pytest.fixture(scope="module")
+def result():
+    made = example_result()
+    return railsim.Result(
+        {name: made[name] for name in made}, made.quantities, made.coordinates, made.attributes,
+        PROFILES,
+    )  # fmt: skip
+
+
+def test_scene_holds_the_vehicle_and_its_way(result):
+    scene = result_scene(result, frames=50)
+    kinds = [body.kind for body in scene.bodies]
+    assert kinds == ["car", "frame", "frame", "wheelset", "wheelset", "wheelset", "wheelset"]
+    assert len(scene.time) == 50
+    wheels = [body for body in scene.bodies if body.kind == "wheelset"]
+    assert [round(body.offset, 2) for body in wheels] == [10.78, 8.22, -8.22, -10.78]
+    # 49 s at 20 m/s through a right-hand curve of 250 m: the track turns by 120/250 + 60/250 - ...
+    turn = scene.track["heading"][-1] - scene.track["heading"][0]
+    kappa = np.trapezoid(np.interp(np.arange(980.0), [300, 360, 420, 480], [0, 1, 1, 0])) / 250.0
+    assert turn == pytest.approx(kappa, rel=1e-3)
+    way = np.hypot(np.diff(scene.track["x"]), np.diff(scene.track["y"]))
+    assert np.allclose(way, 1.0, atol=1e-5)
+
+
+def test_wheels_stand_on_their_rails(result):
+    """Nominal place: the tread near the tape circle touches the rail's top within 0.2 mm."""
+    scene = result_scene(result, frames=5)
+    for section in scene.sections:
+        y = np.abs(section["wheel_y"])
+        tread = (y > 0.73) & (y < 0.76)
+        wheel = section["wheel_z"][tread] - 0.46
+        order = np.argsort(np.abs(section["rail_y"]))
+        rail = np.interp(y[tread], np.abs(section["rail_y"])[order], section["rail_z"][order])
+        assert abs(np.max(wheel - rail)) < 2e-4
+
+
+def test_page_needs_nothing_from_elsewhere(result, tmp_path):
+    page = write_page(result_scene(result, frames=40), tmp_path / "run.html").read_text()
+    assert not re.search(r"(src|href)=|https?://|@import|url\(", page)
+    data = json.loads(re.search(r"const scene = (.*);\n", page).group(1).replace("<\\/", "</"))
+    assert data["forces"]["Q"][0][0] == [68.8, 68.8]
+    assert "@TITLE@" not in page
+
+
+def test_part_of_a_run(result):
+    scene = result_scene(result, between=(340.0, 420.0))
+    assert scene.distance[0] >= 340.0
+    assert scene.distance[-1] <= 420.0
+    with pytest.raises(InputError, match="nothing between"):
+        result_scene(result, between=(2000.0, 3000.0))
+
+
+MODE = {"name": "lower sway", "frequency": 0.56, "damping_ratio": 0.22,
+        "shape": {"carbody.y": [1.0, 0.0], "carbody.roll": [0.4, 0.1],
+                  "front.frame.y": [0.1, -0.2]}}  # fmt: skip
+
+
+def test_mode_moves_by_five_per_cent_of_the_length_with_its_phases():
+    scene = mode_scene(railsim.load_vehicle("coach_manchester"), MODE)
+    car = scene.bodies[0]
+    # the roof moves most: y - roll z at the box's upper edge, z down
+    roof = car.box[3] - car.box[2]
+    moved = abs(1.0 - (0.4 + 0.1j) * roof)
+    largest = np.max(np.abs(scene.pose[:, 0, 1] - roof * scene.pose[:, 0, 3]))
+    assert largest == pytest.approx(0.05 * 21.56, rel=1e-2)
+    scale = 0.05 * 21.56 / moved
+    phase = 2.0 * np.pi * MODE["frequency"] * scene.time
+    np.testing.assert_allclose(
+        scene.pose[:, 1, 1], scale * np.real((0.1 - 0.2j) * np.exp(1j * phase)), atol=1e-9
+    )
+
+
+def test_command_writes_a_page_of_a_mode(tmp_path, capsys):
+    modes = tmp_path / "modes.json"
+    modes.write_text(json.dumps({"vehicle": "coach_manchester", "modes": [MODE]}))
+    assert main(["animate", str(modes), "--mode", "lower sway"]) == 0
+    assert (tmp_path / "modes.html").stat().st_size > 20_000
+    assert main(["animate", str(modes), "--mode", "upper", "--overwrite"]) == 2
+    assert "no such mode" in capsys.readouterr().err
+
+
+def test_film_has_a_picture_for_each_frame(result, tmp_path):
+    from PIL import Image
+
+    path = write_movie(result_scene(result, frames=4), tmp_path / "run.gif")
+    with Image.open(path) as film:
+        assert film.n_frames == 4
+        assert np.asarray(film.convert("RGB")).std() > 10.0
+
+
+def test_wrong_calls_end_with_status_2(result, tmp_path, capsys):
+    path = str(result.to_hdf5(tmp_path / "run.h5"))
+    broken = tmp_path / "broken.json"
+    broken.write_text('{"modes": []}')
+    for wrong in ([path, "--out", str(tmp_path / "a.txt")], [str(broken)], ["no.h5"],
+                  [path, "--mode", "1", "--out", str(tmp_path / "b.html")]):  # fmt: skip
+        assert main(["animate", *wrong]) == 2, wrong
+        assert "Traceback" not in capsys.readouterr().err
+
+
+def test_numbers_are_rounded_to_what_a_screen_shows(result):
+    data = scene_data(result_scene(result, frames=3))
+    assert all(v == round(v, 5) for body in data["pose"][1] for v in body)

@@ -1,0 +1,299 @@
+"""Assessments of made-up runs with known answers, and of wrong input."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from made_record import Q0, curve, made, track
+
+import railsim
+from railsim.assessment import assess
+from railsim.cli import main
+from railsim.definitions.vehicle import Service
+from railsim.errors import InputError
+
+STRAIGHT = {"type": "STR", "length": 1700.0}
+FAST = 1.1 * 44.44444
+
+
+def both_sides(force):
+    return np.stack([0.5 * force, 0.5 * force], axis=-1)
+
+
+def rows_of(assessment, zone, name):
+    report = next(z for z in assessment.zones if z.zone == zone)
+    return {row.place: row for row in report.rows if row.rule.name == name}
+
+
+@pytest.fixture(scope="module")
+def hunting():
+    """30 kN at 5 Hz on straight track, 0.2 m/s2 of the body at 1 Hz."""
+    return made(
+        track(STRAIGHT), FAST,
+        Y=lambda t, s: both_sides(30e3 * np.sin(2 * np.pi * 5.0 * t)[:, None] + 0.0 * s),
+        lateral=lambda t: 0.2 * np.sin(2 * np.pi * t),
+    )  # fmt: skip
+
+
+def test_instability_of_a_sine_against_half_the_limit_of_the_sum_of_y(hunting):
+    """E5: 21.21 against 23.18 kN for the benchmark's wheel load."""
+    (found,) = assess(hunting)
+    row = rows_of(found, "1", "instability")["wheelset 1"]
+    # 100 m are 10.2 periods: the rms of a window differs by up to 1/(4 pi 10.2)
+    assert row.estimate.value == pytest.approx(21.21e3, rel=8e-3)
+    assert row.limit == pytest.approx(23.18e3, abs=10.0)
+    frequencies = found.zones[0].values[0].frequencies
+    assert frequencies["wheelset 1"] == pytest.approx(5.0, abs=0.02)
+
+
+def test_straight_track_gives_both_percentiles_of_signed_quantities(hunting):
+    (found,) = assess(hunting)
+    report = found.zones[0]
+    assert [len(report.values), report.needed, report.complete] == [6, 25, False]
+    row = rows_of(found, "1", "sum_Y")["wheelset 2"]
+    # 2 m means of a wave of 9.78 m
+    wave = FAST / 5.0
+    gain = math.sin(math.pi * 2.0 / wave) / (math.pi * 2.0 / wave)
+    assert row.estimate.N == 12
+    assert row.estimate.mean == pytest.approx(30e3 * gain, rel=3e-3)
+    body = rows_of(found, "1", "body_y_rms")["floor_middle"]
+    assert body.estimate.mean == pytest.approx(0.2 / math.sqrt(2.0), rel=0.01)
+    assert found.verdict == "incomplete"
+    assert "zone 4: no sections" in found.reasons
+
+
+def steady(turn):
+    """Outer wheel 40 kN outwards, inner one 25 kN, in a curve to the side `turn`."""
+
+    def Y(t, s):
+        outer = 40e3 if turn > 0 else 25e3
+        inner = 25e3 if turn > 0 else 40e3
+        return np.stack([np.full(s.shape, -outer), np.full(s.shape, inner)], axis=-1)
+
+    on = track(*curve(300.0 * turn, 800.0), cant=0.12 * turn)
+    return made(on, 23.0, Y=Y, lateral=lambda t: turn * (1.0 + 9.81 * 0.08) + 0.0 * t)
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_left_and_right_curves_give_the_same_values(turn):
+    (found,) = assess(steady(turn))
+    assert rows_of(found, "4", "Y_qst")["wheelset 1 outer"].estimate.mean == pytest.approx(
+        40e3 - 50e3 * (25e3 / Q0 - 0.40), rel=1e-6
+    )
+    assert rows_of(found, "4", "sum_Y")["wheelset 1"].estimate.mean == pytest.approx(15e3, 1e-6)
+    quotient = rows_of(found, "4", "Y_over_Q")["wheelset 1 outer"].estimate.mean
+    assert quotient == pytest.approx(40e3 / Q0, rel=1e-6)
+    # absolute acceleration less gravity on the cant
+    reading = rows_of(found, "4", "body_y_qst")["floor_middle"].estimate.mean
+    assert reading == pytest.approx(1.0, abs=5e-3)
+
+
+def test_limits_of_the_curve_follow_its_radius_and_the_vehicle():
+    (found,) = assess(steady(1))
+    assert rows_of(found, "4", "Y_qst")["wheelset 1 outer"].limit == pytest.approx(65e3)
+    assert rows_of(found, "4", "sum_Y")["wheelset 1"].limit == pytest.approx(46.36e3, abs=5.0)
+    assert rows_of(found, "4", "Q")["wheelset 1 outer"].limit == pytest.approx(90e3 + Q0)
+    (found,) = assess(steady(1), "uic518")
+    row = rows_of(found, "4", "Y_qst")["wheelset 1 outer"]
+    assert (row.limit, row.estimate.mean) == (pytest.approx(60e3), pytest.approx(40e3))
+    freight = Service(admissible_speed=30.0, cant_deficiency=0.15, category="freight")
+    (found,) = assess(steady(1), service=freight)
+    limit = rows_of(found, "4", "sum_Y")["wheelset 1"].limit
+    assert limit == pytest.approx(0.85 * 46.36e3, abs=5.0)
+
+
+def test_simplified_method_needs_no_limit_of_forces():
+    (found,) = assess(steady(1), method="simplified")
+    names = {row.rule.name for row in found.zones[-1].rows}
+    assert {"body_y_safety", "frame_y"} <= names
+    assert not {"sum_Y", "Q"} & names
+    frame = rows_of(found, "4", "frame_y")["frame_1"]
+    assert frame.limit == pytest.approx(12.0 - (2615.0 + 2 * 1813.0) / 1000.0 / 5.0)
+
+
+def test_lifted_wheel_is_reported_in_metres_and_is_no_number():
+    def Q(t, s):
+        loads = np.full((*s.shape, 2), Q0)
+        loads[(s > 400.0) & (s < 406.0), 0] = -1e3
+        return loads
+
+    run = made(track(*curve(300.0, 800.0), cant=0.12), 23.0, Q=Q)
+    (found,) = assess(run)
+    report = next(z for z in found.zones if z.zone == "4")
+    metres = sum(v.lifted.get("wheelset 1 outer", 0.0) for v in report.values)
+    # the filter of 20 Hz spreads the edges by less than half a metre
+    assert metres == pytest.approx(6.0, abs=0.6)
+    assert all(math.isfinite(row.share) for row in report.rows)
+    assert any("without load" in note for note in report.notes)
+
+
+def test_sections_outside_the_conditions_do_not_count_unless_asked():
+    run = made(track(*curve(300.0, 800.0), cant=0.12), 15.0)
+    (found,) = assess(run)
+    report = next(z for z in found.zones if z.zone == "4")
+    assert not report.values
+    assert any("cant deficiency" in note for note in report.notes)
+    (found,) = assess(run, all_sections=True)
+    assert len(next(z for z in found.zones if z.zone == "4").values) == 11
+
+
+def test_more_cant_deficiency_takes_the_two_dimensional_method():
+    plan = [e for r in (290.0, 310.0, 330.0) for e in curve(r, 500.0)]
+    run = made(track(*plan, cant=0.12), 23.0, Y=lambda t, s: both_sides(-1e3 + 0.0 * s))
+    (found,) = assess(run)
+    row = rows_of(found, "4", "sum_Y")["wheelset 1"]
+    assert row.estimate.method == "two"
+    assert row.estimate.value == pytest.approx(1e3, rel=1e-6)
+    # the straights between them are too short for a section: told, and no zone
+    assert any("a section needs" in note for z in found.zones for note in z.notes)
+
+
+def test_derailed_run_is_no_pass():
+    (found,) = assess(made(track(STRAIGHT), FAST, status="derailed"))
+    assert found.verdict == "derailed"
+    assert found.exceeded
+
+
+def test_excess_is_a_failure_even_with_few_sections():
+    (found,) = assess(made(track(STRAIGHT), FAST, Y=lambda t, s: both_sides(60e3 + 0.0 * s)))
+    assert found.verdict == "fail"
+    assert any("track shifting force" in reason for reason in found.reasons)
+
+
+def test_track_quality_stands_beside_the_sections():
+    random = {"type": "random", "spectrum": "erri_b176_low", "seed": 3}
+    (found,) = assess(made(track(STRAIGHT, irregularities=[random]), FAST))
+    assert len(found.quality) == 6
+    alignment = np.mean([q.alignment for q in found.quality])
+    # 0.71 mm of the whole spectrum in 3 to 25 m; the worse rail, six sections of 250 m
+    assert alignment == pytest.approx(0.71e-3, rel=0.2)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    ({"without": ("Q",)}, r"Q: is not in the result; run it with settings.outputs.quantities"),
+    ({"rate": 200.0}, r"200 samples a second; 1000 at least"),
+    ({"until": 100.0}, r"too short for one section"),
+])  # fmt: skip
+def test_what_cannot_be_assessed_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        assess(made(track(STRAIGHT), FAST, **change))
+
+
+def test_run_without_a_whole_section_says_how_long_one_is():
+    (found,) = assess(made(track(STRAIGHT), FAST, until=400.0))
+    assert found.verdict == "incomplete"
+    assert any("m of a straight, a section needs 250 m" in reason for reason in found.reasons)
+
+
+def test_coarse_samples_are_taken_when_asked_and_told():
+    (found,) = assess(made(track(STRAIGHT), FAST, rate=200.0), coarse=True)
+    assert any("too few for instantaneous" in remark for remark in found.remarks)
+
+
+def test_low_passed_samples_are_fine():
+    settings = '{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}'
+    (found,) = assess(made(track(STRAIGHT), FAST, rate=200.0, settings=settings))
+    assert found.verdict == "incomplete"
+
+
+def test_vehicle_without_a_service_table_is_refused():
+    bare = railsim.load_vehicle("coach_manchester", []).model_dump(exclude_none=True)
+    bare.pop("service")
+    vehicle = railsim.load_vehicle("coach_manchester").__class__.model_validate(bare).to_toml()
+    with pytest.raises(InputError, match=r"no service table"):
+        assess(made(track(STRAIGHT), FAST, vehicle=vehicle))
+
+
+def test_limits_file_with_an_unknown_key_is_refused(tmp_path):
+    limits = tmp_path / "own.toml"
+    limits.write_text('format = "railsim-limits/1"\nextends = "en14363"\nsum_Z = 3\n')
+    with pytest.raises(InputError, match=r"sum_Z"):
+        assess(made(track(STRAIGHT), FAST), limits=limits)
+
+
+def test_own_limits_replace_single_values(tmp_path):
+    limits = tmp_path / "own.toml"
+    limits.write_text(
+        'format = "railsim-limits/1"\nextends = "en14363"\n'
+        '[Y_over_Q]\nvalue = 0.7\nsource = "our own"\nchecked = true\n'
+    )
+    (found,) = assess(steady(1), limits=limits)
+    row = rows_of(found, "4", "Y_over_Q")["wheelset 1 outer"]
+    assert (row.limit, row.source, row.checked) == (0.7, "our own", True)
+
+
+def test_comfort_of_known_vibration():
+    run = made(track(STRAIGHT), FAST, lateral=lambda t: 0.2 * np.sin(2 * np.pi * 1.25 * t))
+    (found,) = assess(run, "comfort")
+    points = next(iter(found.comfort.values()))
+    middle = next(p for p in points if p.sensor == "floor_middle")
+    assert pytest.approx(6.0 * 0.14250, rel=0.01) == middle.mean.N_MV
+    assert any("60" in remark for remark in found.remarks)
+
+
+def test_wear_of_a_known_wear_number():
+    def T_gamma(t, s):
+        return np.stack([np.full(s.shape, 65.0), np.full(s.shape, 250.0)], axis=-1)
+
+    (found,) = assess(made(track(STRAIGHT), FAST, T_gamma=T_gamma), "wear")
+    left, right = next(iter(found.wear.values()))[:2]
+    assert 1e6 * left.rail_damage == pytest.approx(10.0)
+    assert 1e9 * right.pearce_sherratt == pytest.approx(0.1560, rel=5e-4)
+    assert left.percentiles["95"] == pytest.approx(65.0, abs=left.bound)
+
+
+def test_command_prints_writes_and_fails_only_when_asked(hunting, tmp_path, capsys):
+    path = str(hunting.to_hdf5(tmp_path / "run.h5"))
+    assert main(["assess", path]) == 0
+    shown = capsys.readouterr().out
+    assert "verdict: incomplete" in shown
+    assert "not checked against the printed standard" in shown
+    assert main(["assess", path, "--json", "--out", str(tmp_path / "out")]) == 0
+    data = json.loads(capsys.readouterr().out)[0]
+    assert data["standard"] == "en14363"
+    keys = {"name", "place", "mean", "deviation", "estimate", "limit", "share", "source", "checked"}
+    assert keys <= set(data["zones"][0]["quantities"][0])
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert names == {"assessment.json", "assessment.csv", "assessment.png"}
+    assert main(["assess", path, "--out", str(tmp_path / "out")]) == 2
+    assert main(["assess", path, "--fail"]) == 0
+    bad = made(track(STRAIGHT), FAST, Y=lambda t, s: both_sides(60e3 + 0.0 * s))
+    assert main(["assess", str(bad.to_hdf5(tmp_path / "bad.h5")), "--fail"]) == 4
+
+
+@pytest.mark.parametrize("standard", ["comfort", "wear"])
+def test_command_of_other_standards(hunting, tmp_path, capsys, standard):
+    path = str(hunting.to_hdf5(tmp_path / "run.h5"))
+    out = str(tmp_path / standard)
+    assert main(["assess", path, "--standard", standard, "--out", out]) == 0
+    assert "wheelset 1 left" in (shown := capsys.readouterr().out) or "floor_middle" in shown
+    assert (tmp_path / standard / "assessment.png").stat().st_size > 5000
+
+
+def test_wrong_command_lines_end_with_status_2(hunting, tmp_path, capsys):
+    path = str(hunting.to_hdf5(tmp_path / "run.h5"))
+    (tmp_path / "empty").mkdir()
+    for wrong in (
+        [str(tmp_path / "no.h5")], [path, path], [str(tmp_path / "empty")],
+        [path, "--limits", "nothing"], [path, "--limits", "comfort"],
+        [path, "--cant-deficiency", "-1"],
+    ):  # fmt: skip
+        assert main(["assess", *wrong]) == 2, wrong
+        assert "Traceback" not in capsys.readouterr().err
+
+
+def test_simulated_coach_feels_the_uncompensated_acceleration():
+    """R 250 m, cant 150 mm, 20 m/s: 0.814 m/s2 at the floor, not 1.593; 1 %."""
+    settings = railsim.load_settings(None, ["output_rate=1000"])
+    run = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250"),
+        speed=20.0, start=388.0, duration=3.0, settings=settings,
+    )  # fmt: skip
+    from railsim.assessment.record import Record
+
+    record = Record(run, "run")
+    acceleration = record.readings(slice(0, record.rows))[0]
+    middle = list(record.sensors).index("floor_middle")
+    there = np.abs(record.distance[: record.rows] - 390.0) < 5.0
+    assert np.mean(acceleration[there, middle, 1]) == pytest.approx(0.814, rel=0.01)

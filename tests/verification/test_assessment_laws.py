@@ -1,0 +1,342 @@
+"""Filters, weightings, statistics, comfort, wear and safety against numbers from elsewhere.
+
+The numbers of E1 to E5, K1 to K3 and W1 were computed apart from this program; the gains are those
+of ISO 2631-1:1997, tables 3 and 4.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from railsim.assessment.comfort import (
+    en12299_mean_comfort,
+    event_comfort,
+    iso2631_vibration,
+    p_ct,
+    p_de,
+    transition_comfort,
+)
+from railsim.assessment.en14363 import dominant_frequency
+from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
+from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
+from railsim.assessment.statistics import one_dimensional, two_dimensional
+from railsim.assessment.wear import (
+    WholeLifeRailModel,
+    pearce_sherratt_1991,
+    surface_fatigue_index,
+    usfd,
+)
+from railsim.assessment.weighting import WEIGHTINGS
+from railsim.profiles import load_profile
+from railsim.result.filters import (
+    StreamingPercentiles,
+    band_passed,
+    butterworth,
+    distance_means,
+    filtered,
+    low_passed,
+    window_centres,
+)
+
+RATE = 1000.0
+
+
+def sine(frequency, seconds=20.0, rate=RATE, amplitude=1.0):
+    t = np.arange(round(seconds * rate)) / rate
+    return amplitude * np.sin(2.0 * np.pi * frequency * t)
+
+
+# filters ------------------------------------------------------------------------------------------
+
+
+def test_percentiles_of_two_metre_means_of_a_wave_of_ten_metres():
+    """E1: 2 m means take a wave of 10 m by sin(pi/5)/(pi/5)."""
+    s = 20.0 * np.arange(60_000) / RATE
+    sum_Y = 20.0 + 10.0 * np.sin(2.0 * np.pi * s / 10.0)
+    means = distance_means(s, low_passed(sum_Y, RATE, 20.0), window_centres(50, 1150, 2, 0.5), 2.0)
+    low, middle, high = np.percentile(means, [0.15, 50.0, 99.85])
+    assert (low, middle, high) == pytest.approx((10.65, 20.0, 29.35), rel=3e-3)
+
+
+@pytest.mark.parametrize(("f", "gain"), [(5, 1.0), (10, 0.998), (20, 0.707), (30, 0.194)])
+def test_zero_phase_filter_is_one_butterworth_not_two(f, gain):
+    """E2, and against scipy's analogue filter of the same order."""
+    inner = slice(5000, 15000)
+    assert np.max(np.abs(low_passed(sine(f), RATE, 20.0)[inner])) == pytest.approx(gain, abs=2e-3)
+    b, a = signal.butter(4, 2.0 * np.pi * 20.0, analog=True)
+    _, response = signal.freqs(b, a, [2.0 * np.pi * f])
+    assert butterworth(high=20.0)(np.array([float(f)]))[0] == pytest.approx(abs(response[0]), 1e-9)
+
+
+@pytest.mark.parametrize("corners", [(0.4, 10.0), (3.0, 7.0), (0.4, 4.0)])
+def test_band_pass_against_scipys_analogue_filter(corners):
+    f = np.geomspace(0.01, 200.0, 300)
+    b, a = signal.butter(4, 2.0 * np.pi * np.array(corners), "bandpass", analog=True)
+    _, response = signal.freqs(b, a, 2.0 * np.pi * f)
+    np.testing.assert_allclose(butterworth(*corners)(f), np.abs(response), rtol=1e-6, atol=1e-12)
+    assert butterworth(*corners)(np.zeros(1))[0] == 0.0
+
+
+def test_zero_phase_filter_keeps_the_phase_and_the_causal_one_delays():
+    wave = sine(8.0)
+    inner = slice(5000, 15000)
+    expected = butterworth(high=20.0)(np.array([8.0]))[0] * wave
+    np.testing.assert_allclose(low_passed(wave, RATE, 20.0)[inner], expected[inner], atol=1e-4)
+    causal = low_passed(wave, RATE, 20.0, causal=True)[inner]
+    assert np.max(np.abs(causal)) == pytest.approx(expected.max(), abs=2e-3)
+    assert np.argmax(np.correlate(causal, wave[inner], "full")) - len(causal) + 1 > 15
+
+
+@given(st.integers(1000, 9000), st.floats(1.0, 30.0))
+@settings(max_examples=20, deadline=None)
+def test_filter_in_blocks_is_the_filter_of_the_whole(split, corner):
+    """A part read with its margin gives the rows that the whole record gives."""
+    x = np.random.default_rng(1).normal(size=(10_000, 2)).cumsum(axis=0)
+    margin = 8.0 / corner
+    rows = slice(max(0, split - round(margin * RATE)), min(len(x), split + round(margin * RATE)))
+    whole = filtered(x, RATE, butterworth(high=corner), margin)[split]
+    part = filtered(x[rows], RATE, butterworth(high=corner), margin)[split - rows.start]
+    inside = rows.start > 0 and rows.stop < len(x)
+    assert part == pytest.approx(whole, abs=1e-4 * np.ptp(x) if inside else 0.05 * np.ptp(x))
+
+
+def test_blocks_of_a_long_record_join_without_a_seam():
+    x = np.random.default_rng(2).normal(size=200_000).cumsum()
+    size = 2**21  # one block
+    spectrum = np.fft.rfft(np.concatenate([x, x[::-1], np.full(size - 400_000, x[0])]))
+    once = np.fft.irfft(spectrum * butterworth(0.4, 10.0)(np.fft.rfftfreq(size, 1 / RATE)), size)
+    blocks = band_passed(x, RATE, 0.4, 10.0)
+    inner = slice(20_000, 180_000)
+    np.testing.assert_allclose(blocks[inner], once[:200_000][inner], atol=1e-4 * np.ptp(x))
+
+
+@given(st.lists(st.floats(0.01, 3.0), min_size=5, max_size=40), st.floats(0.1, 2.0))
+def test_means_over_distance_are_exact_for_straight_lines(steps, length):
+    """A line integrates exactly however unequal the samples are."""
+    s = np.cumsum(steps)
+    centres = window_centres(s[0], s[-1], length, 0.3)
+    means = distance_means(s, 3.0 - 2.0 * s, centres, length)
+    np.testing.assert_allclose(means, 3.0 - 2.0 * centres, rtol=1e-9, atol=1e-9)
+
+
+@given(st.integers(0, 2**31), st.floats(0.1, 1e4), st.sampled_from([0.15, 50.0, 95.0, 99.85]))
+def test_percentile_of_a_stream_is_within_a_cell_of_one_of_the_record(seed, scale, per_cent):
+    x = np.random.default_rng(seed).standard_t(3, size=20_000) * scale
+    stream = StreamingPercentiles(1e-3 * scale)
+    for part in np.array_split(x, 17):
+        stream.add(part)
+    low = np.percentile(x, per_cent, method="lower")
+    high = np.percentile(x, per_cent, method="higher")
+    assert low - stream.width <= stream.percentile(per_cent) <= high + stream.width
+
+
+def test_dominant_frequency_of_a_hunting_wheelset_in_noise():
+    noise = np.random.default_rng(3).normal(size=12_000)
+    assert dominant_frequency(5.0 * sine(6.3, 12.0) + noise, RATE) == pytest.approx(6.3, abs=0.05)
+
+
+# statistics ---------------------------------------------------------------------------------------
+
+SECTIONS = np.array([31.2, 29.8, 33.5, 30.4, 32.1, 34.0, 28.9, 31.7, 30.9, 32.6])
+DEFICIENCY = np.array([70, 85, 95, 100, 110, 120, 125, 135, 145, 150.0])
+FORCES = np.array([24.1, 26.0, 28.2, 27.5, 30.1, 31.0, 32.9, 33.1, 36.0, 35.4])
+
+
+def test_one_dimensional_estimates():
+    """E3."""
+    assert one_dimensional(SECTIONS, 3.0).value == pytest.approx(36.323, abs=5e-4)
+    assert one_dimensional(SECTIONS, 2.2).value == pytest.approx(35.040, abs=5e-4)
+    assert one_dimensional(SECTIONS, 0.0).value == pytest.approx(np.mean(SECTIONS))
+
+
+@pytest.mark.parametrize(("probability", "value"), [(0.95, 37.254), (0.99, 38.007)])
+def test_two_dimensional_estimates(probability, value):
+    """E4."""
+    found = two_dimensional(DEFICIENCY, FORCES, 150.0, probability)
+    assert found.value == pytest.approx(value, abs=5e-4)
+
+
+def test_half_the_further_observations_lie_above_the_line():
+    """Coverage of the bound: of 2000 samples 95 % of the next observations lie below it."""
+    rng = np.random.default_rng(4)
+    below = 0
+    for _ in range(2000):
+        y = 5.0 + 0.2 * DEFICIENCY + rng.normal(size=10)
+        bound = two_dimensional(DEFICIENCY, y, 150.0, 0.95).value
+        below += 5.0 + 0.2 * 150.0 + rng.normal() < bound
+    assert below / 2000 == pytest.approx(0.95, abs=0.015)  # 3 standard errors of a share
+
+
+def test_too_few_values_give_no_estimate():
+    assert math.isnan(one_dimensional(SECTIONS[:1], 3.0).value)
+    assert math.isnan(two_dimensional(DEFICIENCY[:2], FORCES[:2], 150.0, 0.95).value)
+    assert math.isnan(two_dimensional(np.full(5, 100.0), FORCES[:5], 150.0, 0.95).value)
+
+
+# weightings and comfort ---------------------------------------------------------------------------
+
+BANDS = (0.5, 1, 2, 4, 5, 8, 10, 16, 20, 40, 80)
+GAINS = {  # x 1000; the printed Wd at 10 Hz, 212, is a misprint
+    "Wk": (418, 482, 531, 967, 1039, 1036, 988, 768, 636, 314, 132),
+    "Wd": (853, 1011, 890, 512, 409, 253, 202, 125, 100, 49.4, 21.1),
+    "Wc": (843, 991, 1012, 1024, 1013, 891, 776, 512, 409, 199, 84.4),
+    "Wb": (335.4, 391.1, 436.7, 821.8, 957.0, 1055.9, 1048.4, 918.3, 797.9, 414.2, 174.0),
+}
+
+
+@pytest.mark.parametrize("name", GAINS)
+def test_gains_of_the_weightings(name):
+    """Three digits are printed: half a unit of the last one and 0.15 %."""
+    found = 1e3 * WEIGHTINGS[name].gain(np.array(BANDS, dtype=float))
+    np.testing.assert_allclose(found, GAINS[name], rtol=1.5e-3, atol=0.5 if name != "Wb" else 0.05)
+
+
+@pytest.mark.parametrize("name", GAINS)
+def test_responses_against_scipys_analogue_filters(name):
+    """The same polynomials multiplied out, from 0.1 to 80 Hz."""
+    w = WEIGHTINGS[name]
+    w1, w2, w3, w4 = (2 * np.pi * f for f in (w.f1, w.f2, w.f3, w.f4))
+    above = np.polymul([1.0, 0.0, 0.0], np.array([1.0, w3]) * w2**2 * w4**2 / w3)
+    below = np.polymul([1.0, w1 * np.sqrt(2.0), w1**2], [1.0, w2 * np.sqrt(2.0), w2**2])
+    below = np.polymul(below, [1.0, w4 / w.Q2, w4**2])
+    if np.isfinite(w.f5):
+        w5, w6 = 2 * np.pi * w.f5, 2 * np.pi * w.f6
+        above = np.polymul(above, w.K * np.array([w5**-2, 1.0 / (w.Q3 * w5), 1.0]))
+        below = np.polymul(below, [w6**-2, 1.0 / (w.Q4 * w6), 1.0])
+    f = np.geomspace(0.1, 80.0, 200)
+    _, response = signal.freqs(above, below, 2 * np.pi * f)
+    np.testing.assert_allclose(w.response(f), response, rtol=1e-9)
+
+
+def test_weighting_a_record_is_weighting_its_tones():
+    weighted = WEIGHTINGS["Wk"].weighted(sine(5.0, 60.0), RATE)[20_000:40_000]
+    assert np.std(weighted) * np.sqrt(2.0) == pytest.approx(1.0388, abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [200.0, 1000.0])
+def test_mean_comfort_of_three_tones(rate):
+    """K1, also at 200 samples a second: the weighting is that of the analogue filter."""
+    a = np.stack([
+        sine(1.0, 300.0, rate, 0.05), sine(1.25, 300.0, rate, 0.20), sine(5.0, 300.0, rate, 0.30),
+    ], axis=-1)  # fmt: skip
+    found = en12299_mean_comfort(a, rate)
+    assert pytest.approx(1.504, rel=5e-3) == found.N_MV
+    assert found.blocks == 60
+    np.testing.assert_allclose(
+        np.median(found.continuous, axis=0), [0.03574, 0.14250, 0.20302], rtol=5e-3
+    )
+
+
+def test_iso_2631_of_a_tone():
+    found = iso2631_vibration(np.stack([0 * sine(5.0), 0 * sine(5.0), sine(5.0)], axis=-1), RATE)
+    assert found.total == pytest.approx(1.0388 / np.sqrt(2.0), rel=2e-3)
+    assert found.MTVV[2] == pytest.approx(found.rms[2], rel=0.02)
+    # of a sine: integral of sin^4 is 3/8 of the time
+    assert found.VDV[2] == pytest.approx(1.0388 * (0.375 * 20.0) ** 0.25, rel=5e-3)
+
+
+def test_comfort_on_transitions_and_events():
+    """K2."""
+    assert p_ct(1.0, 0.5, 2.0, "standing") == pytest.approx(28.69, abs=0.005)
+    assert p_ct(1.0, 0.5, 2.0, "seated") == pytest.approx(8.28, abs=0.005)
+    assert p_de(1.2, 1.0, "standing") == pytest.approx(9.95, abs=0.005)
+    assert p_de(1.2, 1.0, "seated") == pytest.approx(1.50, abs=0.005)
+
+
+def test_a_linear_ramp_has_its_own_slope_as_jerk():
+    """0 to 1 m/s2 within 4 s: 0.25 m/s3 and, rolling by 8 degrees, 2 degrees a second."""
+    t = np.arange(0.0, 20.0, 0.005)
+    ramp = np.clip((t - 8.0) / 4.0, 0.0, 1.0)
+    roll_rate = np.radians(8.0) / 4.0 * ((t > 8.0) & (t < 12.0))
+    found = transition_comfort(t, ramp, roll_rate, 8.0, 12.0)
+    assert found.acceleration == pytest.approx(1.0, abs=5e-3)
+    assert found.jerk == pytest.approx(0.25, abs=5e-3)
+    assert found.roll_rate == pytest.approx(2.0, rel=0.02)
+    assert transition_comfort(t, ramp, roll_rate, 8.0, 19.0) is None
+
+
+def test_event_of_a_slow_swing():
+    """0.2 Hz, amplitude 1: within 2 s at most 1.18 peak to peak with a mean of 0, and so on."""
+    found = event_comfort(sine(0.2, 60.0), RATE)
+    phases = np.linspace(0.0, 2.0 * np.pi, 2000)
+    window = np.linspace(-0.2 * 2.0 * np.pi, 0.2 * 2.0 * np.pi, 801)
+    waves = np.sin(phases[:, None] + window)
+    expected = max(p_de(np.ptp(w), abs(w.mean()), "standing") for w in waves)
+    assert found["standing"] == pytest.approx(expected, abs=0.05)
+
+
+@pytest.mark.parametrize(("tones", "Wz"), [
+    ({1.0: 0.5}, 2.609), ({5.0: 0.5}, 3.039), ({10.0: 0.5}, 2.615), ({1.2: 0.4, 5.0: 0.3}, 2.832),
+])  # fmt: skip
+def test_sperling_of_tones(tones, Wz):
+    """K3; several tones add as the 20/3rd powers of their indices."""
+    record = sum(sine(f, 60.0, RATE, a) for f, a in tones.items())
+    assert sperling_index(record, RATE, "vertical") == pytest.approx(Wz, abs=5e-3)
+    single = [index_of_rms(a / np.sqrt(2) * float(sperling_gain(np.array(f), "vertical")))
+              for f, a in tones.items()]  # fmt: skip
+    assert sum(v ** (20 / 3) for v in single) ** 0.15 == pytest.approx(Wz, abs=5e-3)
+
+
+def test_sperling_of_flat_noise():
+    """K3: 0.01 (m/s2)2/Hz from 0.5 to 30 Hz."""
+    n, rate = 2**17, 256.0
+    f = np.fft.rfftfreq(n, 1 / rate)
+    inside = (f >= 0.5) & (f <= 30.0)
+    phases = np.exp(2j * np.pi * np.random.default_rng(5).random(len(f)))
+    spectrum = np.where(inside, np.sqrt(0.01 * rate * n / 2.0), 0.0) * phases
+    found = sperling_index(np.fft.irfft(spectrum, n), rate, "vertical")
+    assert found == pytest.approx(2.874, abs=5e-3)
+
+
+# wear and safety ----------------------------------------------------------------------------------
+
+
+def test_wear_laws():
+    """W1."""
+    worn = 1e9 * pearce_sherratt_1991(np.array([50.0, 150.0, 250.0]), 0.92)
+    np.testing.assert_allclose(worn, [0.01359, 0.02717, 0.1560], rtol=5e-4)
+    np.testing.assert_allclose(1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0])), [26.5, 55.0, 1466],
+                               rtol=5e-4)
+    damage = 1e6 * WholeLifeRailModel()(np.array([40.0, 65.0, 120.0]))
+    np.testing.assert_allclose(damage, [5.0, 10.0, 5.0], rtol=1e-9)
+
+
+def test_rail_damage_begins_at_the_threshold_and_turns_into_wear():
+    model = WholeLifeRailModel(threshold=20.0)
+    assert model(np.array([0.0, 20.0])).tolist() == [0.0, 0.0]
+    assert model(np.array([175.0, 285.0])) == pytest.approx([0.0, -10e-6])
+
+
+def test_surface_fatigue_index_is_traction_minus_k_over_p0():
+    """p0 = 3 N/(2 pi a b) after Hertz."""
+    N, a, b = 70e3, 6e-3, 5e-3
+    p0 = 1.5 * N / (np.pi * a * b)
+    assert surface_fatigue_index(0.3 * N, N, a, b) == pytest.approx(0.3 - 300e6 / p0)
+
+
+def test_nadals_limit():
+    """70 degrees and 0.36: 1.2, the figure that EN 14363 quotes for its stationary test."""
+    assert nadal(math.radians(70.0), 0.36) == pytest.approx(1.20, abs=0.005)
+
+
+def test_flange_angle_of_s1002():
+    """EN 13715: the flange of S1002 stands at 70 degrees."""
+    assert math.degrees(flange_angle(load_profile("S1002"))) == pytest.approx(70.0, abs=0.5)
+
+
+def test_climb_counts_a_lifted_wheel_and_the_longest_stretch():
+    s = np.arange(0.0, 10.0, 0.5)
+    quotient = np.where((s > 2.0) & (s < 6.0), 1.4, 0.5)
+    quotient[8] = np.nan
+    found = climb_distance(s, quotient, 1.2, 2e-3 * s)
+    assert (found.begin, found.length) == (2.5, 3.0)
+    assert found.rise == pytest.approx(6e-3)
+
+
+def test_overturning_is_one_when_one_side_is_without_load():
+    Q = np.array([[[80e3, 0.0], [70e3, 0.0]], [[50e3, 50e3], [50e3, 50e3]]])
+    assert overturning(Q).tolist() == [1.0, 0.0]
