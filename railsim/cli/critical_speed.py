@@ -55,8 +55,8 @@ FILES = ("critical_speed.json", "critical_speed.png")
 def command(
     vehicle: str, track: str | None, method: str, low: float, high: float, points: int,
     conicity: str | None, friction: str | None, workers: int | None, out: str | None,
-    settings: str | None, load: str | None, assignments: tuple[str, ...], overwrite: bool, as_json: bool,
-    quiet: bool, **how: Any,
+    settings: str | None, load: str | None, assignments: tuple[str, ...], overwrite: bool,
+    as_json: bool, quiet: bool, **how: Any,
 ) -> None:
     """Find from which speed a vehicle hunts on ideal straight track.
 

@@ -41,8 +41,8 @@ MARKS = {0: "no steady state", 1: "", 2: "by time integration"}
 @quiet_option
 def command(
     vehicle: str, radius: str, cant: float, cant_deficiency: str, friction: str | None,
-    track: str | None, out: str | None, settings: str | None, load: str | None, assignments: tuple[str, ...],
-    overwrite: bool, as_json: bool, quiet: bool,
+    track: str | None, out: str | None, settings: str | None, load: str | None,
+    assignments: tuple[str, ...], overwrite: bool, as_json: bool, quiet: bool,
 ) -> None:
     """Find how a vehicle runs steadily in curves, at every combination of the values given.
 

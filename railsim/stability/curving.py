@@ -32,7 +32,7 @@ from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
 from railsim.profiles import Profile
-from railsim.time_step import choose_step, empty_recorder
+from railsim.time_step import Stability, empty_recorder
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 
@@ -315,8 +315,12 @@ class _Search:
         state[-3:] = 0.0, PLACE, speed
         try:
             state = solver.prepared(state, speed)
-            step = choose_step(self.model, self._system(0.0, 0.0, goal.friction),
-                               solver.prepared(self._rest.state, speed), "fast", 5e-3)
+            straight = self._system(0.0, 0.0, goal.friction)
+            rolling = solver.prepared(self._rest.state, speed)
+            # the curve itself is where the run settles: judged with the state that Newton left
+            step = Stability(
+                self.model, straight, rolling, "fast", lambda _: (system, state)
+            ).choose(5e-3)
         except ModelError:
             return self._values(solver, state, FAILED)
         work, derivative = work_arrays(system), np.zeros_like(state)

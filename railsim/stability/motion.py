@@ -19,7 +19,7 @@ from railsim.kernels.time_loop import time_loop
 from railsim.kernels.wheel_rail import W_Y
 from railsim.linear.circle import PLACE
 from railsim.linear.vehicle import LinearVehicle
-from railsim.time_step import SCHEMES, choose_step, empty_recorder
+from railsim.time_step import SCHEMES, Stability, empty_recorder
 
 Floats = NDArray[np.float64]
 
@@ -110,8 +110,9 @@ class VehicleMotion:
         self.system = prepared.system
         self.scheme = SCHEMES[scheme]
         self.step = min(
-            choose_step(self.model, self.system, prepared.steady(v).state, scheme,
-                        1.0 / OUTPUT_RATE)
+            Stability(
+                self.model, self.system, prepared.steady(v).state, scheme, lambda _: None
+            ).choose(1.0 / OUTPUT_RATE)
             for v in speeds
         )
         self.every = round(1.0 / OUTPUT_RATE / self.step)

@@ -101,7 +101,8 @@ class VehicleFlow:
 
     def steps(self, duration: float) -> int:
         """Number of steps in a period of the length of the runs' steps, as nearly as it fits."""
-        return max(8, round(duration / self._motion.step))
+        steps: int = round(duration / self._motion.step)
+        return max(8, steps)
 
     def after(self, states: Floats, durations: Floats, speeds: Floats) -> Floats:
         """States after a while, one motion a row; all with the number of steps of the first."""

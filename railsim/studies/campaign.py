@@ -27,7 +27,7 @@ from railsim.studies.execute import (
     on_cluster,
 )
 from railsim.studies.study import cores
-from railsim.studies.summary import Record
+from railsim.studies.journal import Record
 
 GRAVITY, CANT_BASE = 9.81, 1.5
 

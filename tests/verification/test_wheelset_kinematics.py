@@ -74,7 +74,7 @@ def test_creepage_is_the_velocity_of_the_material_against_the_rail_at_the_patch(
         frame = absolute_frame(system, state[-2] + system.frame_offset[system.bodies.frame[b]])
         A, omega = frame[3:12].reshape(3, 3), SPEED * frame[12:15]
         q, v = state[6 * b : 6 * b + 6], state[6 * (n + b) : 6 * (n + b) + 6]
-        r = q[:3] + [0.0, *system.bodies.nominal[b]]
+        r = q[:3] + np.array([0.0, *system.bodies.nominal[b]])
         C = rotation(q[5], 2) @ rotation(q[3], 0)
         c = work.patch[[C_X, C_Y, C_Z], k]
         spin = A @ C @ v[3:]
