@@ -26,8 +26,8 @@ from railsim.studies.execute import (
     in_this_process,
     on_cluster,
 )
-from railsim.studies.study import cores
 from railsim.studies.journal import Record
+from railsim.studies.study import cores
 
 GRAVITY, CANT_BASE = 9.81, 1.5
 
