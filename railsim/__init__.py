@@ -22,8 +22,11 @@ if TYPE_CHECKING:
         load_vehicle,
     )
     from railsim.errors import InputError, ModelError
+    from railsim.linear.modes import modes, root_locus
     from railsim.result import Result, mid_curves, open_result, peaks
     from railsim.simulation import simulate, simulate_together
+    from railsim.stability.critical_speed import critical_speed
+    from railsim.stability.curving import curving
     from railsim.studies import study
 
 _HOMES = {
@@ -31,13 +34,17 @@ _HOMES = {
     "InputError": "railsim.errors",
     "ModelError": "railsim.errors",
     "Result": "railsim.result",
+    "critical_speed": "railsim.stability.critical_speed",
+    "curving": "railsim.stability.curving",
     "load_mechanism": "railsim.definitions.loading",
     "load_settings": "railsim.definitions.loading",
     "load_track": "railsim.definitions.loading",
     "load_vehicle": "railsim.definitions.loading",
     "mid_curves": "railsim.result",
+    "modes": "railsim.linear.modes",
     "open_result": "railsim.result",
     "peaks": "railsim.result",
+    "root_locus": "railsim.linear.modes",
     "simulate": "railsim.simulation",
     "simulate_together": "railsim.simulation",
     "study": "railsim.studies",
@@ -49,13 +56,17 @@ __all__ = [
     "Result",
     "__version__",
     "assess",
+    "critical_speed",
+    "curving",
     "load_mechanism",
     "load_settings",
     "load_track",
     "load_vehicle",
     "mid_curves",
+    "modes",
     "open_result",
     "peaks",
+    "root_locus",
     "simulate",
     "simulate_together",
     "study",

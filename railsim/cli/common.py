@@ -55,7 +55,7 @@ def print_json(data: Any) -> None:
 
 
 def plain(data: Any) -> Any:
-    """Return data with numbers that JSON lacks as None."""
+    """Return data as JSON can hold it: names as text, numbers that it lacks as null."""
     if isinstance(data, dict):
         return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

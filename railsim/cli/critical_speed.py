@@ -1,0 +1,177 @@
+"""``railsim critical-speed``: linear and non-linear critical speed of a vehicle."""
+
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from railsim.cli.common import (
+    json_option,
+    load_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+    table,
+)
+from railsim.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from railsim.cli.analysis import Inputs
+    from railsim.stability.critical_speed import CriticalSpeed
+
+METHODS = ("linear", "ramp", "bifurcation", "continuation", "all")
+FILES = ("critical_speed.json", "critical_speed.png")
+
+
+@click.command(name="critical-speed")
+@click.argument("vehicle", metavar="VEHICLE")
+@click.argument("track", metavar="TRACK", required=False)
+@click.option("--method", default="ramp", show_default=True, type=click.Choice(METHODS),
+              help="The linear critical speed is always found.")
+@click.option("--from", "low", type=float, default=5.0, show_default=True, metavar="V",
+              help="Lowest speed in m/s.")
+@click.option("--to", "high", type=float, default=120.0, show_default=True, metavar="V",
+              help="Highest speed in m/s.")
+@click.option("--points", type=int, default=16, show_default=True, metavar="N",
+              help="Speeds of a bifurcation diagram.")
+@click.option("--linearisation", default="tangent", show_default=True,
+              type=click.Choice(["tangent", "harmonic"]),
+              help="Contact: its derivative, or its first harmonic for --amplitude.")
+@click.option("--amplitude", type=float, default=3e-3, show_default=True, metavar="A",
+              help="Lateral amplitude of the wheelsets in m, for harmonic.")
+@click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")
+@click.option("--friction", metavar="MU or A:B:N", help="Friction; several values: a map.")
+@click.option("--workers", type=click.IntRange(min=1), metavar="N",
+              help="Processes for a map; default: all cores.")
+@click.option("--out", metavar="DIR",
+              help="Folder for critical_speed.json and .png; a map goes on where it stopped.")
+@click.option("--settings", metavar="F", help="Settings file: scheme, creep law, contact.")
+@load_option
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    vehicle: str, track: str | None, method: str, low: float, high: float, points: int,
+    conicity: str | None, friction: str | None, workers: int | None, out: str | None,
+    settings: str | None, load: str | None, assignments: tuple[str, ...], overwrite: bool,
+    as_json: bool, quiet: bool, **how: Any,
+) -> None:
+    """Find from which speed a vehicle hunts on ideal straight track.
+
+    V_lin: lowest speed at which a mode is not damped.  V_n: lowest speed at which hunting
+    sustains itself, by a ramp of falling speed with runs at constant speed, by a bifurcation
+    diagram, or by continuation of the periodic motions.  Of TRACK (default: straight) rails,
+    gauge, friction and support count.
+
+    \b
+    Example:
+      railsim critical-speed coach_manchester --method linear
+      railsim critical-speed coach_manchester --method all --out stability --overwrite
+      railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
+    """  # noqa: D301 - click reads the escape
+    from railsim.cli.analysis import Folder, load_inputs, values_of
+
+    inputs = load_inputs(vehicle, track, settings, assignments, load)
+    conicities = values_of(conicity, "--conicity") if conicity else [None]
+    frictions = values_of(friction, "--friction") if friction else [None]
+    methods = METHODS[:-1] if method == "all" else ("linear", method)
+    options = {"methods": tuple(dict.fromkeys(methods)), "low": low, "high": high,
+               "points": points, **how}
+    grid = list(product(conicities, frictions))
+    folder = Folder(out, FILES, overwrite)
+    with progress_bar("critical speed", quiet=quiet) as progress:
+        if len(grid) > 1:
+            from railsim.studies.stability_map import stability_map
+
+            points_found = stability_map(
+                inputs.vehicle, inputs.track, inputs.settings, grid, options,
+                folder=folder.path, workers=workers, overwrite=overwrite, progress=progress,
+            )
+        else:
+            one = _one(inputs, *grid[0], options, progress)
+    if len(grid) > 1:
+        _tell_map(folder, inputs, conicities, frictions, points_found, as_json)
+        return
+    from railsim.plot.stability import bifurcation_figure
+
+    folder.write_json(FILES[0], one.record())
+    if folder.path is not None:
+        folder.write_picture(FILES[1], bifurcation_figure(one, inputs.vehicle.name))
+    if as_json:
+        print_json(one.record())
+        return
+    click.echo("\n".join(_lines(one)))
+    folder.tell()
+
+
+def _one(
+    inputs: "Inputs", conicity: float | None, friction: float | None, options: dict[str, Any],
+    progress: Any,
+) -> "CriticalSpeed":
+    from railsim.stability.critical_speed import critical_speed
+
+    track = inputs.track if friction is None else inputs.track.replace(
+        friction=friction, friction_table=None)
+    return critical_speed(inputs.vehicle, track, settings=inputs.settings, conicity=conicity,
+                          progress=progress, **options)
+
+
+def _tell_map(
+    folder: Any, inputs: "Inputs", conicities: list[Any], frictions: list[Any],
+    found: list[dict[str, Any]], as_json: bool,
+) -> None:
+    """Print, write and draw a map."""
+    import numpy as np
+
+    from railsim.plot.stability import map_figure
+
+    values = {name: several for name, several in
+              (("conicity", conicities), ("friction", frictions)) if len(several) > 1}
+    shape = [len(several) for several in values.values()]
+    speeds = {}
+    for kind, words in (("linear", "linear"), ("nonlinear", "non-linear")):
+        column = [record[kind]["speed"] if record[kind] else np.nan for record in found]
+        if kind == "linear" or np.isfinite(column).any():
+            speeds[words] = np.array(column).reshape(shape)
+    folder.write_json(FILES[0], found)
+    if folder.path is not None:
+        folder.write_picture(FILES[1], map_figure(values, speeds, inputs.vehicle.name))
+    if as_json:
+        print_json(found)
+        return
+    rows = []
+    for record in found:
+        point = [f"{record['at'][name]:g}" for name in values]
+        cells = [f"{record[kind]['speed']:.2f}" if record[kind] else "none"
+                 for kind in ("linear", "nonlinear")]
+        rows.append([*point, *cells])
+    header = [*values, "linear (m/s)", "non-linear (m/s)"]
+    click.echo("\n".join(table(header, rows, numbers=0)))
+    for remark in dict.fromkeys(remark for record in found for remark in record["remarks"]):
+        click.echo(f"remark: {remark}")
+    folder.tell()
+
+
+def _lines(found: "CriticalSpeed") -> list[str]:
+    rows = []
+    if found.linear is not None:
+        rows.append(["linear", f"{found.linear['speed']:.2f}",
+                     f"{found.linear['frequency']:.2f}", "", found.linear["mode"]])
+    else:
+        rows.append(["linear", "none", "", "", ""])
+    for method, lowest in found.nonlinear.items():
+        if lowest.speed is None:
+            rows.append([f"non-linear, {method}", "none", "", "", ""])
+        else:
+            rows.append([f"non-linear, {method}", f"{lowest.speed:.2f}",
+                         f"{lowest.frequency:.2f}", f"{1e3 * lowest.amplitude:.2f}", ""])
+    for words, limit in (("amplitude above {:g} mm", found.amplitude_limit),
+                         ("rms of sum_Y above {:.3g} kN", found.instability_limit)):
+        if limit is not None:
+            size = limit["limit"] * (1e3 if "mm" in words else 1e-3)
+            rows.append([words.format(size), f"{limit['speed']:.2f}", "", "", ""])
+    header = ["critical speed", "m/s", "Hz", "mm", "mode"]
+    kind = [f"the bifurcation is {found.type}"] if found.type not in ("", "none") else []
+    return [*table(header, rows), *kind, *(f"remark: {remark}" for remark in found.remarks)]

@@ -1,0 +1,42 @@
+"""Track of constant curvature and cant, on which a vehicle can roll steadily."""
+
+import math
+
+from railsim.definitions.track import Track
+
+LENGTH = 50.0  # m; the tables reach beyond both ends
+PLACE = 25.0  # m, where a vehicle stands on it
+
+
+def circle(
+    track: Track,
+    *,
+    curvature: float = 0.0,
+    cant: float = 0.0,
+    friction: float | tuple[float, float] | None = None,
+) -> Track:
+    """Return a track of constant curvature and cant with rails, gauge and friction of another.
+
+    Parameters
+    ----------
+    track : Track
+        Whose rails they are.
+    curvature : float
+        1/radius, positive to the right [1/m].
+    cant : float
+        Left rail over the right one, on 1.5 m [m].
+    friction : float or pair, optional
+        Coefficient of friction; by default that of `track` at its beginning.
+    """
+    radius = 1.0 / curvature if curvature else math.inf
+    element = {"type": "CIR", "length": LENGTH, "radius": radius}
+    if not curvature:
+        element = {"type": "STR", "length": LENGTH}
+    if friction is None:
+        friction = track.friction if track.friction_table is None else track.friction_table[0][1:]
+    both = (friction, friction) if isinstance(friction, float | int) else tuple(friction)
+    return track.replace(
+        plan=[element],
+        cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
+        vertical=[], irregularities=[], gauge_widening=None, friction_table=None, friction=both,
+    )

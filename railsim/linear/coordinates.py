@@ -1,0 +1,270 @@
+"""Coordinates of a vehicle without those that nothing depends on, and their names.
+
+Of the state vector of `railsim.kernels.system` are left out: time, place and speed, the memory of
+the fast scheme, the spin angles of the wheelsets (their rates stay), and the places that an axlebox
+does not use.  The reference body's x, which runs hold, is free here: held, it would be a car body
+of infinite mass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, work_arrays
+from railsim.errors import ModelError
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
+from railsim.kernels.system import AXLEBOX, FREE, N_SCALARS, WHEELSET, Drive, System
+from railsim.kernels.track_frame import OMEGA
+from railsim.linear.system import Linearisation, jacobian
+from railsim.notation import COMPONENTS
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+TRACK_PARTS = (
+    "rail.left.y", "rail.left.z", "rail.right.y", "rail.right.z", "sleeper.y", "sleeper.z",
+    "sleeper.roll",
+)
+STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Which entries of the state vector are coordinates of the analysis.
+
+    Attributes
+    ----------
+    names : tuple of str
+        ``carbody.y``, of its rate ``carbody.y'``; of an internal state the element's name; of the
+        track ``front.outer.wheelset.rail.left.y``.
+    places : int64[n]
+        Places in the state vector: positions and velocities of the bodies, internal states of
+        elements, displacements of elastic rails, their rates.
+    bodies, components : int64[n]
+        Body and component of positions and velocities, -1 of all others.
+    n_positions, n_velocities : int
+        Of the bodies.
+    steps : float64[n]
+        Steps of difference quotients.
+    forceless : int64[...]
+        Rates of rails without mass: their equations say that the forces balance.
+    """
+
+    names: tuple[str, ...]
+    places: Places
+    bodies: Places
+    components: Places
+    n_positions: int
+    n_velocities: int
+    steps: Floats
+    forceless: Places
+
+    def place(self, body: int, component: int) -> int:
+        """Place of a body's position among the coordinates."""
+        same = (self.bodies == body) & (self.components == component)
+        return int(np.flatnonzero(same)[0])
+
+    @property
+    def positions(self) -> slice:
+        """Where the positions stand."""
+        return slice(0, self.n_positions)
+
+    @property
+    def velocities(self) -> slice:
+        """Where the velocities stand."""
+        return slice(self.n_positions, self.n_positions + self.n_velocities)
+
+
+def coordinates(model: Model, *, held: bool = False) -> Coordinates:
+    """Return the coordinates of a vehicle.
+
+    Parameters
+    ----------
+    model : Model
+    held : bool
+        Leave out all coordinates of the wheelsets; axleboxes pitch.
+    """
+    positions, velocities = [], []
+    n = model.index.n_bodies
+    for body, kind in enumerate(model.system.bodies.kind):
+        if kind == WHEELSET and held:
+            continue
+        for component in (4,) if kind == AXLEBOX else range(6):
+            if not (kind == WHEELSET and component == 4):
+                positions.append((body, component))
+            velocities.append((body, component))
+    both = [*positions, *velocities]
+    names = [f"{model.index.bodies[b]}.{COMPONENTS[k]}" for b, k in positions]
+    names += [f"{model.index.bodies[b]}.{COMPONENTS[k]}'" for b, k in velocities]
+    rest = _internal_names(model)
+    places = [6 * b + k for b, k in positions] + [6 * n + 6 * b + k for b, k in velocities]
+    places += [12 * n + i for i in range(len(rest))]
+    steps = [STEP] * len(positions) + [RATE_STEP] * len(velocities) + [FORCE_STEP] * len(rest)
+    forceless = []
+    if not held:
+        track, track_names = track_places(model)
+        places += [*track, *(k + RATE for k in track)]
+        rest += [*track_names, *(f"{name}'" for name in track_names)]
+        steps += [STEP] * len(track) + [RATE_STEP] * len(track)
+        if model.system.support.massless:
+            forceless = list(range(len(places) - len(track), len(places)))
+    return Coordinates(
+        names=(*names, *rest),
+        places=np.array(places, dtype=np.int64),
+        bodies=np.array([b for b, _ in both] + [-1] * len(rest), dtype=np.int64),
+        components=np.array([k for _, k in both] + [-1] * len(rest), dtype=np.int64),
+        n_positions=len(positions),
+        n_velocities=len(velocities),
+        steps=np.array(steps),
+        forceless=np.array(forceless, dtype=np.int64),
+    )
+
+
+def track_places(model: Model) -> tuple[list[int], list[str]]:
+    """Places of the displacements of elastic rails and sleepers in the state, and their names."""
+    support = model.system.support
+    if not support.elastic:
+        return [], []
+    first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(model.index.wheelsets)
+    moving = DOF if support.sleeper else RAIL_DOF
+    places = [
+        first + SUPPORT_SIZE * w + k for w in range(len(model.index.wheelsets))
+        for k in range(moving)
+    ]
+    return places, [
+        f"{wheelset}.{part}" for wheelset in model.index.wheelsets for part in TRACK_PARTS[:moving]
+    ]
+
+
+def _internal_names(model: Model) -> list[str]:
+    """Names of the internal states after their elements."""
+    system = model.system
+    names = [""] * len(system.internal.kind)
+    for name, i in zip(model.index.links, system.links.internal, strict=True):
+        if i >= 0:
+            names[i] = name
+    for name, row in zip(model.index.mounts, system.mounts.internal, strict=True):
+        for axis, i in enumerate(row):
+            if i >= 0:
+                names[i] = f"{name}.{'xyz'[axis]}"
+    return names
+
+
+class FreeVehicle:
+    """x' = f(x) of a vehicle about a state of steady rolling, the reference body's x free.
+
+    The kernels keep the reference body's x; in free running they say by which V' they do so.  Added
+    back to all bodies, with the traction that keeps the speed, it gives the motion of the free body
+    seen from frames that move at constant speed.
+
+    Parameters
+    ----------
+    model : Model
+        With preloads.
+    system : System
+        On its track.
+    state : float64[n_state]
+        Steady rolling.
+    held : bool
+        Whether the wheelsets are held.
+    """
+
+    def __init__(self, model: Model, system: System, state: Floats, *, held: bool = False) -> None:
+        self.model = model
+        self.coordinates = coordinates(model, held=held)
+        self.state = state.copy()
+        self.work = work_arrays(system)
+        self._derivative = np.zeros_like(state)
+        self._trial = state.copy()
+        self._n = model.index.n_bodies
+        bodies = system.bodies
+        self._whole = np.asarray(bodies.whole)
+        self._frames = bodies.frame[self._whole]
+        self._nominal = np.hstack([np.zeros((len(self._whole), 1)), bodies.nominal[self._whole]])
+        reference = int(bodies.references[0])
+        self._reference = 6 * reference, 6 * self._n + 6 * reference
+        self.system = system._replace(drive=Drive(FREE, np.zeros((1, 2)), np.zeros(3)))
+        change = self.evaluate(state)[-1]
+        self._is_straight = not self.work.frames[:, OMEGA : OMEGA + 3].any()
+        along = self._directions(state)[np.flatnonzero(self._whole == reference)[0], 0]
+        # the traction without which the vehicle would slow down in the curve
+        force = -change * float(along * bodies.mass[reference])
+        self.system = system._replace(drive=Drive(FREE, np.array([[0.0, force]]), np.zeros(3)))
+
+    @property
+    def x(self) -> Floats:
+        """The coordinates in the state of steady rolling, float64[n]."""
+        return self.state[self.coordinates.places].copy()
+
+    def tangent(self) -> Floats:
+        """Jacobian of `rate` at the state of steady rolling, float64[n, n].
+
+        Raises
+        ------
+        ModelError
+            It is not finite.
+        """
+        matrix = jacobian(self.rate, self.x, self.coordinates.steps)
+        if not np.isfinite(matrix).all():
+            raise ModelError("the vehicle cannot be linearised: a derivative is not finite")
+        return matrix
+
+    def linearisation(self, matrix: Floats) -> Linearisation:
+        """Linearisation with the rates of rails without mass eliminated.
+
+        Of such a rail B_y y + B_w w = 0 is the balance of forces, w its rate: w = -B_w^-1 B_y y.
+        """
+        c, x = self.coordinates, self.x
+        w = c.forceless
+        if len(w):
+            y = np.setdiff1d(np.arange(len(c.names)), w)
+            solved = np.linalg.solve(matrix[np.ix_(w, w)], matrix[np.ix_(w, y)])
+            # their rate stands in the equations of the displacements as well as in all others
+            matrix = matrix[np.ix_(y, y)] - matrix[np.ix_(y, w)] @ solved
+            return Linearisation(
+                tuple(c.names[k] for k in y), matrix, x[y], float(self.state[-1])
+            )
+        return Linearisation(c.names, matrix, x, float(self.state[-1]))
+
+    def linearised(self) -> Linearisation:
+        """Linearise about the state of steady rolling; the parameter is the speed."""
+        return self.linearisation(self.tangent())
+
+    def evaluate(self, state: Floats) -> Floats:
+        """Derivative of a whole state as the kernels give it; leaves forces in `work`.
+
+        Raises
+        ------
+        ModelError
+            The state lies outside the range of the model.
+        """
+        status, where, _ = right_hand_side(self.system, self.work, state, self._derivative)
+        if status != RUNNING:
+            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
+            raise ModelError(f"outside the range of the model: {sentence}")
+        return self._derivative
+
+    def rate(self, x: Floats) -> Floats:
+        """Derivative of the coordinates, float64[n]."""
+        trial = self._trial
+        trial[:] = self.state
+        trial[self.coordinates.places] = x
+        derivative = self.evaluate(trial)
+        derivative[self._reference[0]] = trial[self._reference[1]]
+        velocities = derivative[6 * self._n : 12 * self._n].reshape(-1, 6)
+        if self._is_straight:
+            velocities[self._whole, 0] += derivative[-1]
+        else:
+            velocities[self._whole, :3] += derivative[-1] * self._directions(trial)
+        return np.asarray(derivative[self.coordinates.places])
+
+    def _directions(self, state: Floats) -> Floats:
+        """e_x + omega x r of whole bodies: how they move as their frames go along the track."""
+        r = state[: 6 * self._n].reshape(-1, 6)[self._whole, :3] + self._nominal
+        omega = self.work.frames[self._frames, OMEGA : OMEGA + 3]
+        moved = np.cross(omega, r)
+        moved[:, 0] += 1.0
+        return moved

@@ -1,0 +1,249 @@
+"""Eigenmodes of a linearisation, followed over a parameter; the first loss of stability.
+
+With A r = lambda r and l A = lambda l, a mode has the frequency f = Im(lambda)/2pi, the undamped
+frequency f0 = |lambda|/2pi and the damping ratio zeta = -Re(lambda)/|lambda|.
+
+Modes of neighbouring parameters a and b are paired by c_ij = |(l_i^a r_j^b)(l_j^b r_i^a)|, which is
+1 for the same mode and does not depend on how coordinates and vectors are scaled.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eig
+from scipy.optimize import brentq, linear_sum_assignment
+
+from railsim.linear.system import Linearisation
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+At = Callable[[float], Linearisation]
+
+SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are looked for
+SLOWEST = 1e-3  # Hz; below it a mode is no oscillation
+SAME = 0.6  # pairing of neighbouring modes that needs no look in between
+UNRELATED = 0.1  # pairing below which two modes are not the same
+EQUAL = 0.02  # relative distance of eigenvalues that cannot be told apart
+MOST_HALVINGS = 3
+
+
+@dataclass(frozen=True)
+class Eigenmodes:
+    """Modes of one linearisation; of a conjugate pair the one with Im(lambda) > 0.
+
+    Attributes
+    ----------
+    linearisation : Linearisation
+    eigenvalues : complex128[m]
+        By rising magnitude [1/s].
+    shapes : complex128[m, n]
+        Right eigenvectors, largest component 1.
+    left : complex128[m, n]
+        Left eigenvectors with l r = 1 (where they can be scaled so).
+    """
+
+    linearisation: Linearisation
+    eigenvalues: Complex
+    shapes: Complex
+    left: Complex
+
+    @property
+    def frequencies(self) -> Floats:
+        """Damped frequencies [Hz]."""
+        return np.asarray(self.eigenvalues.imag / (2.0 * np.pi))
+
+    @property
+    def natural_frequencies(self) -> Floats:
+        """|lambda|/2pi [Hz]."""
+        return np.asarray(np.abs(self.eigenvalues) / (2.0 * np.pi))
+
+    @property
+    def damping_ratios(self) -> Floats:
+        """-Re(lambda)/|lambda|, 0 where lambda is."""
+        size = np.abs(self.eigenvalues)
+        return np.asarray(-self.eigenvalues.real / np.where(size > 0.0, size, 1.0))
+
+    def taken(self, order: Sequence[int] | NDArray[np.intp]) -> "Eigenmodes":
+        """Return some of the modes, in this order."""
+        chosen = np.asarray(order, dtype=int)
+        return Eigenmodes(self.linearisation, self.eigenvalues[chosen], self.shapes[chosen],
+                          self.left[chosen])
+
+
+def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
+    """Eigenmodes of a linearisation, by rising |lambda|.
+
+    Examples
+    --------
+    >>> oscillator = Linearisation(("x", "v"), np.array([[0.0, 1.0], [-4.0, -0.4]]), np.zeros(2), 1)
+    >>> modes = eigenmodes(oscillator)
+    >>> modes.natural_frequencies.round(4), modes.damping_ratios.round(4)
+    (array([0.3183]), array([0.1]))
+    """
+    values, left, right = _eig(linearisation.matrix)
+    upper = np.flatnonzero(values.imag >= 0.0)
+    order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
+    shapes = right[:, order].T
+    largest = np.argmax(np.abs(shapes), axis=1)
+    shapes = shapes / shapes[np.arange(len(order)), largest][:, None]
+    dual = left[:, order].conj().T
+    product = np.sum(dual * shapes, axis=1)
+    # a defective pair, such as two zero eigenvalues of a free vehicle, has no product to divide by
+    dual = dual / np.where(np.abs(product) > 1e-30, product, 1.0)[:, None]
+    return Eigenmodes(linearisation, values[order], shapes, dual)
+
+
+def _eig(matrix: Floats) -> tuple[Complex, Complex, Complex]:
+    found: Any = eig(matrix, left=True, right=True)
+    values, left, right = (np.asarray(part, dtype=complex) for part in found)
+    return values, left, right
+
+
+def pairing(before: Eigenmodes, after: Eigenmodes) -> Floats:
+    """How much mode i of one set is mode j of the other, 1 for the same, float64[m_1, m_2]."""
+    forth = before.left @ after.shapes.T
+    back = after.left @ before.shapes.T
+    return np.asarray(np.abs(forth * back.T))
+
+
+def oscillations(modes: Eigenmodes, most: float = np.inf) -> Eigenmodes:
+    """Return the modes that oscillate with at most `most` Hz of undamped frequency."""
+    inside = (modes.frequencies > SLOWEST) & (modes.natural_frequencies <= most)
+    return modes.taken(np.flatnonzero(inside))
+
+
+def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[Eigenmodes]:
+    """Oscillations over a parameter, each mode in the same place throughout.
+
+    Where the pairing of neighbours is not clear, linearisations between them are looked at.  An
+    oscillation that becomes overdamped, or leaves the range of frequencies, leaves its place empty,
+    one that appears gets a new place: empty places hold NaN.
+
+    Parameters
+    ----------
+    at : callable
+        Parameter to linearisation.
+    parameters : sequence of float
+        Rising or falling.
+    most : float
+        Largest undamped frequency of a mode that is followed [Hz].
+
+    Returns
+    -------
+    list of Eigenmodes
+        One for each parameter, all with the same number of places.
+    """
+    sets = [oscillations(eigenmodes(at(parameter)), most) for parameter in parameters]
+    chains: list[list[int]] = [[i] for i in range(len(sets[0].eigenvalues))]
+    for number, (before, after) in enumerate(pairwise(sets)):
+        partner = _partners(at, before, after, most, MOST_HALVINGS)
+        for chain in chains:
+            chain.append(partner.get(chain[-1], -1))
+        known = {chain[-1] for chain in chains}
+        chains += [
+            [-1] * (number + 1) + [j] for j in range(len(after.eigenvalues)) if j not in known
+        ]
+    table = np.array(chains, dtype=int).reshape(-1, len(sets))
+    return [_placed(modes, table[:, k]) for k, modes in enumerate(sets)]
+
+
+def _partners(
+    at: At, before: Eigenmodes, after: Eigenmodes, most: float, halvings: int
+) -> dict[int, int]:
+    """Which mode of `before` is which of `after`."""
+    shared = np.minimum(pairing(before, after), 1.0)
+    one, other = before.eigenvalues[:, None], after.eigenvalues
+    apart = np.abs(one - other) / (np.abs(one) + np.abs(other))
+    # of modes with nearly the same eigenvalue any mixture is a mode: the nearer value decides
+    scores = shared - apart
+    rows, columns = linear_sum_assignment(-scores)
+    pairs = {
+        int(i): int(j) for i, j in zip(rows, columns, strict=True)
+        if shared[i, j] > UNRELATED or apart[i, j] < EQUAL
+    }
+    unclear = any(shared[i, j] < SAME and apart[i, j] > EQUAL for i, j in pairs.items())
+    if not unclear or halvings == 0:
+        return pairs
+    middle = 0.5 * (before.linearisation.parameter + after.linearisation.parameter)
+    between = oscillations(eigenmodes(at(middle)), most)
+    first = _partners(at, before, between, most, halvings - 1)
+    second = _partners(at, between, after, most, halvings - 1)
+    return {i: second[j] for i, j in first.items() if j in second}
+
+
+def _placed(modes: Eigenmodes, places: NDArray[np.intp]) -> Eigenmodes:
+    """Modes in given places, NaN in those that are empty (-1)."""
+    there = places >= 0
+    size, n = len(places), modes.shapes.shape[1]
+    values = np.full(size, np.nan, dtype=complex)
+    shapes, left = np.full((2, size, n), np.nan, dtype=complex)
+    values[there] = modes.eigenvalues[places[there]]
+    shapes[there], left[there] = modes.shapes[places[there]], modes.left[places[there]]
+    return Eigenmodes(modes.linearisation, values, shapes, left)
+
+
+@dataclass(frozen=True)
+class LossOfStability:
+    """Where an equilibrium loses its stability to an oscillation, or that it does not.
+
+    Attributes
+    ----------
+    parameter : float or None
+        Lowest value with Re(lambda) = 0 (a Hopf bifurcation); None if there is none in the range.
+    already : bool
+        Whether the equilibrium is unstable at the range's lower end.
+    modes : tuple of Eigenmodes
+        One mode each: the critical one at `parameter`; where there is none, the least damped ones
+        at both ends of the range.
+    """
+
+    parameter: float | None
+    already: bool
+    modes: tuple[Eigenmodes, ...]
+
+
+def loss_of_stability(
+    at: At, low: float, high: float, points: int = 12, searched: tuple[float, float] = SEARCHED
+) -> LossOfStability:
+    """Find the lowest parameter at which an oscillation is no longer damped.
+
+    Parameters
+    ----------
+    at : callable
+        Parameter to linearisation.
+    low, high : float
+        Range of the search.
+    points : int
+        Values of the parameter at which the range is looked through.
+    searched : tuple of 2 floats
+        Frequencies that count [Hz].
+    """
+    known: dict[float, Eigenmodes] = {}
+
+    def growth(parameter: float) -> float:
+        if parameter not in known:
+            known[parameter] = _least_damped(eigenmodes(at(parameter)), searched)
+        return float(known[parameter].eigenvalues[0].real)
+
+    grid = np.linspace(low, high, points).tolist()
+    if growth(grid[0]) >= 0.0:
+        return LossOfStability(None, True, (known[grid[0]],))
+    for before, after in pairwise(grid):
+        if growth(after) >= 0.0:
+            root = float(brentq(growth, before, after, xtol=1e-7 * high, rtol=1e-12))
+            growth(root)
+            return LossOfStability(root, False, (known[root],))
+    return LossOfStability(None, False, (known[grid[0]], known[grid[-1]]))
+
+
+def _least_damped(modes: Eigenmodes, searched: tuple[float, float]) -> Eigenmodes:
+    """The mode of largest growth among the oscillations within a band of frequencies."""
+    frequency = modes.frequencies
+    inside = np.flatnonzero((frequency >= searched[0]) & (frequency <= searched[1]))
+    if len(inside) == 0:
+        inside = np.arange(len(frequency))
+    return modes.taken([int(inside[np.argmax(modes.eigenvalues[inside].real)])])

@@ -1,0 +1,122 @@
+"""First harmonic of the wheel-rail forces: a linearisation for a finite lateral amplitude.
+
+A wheelset is moved by y = a sin(theta) along the contact path, that is with z and roll such that
+the vertical force and the roll moment of its contacts stay as they are.  With F any derivative of
+the state, its first harmonic over 24 angles
+
+    H[F] = 1/(pi a) integral F sin(theta) d theta
+
+is what a linear system has to give for a motion of this amplitude (describing function, Krylov and
+Bogoliubov 1937; for wheelsets equivalent conicity with the real contact).  As the tangent's columns
+of z and roll stay, the column of y becomes
+
+    A_y = H[F] - A_z H[z] - A_roll H[roll],
+
+so that a motion along the path has just these forces, and the tangent is the limit of small a.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import Fault, InputError, ModelError
+from railsim.linear.coordinates import FreeVehicle
+
+Floats = NDArray[np.float64]
+
+ANGLES = 24
+BALANCED = 1e-2  # N and N m, of a wheelset's vertical force and roll moment
+MOST_ITERATIONS = 15
+STEP = 1e-8  # m and rad
+Y, Z, ROLL = 1, 2, 3
+
+
+class ContactPath:
+    """Wheelsets moved along their contact path by one amplitude.
+
+    Parameters
+    ----------
+    amplitude : float
+        a [m].
+    """
+
+    def __init__(self, amplitude: float) -> None:
+        self.amplitude = amplitude
+        # where the path was found last: the next speed's is near
+        self._known: dict[tuple[int, float], Floats] = {}
+
+    def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
+        """Return the matrix of a linearisation with the columns of y replaced.
+
+        Parameters
+        ----------
+        vehicle : FreeVehicle
+        tangent : float64[n, n]
+            Its tangent matrix.
+
+        Raises
+        ------
+        InputError
+            The contact table is narrower than the amplitude.
+        """
+        found = tangent.copy()
+        for body in vehicle.system.contact.body:
+            y, z, roll = (vehicle.coordinates.place(int(body), k) for k in (Y, Z, ROLL))
+            force, height, angle = self._harmonics(vehicle, int(body))
+            found[:, y] = force - tangent[:, z] * height - tangent[:, roll] * angle
+        return found
+
+    def _harmonics(self, vehicle: FreeVehicle, body: int) -> tuple[Floats, float, float]:
+        """H of the derivative, of z and of roll."""
+        total = np.zeros(len(vehicle.x))
+        moved = np.zeros(2)
+        for side in (1.0, -1.0):
+            pose = np.zeros(2)
+            before = 0.0
+            # sin(theta) has the same value at two angles of a quadrant's pair
+            for sine in np.sin(2.0 * np.pi * (np.arange(ANGLES // 4) + 0.5) / ANGLES):
+                y = side * self.amplitude * sine
+                # from the middle outwards: far from its path a wheelset stands on one rail
+                guess = self._known.get((body, y), pose * (y / before if before else 0.0))
+                try:
+                    x, pose = self._on_path(vehicle, body, y, guess)
+                except ModelError as error:
+                    raise InputError([Fault(
+                        "--amplitude", "", f"found {1e3 * self.amplitude:g} mm, but {error}",
+                        "a smaller amplitude",
+                    )]) from None
+                self._known[body, y] = pose
+                before = y
+                share = 4.0 * side * sine / (ANGLES * self.amplitude)
+                total += share * vehicle.rate(x)
+                moved += share * pose
+        return total, float(moved[0]), float(moved[1])
+
+    def _on_path(
+        self, vehicle: FreeVehicle, body: int, y: float, pose: Floats
+    ) -> tuple[Floats, Floats]:
+        """Coordinates with a wheelset moved by y along its path, and its dz and droll."""
+        places = [vehicle.coordinates.place(body, k) for k in (Y, Z, ROLL)]
+        base = vehicle.x
+        vehicle.rate(base)
+        goal = vehicle.work.rail_force[body, [2, 3]].copy()
+
+        def rest(pose: Floats) -> Floats:
+            x = base.copy()
+            x[places] += (y, *pose)
+            vehicle.rate(x)
+            return np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
+
+        for _ in range(MOST_ITERATIONS):
+            value = rest(pose)
+            if np.max(np.abs(value)) < BALANCED:
+                break
+            slopes = np.array([
+                (rest(pose + STEP * unit) - rest(pose - STEP * unit)) / (2.0 * STEP)
+                for unit in np.eye(2)
+            ]).T
+            pose = pose - np.linalg.solve(slopes, value)
+        else:
+            raise ModelError("the contact path is not found")
+        x = base.copy()
+        x[places] += (y, *pose)
+        return x, pose

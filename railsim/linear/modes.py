@@ -1,0 +1,393 @@
+"""`modes`: eigenfrequencies, damping and shapes of a vehicle, at one speed or over many."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.loading import load_track
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError
+from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
+from railsim.linear.naming import Parts, mode_name, parts_of
+from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle
+from railsim.profiles import Profile
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+SPEED_RANGE = (0.5, 150.0)  # m/s
+LEAST_SHARE = 0.005  # of the kinetic energy that is listed
+FOLLOWED = 100.0  # Hz, largest undamped frequency in a root locus
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of a vehicle.
+
+    Attributes
+    ----------
+    name : str
+        After the field, see `railsim.linear.naming`; empty, and NaN values, where a root locus has
+        no such mode.
+    eigenvalue : complex
+        lambda [1/s].
+    participation : dict of str to float
+        Share of the kinetic energy by ``body.component``, largest first.
+    shape : dict of str to complex
+        Displacements by ``body.component``, the largest 1 [m, rad].
+    """
+
+    name: str
+    eigenvalue: complex
+    participation: dict[str, float]
+    shape: dict[str, complex]
+
+    @property
+    def frequency(self) -> float:
+        """Damped frequency Im(lambda)/2pi [Hz]."""
+        return self.eigenvalue.imag / (2.0 * math.pi)
+
+    @property
+    def natural_frequency(self) -> float:
+        """|lambda|/2pi [Hz]."""
+        return abs(self.eigenvalue) / (2.0 * math.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """-Re(lambda)/|lambda|."""
+        size = abs(self.eigenvalue)
+        return -self.eigenvalue.real / size if size else 0.0
+
+    @property
+    def exists(self) -> bool:
+        """Whether there is this mode here."""
+        return not math.isnan(self.eigenvalue.real)
+
+    @property
+    def oscillates(self) -> bool:
+        """Whether it is an oscillation."""
+        return self.frequency > SLOWEST
+
+    def record(self) -> dict[str, Any]:
+        """Return the mode as plain data."""
+        return {
+            "name": self.name,
+            "frequency": self.frequency,
+            "natural_frequency": self.natural_frequency,
+            "damping_ratio": self.damping_ratio,
+            "eigenvalue": [self.eigenvalue.real, self.eigenvalue.imag],
+            "participation": self.participation,
+            "shape": {name: [value.real, value.imag] for name, value in self.shape.items()},
+        }
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Modes of a vehicle at one speed.
+
+    Attributes
+    ----------
+    speed : float
+        [m/s].
+    contact : Contact
+        How the contact was linearised.
+    modes : tuple of Mode
+        By rising |lambda|, or in the order of the root locus.
+    remarks : tuple of str
+        What a reader must know.
+    parameter : tuple of str and float, or None
+        Key and value of another parameter than the speed.
+    """
+
+    speed: float
+    contact: Contact
+    modes: tuple[Mode, ...]
+    remarks: tuple[str, ...] = ()
+    parameter: tuple[str, float] | None = None
+
+    def __iter__(self) -> Any:
+        return iter(self.modes)
+
+    def __getitem__(self, name: str) -> Mode:
+        for mode in self.modes:
+            if mode.name == name:
+                return mode
+        raise KeyError(name)
+
+    @property
+    def oscillations(self) -> tuple[Mode, ...]:
+        """Modes that oscillate, by rising frequency."""
+        return tuple(sorted(
+            (mode for mode in self.modes if mode.exists and mode.oscillates),
+            key=lambda mode: mode.natural_frequency,
+        ))
+
+    @property
+    def least_damped(self) -> Mode | None:
+        """Least damped oscillation between 0.3 and 40 Hz."""
+        low, high = SEARCHED
+        inside = [mode for mode in self.oscillations if low <= mode.frequency <= high]
+        return min(inside, key=lambda mode: mode.damping_ratio, default=None)
+
+    def record(self) -> dict[str, Any]:
+        """Return speed, kind of linearisation and modes as plain data."""
+        data: dict[str, Any] = {
+            "speed": self.speed,
+            "linearisation": self.contact.linearisation,
+            "amplitude": (
+                self.contact.amplitude if self.contact.linearisation == "harmonic" else None
+            ),
+            "conicity": self.contact.conicity,
+            "remarks": list(self.remarks),
+            "modes": [mode.record() for mode in self.modes if mode.exists],
+        }
+        if self.parameter is not None:
+            data["parameter"] = {"key": self.parameter[0], "value": self.parameter[1]}
+        return data
+
+
+@dataclass(frozen=True)
+class RootLocus:
+    """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
+
+    Attributes
+    ----------
+    key : str
+        ``speed`` or the key of the parameter.
+    values : tuple of float
+        Its values.
+    sets : tuple of Modes
+        One for each value.
+    """
+
+    key: str
+    values: tuple[float, ...]
+    sets: tuple[Modes, ...]
+
+    @property
+    def eigenvalues(self) -> Complex:
+        """Eigenvalues, complex128[value, mode], NaN where a mode does not exist [1/s]."""
+        return np.array([[mode.eigenvalue for mode in modes.modes] for modes in self.sets])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each mode: the one that it bears at most values, numbered where it is not alone.
+
+        Of equally frequent names the one at the higher value.
+        """
+        chosen = []
+        for k in range(len(self.sets[0].modes)):
+            borne = [modes.modes[k].name for modes in self.sets if modes.modes[k].exists]
+            chosen.append(max(reversed(borne), key=borne.count) if borne else "")
+        return tuple(numbered(chosen))
+
+    def record(self) -> list[dict[str, Any]]:
+        """Return one record a value."""
+        return [modes.record() for modes in self.sets]
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """Names with a number from the second of the same on.
+
+    Examples
+    --------
+    >>> numbered(["front hunting", "bogie roll", "front hunting"])
+    ['front hunting', 'bogie roll', 'front hunting 2']
+    """
+    seen: dict[str, int] = {}
+    found = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        found.append(f"{name} {seen[name]}" if seen[name] > 1 else name)
+    return found
+
+
+def modes(
+    vehicle: Vehicle,
+    track: Track | None = None,
+    *,
+    speed: float = 20.0,
+    linearisation: str = "tangent",
+    amplitude: float = AMPLITUDE,
+    conicity: float | None = None,
+    radius: float = math.inf,
+    cant: float = 0.0,
+    held: bool = False,
+    settings: Settings | None = None,
+    profiles: Mapping[str, Profile] | None = None,
+) -> Modes:
+    """Return the modes of a vehicle that rolls steadily.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        See `load_vehicle`.
+    track : Track, optional
+        Whose rails, gauge and friction count; by default ``straight``.
+    speed : float
+        [m/s].
+    linearisation : "tangent" or "harmonic"
+        Of the contact: its derivative, or its first harmonic for `amplitude`.
+    amplitude : float
+        Lateral amplitude of the wheelsets [m].
+    conicity : float, optional
+        Wheels replaced by straight cones of this slope [1].
+    radius, cant : float
+        Of the track on which the vehicle rolls [m].
+    held : bool
+        Hold the wheelsets: modes of the suspended masses alone.
+    settings : Settings, optional
+        Creep law and contact.
+    profiles : mapping of str to Profile, optional
+        Profiles that take precedence over built-in ones and files.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    InputError
+        An argument is out of range, or the amplitude larger than the contact table.
+    ModelError
+        There is no equilibrium.
+
+    Examples
+    --------
+    >>> import railsim
+    >>> found = railsim.modes(railsim.load_vehicle("coach_manchester"), speed=30.0)
+    >>> mode = found["car body bounce"]
+    >>> print(f"{mode.natural_frequency:.2f} Hz, {100 * mode.damping_ratio:.0f} %")
+    0.92 Hz, 12 %
+    """
+    check_speeds([speed])
+    prepared = LinearVehicle(
+        vehicle, track or load_track("straight"),
+        contact=Contact(linearisation, amplitude, conicity), radius=radius, cant=cant, held=held,
+        settings=settings, profiles=profiles,
+    )
+    return modes_at(prepared, speed)
+
+
+def root_locus(
+    vehicle: Vehicle, track: Track | None = None, *, speeds: Sequence[float], **how: Any
+) -> RootLocus:
+    """Return the modes of a vehicle over speed, each followed.
+
+    Parameters
+    ----------
+    vehicle, track : Vehicle, Track
+        As in `modes`.
+    speeds : sequence of float
+        [m/s].
+    **how
+        The other arguments of `modes`: linearisation, amplitude, conicity, radius, cant, held,
+        settings, profiles.
+
+    Returns
+    -------
+    RootLocus
+    """
+    check_speeds(speeds)
+    settings, profiles = how.pop("settings", None), how.pop("profiles", None)
+    contact = Contact(
+        how.pop("linearisation", "tangent"), how.pop("amplitude", AMPLITUDE),
+        how.pop("conicity", None),
+    )
+    prepared = LinearVehicle(
+        vehicle, track or load_track("straight"), contact=contact, settings=settings,
+        profiles=profiles, **how,
+    )
+    sets = followed(prepared.linearised, list(speeds), FOLLOWED)
+    parts = parts_of(prepared.model, prepared.coordinates)
+    return RootLocus("speed", tuple(speeds), tuple(
+        _named(prepared, parts, found, speed) for found, speed in zip(sets, speeds, strict=True)
+    ))
+
+
+def parameter_locus(
+    prepared: Callable[[float], LinearVehicle], key: str, values: Sequence[float], speed: float
+) -> RootLocus:
+    """Return the modes of a vehicle over any parameter of its files.
+
+    Parameters
+    ----------
+    prepared : callable
+        Value of the parameter to the vehicle.
+    key : str
+        What the parameter is called.
+    values : sequence of float
+    speed : float
+        [m/s].
+    """
+    check_speeds([speed])
+    known: dict[float, LinearVehicle] = {}
+
+    def of(value: float) -> LinearVehicle:
+        if value not in known:
+            known[value] = prepared(value)
+        return known[value]
+
+    sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
+    named = []
+    for found, value in zip(sets, values, strict=True):
+        parts = parts_of(of(value).model, of(value).coordinates)
+        named.append(_named(of(value), parts, found, speed, (key, value)))
+    return RootLocus(key, tuple(values), tuple(named))
+
+
+def modes_at(prepared: LinearVehicle, speed: float) -> Modes:
+    """Return the modes of a prepared vehicle at a speed [m/s]."""
+    found = eigenmodes(prepared.linearised(speed))
+    return _named(prepared, parts_of(prepared.model, prepared.coordinates), found, speed)
+
+
+def check_speeds(speeds: Sequence[float]) -> None:
+    """Raise InputError where speeds are out of range."""
+    low, high = SPEED_RANGE
+    bad = [v for v in speeds if not (math.isfinite(v) and low <= v <= high)]
+    if bad or not len(speeds):
+        found = f"found {bad[0]:g} m/s" if bad else "no speed"
+        raise InputError([Fault("--speed", "", found, f"{low:g} to {high:g} m/s")])
+
+
+def _named(
+    prepared: LinearVehicle,
+    parts: Parts,
+    found: Eigenmodes,
+    speed: float,
+    parameter: tuple[str, float] | None = None,
+) -> Modes:
+    c = prepared.coordinates
+    names = [
+        "" if np.isnan(value) else mode_name(parts, shape, complex(value), speed)
+        for shape, value in zip(found.shapes, found.eigenvalues, strict=True)
+    ]
+    listed = []
+    for name, value, shape in zip(numbered(names), found.eigenvalues, found.shapes, strict=True):
+        if np.isnan(value):
+            listed.append(Mode("", complex(np.nan, np.nan), {}, {}))
+            continue
+        positions = shape[c.positions]
+        largest = positions[int(np.argmax(np.abs(positions)))]
+        shown = positions / largest if largest else positions
+        listed.append(Mode(
+            name, complex(value), _participation(parts, shape),
+            dict(zip(c.names[: c.n_positions], shown.tolist(), strict=True)),
+        ))
+    return Modes(speed, prepared.contact, tuple(listed), prepared.remarks, parameter)
+
+
+def _participation(parts: Parts, shape: Complex) -> dict[str, float]:
+    shares = parts.energy_shares(shape)
+    names = [name.rstrip("'") for name in parts.coordinates.names[parts.coordinates.velocities]]
+    c = parts.coordinates
+    values = shares[c.bodies[c.velocities], c.components[c.velocities]]
+    order = np.argsort(-values, kind="stable")
+    return {names[k]: float(values[k]) for k in order if values[k] >= LEAST_SHARE}

@@ -1,0 +1,180 @@
+"""Names of modes after the field, from where their kinetic energy is.
+
+Car bodies are the rigid bodies that no element joins to a wheelset or axlebox (where there are
+none, the heaviest ones); bogies are those that one does.
+
+=============  ==================================================================================
+car body       more than half of the energy is in car bodies: bounce, pitch, yaw, longitudinal;
+               lateral with roll is lower sway where both are in phase (the pole lies below the
+               centre of gravity), else upper sway
+hunting        a wheelset whose yaw V/(omega y) is 1 +- 0.3 and about 90 degrees ahead or behind,
+               and whose y is at least half of the largest lateral motion; of the bogie that moves
+               most
+bogie          the frames have 30 % of the energy and more: bounce, pitch, roll, lateral, yaw,
+               longitudinal, in phase or out of phase between the bogies
+rolling        the whole vehicle runs along the track: eigenvalue zero
+=============  ==================================================================================
+
+Any other mode is called after the body and component with most of its energy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model
+from railsim.kernels.system import AXLEBOX, RIGID, WHEELSET
+from railsim.linear.coordinates import Coordinates
+from railsim.notation import COMPONENTS
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+NEAR_ZERO = 0.05  # 1/s, |lambda| of rolling
+HUNTING_RATIO = 0.3
+HUNTING_PHASE = np.radians(45.0)
+CAR_NAMES = {0: "longitudinal", 2: "bounce", 4: "pitch", 5: "yaw"}
+LEAST_OF_FRAMES = 0.3  # share of the frames in a mode of the bogies
+BOGIE_NAMES = ("longitudinal", "lateral", "bounce", "roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Which bodies are what.
+
+    Attributes
+    ----------
+    model : Model
+    coordinates : Coordinates
+    cars, frames, wheelsets : tuple of int
+        Body indices.
+    """
+
+    model: Model
+    coordinates: Coordinates
+    cars: tuple[int, ...]
+    frames: tuple[int, ...]
+    wheelsets: tuple[int, ...]
+
+    def energy_shares(self, shape: Complex) -> Floats:
+        """Share of each body and component in the kinetic energy, float64[n_bodies, 6]."""
+        c, bodies = self.coordinates, self.model.system.bodies
+        inertia = np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia])
+        own = c.velocities
+        energy = np.zeros((len(bodies.kind), 6))
+        places = c.bodies[own], c.components[own]
+        energy[places] = inertia[places] * np.abs(shape[own]) ** 2
+        total = float(energy.sum())
+        return energy / total if total > 0.0 else energy
+
+    def component(self, shape: Complex, body: int, component: int) -> complex:
+        """Position component of a shape, 0 where the body is held or has none."""
+        c = self.coordinates
+        own = slice(0, c.n_positions)
+        found = np.flatnonzero((c.bodies[own] == body) & (c.components[own] == component))
+        return complex(shape[found[0]]) if len(found) else 0j
+
+    def bogie_of(self, body: int) -> str:
+        """First part of a body's dotted name."""
+        return self.model.index.bodies[body].split(".")[0]
+
+
+def parts_of(model: Model, coordinates: Coordinates) -> Parts:
+    """Tell car bodies from bogie frames by the elements that join them to wheelsets."""
+    bodies = model.system.bodies
+    rolling = {int(b) for b in np.flatnonzero((bodies.kind == WHEELSET) | (bodies.kind == AXLEBOX))}
+    pairs = [*model.system.links.body.tolist(), *model.system.mounts.body.tolist()]
+    carried = {a for pair in pairs for a, b in (pair, pair[::-1]) if b in rolling} - rolling
+    rigid = [int(b) for b in np.flatnonzero(bodies.kind == RIGID)]
+    cars = [b for b in rigid if b not in carried]
+    if not cars and rigid:
+        heaviest = max(float(bodies.mass[b]) for b in rigid)
+        cars = [b for b in rigid if bodies.mass[b] > 0.5 * heaviest]
+        if len(cars) > 1 and len(cars) == len(rigid):
+            cars = []  # bogies alone
+    return Parts(
+        model, coordinates, tuple(cars), tuple(b for b in rigid if b not in cars),
+        tuple(int(b) for b in model.system.contact.body),
+    )
+
+
+def mode_name(parts: Parts, shape: Complex, eigenvalue: complex, speed: float) -> str:
+    """Name one mode.
+
+    Parameters
+    ----------
+    shape : complex128[n]
+        Right eigenvector.
+    eigenvalue : complex
+        [1/s].
+    speed : float
+        [m/s].
+    """
+    shares = parts.energy_shares(shape)
+    if abs(eigenvalue) < NEAR_ZERO and shares[:, 0].sum() + shares[:, 4].sum() > 0.9:
+        return "rolling"
+    hunting = _hunting_bogie(parts, shape, eigenvalue, speed)
+    if hunting is not None:
+        return f"{hunting} hunting".strip()
+    if parts.cars and shares[list(parts.cars)].sum() > 0.5:
+        return _car_name(parts, shape, shares)
+    frames = list(parts.frames)
+    if frames and shares[frames].sum() > LEAST_OF_FRAMES:
+        component = int(np.argmax(shares[frames].sum(axis=0)))
+        return f"bogie {BOGIE_NAMES[component]}{_phase(parts, shape, component)}"
+    body, component = divmod(int(np.argmax(shares)), shares.shape[1])
+    return f"{parts.model.index.bodies[body]}.{COMPONENTS[component]}"
+
+
+def _car_name(parts: Parts, shape: Complex, shares: Floats) -> str:
+    component = int(np.argmax(shares[list(parts.cars)].sum(axis=0)))
+    words = "car body" if len(parts.cars) == 1 else "car bodies"
+    if component in CAR_NAMES:
+        return f"{words} {CAR_NAMES[component]}"
+    car = max(parts.cars, key=lambda b: float(shares[b].sum()))
+    y, roll = parts.component(shape, car, 1), parts.component(shape, car, 3)
+    return "lower sway" if (y * roll.conjugate()).real > 0.0 else "upper sway"
+
+
+def _phase(parts: Parts, shape: Complex, component: int) -> str:
+    """Whether the outermost bogies move together or against each other."""
+    if len(parts.frames) < 2:
+        return ""
+    first, last = (parts.component(shape, parts.frames[k], component) for k in (0, -1))
+    smaller = min(abs(first), abs(last))
+    if smaller < 0.1 * max(abs(first), abs(last)):
+        moving = parts.frames[0] if abs(first) > abs(last) else parts.frames[-1]
+        return f", {parts.bogie_of(moving)}"
+    in_phase = (first * last.conjugate()).real > 0.0
+    return ", in phase" if in_phase else ", out of phase"
+
+
+def _hunting_bogie(
+    parts: Parts, shape: Complex, eigenvalue: complex, speed: float
+) -> str | None:
+    """Name of the bogie that hunts most, empty without bogies; None where nothing hunts."""
+    omega = eigenvalue.imag
+    shares = parts.energy_shares(shape)
+    # yaw or roll of a frame takes its wheelsets along
+    own = float(shares[list(parts.frames)][:, [3, 5]].sum()) if parts.frames else 0.0
+    if omega <= 0.0 or shares[:, [1, 5]].sum() < 0.5 or own > 0.5:
+        return None
+    everything = [
+        abs(parts.component(shape, b, 1)) for b in (*parts.cars, *parts.frames, *parts.wheelsets)
+    ]
+    largest = max(everything, default=0.0)
+    best: tuple[float, int] | None = None
+    for body in parts.wheelsets:
+        y, yaw = parts.component(shape, body, 1), parts.component(shape, body, 5)
+        if abs(y) < 0.5 * largest or abs(y) == 0.0:
+            continue
+        ratio = abs(yaw) * speed / (omega * abs(y))
+        phase = abs(abs(np.angle(yaw / y)) - 0.5 * np.pi) if abs(yaw) else np.pi
+        is_hunting = abs(ratio - 1.0) <= HUNTING_RATIO and phase < HUNTING_PHASE
+        if is_hunting and (best is None or abs(y) > best[0]):
+            best = abs(y), body
+    if best is None:
+        return None
+    several = len({parts.bogie_of(body) for body in parts.wheelsets}) > 1
+    return parts.bogie_of(best[1]) if several and parts.frames else ""

@@ -1,0 +1,315 @@
+"""Quasi-static states: steady rolling on straight or circular track of constant cant, by Newton.
+
+On a circle nothing changes with time when seen from the track frames: r' = 0, the angular velocity
+of a body is u = C^T w_F, of a wheelset too but for its spin rate, which is unknown, and all
+accelerations and internal rates vanish.  The unknowns are the coordinates, of wheelsets the spin
+rate in place of the pitch; the reference body's x stays, held by the traction.
+
+Newton's method on forces and moments, with differences, a line search, and a least-squares step
+where the matrix is nearly singular.  The normal force has a potential and creep forces are
+continuous, hence contact patches come and go without any logic of switching.  Where the way is too
+far, it is gone in parts: the curvature, cant, friction and square of the speed are led from a known
+state to the one sought, and steps that fail are halved.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.errors import ModelError
+from railsim.kernels.internal import AIR
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.support import RATE, REFERENCE_MASS
+from railsim.kernels.system import AXLEBOX, WHEELSET, System
+from railsim.kernels.track_frame import OMEGA
+from railsim.linear.coordinates import track_places
+from railsim.notation import COMPONENTS
+
+Floats = NDArray[np.float64]
+
+RESIDUAL = 1e-7  # largest acceleration left (m/s2, rad/s2)
+GOOD_ENOUGH = 1e-5  # the same where rounding and the cells of the creep law let it be no smaller
+MOST_ITERATIONS = 40
+LEAST_FACTOR = 2.0**-10  # of the line search
+STEP = 1e-8  # of the difference quotients (m, rad; of spin rates times the speed over 1 m)
+
+
+class NotConverged(ModelError):
+    """Newton's method found no steady state."""
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """A state of steady rolling.
+
+    Attributes
+    ----------
+    state : float64[n_state]
+    residual : float
+        Largest remaining acceleration [m/s2, rad/s2].
+    iterations : int
+        Steps of Newton's method.
+    """
+
+    state: Floats
+    residual: float
+    iterations: int
+
+
+class SteadyRolling:
+    """Newton's method for one vehicle on one track of constant curvature and cant.
+
+    Parameters
+    ----------
+    model : Model
+        With preloads.
+    system : System
+        The model on that track.
+    held : bool
+        Whether the wheelsets stay where the guess has them.
+    """
+
+    def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
+        self.model = model
+        self.system = system._replace(
+            drive=CONSTANT_SPEED,
+            loads=system.loads._replace(body=system.loads.body[:0]),
+        )
+        self.work = work_arrays(system)
+        self.patches = 0  # loaded ones, of the last evaluation
+        self._derivative = np.zeros(model.n_state)
+        self._trial = np.zeros(model.n_state)
+        self._unknowns, self._equations, self._inertias = _conditions(model, system, held)
+        bodies = system.bodies
+        self._rigid = np.flatnonzero(bodies.kind != AXLEBOX)
+        self._wheelsets = np.flatnonzero(bodies.kind == WHEELSET)
+        self._no_pitch = bodies.kind[self._rigid] == WHEELSET
+        self._frames = bodies.frame[self._rigid]
+
+    def solve(self, guess: Floats, speed: float) -> SteadyState:
+        """Return the steady state nearest to a guess.
+
+        Parameters
+        ----------
+        guess : float64[n_state]
+            Positions and spin rates count; place and time are kept.
+        speed : float
+            [m/s].
+
+        Raises
+        ------
+        NotConverged
+            Names the largest remaining accelerations.
+        """
+        state = self.prepared(guess, speed)
+        forces = self._forces(state)
+        iterations = 0
+        while self._largest(forces) >= RESIDUAL and iterations < MOST_ITERATIONS:
+            iterations += 1
+            better = self._better(state, forces)
+            if better is None:
+                break
+            state, forces = better
+        residual = self._largest(forces)
+        if not residual < GOOD_ENOUGH:
+            raise NotConverged(self._message(forces))
+        return SteadyState(state, residual, iterations)
+
+    def evaluate(self, state: Floats) -> Floats:
+        """Derivative of a state, forces into `work`.
+
+        Raises
+        ------
+        NotConverged
+            The state lies outside the range of the model.
+        """
+        status, where, self.patches = right_hand_side(
+            self.system, self.work, state, self._derivative)
+        if status != RUNNING:
+            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
+            raise NotConverged(f"no steady state: {sentence}")
+        return self._derivative
+
+    def prepared(self, guess: Floats, speed: float) -> Floats:
+        """Return a guess with the velocities of steady rolling at a speed [m/s]."""
+        state = guess.copy()
+        n = self.model.index.n_bodies
+        spins = 6 * n + 6 * self._wheelsets + 4
+        before = float(guess[-1])
+        state[6 * n : 12 * n] = 0.0
+        state[-1] = speed
+        rolling = -speed / self.system.bodies.radius[self._wheelsets]
+        state[spins] = guess[spins] * speed / before if np.all(guess[spins]) else rolling
+        self.evaluate(state)  # the frames
+        self._turn_with_frames(state)
+        return state
+
+    def _turn_with_frames(self, state: Floats) -> None:
+        """Set u = C^T w_F of all bodies, of wheelsets but for the spin."""
+        n = self.model.index.n_bodies
+        omega = state[-1] * self.work.frames[self._frames, OMEGA : OMEGA + 3]
+        if not omega.any():
+            return
+        angles = state[: 6 * n].reshape(n, 6)[self._rigid, 3:]
+        roll, pitch, yaw = angles.T
+        pitch = np.where(self._no_pitch, 0.0, pitch)
+        x, y, z = omega.T
+        x, y = np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
+        y, z = np.cos(roll) * y + np.sin(roll) * z, np.cos(roll) * z - np.sin(roll) * y
+        x, z = np.cos(pitch) * x - np.sin(pitch) * z, np.cos(pitch) * z + np.sin(pitch) * x
+        rates = state[6 * n : 12 * n].reshape(n, 6)
+        rates[self._rigid, 3] = x
+        rates[self._rigid, 4] = np.where(self._no_pitch, rates[self._rigid, 4], y)
+        rates[self._rigid, 5] = z
+
+    def _forces(self, state: Floats) -> Floats:
+        self._turn_with_frames(state)
+        found = self.evaluate(state)[self._equations] * self._inertias
+        return np.asarray(found)
+
+    def _largest(self, forces: Floats) -> float:
+        return float(np.max(np.abs(forces / self._inertias)))
+
+    def _better(self, state: Floats, forces: Floats) -> tuple[Floats, Floats] | None:
+        """State and forces after one step of Newton's method, None if none is better."""
+        matrix = self._jacobian(state, forces)
+        try:
+            change = np.asarray(np.linalg.solve(matrix, -forces), dtype=float)
+            better = self._line_search(state, forces, change)
+        except np.linalg.LinAlgError:
+            better = None
+        if better is None:  # nearly singular, such as without friction
+            least, *_ = np.linalg.lstsq(matrix, -forces, rcond=1e-12)
+            better = self._line_search(state, forces, np.asarray(least, dtype=float))
+        return better
+
+    def _jacobian(self, state: Floats, forces: Floats) -> Floats:
+        trial = self._trial
+        columns = np.empty((len(forces), len(self._unknowns)))
+        for column, k in enumerate(self._unknowns):
+            step = STEP * max(1.0, abs(state[k]))
+            trial[:] = state
+            trial[k] += step
+            columns[:, column] = (self._forces(trial) - forces) / step
+        return columns
+
+    def _line_search(
+        self, state: Floats, forces: Floats, change: Floats
+    ) -> tuple[Floats, Floats] | None:
+        size = float(np.linalg.norm(forces))
+        factor = 1.0
+        while factor >= LEAST_FACTOR:
+            trial = state.copy()
+            trial[self._unknowns] += factor * change
+            try:
+                found = self._forces(trial)
+            except NotConverged:
+                factor *= 0.5
+                continue
+            if np.linalg.norm(found) < (1.0 - 0.1 * factor) * size:
+                return trial, found
+            factor *= 0.5
+        return None
+
+    def _message(self, forces: Floats) -> str:
+        n = self.model.index.n_bodies
+        rest = forces / self._inertias
+        parts = []
+        for k in np.argsort(-np.abs(rest))[:3]:
+            if self._equations[k] >= 12 * n:
+                continue  # of a track or an air spring, which follow the bodies
+            body, component = divmod(int(self._equations[k]) - 6 * n, 6)
+            name = self.model.index.bodies[body]
+            parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
+        return "no steady state; largest remaining accelerations: " + ", ".join(parts)
+
+
+def _conditions(
+    model: Model, system: System, held: bool
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Places of unknowns and equations in state and derivative; inertia of each equation."""
+    n = model.index.n_bodies
+    bodies = system.bodies
+    unknowns, equations, inertias = [], [], []
+    for body, kind in enumerate(bodies.kind):
+        if kind == WHEELSET and held:
+            continue
+        for component in (4,) if kind == AXLEBOX else range(6):
+            if body in bodies.references and component == 0:
+                continue
+            spin = kind == WHEELSET and component == 4
+            unknowns.append((6 * n if spin else 0) + 6 * body + component)
+            equations.append(6 * n + 6 * body + component)
+            inertias.append(float(
+                bodies.mass[body] if component < 3 else bodies.inertia[body, component - 3]
+            ))
+    if not held:
+        track, _ = track_places(model)
+        unknowns += track
+        equations += [RATE + k for k in track]
+        inertias += [REFERENCE_MASS] * len(track)
+    for i in np.flatnonzero(system.internal.kind == AIR):
+        unknowns.append(12 * n + int(i))
+        equations.append(12 * n + int(i))
+        inertias.append(1.0)
+    return np.array(unknowns), np.array(equations), np.array(inertias)
+
+
+Systems = Callable[[float], tuple[System, float]]
+
+
+def led(
+    model: Model, along: Systems, start: Floats, *, smallest: float = 1.0 / 64.0
+) -> tuple[SteadyState, SteadyRolling]:
+    """Lead a steady state from where it is known to where it is sought.
+
+    Parameters
+    ----------
+    model : Model
+        With preloads.
+    along : callable
+        Share of the way, above 0 to 1, to the system and the speed there.
+    start : float64[n_state]
+        State at share 0.
+    smallest : float
+        Step at which the way ends for want of convergence.
+
+    Returns
+    -------
+    SteadyState, SteadyRolling
+        At share 1, and the solver with the forces there in `work`.
+
+    Raises
+    ------
+    NotConverged
+        Says how far it came.
+    """
+    done, step = 0.0, 1.0
+    before, now = start, start
+    length = 1.0
+    while True:
+        share = min(1.0, done + step)
+        system, speed = along(share)
+        solver = SteadyRolling(model, system)
+        for guess in ([now + (now - before) * (share - done) / length, now]
+                      if done > 0.0 else [now]):
+            try:
+                found = solver.solve(guess, speed)
+                break
+            except NotConverged as error:
+                reason = error
+        else:
+            step *= 0.5
+            if step < smallest:
+                raise NotConverged(f"{reason} ({100.0 * done:.0f} % of the way)")
+            continue
+        before, length = now, share - done
+        now, done = found.state, share
+        if done >= 1.0:
+            solver.evaluate(now)
+            return found, solver
+        step = min(2.0 * step, 1.0 - done)

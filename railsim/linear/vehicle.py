@@ -1,0 +1,208 @@
+"""A vehicle prepared for linear analysis: definitions to a linearisation at any speed."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, SharedTables, assemble
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.equilibrium import equilibrium
+from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.internal import PAD
+from railsim.kernels.system import System
+from railsim.linear.circle import PLACE, circle
+from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
+from railsim.linear.harmonic import ContactPath
+from railsim.linear.steady import SteadyRolling, SteadyState, led
+from railsim.linear.system import Linearisation
+from railsim.profiles import Profile
+from railsim.profiles.builtin import cone
+from railsim.track.tables import track_tables
+
+Floats = NDArray[np.float64]
+
+WALKING_PACE = 1.0  # m/s
+AMPLITUDE = 3e-3  # m, of the wheelsets where the linearisation is harmonic (EN 14363 practice)
+LINEARISATIONS = ("tangent", "harmonic")
+CONICITIES = (0.005, 0.6)  # of straight cones with the flange of S1002
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How the contact of wheel and rail is linearised.
+
+    Attributes
+    ----------
+    linearisation : "tangent" or "harmonic"
+        The derivative at the steady state, or the first harmonic for an amplitude.
+    amplitude : float
+        Of the harmonic linearisation [m].
+    conicity : float or None
+        Wheels replaced by straight cones of this slope [1].
+    """
+
+    linearisation: str = "tangent"
+    amplitude: float = AMPLITUDE
+    conicity: float | None = None
+
+    def faults(self) -> list[Fault]:
+        """Return what is wrong with it."""
+        found = []
+        if self.linearisation not in LINEARISATIONS:
+            found.append(Fault("--linearisation", "", f"found '{self.linearisation}'",
+                               " or ".join(LINEARISATIONS)))
+        if not (math.isfinite(self.amplitude) and self.amplitude > 0.0):
+            found.append(Fault("--amplitude", "", f"found {self.amplitude:g} m",
+                               "a positive number of m"))
+        low, high = CONICITIES
+        if self.conicity is not None and not low <= self.conicity <= high:
+            found.append(
+                Fault("--conicity", "", f"found {self.conicity:g}", f"{low:g} to {high:g}")
+            )
+        return found
+
+
+class LinearVehicle:
+    """A vehicle on straight or circular track, to be linearised at any speed.
+
+    Parameters
+    ----------
+    vehicle, track : Vehicle, Track
+        Definitions; of the track rails, gauge and friction at its beginning count.
+    contact : Contact
+        How wheel and rail are linearised.
+    radius, cant : float
+        Of the track on which the vehicle rolls [m].
+    held : bool
+        Hold the wheelsets.
+    settings : Settings, optional
+    profiles : mapping of str to Profile, optional
+        Profiles that take precedence over built-in ones and files.
+
+    Raises
+    ------
+    InputError
+        Something is out of range.
+    ModelError
+        The vehicle has no equilibrium.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        track: Track,
+        *,
+        contact: Contact | None = None,
+        radius: float = math.inf,
+        cant: float = 0.0,
+        held: bool = False,
+        settings: Settings | None = None,
+        profiles: Mapping[str, Profile] | None = None,
+    ) -> None:
+        self.contact = contact or Contact()
+        faults = self.contact.faults()
+        if not abs(radius) >= 5.0:
+            faults.append(Fault("--radius", "", f"found {radius:g} m", "5 m at least"))
+        if not abs(cant) <= 0.5:
+            faults.append(Fault("--cant", "", f"found {cant:g} m", "0.5 m at most"))
+        if faults:
+            raise InputError(faults)
+        self.held = held
+        self.curvature, self.cant = 1.0 / radius if math.isfinite(radius) else 0.0, cant
+        known = dict(profiles or {})
+        if self.contact.conicity is not None:
+            vehicle, profile = on_cones(vehicle, self.contact.conicity)
+            known[profile.name] = profile
+        self._track = track
+        self._path = None
+        if self.contact.linearisation == "harmonic" and not held:
+            self._path = ContactPath(self.contact.amplitude)
+        assembled = assemble(
+            vehicle, circle(track), settings or Settings(), known, SharedTables()
+        )
+        balance = equilibrium(assembled, WALKING_PACE)
+        self.model: Model = balance.model
+        self.Q0: Floats = balance.Q0
+        self.coordinates: Coordinates = coordinates(self.model, held=held)
+        self._known: dict[float, SteadyState] = {}
+        self._rest = balance.state.copy()
+        self._rest[-2] = PLACE
+        there = circle(track, curvature=self.curvature, cant=cant)
+        self.system = self.model.system._replace(track=track_tables(there))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader of the results must know."""
+        found = []
+        pads = np.flatnonzero(self.model.system.internal.kind == PAD)
+        if len(pads):
+            found.append(
+                f"{len(pads)} friction elements stick: they are linearised with their elasticity "
+                "in sticking, and what they damp in sliding is left out"
+            )
+        return tuple(found)
+
+    def steady(self, speed: float) -> SteadyState:
+        """Return the state of steady rolling at a speed [m/s].
+
+        Raises
+        ------
+        ModelError
+            There is none.
+        """
+        if speed not in self._known:
+            near = min(self._known, key=lambda v: abs(v - speed), default=None)
+            if near is not None:
+                try:
+                    solver = SteadyRolling(self.model, self.system, held=self.held)
+                    self._known[speed] = solver.solve(self._known[near].state, speed)
+                    return self._known[speed]
+                except ModelError:
+                    pass  # too far from the known one: led there from straight track
+            self._known[speed] = self._led(speed)
+        return self._known[speed]
+
+    def _led(self, speed: float) -> SteadyState:
+        if not self.curvature and not self.cant:
+            solver = SteadyRolling(self.model, self.system, held=self.held)
+            return solver.solve(self._rest, speed)
+
+        def along(share: float) -> tuple[System, float]:
+            part = circle(self._track, curvature=share * self.curvature, cant=share * self.cant)
+            system = self.model.system._replace(track=track_tables(part))
+            return system, WALKING_PACE + math.sqrt(share) * (speed - WALKING_PACE)
+
+        return led(self.model, along, self._rest)[0]
+
+    def free(self, speed: float) -> FreeVehicle:
+        """Return the vehicle about its steady rolling at a speed [m/s]."""
+        return FreeVehicle(self.model, self.system, self.steady(speed).state, held=self.held)
+
+    def linearised(self, speed: float) -> Linearisation:
+        """Return the linearisation at a speed [m/s]."""
+        vehicle = self.free(speed)
+        matrix = vehicle.tangent()
+        if self._path is not None:
+            matrix = self._path.matrix(vehicle, matrix)
+        return vehicle.linearisation(matrix)
+
+
+def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:
+    """Return a vehicle with all its wheels replaced by straight cones, and their profile."""
+    profile = cone(conicity)
+    data = vehicle.model_dump(exclude_none=True)
+
+    def replace(group: dict[str, Any]) -> None:
+        for wheelset in group.get("wheelsets", {}).values():
+            wheelset["profile"] = profile.name
+        for assembly in group.get("assemblies", {}).values():
+            replace(assembly)
+
+    replace(data)
+    return Vehicle.model_validate(data), profile

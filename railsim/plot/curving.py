@@ -1,0 +1,85 @@
+"""Pictures of quasi-static curving: angle of attack and forces over radius, wear over the grid."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from railsim.plot.style import DISTINCT, styled, wheelset_colours
+from railsim.stability.curving import Curving
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+LEFT, RIGHT = 0, 1
+WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
+
+
+def curving_figure(found: Curving, title: str) -> Figure:
+    """Leading wheelset over radius, one line for each friction; wear of all over radius.
+
+    Parameters
+    ----------
+    found : Curving
+    title : str
+        What was analysed.
+    """
+    with styled():
+        figure = Figure(figsize=(10.2, 7.4), layout="constrained")
+        figure.suptitle(title, x=0.01, ha="left")
+        axes = figure.subplots(2, 2)
+        order = np.argsort(found.radius)
+        radius = found.radius[order]
+        outer = np.where(radius > 0.0, LEFT, RIGHT)
+        _lines(axes[0, 0], found, order, 1e3 * found.attack[..., 0],
+               "angle of attack, leading wheelset (mrad)")
+        guiding = np.abs(np.take_along_axis(
+            found.Y[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[..., 0])
+        _lines(axes[0, 1], found, order, 1e-3 * guiding[np.argsort(order)],
+               "guiding force Y of the leading outer wheel (kN)")
+        _lines(axes[1, 0], found, order, np.nansum(found.T_gamma, axis=(-2, -1)),
+               r"wear number $T_\gamma$ of all wheels (N)")
+        _steering(axes[1, 1], found, order)
+        for one in axes.flat:
+            one.set_xlabel("radius (m)")
+            if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
+                one.set_xscale("log")
+                one.set_xticks(_ticks(radius), [f"{tick:g}" for tick in _ticks(radius)])
+                one.minorticks_off()
+        axes[0, 0].legend(fontsize=7.5)
+    return figure
+
+
+def _ticks(radius: Floats) -> list[float]:
+    """Round radii within the range drawn."""
+    steps = [k * 10.0**p for p in range(1, 6) for k in (1.0, 2.0, 3.0, 5.0)]
+    return [step for step in steps if 0.9 * np.min(radius) <= step <= 1.1 * np.max(radius)]
+
+
+def _lines(
+    axes: Axes, found: Curving, order: Places, values: Floats, words: str
+) -> None:
+    """Values over radius; friction by colour, cant deficiency by line."""
+    styles: list[Any] = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5))]
+    for m, mu in enumerate(found.friction):
+        for i, deficiency in enumerate(found.cant_deficiency):
+            shown = np.where(found.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
+            axes.plot(found.radius[order], shown, color=DISTINCT[m % len(DISTINCT)],
+                      ls=styles[i % len(styles)], marker=".", ms=4,
+                      label=f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm")
+            timed = found.converged[:, i, m][order] == 2
+            axes.plot(found.radius[order][timed], shown[timed], "o", ms=6, mfc="none",
+                      color=DISTINCT[m % len(DISTINCT)])
+    axes.set_title(words)
+
+
+def _steering(axes: Axes, found: Curving, order: Places) -> None:
+    """How all wheelsets stand in the curve at the first cant deficiency and friction."""
+    colours = wheelset_colours(found.wheelsets)
+    for w, name in enumerate(found.wheelsets):
+        axes.plot(found.radius[order], 1e3 * found.lateral[order, 0, 0, w], color=colours[name],
+                  marker=".", ms=4, label=name)
+    axes.set_title("lateral displacement (mm), first deficiency and friction")
+    axes.legend(fontsize=7.5)

@@ -1,0 +1,137 @@
+"""Pictures of modes: shapes of one, frequencies and damping over speed, root locus."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from railsim.linear.modes import Mode, Modes, RootLocus
+from railsim.plot.style import DISTINCT, LIMIT, styled
+
+Floats = NDArray[np.float64]
+
+SHOWN = 25.0  # Hz, oscillations up to which are drawn
+BARS = 14  # components of a shape that are drawn
+DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
+
+
+def locus_figure(locus: RootLocus, title: str) -> Figure:
+    """Damping ratio and frequency over the parameter, and the root locus.
+
+    Parameters
+    ----------
+    locus : RootLocus
+    title : str
+        What was analysed.
+    """
+    with styled():
+        figure = Figure(figsize=(10.2, 7.4), layout="constrained")
+        figure.suptitle(title, x=0.01, ha="left")
+        grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
+        damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
+        plane = figure.add_subplot(grid[1, 1])
+        values = np.array(locus.values)
+        eigenvalues = locus.eigenvalues
+        chosen = _drawn(eigenvalues)
+        colours = _colours(locus.names, chosen)
+        for k in chosen:
+            size = np.abs(eigenvalues[:, k])
+            colour, width = colours[k]
+            dashes = (0, (4, 2)) if width < 1.0 or locus.names[k][-1].isdigit() else "-"
+            style: dict[str, Any] = {"color": colour, "lw": width, "ls": dashes}
+            label = locus.names[k] if width > 1.0 else None
+            zeta = -eigenvalues[:, k].real / size
+            damping.plot(values, 100.0 * zeta, label=label, **style)
+            frequency.plot(values, size / (2.0 * np.pi), **style)
+            plane.plot(eigenvalues[:, k].real, eigenvalues[:, k].imag / (2.0 * np.pi), **style)
+            known = np.flatnonzero(np.isfinite(size))
+            plane.plot(eigenvalues[known[-1], k].real, eigenvalues[known[-1], k].imag / (2 * np.pi),
+                       ">", ms=3.5, color=colour)
+        _frame(damping, frequency, plane, locus)
+    return figure
+
+
+def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> None:
+    words = "speed (m/s)" if locus.key == "speed" else locus.key
+    damping.axhline(0.0, color=LIMIT, lw=0.8)
+    title = "Damping; below zero unstable (grey: bogies and wheelsets)"
+    damping.set(xlabel=words, ylabel="damping ratio (%)", title=title)
+    damping.set_ylim(max(-30.0, damping.get_ylim()[0]), min(60.0, damping.get_ylim()[1]))
+    damping.legend(ncol=1, loc="upper left", bbox_to_anchor=(1.0, 1.02), fontsize=7.5)
+    frequency.set(xlabel=words, ylabel="undamped frequency (Hz)", title="Frequency")
+    frequency.set_ylim(0.0, None)
+    plane.axvline(0.0, color=LIMIT, lw=0.8)
+    arrow = "speed" if locus.key == "speed" else "the parameter"
+    plane.set(xlabel="growth Re λ (1/s)", ylabel="frequency Im λ/2π (Hz)",
+              title=f"Root locus; heads show where {arrow} goes")
+    plane.set_xlim(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1])
+    plane.set_ylim(0.0, None)
+
+
+def _drawn(eigenvalues: NDArray[np.complex128]) -> list[int]:
+    """Modes that exist at two values at least and stay below `SHOWN`."""
+    with np.errstate(invalid="ignore"):
+        low = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN
+    there = np.isfinite(eigenvalues.real) & low
+    return [k for k in range(eigenvalues.shape[1]) if np.sum(there[:, k]) >= 2]
+
+
+def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str, float]]:
+    """Colour and width: hunting and what the car body does stand out, the rest is grey."""
+    found: dict[int, tuple[str, float]] = {}
+    bright = iter(DISTINCT[0:1] + DISTINCT[2:6] + DISTINCT[7:])
+    for k in chosen:
+        name = names[k]
+        if "hunting" in name:
+            shade = (DISTINCT[1], "#f0a13c", "#8c2d19")[min(2, sum(
+                "hunting" in names[j] for j in found))]
+            found[k] = (shade, 2.0)
+        elif name.startswith(("car", "lower", "upper")):
+            found[k] = (next(bright, "0.4"), 1.3)
+        else:
+            found[k] = ("0.65", 0.9)
+    return found
+
+
+def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
+    """Shapes of the least damped oscillations as bars with their phase.
+
+    Parameters
+    ----------
+    modes : Modes
+    title : str
+        What was analysed.
+    most : int
+        How many modes are drawn.
+    """
+    drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
+    with styled():
+        rows = max(1, (len(drawn) + 1) // 2)
+        figure = Figure(figsize=(10.2, 0.6 + 2.2 * rows), layout="constrained")
+        figure.suptitle(title, x=0.01, ha="left")
+        grid = figure.add_gridspec(rows, 2)
+        for k, mode in enumerate(drawn):
+            _shape(figure.add_subplot(grid[k // 2, k % 2]), mode)
+    return figure
+
+
+def _shape(axes: Axes, mode: Mode) -> None:
+    """Share of each component in the energy, with its phase against the first as colour."""
+    names = list(mode.participation)[:BARS]
+    shares = [100.0 * mode.participation[name] for name in names]
+    reference = mode.shape.get(names[0], 1.0 + 0j)
+    in_phase = [
+        (mode.shape.get(name, 0j) * np.conj(reference)).real >= 0.0 for name in names
+    ]
+    colours = [DISTINCT[0] if same else DISTINCT[1] for same in in_phase]
+    place = np.arange(len(names))
+    axes.barh(place, shares, color=colours, height=0.7)
+    axes.set_yticks(place, names, fontsize=6.5)
+    axes.invert_yaxis()
+    axes.set_xlabel("share of the kinetic energy (%)")
+    axes.set_title(
+        f"{mode.name}: {mode.natural_frequency:.3g} Hz, {100.0 * mode.damping_ratio:.3g} %"
+    )

@@ -1,0 +1,394 @@
+"""Quasi-static curving over radius, cant deficiency and friction.
+
+Each point is steady rolling on a circle by Newton's method (`railsim.linear.steady`), led from the
+neighbouring point.  Where that fails the vehicle runs on the circle in time until it is still;
+such points are marked, and those where it does not come to rest or leaves the track too.
+
+    V^2 = g R (h + I)/1.5 m        speed from radius R, cant h and cant deficiency I
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import GRAVITY, Model, assemble, work_arrays
+from railsim.definitions.loading import load_track
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.equilibrium import equilibrium
+from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.status import RUNNING
+from railsim.kernels.system import System
+from railsim.kernels.time_loop import FAST, time_loop
+from railsim.kernels.wheel_rail import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
+from railsim.linear.circle import PLACE, circle
+from railsim.linear.coordinates import coordinates
+from railsim.linear.naming import parts_of
+from railsim.linear.steady import NotConverged, SteadyRolling, led
+from railsim.linear.vehicle import WALKING_PACE
+from railsim.profiles import Profile
+from railsim.time_step import choose_step, empty_recorder
+from railsim.track.alignment import CANT_BASE
+from railsim.track.tables import track_tables
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m
+SPEED_RANGE = (0.5, 150.0)  # m/s
+FAILED, NEWTON, TIME = range(3)
+SETTLING = 60.0  # s, longest time integration of a point
+STILL = 1e-4  # share of the wheel loads by which forces still change after a second
+
+
+@dataclass(frozen=True)
+class Curving:
+    """Steady curving on a grid.
+
+    Attributes
+    ----------
+    radius, cant_deficiency, friction : float64[r], float64[i], float64[m]
+        The grid [m], [m], [1].
+    cant : float
+        [m].
+    speed : float64[r, i]
+        [m/s].
+    converged : int64[r, i, m]
+        1 by Newton's method, 2 by time integration, 0 where there is no steady state; values are
+        NaN there.
+    Q, Y, Y_over_Q, dQ_over_Q0, T_gamma, contact_y : float64[r, i, m, wheelset, side]
+        See `railsim.notation`; `contact_y` is the place of the most loaded patch across the track
+        [m].
+    lateral, attack : float64[r, i, m, wheelset]
+        Lateral displacement [m] and angle of attack, the yaw against the radial direction [rad].
+    sum_Y : float64[r, i, m, wheelset]
+        [N].
+    steering : float64[r, i, m, bogie]
+        Yaw of the bogie frames against the track at their own places [rad].
+    car_roll : float64[r, i, m]
+        Roll of the (first) car body against the track [rad].
+    wheelsets, bogies : tuple of str
+        Names.
+    """
+
+    radius: Floats
+    cant_deficiency: Floats
+    friction: Floats
+    cant: float
+    speed: Floats
+    converged: NDArray[np.int64]
+    Q: Floats
+    Y: Floats
+    Y_over_Q: Floats
+    dQ_over_Q0: Floats
+    T_gamma: Floats
+    contact_y: Floats
+    lateral: Floats
+    attack: Floats
+    sum_Y: Floats
+    steering: Floats
+    car_roll: Floats
+    wheelsets: tuple[str, ...]
+    bogies: tuple[str, ...]
+
+    DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
+    VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
+        "Q": ("wheelset", "side"), "Y": ("wheelset", "side"), "Y_over_Q": ("wheelset", "side"),
+        "dQ_over_Q0": ("wheelset", "side"), "T_gamma": ("wheelset", "side"),
+        "contact_y": ("wheelset", "side"), "lateral": ("wheelset",), "attack": ("wheelset",),
+        "sum_Y": ("wheelset",), "steering": ("bogie",), "car_roll": (),
+    }
+
+    def record(self) -> dict[str, Any]:
+        """Return everything as plain data; dimensions are named."""
+        data: dict[str, Any] = {
+            "radius": self.radius.tolist(),
+            "cant_deficiency": self.cant_deficiency.tolist(),
+            "friction": self.friction.tolist(),
+            "cant": self.cant,
+            "wheelset": list(self.wheelsets),
+            "side": ["left", "right"],
+            "bogie": list(self.bogies),
+            "speed": self.speed.tolist(),
+            "converged": self.converged.tolist(),
+            "dims": {name: [*self.DIMS, *dims] for name, dims in self.VALUES.items()},
+        }
+        return data | {name: getattr(self, name).tolist() for name in self.VALUES}
+
+    def to_xarray(self) -> Any:
+        """Return an `xarray.Dataset`; needs xarray."""
+        import xarray
+
+        coords = {
+            "radius": self.radius, "cant_deficiency": self.cant_deficiency,
+            "friction": self.friction, "wheelset": list(self.wheelsets),
+            "side": ["left", "right"], "bogie": list(self.bogies),
+        }
+        variables: dict[str, Any] = {
+            name: ((*self.DIMS, *dims), getattr(self, name)) for name, dims in self.VALUES.items()
+        }
+        variables["speed"] = (self.DIMS[:2], self.speed)
+        variables["converged"] = (self.DIMS, self.converged)
+        return xarray.Dataset(variables, coords, {"cant": self.cant})
+
+
+def curving(
+    vehicle: Vehicle,
+    track: Track | None = None,
+    *,
+    radius: Sequence[float],
+    cant: float = 0.15,
+    cant_deficiency: Sequence[float] = (0.0,),
+    friction: Sequence[float] | None = None,
+    settings: Settings | None = None,
+    profiles: Mapping[str, Profile] | None = None,
+    progress: Progress | None = None,
+) -> Curving:
+    """Find how a vehicle runs steadily in curves.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        See `load_vehicle`.
+    track : Track, optional
+        Whose rails, gauge, inclination and support count; by default ``straight``.
+    radius : sequence of float
+        Radii, positive to the right [m].
+    cant : float
+        Of the outer rail over the inner one [m].
+    cant_deficiency : sequence of float
+        What is missing to the balanced cant, negative for too much [m].
+    friction : sequence of float, optional
+        Coefficients of friction of both rails; by default that of the track.
+    settings : Settings, optional
+        Creep law and contact.
+    profiles : mapping of str to Profile, optional
+        Profiles that take precedence over built-in ones and files.
+    progress : callable, optional
+        Called with the finished fraction now and then.
+
+    Returns
+    -------
+    Curving
+
+    Raises
+    ------
+    InputError
+        Values are out of range.
+    ModelError
+        The vehicle has no equilibrium on straight track.
+
+    Examples
+    --------
+    >>> import railsim
+    >>> found = railsim.curving(railsim.load_vehicle("coach_manchester"), radius=[300.0, 600.0],
+    ...                         cant_deficiency=[0.0])
+    >>> found.converged.tolist()
+    [[[1]], [[1]]]
+    """
+    track = track or load_track("straight")
+    mus = list(friction) if friction is not None else [_friction(track)]
+    _check(radius, cant, cant_deficiency, mus)
+    search = _Search(vehicle, track, cant, settings or Settings(), profiles)
+    # from wide to narrow, each point from its neighbour
+    order = sorted(range(len(radius)), key=lambda k: -abs(radius[k]))
+    found: dict[tuple[int, int, int], dict[str, Any]] = {}
+    total = len(radius) * len(cant_deficiency) * len(mus)
+    for m, mu in enumerate(mus):
+        for i, deficiency in enumerate(cant_deficiency):
+            for r in order:
+                found[r, i, m] = search.point(radius[r], deficiency, mu)
+                if progress is not None:
+                    progress(len(found) / total)
+    return _gathered(search, found, radius, cant, cant_deficiency, mus)
+
+
+def _friction(track: Track) -> float:
+    mean: float = sum(track.friction) / 2.0
+    return mean
+
+
+def _check(
+    radius: Sequence[float], cant: float, deficiency: Sequence[float], friction: Sequence[float]
+) -> None:
+    faults = []
+    for value in radius:
+        if not (math.isfinite(value) and abs(value) >= SMALLEST_RADIUS):
+            faults.append(Fault("--radius", "", f"found {value:g} m",
+                                f"{SMALLEST_RADIUS:g} m at least, negative to the left"))
+    if not 0.0 <= cant <= LARGEST_CANT:
+        faults.append(Fault("--cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
+    for value in friction:
+        if not 0.0 < value <= 2.0:
+            faults.append(Fault("--friction", "", f"found {value:g}", "above 0, at most 2"))
+    low, high = SPEED_RANGE
+    for value in deficiency:
+        speeds = [_speed(r, cant, value) for r in radius] if not faults else []
+        if not all(low <= v <= high for v in speeds) or not math.isfinite(value):
+            faults.append(Fault(
+                "--cant-deficiency", "", f"found {value:g} m with a cant of {cant:g} m",
+                f"a sum that gives speeds of {low:g} to {high:g} m/s",
+            ))
+    for name, values in (("--radius", radius), ("--cant-deficiency", deficiency)):
+        if not len(values):
+            faults.append(Fault(name, "", "no value", "one at least"))
+    if faults:
+        raise InputError(faults)
+
+
+def _speed(radius: float, cant: float, deficiency: float) -> float:
+    square = GRAVITY * abs(radius) * (cant + deficiency) / CANT_BASE
+    return math.sqrt(square) if square > 0.0 else math.nan
+
+
+@dataclass(frozen=True)
+class _Known:
+    curvature: float
+    cant: float
+    square: float  # of the speed
+    friction: float
+    state: Floats
+
+
+class _Search:
+    """Steady states of one vehicle, each sought from the nearest known one."""
+
+    def __init__(
+        self, vehicle: Vehicle, track: Track, cant: float, settings: Settings,
+        profiles: Mapping[str, Profile] | None,
+    ) -> None:
+        self.track, self.cant = track, cant
+        balance = equilibrium(assemble(vehicle, circle(track), settings, profiles), WALKING_PACE)
+        self.model: Model = balance.model
+        self.Q0 = balance.Q0
+        self.parts = parts_of(self.model, coordinates(self.model))
+        rest = balance.state.copy()
+        rest[-2] = PLACE
+        self._rest = _Known(0.0, 0.0, WALKING_PACE**2, _friction(track), rest)
+        self._last: _Known = self._rest
+
+    def _system(self, curvature: float, cant: float, friction: float) -> System:
+        there = circle(self.track, curvature=curvature, cant=cant, friction=friction)
+        return self.model.system._replace(track=track_tables(there))
+
+    def point(self, radius: float, deficiency: float, friction: float) -> dict[str, Any]:
+        """Values at one point of the grid."""
+        speed = _speed(radius, self.cant, deficiency)
+        goal = _Known(1.0 / radius, math.copysign(self.cant, radius), speed**2, friction,
+                      self._last.state)
+        for start in (self._last, self._rest):
+            if start.curvature * goal.curvature < 0.0:
+                continue
+            try:
+                state, solver = self._led(start, goal)
+            except NotConverged:
+                continue
+            self._last = replace(goal, state=state)
+            return self._values(solver, state, NEWTON)
+        return self._in_time(goal)
+
+    def _led(self, start: _Known, goal: _Known) -> tuple[Floats, SteadyRolling]:
+        def along(share: float) -> tuple[System, float]:
+            def between(a: float, b: float) -> float:
+                return a + share * (b - a)
+
+            system = self._system(
+                between(start.curvature, goal.curvature), between(start.cant, goal.cant),
+                between(start.friction, goal.friction),
+            )
+            return system, math.sqrt(between(start.square, goal.square))
+
+        found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
+        return found.state, solver
+
+    def _in_time(self, goal: _Known) -> dict[str, Any]:
+        """Run on the circle until nothing changes; failed where it does not come to that."""
+        system = self._system(goal.curvature, goal.cant, goal.friction)
+        speed = math.sqrt(goal.square)
+        solver = SteadyRolling(self.model, system)
+        state = self._last.state.copy()
+        state[-3:] = 0.0, PLACE, speed
+        try:
+            state = solver.prepared(state, speed)
+            step = choose_step(self.model, self._system(0.0, 0.0, goal.friction),
+                               solver.prepared(self._rest.state, speed), "fast", 5e-3)
+        except ModelError:
+            return self._values(solver, state, FAILED)
+        work, derivative = work_arrays(system), np.zeros_like(state)
+        stages, recorder = np.zeros((3, len(state))), empty_recorder(self.model, 1)
+        before = np.zeros_like(self.Q0)
+        for second in range(int(SETTLING)):
+            state[-2] = PLACE
+            status, *_ = time_loop(system, work, state, derivative, stages, recorder, FAST, step,
+                                   1, round(1.0 / step), 1 << 40, int(second == 0), 0)
+            if status != RUNNING:
+                return self._values(solver, state, FAILED)
+            now = work.wheel[:, :, W_Y].copy()
+            if np.max(np.abs(now - before)) < STILL * np.max(self.Q0):
+                return self._values(solver, state, TIME)
+            before = now
+        return self._values(solver, state, FAILED)
+
+    def _values(self, solver: SteadyRolling, state: Floats, how: int) -> dict[str, Any]:
+        wheelsets = np.array(self.parts.wheelsets)
+        frames, cars = list(self.parts.frames), list(self.parts.cars)
+        if how != FAILED:
+            solver.evaluate(state)
+        wheel = solver.work.wheel
+        Q, Y = wheel[:, :, W_Q], wheel[:, :, W_Y]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quotient = Y / Q * np.array([-1.0, 1.0])
+        values = {
+            "Q": Q, "Y": Y, "Y_over_Q": quotient, "dQ_over_Q0": (Q - self.Q0) / self.Q0,
+            "T_gamma": wheel[:, :, W_T_GAMMA],
+            "contact_y": _contact_places(solver, len(wheelsets)),
+            "lateral": state[6 * wheelsets + 1], "attack": state[6 * wheelsets + 5],
+            "sum_Y": Y.sum(axis=1), "steering": state[[6 * b + 5 for b in frames]],
+            "car_roll": state[6 * cars[0] + 3] if cars else np.nan,
+        }
+        if how == FAILED:
+            values = {name: np.full(np.shape(value), np.nan) for name, value in values.items()}
+        return {name: np.array(value, dtype=float) for name, value in values.items()} | {
+            "converged": how}
+
+
+def _contact_places(solver: SteadyRolling, wheelsets: int) -> Floats:
+    """Place of each wheel's most loaded patch from the wheelset's middle [m]."""
+    work = solver.work
+    found = np.full((wheelsets, 2), np.nan)
+    load = np.zeros((wheelsets, 2))
+    for k in range(solver.patches):
+        w, side, _ = work.patch_index[k]
+        if work.patch[NORMAL, k] > load[w, side]:
+            load[w, side] = work.patch[NORMAL, k]
+            found[w, side] = work.patch[C_Y, k]
+    return found
+
+
+def _gathered(
+    search: _Search, found: dict[tuple[int, int, int], dict[str, Any]], radius: Sequence[float],
+    cant: float, deficiency: Sequence[float], friction: Sequence[float],
+) -> Curving:
+    shape = len(radius), len(deficiency), len(friction)
+    arrays = {}
+    for name in Curving.VALUES:
+        first = found[0, 0, 0][name]
+        arrays[name] = np.full((*shape, *first.shape), np.nan)
+        for place, values in found.items():
+            arrays[name][place] = values[name]
+    converged = np.zeros(shape, dtype=np.int64)
+    for place, values in found.items():
+        converged[place] = values["converged"]
+    index = search.model.index
+    return Curving(
+        np.array(radius, dtype=float), np.array(deficiency, dtype=float),
+        np.array(friction, dtype=float), cant,
+        np.array([[_speed(r, cant, i) for i in deficiency] for r in radius]), converged,
+        wheelsets=index.wheelsets, bogies=tuple(index.bodies[b] for b in search.parts.frames),
+        **arrays,
+    )

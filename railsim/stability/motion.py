@@ -1,0 +1,169 @@
+"""Motion of a system over stretches of time, and of a vehicle on track without end.
+
+Ramps of speed and bifurcation diagrams run on anything that can move for a while from a state, at a
+speed that goes evenly from one value to another.  The vehicle does so by the time loop of runs, on
+straight smooth track; its place is set back after each stretch.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import work_arrays
+from railsim.errors import ModelError
+from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.system import TABLE, Drive
+from railsim.kernels.time_loop import time_loop
+from railsim.kernels.wheel_rail import W_Y
+from railsim.linear.circle import PLACE
+from railsim.linear.vehicle import LinearVehicle
+from railsim.time_step import SCHEMES, choose_step, empty_recorder
+
+Floats = NDArray[np.float64]
+
+OUTPUT_RATE = 200.0  # 1/s
+LONGEST = 1.0  # s of a stretch that the table of the track holds
+
+
+class LeftRange(ModelError):
+    """The motion left the range of the model, such as by a derailment."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What a system did for a while.
+
+    Attributes
+    ----------
+    state : float64[n]
+        At the end.
+    time : float64[k]
+        From the beginning of the stretch [s].
+    lateral : float64[k, wheelset]
+        Lateral displacements of the wheelsets [m].
+    sum_Y : float64[k, wheelset]
+        Lateral forces of the wheelsets on the track [N]; zero where a system has none.
+    """
+
+    state: Floats
+    time: Floats
+    lateral: Floats
+    sum_Y: Floats
+
+    @property
+    def amplitude(self) -> float:
+        """Half the largest lateral travel of a wheelset [m]."""
+        return float(0.5 * np.max(np.ptp(self.lateral, axis=0)))
+
+    @property
+    def frequency(self) -> float:
+        """Of the wheelset that moves most, from its crossings of the mean; NaN without any [Hz]."""
+        y = self.lateral[:, int(np.argmax(np.ptp(self.lateral, axis=0)))]
+        y = y - 0.5 * (np.max(y) + np.min(y))
+        rising = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
+        if len(rising) < 2:
+            return float("nan")
+        share = y[rising] / (y[rising] - y[rising + 1])
+        crossings = self.time[rising] + share * (self.time[rising + 1] - self.time[rising])
+        return float((len(crossings) - 1) / (crossings[-1] - crossings[0]))
+
+    @property
+    def sum_Y_rms(self) -> float:
+        """Largest rms of a wheelset's lateral force [N]."""
+        return float(np.max(np.sqrt(np.mean(self.sum_Y**2, axis=0))))
+
+
+class Motion(Protocol):
+    """A system that can move for a while."""
+
+    def rest(self, speed: float, amplitude: float) -> Floats:
+        """State of steady rolling with the wheelsets displaced by `amplitude` [m]."""
+
+    def stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
+        """Move for `duration` [s] while the speed goes evenly from `begin` to `end` [m/s].
+
+        Raises
+        ------
+        LeftRange
+            The motion leaves the range of the model.
+        """
+
+
+class VehicleMotion:
+    """A vehicle on straight track.
+
+    Parameters
+    ----------
+    prepared : LinearVehicle
+        On straight track.
+    scheme : str
+        Integration scheme, ``fast`` or ``rk4``.
+    speeds : tuple of float
+        Speeds at which the step is judged: the shortest counts for all [m/s].
+    """
+
+    def __init__(self, prepared: LinearVehicle, scheme: str, speeds: tuple[float, ...]) -> None:
+        self.prepared = prepared
+        self.model = prepared.model
+        self.system = prepared.system
+        self.scheme = SCHEMES[scheme]
+        self.step = min(
+            choose_step(self.model, self.system, prepared.steady(v).state, scheme,
+                        1.0 / OUTPUT_RATE)
+            for v in speeds
+        )
+        self.every = round(1.0 / OUTPUT_RATE / self.step)
+        self.work = work_arrays(self.system)
+        size = self.model.n_state
+        self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
+        self._recorder = empty_recorder(self.model, int(LONGEST * OUTPUT_RATE) + 2)
+        self._places = 6 * self.system.contact.body + 1
+
+    def rest(self, speed: float, amplitude: float) -> Floats:
+        """State of steady rolling with the wheelsets displaced by `amplitude` [m]."""
+        state = self.prepared.steady(speed).state.copy()
+        state[self._places] += amplitude
+        state[-3] = -1.0  # marks a state without memory
+        return state
+
+    def stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:
+        """Move for `duration` [s] while the speed goes evenly from `begin` to `end` [m/s]."""
+        parts: list[Stretch] = []
+        done = 0.0
+        while done < duration - 1e-9:
+            length = min(LONGEST, duration - done)
+            v0, v1 = (begin + (end - begin) * t / duration for t in (done, done + length))
+            parts.append(self._part(parts[-1].state if parts else state, v0, v1, length, done))
+            done += length
+        return Stretch(
+            parts[-1].state,
+            np.concatenate([part.time for part in parts]),
+            np.concatenate([part.lateral for part in parts]),
+            np.concatenate([part.sum_Y for part in parts]),
+        )
+
+    def _part(
+        self, before: Floats, begin: float, end: float, duration: float, offset: float
+    ) -> Stretch:
+        state = before.copy()
+        fresh = int(before[-3] < 0.0)
+        state[-3:] = 0.0, PLACE, begin
+        way = 0.5 * (begin + end) * duration
+        table = np.array([[PLACE, begin], [PLACE + way, end]])
+        system = self.system._replace(drive=Drive(TABLE, table, np.zeros(3)))
+        steps = max(1, round(duration / self.step))
+        status, where, _, rows = time_loop(
+            system, self.work, state, self._derivative, self._stages, self._recorder, self.scheme,
+            self.step, 0, steps, self.every, fresh, 0,
+        )
+        if status != RUNNING or not np.isfinite(state).all():
+            sentence = STATUS[status][1] if status != RUNNING else "the state is not finite"
+            names = self.model.index.wheelsets
+            raise LeftRange(sentence.format(where=names[where] if where < len(names) else where))
+        wheel = self._recorder.wheel[:rows, :, :, W_Y]
+        return Stretch(
+            state, offset + self.step * self.every * np.arange(rows),
+            self._recorder.state[:rows][:, self._places].copy(), wheel.sum(axis=2),
+        )

@@ -1,0 +1,121 @@
+"""Critical speeds over conicity and friction, point by point over the cores.
+
+Each point is kept in the folder as it is done, under a name that hashes its inputs: the same
+command goes on where it was interrupted.
+"""
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import RailsimError
+from railsim.files import make_folder, whole_file
+from railsim.stability.critical_speed import critical_speed
+from railsim.threads import one_thread_each
+from railsim.version import __version__
+
+Point = tuple[float | None, float | None]
+Progress = Callable[[float], None]
+
+
+def stability_map(
+    vehicle: Vehicle,
+    track: Track,
+    settings: Settings,
+    grid: Sequence[Point],
+    options: dict[str, Any],
+    *,
+    folder: Path | None = None,
+    workers: int | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> list[dict[str, Any]]:
+    """Return the record of `critical_speed` at each point, in the order of the grid.
+
+    Parameters
+    ----------
+    vehicle, track, settings : Vehicle, Track, Settings
+    grid : sequence of (conicity, friction)
+        None where the vehicle's wheels or the track's friction stay.
+    options : dict
+        Further arguments of `critical_speed`.
+    folder : Path, optional
+        Where finished points are kept.
+    workers : int, optional
+        Processes; by default one for each core.
+    overwrite : bool
+        Compute everything again.
+    progress : callable, optional
+        Called with the finished fraction now and then.
+
+    A point that fails has its reason among the remarks.
+    """
+    jobs = [(vehicle, track, settings, point, options) for point in grid]
+    kept = [_kept(folder, job) for job in jobs]
+    found: dict[int, dict[str, Any]] = {}
+    for number, path in enumerate(kept):
+        if path is not None and path.exists() and not overwrite:
+            found[number] = json.loads(path.read_text(encoding="utf-8"))
+    tell = progress or (lambda _: None)
+    tell(len(found) / len(jobs))
+    waiting = [number for number in range(len(jobs)) if number not in found]
+    count = min(workers or os.cpu_count() or 1, max(1, len(waiting)))
+    for number, record in _computed(jobs, waiting, count):
+        found[number] = record
+        path = kept[number]
+        if path is not None:
+            make_folder(path.parent)
+            with whole_file(path) as partial:
+                partial.write_text(json.dumps(record), encoding="utf-8")
+        tell(len(found) / len(jobs))
+    return [found[number] for number in range(len(jobs))]
+
+
+def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
+    """Yield number and record of each waiting job as it is done."""
+    if workers == 1:
+        for number in waiting:
+            yield number, point_record(*jobs[number])
+        return
+    # "spawn": a fork of a process that has run compiled code with threads may hang
+    context = multiprocessing.get_context("spawn")
+    with one_thread_each(), ProcessPoolExecutor(workers, context) as pool:
+        futures = {pool.submit(point_record, *jobs[number]): number for number in waiting}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def point_record(
+    vehicle: Vehicle, track: Track, settings: Settings, point: Point, options: dict[str, Any]
+) -> dict[str, Any]:
+    """Record of one point."""
+    conicity, friction = point
+    if friction is not None:
+        track = track.replace(friction=friction, friction_table=None)
+    where = {"conicity": conicity, "friction": friction}
+    try:
+        found = critical_speed(vehicle, track, settings=settings, conicity=conicity, **options)
+    except RailsimError as error:
+        return {"at": where, "linear": None, "nonlinear": None, "remarks": [str(error)]}
+    return {"at": where, **found.record()}
+
+
+def _kept(folder: Path | None, job: Any) -> Path | None:
+    if folder is None:
+        return None
+    vehicle, track, settings, point, options = job
+    inputs = [__version__, vehicle.to_toml(), track.to_toml(), settings.to_toml(), point, options]
+    text = json.dumps(inputs, sort_keys=True)
+    return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"

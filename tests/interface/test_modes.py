@@ -1,0 +1,61 @@
+"""``railsim modes``: table, root locus, JSON, pictures, and what is refused."""
+
+import json
+
+import pytest
+
+from railsim.cli import main
+
+
+def test_modes_at_one_speed(capsys):
+    assert main(["modes", "coach_manchester", "--speed", "30", "--quiet"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("30 m/s, contact tangent")
+    assert any(line.startswith("lower sway") for line in lines)
+    assert any(line.startswith("front hunting") for line in lines)
+
+
+def test_root_locus_in_json_and_folder(capsys, tmp_path):
+    folder = tmp_path / "modes"
+    arguments = ["modes", "coach_manchester", "--speeds", "20:30:2", "--linearisation", "harmonic",
+                 "--out", str(folder), "--json", "--quiet"]
+    assert main(arguments) == 0
+    records = json.loads(capsys.readouterr().out)
+    assert [record["speed"] for record in records] == [20.0, 30.0]
+    mode = records[0]["modes"][0]
+    assert set(mode) == {"name", "frequency", "natural_frequency", "damping_ratio", "eigenvalue",
+                         "participation", "shape"}
+    assert records[0]["amplitude"] == 3e-3
+    assert json.loads((folder / "modes.json").read_text()) == records
+    assert (folder / "modes.png").stat().st_size > 1000
+    assert main(arguments) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_root_locus_over_a_key(capsys):
+    assert main(["modes", "coach_manchester", "--over", "track.friction=0.2:0.4:2", "--json",
+                 "--quiet"]) == 0
+    records = json.loads(capsys.readouterr().out)
+    assert [record["parameter"]["value"] for record in records] == [0.2, 0.4]
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--speed", "0"], "--speed"),
+    (["--speed", "nan"], "--speed"),
+    (["--speeds", "10:20"], "--speeds"),
+    (["--speeds", "10:20:0"], "--speeds"),
+    (["--speeds", "10:20:2", "--over", "track.friction=0.2:0.4:2"], "--over"),
+    (["--over", "track.nothing=0.2:0.4:2"], "nothing"),
+    (["--radius", "2"], "--radius"),
+    (["--cant", "2"], "--cant"),
+    (["--conicity", "3"], "--conicity"),
+    (["--linearisation", "harmonic", "--amplitude", "0.2"], "--amplitude"),
+    (["--linearisation", "harmonic", "--amplitude", "-1"], "--amplitude"),
+    (["--set", "vehicle.bodies.carbody.mas=3"], "mas"),
+    (["--radius", "100", "--speed", "60"], "no steady state"),
+])
+def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
+    assert main(["modes", "coach_manchester", "--quiet", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Traceback" not in error

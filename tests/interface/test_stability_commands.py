@@ -1,0 +1,68 @@
+"""``railsim critical-speed`` and ``railsim curving``: tables, JSON, pictures, refusals."""
+
+import json
+
+import pytest
+
+from railsim.cli import main
+
+
+def test_linear_critical_speed(capsys, tmp_path):
+    folder = tmp_path / "out"
+    assert main(["critical-speed", "coach_manchester", "--method", "linear", "--json", "--quiet",
+                 "--linearisation", "harmonic", "--out", str(folder)]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["linear"]["mode"].endswith("hunting")
+    assert {"linear", "nonlinear", "amplitude_limit", "instability_limit", "type",
+            "branches"} <= set(record)
+    assert (folder / "critical_speed.png").stat().st_size > 1000
+
+
+def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
+    folder = tmp_path / "map"
+    command = ["critical-speed", "coach_manchester", "--method", "linear", "--friction", "0.2,0.4",
+               "--from", "20", "--to", "80", "--workers", "1", "--out", str(folder), "--quiet"]
+    assert main(command) == 0
+    assert "friction" in capsys.readouterr().out
+    kept = sorted((folder / "points").iterdir())
+    assert len(kept) == 2
+    record = json.loads(kept[0].read_text())
+    record["linear"]["speed"] = 12.25  # what is there is not computed again
+    kept[0].write_text(json.dumps(record))
+    (folder / "critical_speed.json").unlink()
+    (folder / "critical_speed.png").unlink()
+    assert main(command) == 0
+    assert "12.25" in capsys.readouterr().out
+
+
+def test_curving_over_a_grid(capsys, tmp_path):
+    folder = tmp_path / "curving"
+    assert main(["curving", "coach_manchester", "--radius", "300,-600", "--cant-deficiency",
+                 "0,0.1", "--friction", "0.3", "--out", str(folder), "--json", "--quiet"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["converged"] == [[[1], [1]], [[1], [1]]]
+    assert record["dims"]["Q"] == ["radius", "cant_deficiency", "friction", "wheelset", "side"]
+    attack = record["attack"]
+    # the leading wheelset points outwards, to the left in a right-hand curve
+    assert attack[0][0][0][0] < 0.0 < attack[1][0][0][0]
+    assert record["speed"][0][0] == pytest.approx((9.81 * 300.0 * 0.15 / 1.5) ** 0.5)
+    assert (folder / "curving.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["critical-speed", "coach_manchester", "--from", "60", "--to", "50"], "--from"),
+    (["critical-speed", "coach_manchester", "--to", "500"], "--to"),
+    (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
+    (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
+    (["curving", "coach_manchester", "--radius", "5"], "--radius"),
+    (["curving", "coach_manchester", "--radius", "inf"], "--radius"),
+    (["curving", "coach_manchester", "--radius", "300", "--cant", "1"], "--cant"),
+    (["curving", "coach_manchester", "--radius", "300", "--cant-deficiency", "-0.15"],
+     "--cant-deficiency"),
+    (["curving", "coach_manchester", "--radius", "300", "--friction", "-1"], "--friction"),
+])
+def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
+    assert main([*arguments, "--quiet"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Traceback" not in error

@@ -1,0 +1,58 @@
+"""Non-linear critical speed: three methods on Cooperrider's bogie and on a coach."""
+
+import cooperrider
+import numpy as np
+import pytest
+from dynamics import load_track, load_vehicle
+
+from railsim.linear.modes import modes
+from railsim.stability.critical_speed import critical_speed
+from railsim.stability.ramp import THRESHOLD, bifurcation_type, diagram, ramp
+
+RIGID = load_track("straight").replace(support={"preset": "rigid"})
+
+
+def test_ramp_finds_the_fold_of_cooperriders_bogie():
+    """N2: 66.69 m/s; a ramp undershoots it, runs at constant speed do not."""
+    lowest, branch = ramp(cooperrider.Rolling(), 60.0, 72.0)
+    assert lowest.speed == pytest.approx(66.69, abs=0.15)
+    assert 1e3 * lowest.amplitude == pytest.approx(9.36, abs=0.15)
+    assert lowest.frequency == pytest.approx(3.80, rel=0.01)
+    died = min(v for v, a in zip(branch.speed, branch.amplitude, strict=True) if a > 5e-3)
+    assert 65.0 < died < lowest.speed
+    assert np.all(np.diff(branch.speed) <= 0.0)
+
+
+def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurcation():
+    """N1 at 68 and 70 m/s; upwards nothing hunts below 68.67 m/s, downwards it does to 66.69."""
+    speeds = [64.0, 66.0, 68.0, 70.0, 72.0]
+    (up, down), lowest = diagram(cooperrider.Rolling(), speeds)
+    assert up.speed == speeds
+    assert down.speed == speeds[::-1]
+    amplitude = dict(zip(up.speed, up.amplitude, strict=True))
+    assert max(amplitude[v] for v in (64.0, 66.0, 68.0)) < THRESHOLD
+    back = dict(zip(down.speed, down.amplitude, strict=True))
+    assert 1e3 * back[68.0] == pytest.approx(9.735, rel=5e-3)
+    assert 1e3 * back[70.0] == pytest.approx(10.185, rel=5e-3)
+    assert back[66.0] < THRESHOLD
+    assert bifurcation_type([up, down]) == "subcritical"
+    assert lowest.speed == pytest.approx(66.69, abs=0.15)
+
+
+def test_without_critical_speed_in_the_range_the_least_damped_modes_are_told():
+    coach = load_vehicle("coach_manchester")
+    found = critical_speed(coach, RIGID, methods=("linear",), low=10.0, high=20.0)
+    assert found.linear is None
+    assert any("no linear critical speed" in remark and "at 20 m/s" in remark
+               for remark in found.remarks)
+    unstable = critical_speed(coach, RIGID, methods=("linear",), low=60.0, high=70.0)
+    assert any("unstable at the lower end" in remark for remark in unstable.remarks)
+
+
+def test_the_critical_mode_is_undamped_there():
+    coach = load_vehicle("coach_flexicoil")
+    found = critical_speed(coach, RIGID, methods=("linear",), linearisation="harmonic")
+    there = modes(coach, RIGID, speed=found.linear["speed"], linearisation="harmonic")
+    assert there.least_damped.damping_ratio == pytest.approx(0.0, abs=1e-5)
+    assert there.least_damped.frequency == pytest.approx(found.linear["frequency"], rel=1e-6)
+    assert "hunting" in found.linear["mode"]

@@ -1,0 +1,165 @@
+"""Linearised wheel-rail contact: critical speeds of cones, creep coefficients, runs from a mode."""
+
+import numpy as np
+import pytest
+from dynamics import changed, load_track, load_vehicle
+from rig import test_vehicle
+
+from railsim.assembly import CONSTANT_SPEED, level_track_with_friction, work_arrays
+from railsim.errors import InputError
+from railsim.kernels.time_loop import time_loop
+from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillations
+from railsim.linear.modes import modes, root_locus
+from railsim.linear.system import Linearisation
+from railsim.linear.vehicle import Contact, LinearVehicle
+from railsim.profiles import Profile
+from railsim.profiles.builtin import arc_chain_rail
+from railsim.time_step import SCHEMES, choose_step, empty_recorder
+
+RIGID = {"preset": "rigid"}
+STRAIGHT = load_track("straight").replace(support=RIGID)
+
+
+def on_springs(linearisation, lateral, yaw):
+    """A linearised wheelset with springs to the ground."""
+    names, matrix = list(linearisation.names), linearisation.matrix.copy()
+    for name, stiffness, inertia in (("y", lateral, 1813.0), ("yaw", yaw, 1120.0)):
+        place = names.index(f"wheelset.{name}'"), names.index(f"wheelset.{name}")
+        matrix[place] -= stiffness / inertia
+    return Linearisation(linearisation.names, matrix, linearisation.state, linearisation.parameter)
+
+
+@pytest.mark.parametrize("contact", [
+    Contact("harmonic", 0.3e-3), Contact("harmonic", 1e-3), Contact("harmonic", 3e-3),
+])
+def test_critical_speed_of_a_wheelset_on_springs(contact):
+    """L2: cones 1:20 on 60E1, friction 1; 41.37 m/s and 2.524 Hz computed independently, 2 %."""
+    wheelset = LinearVehicle(
+        test_vehicle("single_wheelset"), STRAIGHT.replace(friction=1.0), contact=contact
+    )
+    lost = loss_of_stability(
+        lambda speed: on_springs(wheelset.linearised(speed), 2e5, 4e5), 20.0, 70.0, points=4
+    )
+    assert lost.parameter == pytest.approx(41.37, rel=0.02)
+    assert lost.modes[0].frequencies[0] == pytest.approx(2.524, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def coned():
+    """The benchmark coach on cones 1:20; rails with a head of constant radius, friction 10."""
+    y, z = arc_chain_rail((28.0,), (300.0, 8.0))
+    arc = Profile("arc", "rail", 1e-3 * y, 1e-3 * z, "one arc of 300 mm, corners of 8 mm")
+    vehicle = changed(load_vehicle("benchmark_vehicle1"), lambda kind, _, table:
+                      table.update(profile="cone_1in20") if kind == "wheelsets" else None)
+    track = STRAIGHT.replace(rail="arc", friction=10.0)
+
+    def prepared(contact):
+        return LinearVehicle(vehicle, track, contact=contact, profiles={"arc": arc})
+
+    return prepared
+
+
+@pytest.mark.parametrize("contact", [Contact(), Contact("harmonic", 3e-3)])
+def test_critical_speed_of_the_benchmark_coach_on_cones(coned, contact):
+    """L8: 99.0 m/s and 2.96 Hz computed independently, 5 %; on cones at any amplitude."""
+    lost = loss_of_stability(coned(contact).linearised, 60.0, 130.0, points=4)
+    assert lost.parameter == pytest.approx(99.0, rel=0.05)
+    assert lost.modes[0].frequencies[0] == pytest.approx(2.96, rel=0.05)
+
+
+def test_creep_coefficients_without_saturation_are_kalkers(coned):
+    """L8: f11 9.694e6, f22 8.826e6, f23 2.03e4 per wheel; 2 %."""
+    speed, mass = 50.0, 1813.0
+    linear = coned(Contact()).linearised(speed)
+    names = list(linear.names)
+
+    def slope(force, velocity):
+        return linear.matrix[names.index(f"front.outer.wheelset.{force}'"),
+                             names.index(f"front.outer.wheelset.{velocity}'")]
+
+    assert -slope("x", "x") * mass * speed / 2 == pytest.approx(9.694e6, rel=0.02)
+    assert -slope("y", "y") * mass * speed / 2 == pytest.approx(8.826e6, rel=0.02)
+    assert -slope("y", "yaw") * mass * speed / 2 == pytest.approx(2.03e4, rel=0.02)
+
+
+def test_given_conicity_puts_the_vehicle_on_cones(coned):
+    """Halving the slope of the wheels lowers hunting's frequency by sqrt(2) (Klingel)."""
+    vehicle = load_vehicle("coach_manchester")
+    found = []
+    for conicity in (0.05, 0.1):
+        lowest = [mode for mode in modes(vehicle, STRAIGHT, speed=10.0, conicity=conicity)
+                  if mode.name.endswith("hunting")]
+        found.append(min(mode.frequency for mode in lowest))
+    assert found[1] / found[0] == pytest.approx(np.sqrt(2.0), rel=0.1)
+
+
+AMPLITUDE = 1e-6  # m; at 5 um the contact table's own curvature is seen, 3e-4 of damping
+
+
+@pytest.mark.parametrize("name", ["coach_manchester", "coach_flexicoil"])
+@pytest.mark.parametrize("below", [1.0, 3.0, 6.0])
+def test_a_run_from_the_modes_own_shape_decays_with_its_damping(name, below):
+    """L9: hunting, started with its shape, loses what the eigenvalue says.
+
+    1e-4 (rk4) and 2e-4 (fast).  The run is read through the left eigenvector, which sees this mode
+    alone.
+    """
+    prepared = LinearVehicle(load_vehicle(name), STRAIGHT)
+    critical = loss_of_stability(prepared.linearised, 20.0, 100.0).parameter
+    speed = critical - below
+    linear = prepared.linearised(speed)
+    found = oscillations(eigenmodes(linear), 40.0)
+    hunting = found.taken([int(np.argmin(found.damping_ratios))])
+    for scheme, tolerance in (("rk4", 1e-4), ("fast", 2e-4)):
+        measured = run_from(prepared, hunting, speed, scheme)
+        assert measured == pytest.approx(hunting.damping_ratios[0], abs=tolerance)
+
+
+def run_from(prepared, mode, speed, scheme):
+    """Damping ratio of a mode in a run that starts with its shape."""
+    model, rest = prepared.model, prepared.steady(speed).state
+    names = mode.linearisation.names
+    places = prepared.coordinates.places[[prepared.coordinates.names.index(n) for n in names]]
+    lateral = [abs(mode.shapes[0, names.index(f"{w}.y")]) for w in model.index.wheelsets]
+    state = rest.copy()
+    state[places] += AMPLITUDE * (mode.shapes[0] / max(lateral)).real
+    system = prepared.system._replace(drive=CONSTANT_SPEED)
+    level = level_track_with_friction(system)
+    h = choose_step(model, level, rest, scheme, 1.0 / 200.0)
+    steps = round(1.0 / mode.frequencies[0] / 16.0 / h)
+    work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
+    time, seen = [], []
+    for k in range(4 * 16):
+        status, *_ = time_loop(system, work, state, derivative, stages, empty_recorder(model, 1),
+                               SCHEMES[scheme], h, min(k, 1), steps, 1 << 40, int(k == 0), 0)
+        assert status == 0
+        time.append((k + 1) * steps * h)
+        seen.append(mode.left[0] @ (state[places] - rest[places]))
+    later = slice(16, None)
+    growth = np.polyfit(time[later], np.log(np.abs(seen[later])), 1)[0]
+    omega = np.polyfit(time[later], np.unwrap(np.angle(seen[later])), 1)[0]
+    return -growth / np.hypot(growth, omega)
+
+
+def test_an_amplitude_beyond_the_contact_table_is_refused():
+    with pytest.raises(InputError, match="--amplitude"):
+        modes(load_vehicle("coach_manchester"), STRAIGHT, linearisation="harmonic", amplitude=0.1)
+
+
+def test_names_of_the_coachs_modes_over_speed():
+    """Car body modes stay, hunting rises with speed; both bogies hunt."""
+    locus = root_locus(load_vehicle("coach_manchester"), STRAIGHT, speeds=[10.0, 20.0, 30.0, 40.0],
+                       linearisation="harmonic")
+    names = locus.names
+    for name in ("lower sway", "upper sway", "car body bounce", "car body pitch", "car body yaw",
+                 "bogie bounce, in phase", "bogie pitch, out of phase"):
+        values = locus.eigenvalues[:, names.index(name)]
+        assert np.isfinite(values).all()
+        assert np.ptp(values.imag) < 0.03 * np.max(values.imag)
+    hunting = locus.eigenvalues[:, names.index("front hunting")]
+    assert np.all(np.diff(hunting.imag) > 3.0)
+
+
+def test_friction_elements_that_stick_are_told():
+    found = modes(test_vehicle("two_axle_wagon"), STRAIGHT, speed=15.0)
+    assert any("stick" in remark for remark in found.remarks)

@@ -1,0 +1,145 @@
+"""Linearisation, loss of stability and periodic motions of systems with published speeds."""
+
+import cooperrider
+import numpy as np
+import pytest
+
+from railsim.linear.eigenmodes import followed, loss_of_stability
+from railsim.linear.system import Linearisation, NamedSystem, linearise
+from railsim.stability.periodic import Branch
+
+
+def bogie(speed):
+    system = NamedSystem(
+        cooperrider.NAMES, cooperrider.rate, lambda _: np.zeros(14), np.full(14, 1e-9)
+    )
+    return linearise(system, speed)
+
+
+@pytest.fixture(scope="module")
+def birth():
+    """The beginning of the bogie's branch of periodic motions, and the branch."""
+    lost = loss_of_stability(bogie, 30.0, 120.0)
+    shape = lost.modes[0].shapes[0]
+    scale = np.abs(shape / shape[0]) * 1e-3  # of a motion of 1 mm of the leading wheelset
+    branch = Branch(cooperrider.Periods(), scale, period_scale=0.01, speed_scale=1.0)
+    start = branch.beginning(np.zeros(14), shape, lost.modes[0].frequencies[0], lost.parameter)
+    return branch, start
+
+
+@pytest.fixture(scope="module")
+def motions(birth):
+    """Motions along the branch, and the one where it turns back in speed."""
+    branch, start = birth
+    found = list(branch.followed(start, 2.0, lambda motion: motion.speed < 75.5))
+    turns = [k for k in range(1, len(found)) if found[k - 1].tangent[-1] < 0 < found[k].tangent[-1]]
+    (k,) = turns
+    return found, branch.fold(found[k - 1], found[k], 2.0)
+
+
+@pytest.mark.parametrize(("conicity", "critical"), [(0.05, 40.671), (0.20, 20.329)])
+def test_suspended_wheelset_loses_stability_at_the_speed_of_the_closed_form(conicity, critical):
+    """L1: Wickens (2003), chapter 3, two equations of motion and V in closed form."""
+    m, inertia, f, ky, kpsi, r0, b0 = 1813.0, 1120.0, 1e7, 2e5, 4e5, 0.46, 0.75
+
+    def rate(x, speed):
+        y, yaw, y_rate, yaw_rate = x
+        lateral = 2.0 * f * (y_rate / speed - yaw) + ky * y
+        moment = 2.0 * f * (b0**2 * yaw_rate / speed + b0 * conicity * y / r0) + kpsi * yaw
+        return np.array([y_rate, yaw_rate, -lateral / m, -moment / inertia])
+
+    system = NamedSystem(("y", "yaw", "y'", "yaw'"), rate, lambda _: np.zeros(4), np.full(4, 1e-6))
+    lost = loss_of_stability(lambda speed: linearise(system, speed), 5.0, 90.0)
+    square = (2 * f * kpsi + 2 * f * b0**2 * ky) / (2 * f * inertia + 2 * f * b0**2 * m)
+    stiff = (ky - m * square) * (kpsi - inertia * square) / (4 * f * f)
+    closed = np.sqrt(square * b0**2 / (b0 * conicity / r0 + stiff))
+    assert lost.parameter == pytest.approx(closed, rel=1e-6)
+    assert lost.parameter == pytest.approx(critical, rel=1e-4)
+    assert lost.modes[0].frequencies[0] == pytest.approx(2.4631, rel=1e-4)
+
+
+def test_cooperriders_bogie_loses_stability_at_its_published_speed():
+    """L3: "about 68.66" (bifurcation.de); 68.667 m/s and 3.998 Hz computed independently."""
+    lost = loss_of_stability(bogie, 30.0, 120.0)
+    assert lost.parameter == pytest.approx(68.667, rel=1e-3)
+    assert lost.parameter == pytest.approx(68.66, abs=0.01)
+    assert lost.modes[0].frequencies[0] == pytest.approx(3.998, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "parameter", "already"),
+    [(30.0, 60.0, None, False), (75.0, 90.0, None, True)],
+)
+def test_a_range_without_loss_of_stability_says_so(low, high, parameter, already):
+    lost = loss_of_stability(bogie, low, high)
+    assert (lost.parameter, lost.already) == (parameter, already)
+    growth = [modes.eigenvalues[0].real for modes in lost.modes]
+    assert all(value > 0.0 for value in growth) if already else all(v < 0.0 for v in growth)
+    assert len(growth) == (1 if already else 2)
+
+
+@pytest.mark.parametrize(("speed", "millimetres"), [(75.0, 11.155), (70.0, 10.185), (68.0, 9.735)])
+def test_limit_cycle_of_cooperriders_bogie(birth, motions, speed, millimetres):
+    """N1: amplitude of the leading wheelset, computed independently; 0.5 %."""
+    branch, _ = birth
+    found, _ = motions
+    upper = [motion for motion in found if motion.is_stable]
+    near = min(upper, key=lambda motion: abs(motion.speed - speed))
+    motion = branch.at_speed(near, speed)
+    assert motion.is_stable
+    assert 1e3 * motion.amplitude == pytest.approx(millimetres, rel=5e-3)
+
+
+def test_fold_of_cooperriders_bogie(motions):
+    """N2: 66.69 m/s at 9.36 mm, 3.800 Hz, subcritical; computed independently."""
+    found, fold = motions
+    assert fold.speed == pytest.approx(66.69, abs=0.05)
+    assert 1e3 * fold.amplitude == pytest.approx(9.36, rel=5e-3)
+    assert fold.frequency == pytest.approx(3.800, rel=1e-3)
+    lower = [motion for motion in found if motion.amplitude < 0.99 * fold.amplitude]
+    upper = [motion for motion in found if motion.amplitude > 1.01 * fold.amplitude]
+    assert len(lower) > 3
+    assert len(upper) > 3
+    # the branch begins towards lower speeds: the motions there are unstable
+    assert all(motion.tangent[-1] < 0.0 and not motion.is_stable for motion in lower)
+    assert all(motion.tangent[-1] > 0.0 and motion.is_stable for motion in upper)
+
+
+def test_a_motion_at_the_bifurcation_has_the_critical_modes_period(birth, motions):
+    _, start = birth
+    found, _ = motions
+    assert found[0].amplitude < 1e-3
+    assert found[0].frequency == pytest.approx(1.0 / start.period, rel=5e-3)
+    assert found[0].speed == pytest.approx(start.speed, abs=0.1)
+
+
+def test_modes_keep_their_places_where_frequencies_cross():
+    """Two oscillators, one of which overtakes the other: sorted by size they would change places.
+
+    Their coupling is weak: on a coarse grid the eigenvectors alone would not tell them apart.
+    """
+
+    def at(p):
+        k = np.array([[4.0, 1e-3], [1e-3, p**2]])
+        matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-k, -0.02 * np.eye(2)]])
+        return Linearisation(("a", "b", "a'", "b'"), matrix, np.zeros(4), p)
+
+    grid = np.linspace(1.0, 3.1, 8)
+    sets = followed(at, grid)
+    first, second = (np.array([modes.eigenvalues[i].imag for modes in sets]) for i in (0, 1))
+    assert first == pytest.approx(grid, rel=1e-3)
+    assert second == pytest.approx(np.full(8, 2.0), rel=1e-3)
+
+
+def test_an_oscillation_that_becomes_overdamped_leaves_its_place_empty():
+    def at(c):
+        return Linearisation(
+            ("x", "v"), np.array([[0.0, 1.0], [-1.0, -c]]), np.zeros(2), c
+        )
+
+    values = np.array([modes.eigenvalues for modes in followed(at, [1.0, 1.5, 2.5, 1.8])])
+    assert values.shape == (4, 2)
+    assert values[0, 0] == pytest.approx(complex(-0.5, np.sqrt(0.75)))
+    assert np.isnan(values[2:, 0]).all()
+    assert np.isnan(values[:3, 1]).all()
+    assert values[3, 1] == pytest.approx(complex(-0.9, np.sqrt(0.19)))

@@ -1,0 +1,154 @@
+"""Quasi-static curving and standing by Newton's method, against closed forms and the time loop."""
+
+import numpy as np
+import pytest
+from dynamics import Settings, load_track, load_vehicle, steady
+from rig import test_vehicle
+
+from railsim.assembly import work_arrays
+from railsim.kernels.time_loop import FAST, time_loop
+from railsim.kernels.wheel_rail import W_Q, W_Y
+from railsim.linear.circle import PLACE, circle
+from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
+from railsim.linear.steady import NotConverged, led
+from railsim.run_in import settled
+from railsim.time_step import empty_recorder
+from railsim.track.tables import track_tables
+
+GRAVITY = 9.81
+
+
+def curving(vehicle, radius, cant, speed, friction=None):
+    """Steady state on a circle, its solver and the model."""
+    track = load_track("curve_r250")
+    balance = steady(vehicle, track, Settings(), speed)
+    start = balance.state.copy()
+    start[-2] = PLACE
+
+    def along(share):
+        part = circle(track, curvature=share / radius, cant=share * cant, friction=friction)
+        return balance.model.system._replace(track=track_tables(part)), speed
+
+    found, solver = led(balance.model, along, start)
+    return found, solver, balance
+
+
+@pytest.mark.parametrize("radius", [2000.0, -2000.0])
+def test_free_conical_wheelset_rolls_where_its_radii_fit_the_curve(radius):
+    """Q1: y = -3.258 mm at R 2000 m, yaw 0 +- 2 urad; computed independently, 0.5 %."""
+    speed = 20.0
+    cant = speed**2 / radius / GRAVITY * 1.5
+    found, *_ = curving(test_vehicle("single_wheelset"), radius, cant, speed)
+    assert 1e3 * found.state[1] == pytest.approx(-3.258 * np.sign(radius), rel=5e-3)
+    assert abs(found.state[5]) < 2e-6
+
+
+@pytest.mark.parametrize("name", ["coach_manchester", "coach_flexicoil"])
+@pytest.mark.parametrize("radius", [250.0, -600.0])
+def test_newton_finds_the_end_of_a_long_run(name, radius):
+    """Q2: 0.3 % of the largest, wheel by wheel; run: 10 s into the curve, then 30 s more."""
+    speed, cant = 20.0, np.copysign(0.15, radius)
+    found, solver, balance = curving(load_vehicle(name), radius, cant, speed)
+    model, system = balance.model, solver.system
+    there = load_track("curve_r250").replace(
+        plan=[{"type": "CIR", "length": 100.0, "radius": radius}],
+        cant=[{"type": "CST", "length": 100.0, "cant": cant}],
+    )
+    state = settled(model, balance, there, 50.0, 1e-3)
+    derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
+    work = work_arrays(system)
+    for _ in range(60):
+        state[-2] = PLACE
+        status, *_ = time_loop(system, work, state, derivative, stages, empty_recorder(model, 1),
+                               FAST, 1e-3, 1, 500, 1 << 40, 0, 0)
+        assert status == 0
+    for column in (W_Q, W_Y):
+        wheel = solver.work.wheel[:, :, column]
+        assert work.wheel[:, :, column] == pytest.approx(wheel, abs=3e-3 * np.max(np.abs(wheel)))
+    own = [6 * b + k for b in system.contact.body for k in (1, 5)]
+    for k in (0, 1):
+        at_end, expected = state[own[k::2]], found.state[own[k::2]]
+        assert at_end == pytest.approx(expected, abs=3e-3 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize(("radius", "cant", "speed"), [
+    (250.0, 0.15, 20.0), (400.0, 0.05, 12.0), (3000.0, 0.1, 60.0), (-300.0, -0.12, 22.0),
+])
+def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
+    """Q2: total Q and Y of the vehicle from masses, places and the circle alone; 0.1 %.
+
+    Each mass moves on its own circle; forces along the normal at the middle of the vehicle.
+    """
+    found, solver, balance = curving(load_vehicle("coach_manchester"), radius, cant, speed)
+    system, state, work = solver.system, found.state, solver.work
+    kappa, angle = 1.0 / radius, np.arcsin(cant / 1.5)
+    need = np.zeros(2)
+    for b, mass in enumerate(system.bodies.mass):
+        y, z = state[6 * b + 1 : 6 * b + 3] + system.bodies.nominal[b]
+        right = y * np.cos(angle) - z * np.sin(angle)
+        offset = system.frame_offset[system.bodies.frame[b]] * kappa
+        # towards the centre at the body's own place; its share along the middle's normal
+        inwards = speed**2 * kappa * (1.0 - kappa * right) * np.cos(offset)
+        need += mass * np.array([inwards * np.cos(angle) - GRAVITY * np.sin(angle),
+                                 GRAVITY * np.cos(angle) + inwards * np.sin(angle)])
+    got = np.zeros(2)
+    for w, b in enumerate(system.contact.body):
+        turned = system.frame_offset[system.bodies.frame[b]] * kappa
+        Y, Q = work.wheel[w, :, W_Y].sum(), work.wheel[w, :, W_Q].sum()
+        along = -work.rail_force[b, 0]  # on the rail
+        level = Y * np.cos(angle) - Q * np.sin(angle)  # horizontal, along the wheelset's normal
+        down = Q * np.cos(angle) + Y * np.sin(angle)
+        level = level * np.cos(turned) - along * np.sin(-turned)
+        got += [level * np.cos(angle) + down * np.sin(angle),
+                down * np.cos(angle) - level * np.sin(angle)]
+    weight = GRAVITY * np.sum(system.bodies.mass)
+    assert got[1] == pytest.approx(need[1], rel=1e-3)
+    assert -got[0] == pytest.approx(need[0], abs=1e-3 * max(abs(need[0]), 0.1 * weight))
+    assert balance.Q0.sum() == pytest.approx(weight, rel=1e-9)
+
+
+def test_no_steady_state_is_said_with_what_is_unbalanced():
+    """Twice the speed that overturns: no wheel load can carry it."""
+    with pytest.raises(NotConverged, match="no steady state"):
+        curving(load_vehicle("coach_manchester"), 250.0, 0.0, 45.0)
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return steady(load_vehicle("benchmark_vehicle1"), load_track("straight"), Settings(),
+                  WALKING_PACE)
+
+
+@pytest.mark.parametrize(("millimetres", "coefficient", "lateral"), [
+    (30.0, 0.1929, 15.6), (60.0, 0.1928, 31.1), (100.0, 0.1899, 48.2), (150.0, 0.1857, 64.2),
+])
+def test_standing_on_cant(coach, millimetres, coefficient, lateral):
+    """Q3: roll coefficient 0.5 %; the car's y 0.5 % with wheelsets held, 1 % rolling."""
+    for held, tolerance in ((True, 5e-3), (False, 1e-2)):
+        standing = on_cant(coach, load_track("straight"), 1e-3 * millimetres, held=held)
+        s = roll_coefficient(coach.model, standing, 1e-3 * millimetres, "carbody")
+        assert s == pytest.approx(coefficient, rel=5e-3)
+        y = 1e3 * standing.state[coach.model.index.coordinate("carbody", 1)]
+        assert y == pytest.approx(lateral, rel=tolerance)
+
+
+BOGIE = 7e-3 * 2.56 * np.array([0.5, -0.5, 0.5, -0.5])
+BODY = 0.053 * np.array([0.5, 0.5, -0.5, -0.5])
+
+
+@pytest.mark.parametrize(("heights", "expected"), [
+    (BOGIE, 0.1781), (BODY, 0.1387), (BOGIE + BODY, 0.3169), (-BODY, 0.1387),
+])
+def test_unloading_on_twist(coach, heights, expected):
+    """Q4: dQ/Q0 of the worst wheel, wheelsets held across the track; 1 %."""
+    standing = on_twist(coach, load_track("straight"), heights, held=True)
+    assert standing.unloading == pytest.approx(expected, rel=1e-2)
+    assert standing.Q.sum() == pytest.approx(coach.Q0.sum(), rel=1e-4)
+
+
+def test_rolling_wheelsets_add_their_lateral_forces_to_a_twist(coach):
+    """Canted against each other, two axles push their frame sideways, r0 above the rails."""
+    rolling = on_twist(coach, load_track("straight"), BOGIE)
+    assert 1.1 * 0.1781 < rolling.unloading < 1.4 * 0.1781
+    # Q is normal to each canted plane
+    assert rolling.Q.sum() == pytest.approx(coach.Q0.sum(), rel=1e-3)

@@ -1,0 +1,101 @@
+"""Modes of the benchmark coach with wheelsets held, against two independent calculations."""
+
+import numpy as np
+import pytest
+from dynamics import Settings, changed, load_track, load_vehicle, undamped
+
+from railsim.assembly import assemble, level_track
+from railsim.equilibrium import equilibrium
+from railsim.linear.coordinates import FreeVehicle
+from railsim.linear.eigenmodes import eigenmodes
+
+
+def held_modes(vehicle, *, loaded):
+    """Modes with held wheelsets at 1 m/s; `loaded` by gravity and preloads, or free of both."""
+    model = assemble(vehicle, load_track("straight"), Settings())
+    if loaded:
+        balance = equilibrium(model, 1.0)
+        model, state = balance.model, balance.state
+        system = level_track(model.system)
+    else:
+        system = level_track(model.system)._replace(gravity=0.0)
+        state = np.zeros(model.n_state)
+        state[-1] = 1.0
+    free = FreeVehicle(model, system, state, held=True)
+    return eigenmodes(free.linearised()), free.coordinates.names
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return load_vehicle("benchmark_vehicle1")
+
+
+@pytest.fixture(scope="module")
+def elastic(coach):
+    return held_modes(undamped(coach), loaded=False)
+
+
+def test_frequencies_without_weight_and_damping(elastic):
+    """L4: computed twice independently, 0.1 %."""
+    modes, _ = elastic
+    expected = [0.5962, 0.8551, 1.0739, 1.2784, 1.2812, 2.8595, 7.4705, 7.4773, 9.6398, 9.6568,
+                11.624, 11.631, 12.805, 12.808, 35.354, 35.354, 36.232, 36.237]
+    assert modes.natural_frequencies == pytest.approx(expected, rel=1e-3)
+    assert np.max(np.abs(modes.damping_ratios)) < 1e-4
+
+
+def test_poles_of_the_sway_modes(elastic):
+    """L7: lower sway turns about a point below the rails, upper sway about one above; 0.02 m."""
+    modes, names = elastic
+    heights = []
+    for shape in modes.shapes[:6]:
+        y, roll = (shape[names.index(f"carbody.{name}")] for name in ("y", "roll"))
+        if abs(roll) > 1e-2 * np.max(np.abs(shape[: len(names) // 2])):
+            # a point dz below the centre of gravity moves by y - roll dz; 1.8 m above the rails
+            heights.append(1.8 - (y / roll).real)
+    assert heights == pytest.approx([-2.04, 2.26], abs=0.02)
+
+
+def test_frequencies_with_weight(coach):
+    """L5: gravity and preloads soften the lower sway and stiffen the upper one; 0.2 %."""
+    modes, _ = held_modes(undamped(coach), loaded=True)
+    expected = [0.5311, 0.8500, 1.0739, 1.2789, 1.3216, 2.8554]
+    assert modes.natural_frequencies[:6] == pytest.approx(expected, rel=2e-3)
+
+
+def test_frequencies_and_damping_with_weight_and_dampers(coach):
+    """L6: f0 and zeta with all dampers and their series springs; 0.2 %."""
+    modes, _ = held_modes(coach, loaded=True)
+    expected = np.array([
+        [0.5631, 0.2215], [0.8757, 0.5339], [1.0835, 0.1346], [1.2961, 0.1594], [1.2982, 0.4309],
+        [2.8614, 0.0428], [7.7457, 0.2464], [7.7553, 0.2412],
+    ])
+    oscillations = modes.taken(np.flatnonzero(modes.frequencies > 1e-3))
+    assert oscillations.natural_frequencies[:8] == pytest.approx(expected[:, 0], rel=2e-3)
+    assert oscillations.damping_ratios[:8] == pytest.approx(expected[:, 1], rel=2e-3)
+
+
+def test_held_reference_would_pitch_otherwise(coach):
+    """Freed, the body pitches at 1.296 Hz; as in runs, with its x held, at 1.386 Hz."""
+    model = assemble(coach, load_track("straight"), Settings())
+    balance = equilibrium(model, 1.0)
+    free = FreeVehicle(balance.model, level_track(balance.model.system), balance.state, held=True)
+    linear = free.linearised()
+    assert np.min(np.abs(eigenmodes(linear).natural_frequencies - 1.2961)) < 2e-3
+    rest = [k for k, name in enumerate(linear.names) if name.rstrip("'") != "carbody.x"]
+    values = np.linalg.eigvals(linear.matrix[np.ix_(rest, rest)])
+    assert np.min(np.abs(np.abs(values) / (2 * np.pi) - 1.386)) < 2e-3
+
+
+def test_a_change_of_the_bodys_mass_moves_the_bounce_as_a_single_mass_would(coach):
+    """Bounce of the body on four coils of 430 kN/m over eight primaries: f ~ sqrt(1/m)."""
+    heavier = changed(coach, lambda kind, name, table: table.update(mass=64e3)
+                      if (kind, name) == ("bodies", "carbody") else None)
+    bounce = []
+    for vehicle in (coach, heavier):
+        modes, names = held_modes(undamped(vehicle), loaded=True)
+        z = [abs(shape[names.index("carbody.z")]) for shape in modes.shapes]
+        bounce.append(modes.natural_frequencies[int(np.argmax(z))])
+    series = 4 * 430e3 * 8 * 1.22e6 / (4 * 430e3 + 8 * 1.22e6)
+    assert bounce[1] == pytest.approx(np.sqrt(series / 64e3) / (2 * np.pi), rel=0.01)
+    assert bounce[1] / bounce[0] == pytest.approx(np.sqrt(0.5), rel=0.01)
