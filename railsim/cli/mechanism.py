@@ -240,6 +240,8 @@ def _result_lines(result: "Analysis", places: Sequence[dict[str, Any]]) -> list[
         lines += ["", *table(*tables.upright(tables.value_table(result, rows)))]
     lines += ["", *tables.sentences(result)]
     lines += ["", *table(*tables.reaction_table(result))]
+    if (published := tables.published_table(result))[1]:
+        lines += ["", *table(*published)]
     if made := checks(result):
         lines += ["", *table(*tables.check_table(made))]
     if choices := selection(result):

@@ -586,7 +586,8 @@ class Envelope(Definition):
     """Smallest and largest y [m]"""
 
 
-OBJECTIVES = ("follow", "constant", "linear", "constant_force", "peak_force")
+RESULTS = ("travel", "stroke", "length_start", "length_end", "max_force", "min_force")
+"""Results that `published` may name, beside the smallest of each angle."""
 Objective = Literal["follow", "constant", "linear", "constant_force", "peak_force"]
 
 
@@ -684,6 +685,8 @@ class Mechanism(FileDefinition):
     """Gas springs to be found in a catalogue"""
     optimise: Optimise | None = None
     """Search for parameters"""
+    published: dict[Name, Quantity] = Field(default_factory=dict)
+    """Results that the source prints, by their names, shown beside ours [SI]"""
     tolerances: dict[Name, Quantity] = Field(default_factory=dict)
     """Tolerances of parameters, plus and minus"""
     cases: dict[Name, dict[Name, QuantityOrAuto]] = Field(default_factory=dict)

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from railsim.definitions.base import Remark
 from railsim.definitions.expressions import Expression, evaluate
 from railsim.definitions.mechanism import (
+    RESULTS,
     AirSpring,
     Cam,
     Cylinder,
@@ -150,6 +151,11 @@ def _parameter_faults(mechanism: Mechanism) -> list[Fault]:
         *((f"units.{unit}", names) for unit, names in mechanism.units.items()),
         ("tolerances", mechanism.tolerances),
     ]
+    results = [*RESULTS, *mechanism.angles]
+    for name in mechanism.published:
+        if name not in results:
+            fault = Fault("", f"published.{name}", "no such result", nearest(name, results))
+            faults.append(fault)
     if mechanism.optimise is not None:
         lists.append(("optimise.bounds", mechanism.optimise.bounds))
         lists.append(("optimise.assemblies", mechanism.optimise.assemblies))

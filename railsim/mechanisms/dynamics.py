@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 
 from railsim.definitions import mechanism as written
 from railsim.definitions.mechanism_faults import ends
@@ -89,6 +87,8 @@ def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float
         if not np.all(np.diff(time) > 0.0):
             fault = Fault(model.definition.name, "motion.table", "times not rising", "rising")
             raise InputError([fault])
+        from scipy.interpolate import CubicSpline
+
         spline = CubicSpline(time, travel)
 
         def tabulated(t: Floats) -> tuple[Floats, Floats, Floats]:
@@ -197,6 +197,8 @@ def free_motion(
     Dormand and Prince's method of order 8 with a relative error of `ACCURACY` a step.  Friction
     acts against the motion.
     """
+    from scipy.integrate import solve_ivp  # imported where it is needed: it takes a while
+
     last = [solve(model, [start])]
 
     def rate(t: float, state: Floats) -> list[float]:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.model import Model
@@ -97,6 +96,8 @@ def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
         if a == 0.0:
             found.append(float(motion.s[k]))
         elif a * b < 0.0:
+            from scipy.optimize import brentq  # imported where it is needed: it takes a while
+
             span = abs(motion.model.end - motion.model.start)
             found.append(float(brentq(at, motion.s[k], motion.s[k + 1], xtol=1e-12 * span)))
     if len(known) and known[-1] == 0.0:

@@ -11,8 +11,8 @@ from railsim.mechanisms.analysis import Analysis, actuator_of
 from railsim.mechanisms.components import cylinder_area, next_size
 from railsim.mechanisms.kinematics import folded
 
-ROUNDING = 1e-9
-"""Share of a limit by which rounding may miss it."""
+ROUNDING = 1e-5
+"""Share of a limit by which rounding may miss it: dimensions have six or seven digits."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
             why.append(f"stroke {stroke * 1e3:.1f} mm is not made")
         elif cylinder.pin_to_pin is not None:
             least = n(cylinder.pin_to_pin) + made
-            if shortest < least:
+            if shortest < least * (1.0 - ROUNDING):
                 why.append(
                     f"{shortest * 1e3:.1f} mm at the shortest, {least * 1e3:g} mm from pin to pin"
                 )

@@ -58,6 +58,7 @@ def analysis_data(result: Analysis) -> Data:
     if result.equilibria:
         data["equilibria"] = [{"travel": s, "stable": ok} for s, ok in result.equilibria]
     data["min_transmission_angles"] = result.min_angles
+    data["published"] = published_data(result)
     data["output"] = {name: _list(array) for name, array in result.output.items()}
     if result.zone:
         names = next(iter(result.zone.values()))
@@ -110,6 +111,27 @@ def analysis_data(result: Analysis) -> Data:
     ]
     data["ok"] = all(check.ok for check in made)
     return data
+
+
+def published_data(result: Analysis) -> dict[str, Data]:
+    """Results that the source prints beside ours; none with parameters that are not the file's."""
+    definition = result.definition
+    changed = {"set", "optimised"} & {definition.provenance_of(p) for p in definition.parameters}
+    if changed or result.case is not None:
+        return {}
+    ours: dict[str, float] = {"travel": result.travel, **result.min_angles}
+    if "length" in result.output:
+        length = result.output["length"]
+        ours |= {"stroke": result.stroke, "length_start": float(length[0])}
+        ours["length_end"] = float(length[-1])
+    if "force" in result.output:
+        force = result.output["force"]
+        ours |= {"max_force": float(np.max(force)), "min_force": float(np.min(force))}
+    return {
+        name: {"published": float(result.model.number(value)), "ours": ours[name]}
+        for name, value in definition.published.items()
+        if name in ours
+    }
 
 
 def motion_data(result: Analysis) -> Data:

@@ -10,7 +10,7 @@ from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import SHOWN, quantity, shown
 from railsim.mechanisms.selection import Check, Choice
-from railsim.mechanisms.summary import parameter_data
+from railsim.mechanisms.summary import parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
 
 if TYPE_CHECKING:
@@ -62,6 +62,19 @@ def parameter_table(result: Analysis) -> Texts:
         for name, value in parameter_data(result).items()
     ]
     return ["parameter", "value", "provenance"], rows
+
+
+def published_table(result: Analysis) -> Texts:
+    """Results that the source prints, beside ours."""
+    rows = []
+    for name, both in published_data(result).items():
+        unit = "N" if name.endswith("force") else "rad" if name in result.min_angles else "m"
+        if name == "travel":
+            unit = quantity("travel", result.definition).unit
+        difference = both["ours"] / both["published"] - 1.0
+        cells = [shown(both[key], unit, 8) for key in ("published", "ours")]
+        rows.append([name, *cells, f"{difference:+.1e}"])
+    return ["result", "published", "ours", "relative difference"], rows
 
 
 def check_table(checks: Sequence[Check]) -> Texts:

@@ -339,7 +339,8 @@ def _verdict(result: Analysis) -> dict[str, Any]:
     failed = [check.name for check in made if not check.ok]
     if not made:
         return {"ok": True, "text": "The file states no limits to check."}
-    text = f"Not met: {', '.join(failed)}." if failed else f"All {len(made)} checks are met."
+    met = "The check is met." if len(made) == 1 else f"All {len(made)} checks are met."
+    text = f"Not met: {', '.join(failed)}." if failed else met
     return {"ok": not failed, "text": text}
 
 
@@ -366,6 +367,8 @@ def _table(
 
 def _results(result: Analysis, drawn: Mapping[str, bytes]) -> Section:
     shown = [_table(tables.upright(tables.position_table(result)))]
+    if (published := tables.published_table(result))[1]:
+        shown.append(_table(published, "Printed in the source, and ours"))
     if made := checks(result):
         failed = frozenset(i for i, check in enumerate(made) if not check.ok)
         header, rows = tables.check_table(made)

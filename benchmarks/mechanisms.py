@@ -1,0 +1,99 @@
+"""Speed of the tool for linkages: kinematics with force, search, the whole command.
+
+    python benchmarks/mechanisms.py
+
+Times are CPU times of this process where one does the work, else wall times; the machine is told.
+A loop of Python with the closed form of lift 5 and its force is the peer in the same run.
+"""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+from railsim.definitions.loading import load_mechanism
+from railsim.mechanisms.forces import actuator_force
+from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.model import build
+from railsim.mechanisms.optimisation import optimise
+
+POSITIONS, REPEATS, STARTS = 1000, 20, 20
+
+
+def best(function):
+    """Least CPU time of several calls [s]."""
+    function()
+    times = []
+    for _ in range(REPEATS):
+        begin = time.process_time()
+        function()
+        times.append(time.process_time() - begin)
+    return min(times)
+
+
+def kinematics():
+    model = build(load_mechanism("atr95_lift_5"))
+    s = np.linspace(model.start, model.end, POSITIONS)
+    return best(lambda: solve(model, s)), best(lambda: actuator_force(solve(model, s), "lift"))
+
+
+def closed_form_in_python():
+    """Length of lift 5 at every position in a loop of Python, by its closed form."""
+    p = build(load_mechanism("atr95_lift_5")).values
+    a1, a2, a3, a4, d = (p[name] for name in ("a1", "a2", "a3", "a4", "d"))
+    travel = np.linspace(0.0, p["travel"], POSITIONS)
+
+    def loop():
+        for s in travel:
+            A = p["alpha1_in"] + s
+            a, b = 2 * a1 * a2 * np.sin(A), 2 * a2 * (a1 * np.cos(A) - d)
+            c = a1**2 + a2**2 + d**2 - 2 * a1 * d * np.cos(A) - a3**2
+            root = np.sqrt(a * a + b * b - c * c)
+            angle = np.arctan2(-(a * c + b * root), -b * c + a * root) - p["gamma"]
+            x = a1 * np.cos(A) + a4 * np.cos(angle) - p["d_x"]
+            np.hypot(x, a1 * np.sin(A) + a4 * np.sin(angle) + p["d_y"])
+
+    return best(loop)
+
+
+def search(workers):
+    mechanism = load_mechanism("atr95_lift_5")
+    begin = time.perf_counter()
+    optimise(mechanism, starts=STARTS, workers=workers)
+    return time.perf_counter() - begin
+
+
+def command():
+    """CPU time of the whole command, warm, and of one that only tells its version [s]."""
+    times = []
+    for arguments in (["mechanism", "atr95_lift_5", "--json"], ["--version"]):
+        found = []
+        for _ in range(3):
+            before = os.times()
+            subprocess.run(
+                [sys.executable, "-m", "railsim", *arguments], check=True, stdout=subprocess.DEVNULL
+            )
+            after = os.times()
+            found.append(
+                after.children_user + after.children_system
+                - before.children_user - before.children_system
+            )  # fmt: skip
+        times.append(min(found))
+    return times
+
+
+def main():
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    positions, with_force = kinematics()
+    loop = closed_form_in_python()
+    print(f"{POSITIONS} positions: {positions * 1e3:.2f} ms, with force {with_force * 1e3:.2f} ms")
+    print(f"closed form of the lift alone in a loop of Python: {loop / positions:.1f} times that")
+    whole, version = command()
+    print(f"whole command {whole:.2f} s of CPU, --version {version:.2f} s")
+    print(f"{STARTS} starts of lift 5 on 2 cores: {search(2):.1f} s")
+
+
+if __name__ == "__main__":
+    main()
