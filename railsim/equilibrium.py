@@ -21,6 +21,7 @@ from railsim.element_arrays import vertical_support
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_table import K2, K
+from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
@@ -33,9 +34,11 @@ from railsim.kernels.support import (
     SUPPORT_SIZE,
 )
 from railsim.kernels.system import AXLEBOX, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
+from railsim.kernels.time_loop import FAST, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
-from railsim.kernels.wheel_rail import W_Q
-from railsim.notation import COMPONENTS
+from railsim.kernels.wheel_rail import NORMAL, W_Q
+from railsim.notation import COMPONENTS, SIDES
+from railsim.time_step import empty_recorder
 
 Floats = NDArray[np.float64]
 
@@ -365,18 +368,62 @@ class _Balance:
         state[-2] = 0.0
         self._start_rolling(state)
         rest = self._accelerations(state)
+        change = np.zeros(len(self._unknowns))
         for _ in range(_STEPS):
             self.residual = float(np.max(np.abs(rest)))
             if self.residual < RESIDUAL:
                 break
             change = _least_squares(self._jacobian(state, rest), -rest, 1e-13)
-            state, rest, shorter = self._line_search(state, rest, change)
+            state, rest, shorter = self._line_search(state, rest, change, 2)
+            if not shorter:
+                state, rest, shorter = self._over_kinks(state, rest, change)
+            if not shorter:
+                state, rest, shorter = self._line_search(state, rest, change, 12)
             if not shorter:
                 break
         self.residual = float(np.max(np.abs(rest)))
         if not self.residual < 1e3 * RESIDUAL:  # so that NaN counts too
-            raise ModelError(self._message(rest))
+            raise ModelError(self._message(state, rest, change))
         return state
+
+    def _over_kinks(
+        self, state: Floats, rest: Floats, change: Floats
+    ) -> tuple[Floats, Floats, bool]:
+        """Newton's step with slopes averaged over the way that it would go.
+
+        Where the force of an element or contact has a kink, the slope on this side sends Newton's
+        method beyond the kink, and the one on the other side sends it back.  The mean of both
+        brings it nearer; the span shrinks until it leaves the kink out.
+        """
+        for span in 0.25 ** np.arange(10):
+            try:
+                averaged = self._mean_jacobian(state, span * np.abs(change))
+            except ModelError:
+                continue
+            mean = _least_squares(averaged, -rest, 1e-13)
+            # where one side is far softer the mean slope gives but a small part of the way
+            found = [
+                self._line_search(state, rest, factor * direction, 1)
+                for factor in (256.0, 64.0, 16.0, 4.0, 1.0, 0.25)
+                for direction in (mean, span * change)
+            ]
+            after, rest_after, shorter = min(found, key=lambda each: float(np.linalg.norm(each[1])))
+            if shorter:
+                return after, rest_after, True
+        return state, rest, False
+
+    def _mean_jacobian(self, state: Floats, spans: Floats) -> Floats:
+        """Slopes of the accelerations, averaged over `spans` to both sides of each unknown."""
+        columns = []
+        for k, span in zip(self._unknowns, spans, strict=True):
+            span = max(float(span), 1e-9 * max(1.0, abs(state[k])))
+            ends = []
+            for sign in (1.0, -1.0):
+                self._state[:] = state
+                self._state[k] += sign * span
+                ends.append(self._accelerations(self._state))
+            columns.append((ends[0] - ends[1]) / (2.0 * span))
+        return np.array(columns).T
 
     def _start_rolling(self, state: Floats) -> None:
         n = self.model.index.n_bodies
@@ -401,10 +448,10 @@ class _Balance:
         return np.array(columns).T
 
     def _line_search(
-        self, state: Floats, rest: Floats, change: Floats
+        self, state: Floats, rest: Floats, change: Floats, trials: int
     ) -> tuple[Floats, Floats, bool]:
         size = float(np.linalg.norm(rest))
-        for factor in 0.5 ** np.arange(12):
+        for factor in 0.5 ** np.arange(trials):
             trial = state.copy()
             trial[self._unknowns] += factor * change
             try:
@@ -415,7 +462,39 @@ class _Balance:
                 return trial, trial_rest, True
         return state, rest, False
 
-    def _message(self, rest: Floats) -> str:
+    def _alternating(self, state: Floats, change: Floats) -> list[str]:
+        """Elements and wheels that are on other branches here than after Newton's step."""
+        system, index = self.system, self.model.index
+        after = state.copy()
+        after[self._unknowns] += change
+        links = [[LINK, k] for k in np.flatnonzero((system.links.curve >= 0).any(axis=1))]
+        mounts = [[MOUNT, k] for k in np.flatnonzero((system.mounts.curve >= 0).any(axis=1))]
+        chosen = np.array(links + mounts, dtype=np.int64).reshape(-1, 2)
+        deflections, patches = [], []
+        for each in (state, after):
+            recorder = empty_recorder(self.model, 1, chosen, patches=True)
+            trial, derivative = each.copy(), np.zeros_like(each)
+            status, *_ = time_loop(system, work_arrays(system), trial, derivative,
+                                   np.zeros((3, len(each))), recorder, FAST, 1.0, 0, 0, 1, 0, 1)
+            if status != RUNNING:
+                return []
+            deflections.append(recorder.element[0, :, DEFLECTION : DEFLECTION + 3])
+            patches.append(recorder.patch[0, :, :, :, NORMAL] > 0.0)
+        names = []
+        for row, (group, k) in enumerate(chosen.tolist()):
+            curves = (system.links if group == LINK else system.mounts).curve[k]
+            for axis, curve in enumerate(curves):
+                if curve >= 0:
+                    nodes = system.curves.x[system.curves.start[curve] :
+                                            system.curves.start[curve + 1]]
+                    ends = np.sort([d[row, axis if group == MOUNT else 0] for d in deflections])
+                    if ((nodes >= ends[0]) & (nodes <= ends[1])).any():
+                        names.append((index.links if group == LINK else index.mounts)[k])
+        other = (patches[0] != patches[1]).any(axis=2)
+        names += [f"{index.wheelsets[w]} {SIDES[side]} (contact)" for w, side in np.argwhere(other)]
+        return list(dict.fromkeys(names))
+
+    def _message(self, state: Floats, rest: Floats, change: Floats) -> str:
         n = self.model.index.n_bodies
         worst = np.argsort(-np.abs(rest))[:5]
         parts = []
@@ -425,7 +504,12 @@ class _Balance:
             body, component = divmod(self._equations[k] - 6 * n, 6)
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
-        return "no static equilibrium; largest remaining accelerations: " + ", ".join(parts)
+        names = self._alternating(state, change)
+        alternate = f"alternating between two branches: {', '.join(names)}; " if names else ""
+        return (
+            f"no static equilibrium; {alternate}largest remaining accelerations: "
+            + ", ".join(parts)
+        )
 
 
 def _components(kind: int) -> tuple[int, ...]:

@@ -8,7 +8,9 @@ the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
   relative to the track frames, is the state at the place;
 - into a transition, a ramp or a vertical curve over the real track, from the last place before it
   where nothing changes under the vehicle: there it stands on a twist that it came over;
-- onto irregular rails over the last seconds of the real track before the start.
+- onto irregular rails over the last seconds of the real track before the start;
+- where it does not stay on the rails that way, over the whole track from its beginning: so it can
+  start wherever a run passes.
 """
 
 import math
@@ -77,6 +79,21 @@ def start_state(
     """
     speed = float(balance.state[-1])
     steps = _approach(model, track, start, speed, step)
+    whole = math.floor(start / (speed * step))
+    try:
+        return _arrived(model, balance, track, start, step, scheme, steps)
+    except InputError:
+        if whole <= steps:
+            raise
+    return _arrived(model, balance, track, start, step, scheme, whole)
+
+
+def _arrived(
+    model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int,
+    steps: int,
+) -> Floats:
+    """State at `start` after so many steps over the real track."""
+    speed = float(balance.state[-1])
     place = start - steps * speed * step
     state = settled(model, balance, track, place, step)
     if state is None:

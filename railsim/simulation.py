@@ -250,9 +250,7 @@ def _begun(
     began = time.perf_counter()
     settings = inputs.settings
     prepared = prepare(vehicle, inputs.track, settings, inputs.speed, inputs.start,
-                       inputs.duration, inputs.until, profiles, shared)
-    if before is not None:
-        take_up(prepared, before, inputs.duration)
+                       inputs.duration, inputs.until, profiles, shared, before)
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
     sink = filtering(sink, settings)
     sink.begin(plan.coordinates, plan.quantities)
@@ -360,19 +358,24 @@ def prepare(
     until: float | None = None,
     profiles: Mapping[str, Profile] | None = None,
     shared: SharedTables | None = None,
+    before: Floats | None = None,
 ) -> Preparation:
-    """Assemble, balance, choose the step and set the initial state."""
+    """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
     model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state})
     step, _ = pace.at(speed)
-    state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
-    _disturb(model, settings, state)
+    if before is None:
+        state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
+        _disturb(model, settings, state)
+    else:
+        state = _taken_up(model, before)
     return Preparation(
         model, balance, state,
-        end_time=math.inf if duration is None else duration,
+        end_time=math.inf if duration is None else float(state[-3]) + duration,
         end_distance=track.length if until is None else until,
         pace=pace,
+        fresh=before is None,
     )
 
 
@@ -409,17 +412,14 @@ def state_before(
     return np.array(resume.groups["state"]["end"])
 
 
-def take_up(prepared: Preparation, before: Floats, duration: float | None) -> None:
-    """Let a prepared run begin in the state `before`."""
-    if before.shape != prepared.state.shape:
+def _taken_up(model: Model, before: Floats) -> Floats:
+    """State `before` in which a run goes on."""
+    if before.shape != (model.n_state,):
         raise InputError([Fault(
             "--continue", "", f"a state of {before.size} values",
-            f"{prepared.state.size} values, those of this vehicle",
+            f"{model.n_state} values, those of this vehicle",
         )])
-    prepared.state = before.copy()
-    prepared.fresh = False
-    if duration is not None:
-        prepared.end_time = float(before[-3]) + duration
+    return before.copy()
 
 
 def _disturb(model: Model, settings: Settings, state: Floats) -> None:

@@ -5,6 +5,8 @@ import pytest
 from dynamics import Settings, load_track, load_vehicle
 from rig import test_vehicle
 
+from railsim import run_in, simulation
+from railsim.errors import Fault, InputError
 from railsim.result import open_result
 from railsim.simulation import simulate
 
@@ -145,7 +147,38 @@ def test_start_on_irregular_rails_is_the_state_on_the_way(straight):
     assert np.max(np.abs(here.Y - way.Y[rows])) < 0.01 * np.max(np.abs(way.Y[rows]))
 
 
+def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(straight, monkeypatch):
+    """Then it is the state of the run from the beginning, to the rounding of the first step."""
+    track = straight.replace(irregularities=[
+        {"type": "random", "spectrum": "erri_b176_low", "seed": 1, "begin": 10.0}])
+    coach = load_vehicle("coach_manchester")
+    way = simulate(coach, track, speed=20.0, until=150.0)
+    usual = run_in.settled
+
+    def refused(model, balance, track, start, step):
+        if start > 1.0:
+            raise InputError([Fault("--start", "", "off the rails", "another place")])
+        return usual(model, balance, track, start, step)
+
+    monkeypatch.setattr(run_in, "settled", refused)
+    here = simulate(coach, track, speed=20.0, start=140.0, until=150.0)
+    rows = way.distance > 140.0 - 1e-6
+    np.testing.assert_allclose(here.Y, way.Y[rows], atol=1e-3 * np.max(np.abs(way.Y)))
+
+
 # continuation -------------------------------------------------------------------------------------
+
+
+def test_continued_run_needs_no_run_in(straight, monkeypatch):
+    coach = load_vehicle("coach_manchester")
+    first = simulate(coach, straight, speed=20.0, until=5.0)
+
+    def refused(*arguments):
+        raise AssertionError("a run-in")
+
+    monkeypatch.setattr(simulation, "start_state", refused)
+    assert simulate(coach, straight, resume=first, until=10.0).status == "complete"
+
 
 CASES = {
     "constant": (20.0, Settings()),

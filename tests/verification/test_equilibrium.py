@@ -1,0 +1,93 @@
+"""Steady rolling of vehicles whose elements have kinks where they rest, and of worn wheels."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dynamics import Settings, load_track
+
+import railsim.equilibrium
+from railsim.assembly import assemble
+from railsim.definitions.loading import load_vehicle_text
+from railsim.equilibrium import RESIDUAL, equilibrium
+from railsim.errors import ModelError
+from railsim.profiles import load_profile
+from railsim.profiles.profile import Profile
+
+DATA = Path(__file__).parents[1] / "data" / "vehicles"
+WAGON = (DATA / "two_axle_wagon.toml").read_text(encoding="utf-8")
+GUARDS = {
+    "x": "table = [[0.0, 0.0], [0.0225, 0.0], [0.0235, 5e3]]",
+    "y": "table = [[0.0, 0.0], [0.020, 0.0], [0.021, 5e3]]",
+}
+# forces over travel; each has its kink at rest
+STOP = "table = [[-0.1, -5e6], [0.0, 0.0], [0.1, 0.0]]"  # without clearance, one direction
+STIFF_STOP = "table = [[-0.1, -5e7], [0.0, 0.0], [0.1, 0.0]]"
+PUSHER = "table = [[-0.1, -2.1e4], [-1e-5, -2e4], [0.0, 0.0], [0.1, 1e6]]"  # Lenoir's, pressed on
+CLAMPED = "table = [[0.0, 0.0], [1e-6, 1e4], [0.1, 1.01e4]]"  # 10 GN/m within 1 um
+SECOND_STAGE = """
+[assemblies.axle.elements.stage]
+kind = "bump_stop"
+bodies = ["wagon", "wheelset"]
+point = [0.0, 1.0, -0.46]
+sides = "both"
+axis = "z"
+table = [[-0.1, -3e6], [0.0, 0.0], [0.1, 0.0]]
+"""
+
+
+def wagon(payload, along, across):
+    text = WAGON.replace("mass = 20000.0", f"mass = {8000.0 + payload}")
+    text = text.replace(GUARDS["x"], along).replace(GUARDS["y"], across)
+    assert GUARDS["x"] not in text
+    assert GUARDS["y"] not in text
+    return load_vehicle_text(text + SECOND_STAGE)
+
+
+def rolling(vehicle, speed, profiles=None):
+    model = assemble(vehicle, load_track("straight"), Settings(), profiles)
+    return equilibrium(model, speed)
+
+
+@pytest.mark.parametrize(("along", "across"), [
+    (STOP, STOP), (STIFF_STOP, STOP), (PUSHER, STOP), (CLAMPED, PUSHER), (CLAMPED, STIFF_STOP),
+], ids=["stops", "stiff stops", "pushers", "clamped axles", "clamped axles and stops"])  # fmt: skip
+def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
+    for payload, speed in itertools.product((0.0, 25e3, 50e3), (5.0, 20.0, 33.0)):
+        found = rolling(wagon(payload, along, across), speed)
+        assert found.residual < 1e3 * RESIDUAL
+        weight = found.model.system.gravity * np.sum(found.model.system.bodies.mass)
+        assert np.sum(found.Q0) == pytest.approx(weight, rel=1e-6)
+
+
+def test_message_names_the_elements_that_alternate(monkeypatch):
+    monkeypatch.setattr(railsim.equilibrium._Balance, "_over_kinks",
+                        lambda self, state, rest, change: (state, rest, False))
+
+    def all_of_them():
+        for payload, speed in itertools.product((0.0, 25e3, 50e3), (5.0, 20.0, 33.0)):
+            rolling(wagon(payload, PUSHER, PUSHER), speed)
+
+    with pytest.raises(ModelError, match="alternating between two branches: .*(guard|stage)"):
+        all_of_them()
+
+
+def hollow(depth, width=0.05):
+    """S1002 with a hollow of the tread, one wave of 1 - cos about the tape circle."""
+    new = load_profile("S1002", kind="wheel")
+    y = np.linspace(np.min(new.y), np.max(new.y), 2001)
+    u = np.clip(2.0 * y / width, -1.0, 1.0)
+    z = np.interp(y, new.y, new.z) - 0.5 * depth * (1.0 + np.cos(np.pi * u))
+    return Profile("hollow", "wheel", y, z, f"S1002, {1e3 * depth:g} mm hollow")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("depth", [2e-3, 4e-3])
+def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
+    coach = railsim.load_vehicle("coach_manchester")
+    found = rolling(coach, 20.0, {"S1002": hollow(depth)})
+    assert found.residual < 1e3 * RESIDUAL
+    np.testing.assert_allclose(found.Q0, found.Q0[0, 0], rtol=1e-6)
+    for body in found.model.system.contact.body:
+        assert abs(found.state[6 * body + 1]) < 1e-9
