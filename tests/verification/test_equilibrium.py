@@ -69,7 +69,7 @@ def test_message_names_the_elements_that_alternate(monkeypatch):
         for payload, speed in itertools.product((0.0, 25e3, 50e3), (5.0, 20.0, 33.0)):
             rolling(wagon(payload, PUSHER, PUSHER), speed)
 
-    with pytest.raises(ModelError, match="alternating between two branches: .*(guard|stage)"):
+    with pytest.raises(ModelError, match=r"alternating between two branches: .*(guard|stage)"):
         all_of_them()
 
 
