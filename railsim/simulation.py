@@ -296,7 +296,9 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
         prepared.model.profiles,
         {
             "state": {"end": run.state} | ({} if before is None else {"start": before}),
-            "peaks": run_extremes(run.extremes, prepared.balance.Q0),
+            # of quantities that are stored filtered the peaks are those of what is stored
+            **({} if settings.outputs.low_pass is not None else
+               {"peaks": run_extremes(run.extremes, prepared.balance.Q0)}),
         },
     )
     for remark in result.remarks:

@@ -148,7 +148,7 @@ def test_start_on_irregular_rails_is_the_state_on_the_way(straight):
 
 
 def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(straight, monkeypatch):
-    """Then it is the state of the run from the beginning, to the rounding of the first step."""
+    """Then it is the state of the run from the beginning; the scheme's memory begins anew: 1 %."""
     track = straight.replace(irregularities=[
         {"type": "random", "spectrum": "erri_b176_low", "seed": 1, "begin": 10.0}])
     coach = load_vehicle("coach_manchester")
@@ -163,7 +163,7 @@ def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(stra
     monkeypatch.setattr(run_in, "settled", refused)
     here = simulate(coach, track, speed=20.0, start=140.0, until=150.0)
     rows = way.distance > 140.0 - 1e-6
-    np.testing.assert_allclose(here.Y, way.Y[rows], atol=1e-3 * np.max(np.abs(way.Y)))
+    np.testing.assert_allclose(here.Y, way.Y[rows], atol=0.01 * np.max(np.abs(way.Y)))
 
 
 # continuation -------------------------------------------------------------------------------------
