@@ -23,10 +23,10 @@ the elastic patch, which grows with the load, and no softness is chosen.  Where 
 ellipse of the half relative curvatures A and B, with Hertz' unit-load semi-axis b1 and approach d1,
 the foundation's patch is as wide in proportion to it as
 
-    k = max(1.3 E*, 0.58 k_H),   k_H = 3/(4 B b1^3)   (a smooth maximum of the fourth power)
+    k = max(1.2 E*, 0.58 k_H),   k_H = 3/(4 B b1^3)   (a smooth maximum of the fourth power)
 
 gives (k_H would make it exactly as wide), and kappa = d1 - B^(1/3) (3/(4 k))^(2/3) makes the whole
-approach Hertz'.  1.3 is the one number that was fitted: to the lateral stiffness that boundary
+approach Hertz'.  1.2 is the one number that was fitted: to the lateral stiffness that boundary
 elements give (docs/validation/contact_geometry.md); B is averaged over the ellipse's width.  g, K
 and K2 are those that give the energies under three loads.
 
@@ -80,7 +80,16 @@ from railsim.errors import InputError
 from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
 from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
-from railsim.kernels.contact_table import A1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
+from railsim.kernels.contact_table import (
+    A1,
+    B1,
+    D_B1,
+    FINE_ROLL,
+    K2,
+    N_FIELD,
+    K,
+    stretched_roll,
+)
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
 
@@ -357,6 +366,8 @@ def build_contact_table(
     fill(tasks[0])  # compile once, not in every thread
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         list(pool.map(fill, tasks[1:]))
+    # a zone of a single candidate, at the end of the contour, has no width to carry anything
+    values[~np.isfinite(values).all(axis=-1)] = NOTHING
     values = spline_coefficients(values, stretched_nodes)
     # as from the cache: the time loop is compiled once, not for both kinds of arrays
     values.setflags(write=False)
@@ -390,6 +401,9 @@ def _chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
     grid = grid or TableGrid()
     return replace(grid, normal=normal) if normal else grid
 
+
+NOTHING = np.array([1.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])
+"""Fields of a zone that never touches."""
 
 CROWN_SLOPE = 0.3
 """Slope of a rail up to which its surface counts as its top, the tangent of 17 degrees [1]."""
@@ -452,6 +466,9 @@ def spline_coefficients(values: Array, stretched: Array) -> Array:
         second[1:-1] = source[2:] - 2.0 * source[1:-1] + source[:-2]
         source -= share * second / 6.0
     np.maximum(result[..., A1], 0.5 * values[..., A1], out=result[..., A1])
+    np.maximum(result[..., B1], 0.5 * values[..., B1], out=result[..., B1])
+    wide = 0.5 * (values[..., B1] + values[..., D_B1])
+    np.maximum(result[..., D_B1], wide - result[..., B1], out=result[..., D_B1])
     # K and K + K2 sqrt(e) at e = 0.1 mm
     low = np.zeros(values.shape[:-1], dtype=bool)
     for root in (0.0, 0.01):
