@@ -97,4 +97,5 @@ def in_flange_contact(
         damped, work_arrays(damped), state, np.zeros_like(state), np.zeros((3, len(state))),
         empty_recorder(model, 1), FAST, short, 1, steps, steps + 2, 1, 0,
     )
+    state[-4] = 0.0  # of the last step's length: steps of any length are judged from here
     return (smooth, state) if status == RUNNING else None
