@@ -211,9 +211,19 @@ def _assumption_lines(case: "Case") -> list[str]:
         f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
         f"  track     transitions rounded over {track.rounding:g} m, cant about the "
         f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
+        f"  support   rails {_support(track)}",
         *_irregularity_lines(track),
         f"  time      scheme {settings.scheme}, step {step}, output {rate}",
     ]
+
+
+def _support(track: "Track") -> str:
+    """Say what carries the rails."""
+    preset = track.support.preset
+    if preset == "rigid":
+        return "rigid"
+    changed = track.support.model_dump(exclude={"preset"}, exclude_none=True)
+    return f"elastic, {preset}{' with own values' if changed else ''}"
 
 
 def _irregularity_lines(track: "Track") -> list[str]:
