@@ -42,7 +42,7 @@ PART = {FAST: 1e-4, RK4: 2.5e-4}
 SWING = 0.1
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve
-GROWTH, GROWTH_IN_FLANGE = 5.0, 1.0
+GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
 _NEVER = 1 << 40
 
 
