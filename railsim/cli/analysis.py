@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from railsim.cli.common import echo
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, make_folder, whole_file
 
@@ -145,4 +144,4 @@ class Folder:
     def tell(self) -> None:
         """Print what was written."""
         for path in self.written:
-            click.echo(str(path))
+            echo(str(path))

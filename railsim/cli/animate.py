@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
 from railsim.files import check_file
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def command(
     if as_json:
         print_json({"file": str(path), "frames": len(scene.time), "title": scene.title})
     elif not quiet:
-        click.echo(str(path))
+        echo(str(path))
 
 
 def _scene(

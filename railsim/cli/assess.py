@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     overwrite_option,
     print_json,
@@ -90,9 +91,9 @@ def command(
         print_json([assessment.record() for assessment in assessments])
     else:
         for assessment in assessments:
-            click.echo("\n".join(assessment_lines(assessment, quiet=quiet)))
+            echo("\n".join(assessment_lines(assessment, quiet=quiet)))
         for path in written:
-            click.echo(str(path))
+            echo(str(path))
     return LIMIT_EXCEEDED if fail and any(a.exceeded for a in assessments) else DONE
 
 

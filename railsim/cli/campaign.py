@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-import click
-
-from railsim.cli.common import print_json
+from railsim.cli.common import echo, print_json
 from railsim.cli.progress import progress_bar
 
 
@@ -34,7 +32,7 @@ def run_campaign(
         from tqdm import tqdm
 
         with tqdm.external_write_mode():
-            click.echo(f"{record['name']}  {record['status']}")
+            echo(f"{record['name']}  {record['status']}")
 
     with progress_bar(scenario, quiet=quiet) as progress:
         done = campaign(
@@ -50,7 +48,7 @@ def run_campaign(
         })  # fmt: skip
         return DONE
     for assessment in done.assessments:
-        click.echo("\n".join(["", *assessment_lines(assessment, quiet=quiet)]))
+        echo("\n".join(["", *assessment_lines(assessment, quiet=quiet)]))
     for path in written:
-        click.echo(str(path))
+        echo(str(path))
     return DONE

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     load_option,
     overwrite_option,
@@ -102,7 +103,7 @@ def command(
     if as_json:
         print_json(one.record())
         return
-    click.echo("\n".join(_lines(one)))
+    echo("\n".join(_lines(one)))
     folder.tell()
 
 
@@ -148,9 +149,9 @@ def _tell_map(
                  for kind in ("linear", "nonlinear")]
         rows.append([*point, *cells])
     header = [*values, "linear (m/s)", "non-linear (m/s)"]
-    click.echo("\n".join(table(header, rows, numbers=0)))
+    echo("\n".join(table(header, rows, numbers=0)))
     for remark in dict.fromkeys(remark for record in found for remark in record["remarks"]):
-        click.echo(f"remark: {remark}")
+        echo(f"remark: {remark}")
     folder.tell()
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    echo,
     json_option,
     load_option,
     overwrite_option,
@@ -100,7 +101,7 @@ def command(
     if as_json:
         print_json(found.record())
         return
-    click.echo("\n".join(_lines(found)))
+    echo("\n".join(_lines(found)))
     folder.tell()
 
 

@@ -14,7 +14,7 @@ Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`
   c_x = (c_x/yaw)(yaw - t_y) - t_y c_y - t_z c_z with the table's (c_x/yaw);
 - creepages from the velocity of the wheel's material at the patch, v = V e_x + w_F x r + r'
   + w_abs x c less that of the rail's material (none where the rail is rigid: a slope of its shape
-  is no velocity), along d and at right angles to it, over V_p = V (1 + (omega x rho)_x), the
+  is no velocity), along d and at right angles to it, over V_p = V (1 + (omega x rho)_x) + x', the
   speed at which the patch runs along its rail;
 - tangential forces by the creep law for all patches of the vehicle in one call.
 
@@ -384,7 +384,7 @@ def creepages(system, work, n, speed, state):
               - cosine * rail_y + sine * rail_z)
         vz = (state[v + 2] + speed * (w1 * y - w2 * x) + a1 * cy - a2 * cx
               - sine * rail_y - cosine * rail_z)
-        rolling = speed * (1.0 + w2 * (z + cz) - w3 * (y + cy))
+        rolling = speed * (1.0 + w2 * (z + cz) - w3 * (y + cy)) + state[v]
         patch[C_X, k] = cx
         patch[C_Y, k] = cy
         patch[C_Z, k] = cz

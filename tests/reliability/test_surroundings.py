@@ -142,3 +142,9 @@ def test_cache_of_another_user_is_refused(tmp_path):
     cache.notices.clear()
     assert cache.safe_folder(folder) is None
     cache.notices.clear()
+
+
+def test_commands_print_by_the_function_that_escapes():
+    folder = ROOT / "railsim" / "cli"
+    by_click = [path.name for path in folder.glob("*.py") if "click.echo(" in path.read_text()]
+    assert by_click == ["common.py"]

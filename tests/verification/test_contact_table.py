@@ -62,8 +62,8 @@ def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
         height = lowest_gap(*WHEEL, *rail, y, roll, yaw, 0.46)[0]
         errors.append(evaluate(table, y, roll, yaw**2)[0][:, 0].min() - height)
     # g is fitted to the patch's energies: below first touch where a patch grows to one side only
-    assert np.max(np.abs(errors)) < 30e-6
-    assert np.median(np.abs(errors)) < 13e-6
+    assert np.max(np.abs(errors)) < 40e-6
+    assert np.median(np.abs(errors)) < 15e-6
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -76,8 +76,8 @@ def test_heights_of_worn_profiles_agree_too(seed):
     for y, roll, yaw in random_places(12, seed):
         height = lowest_gap(wheel.y, wheel.z, *rail, y, roll, yaw, 0.46)[0]
         errors.append(evaluate(table, y, roll, yaw**2)[0][:, 0].min() - height)
-    assert np.max(np.abs(errors)) < 35e-6
-    assert np.median(np.abs(errors)) < 13e-6
+    assert np.max(np.abs(errors)) < 40e-6
+    assert np.median(np.abs(errors)) < 15e-6
 
 
 @pytest.mark.parametrize("wheel", [None, 0, 1])

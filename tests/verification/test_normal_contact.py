@@ -51,11 +51,11 @@ def test_boundary_elements_converge_to_hertz(radius):
     assert np.all(fine[:2] < coarse[:2])
 
 
-@pytest.mark.parametrize("radius", [0.05, 0.30])
+@pytest.mark.parametrize("radius", [0.04, 0.05])
 @pytest.mark.parametrize("normal", ["hertz", "kik-piotrowski"])
 def test_both_normal_contacts_of_the_table_are_exact_for_an_ellipse(radius, normal):
     grid = TableGrid(s_min=-0.005, s_max=0.005, roll_max=0.004, n_w=2, normal=normal)
-    table = build_contact_table(cone(), round_rail(radius), gauge=1.5, inclination=0.0, grid=grid)
+    table = build_contact_table(cone(), round_rail(radius), inclination=0.0, grid=grid)
     fields = evaluate(table, 0.0, 0.0)[0][0]
     exact = hertz(0.5 * np.cos(np.arctan(1 / 40)) / 0.46, 0.5 / radius, LOAD, 2 * G * (1 + NU), NU)
     # the method's strips: 0.2 mm candidates over a patch of some millimetres

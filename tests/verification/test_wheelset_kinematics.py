@@ -86,7 +86,7 @@ def test_creepage_is_the_velocity_of_the_material_against_the_rail_at_the_patch(
         tangent = section @ [0.0, work.patch[ANGLE_COS, k], -work.patch[ANGLE_SIN, k]]
         tangent -= along * (along @ tangent)
         normal = np.cross(along, tangent)
-        rolling = stretch * SPEED
+        rolling = stretch * SPEED + v[0]
         found = work.patch[[XI_X, XI_Y], k]
         expected = np.array([along @ material, tangent @ material]) / rolling
         # the curve within 15 mm of the frame as its tangent, slopes of 2 mrad squared
