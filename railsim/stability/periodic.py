@@ -28,8 +28,9 @@ from railsim.errors import ModelError
 Floats = NDArray[np.float64]
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
-MOST_ITERATIONS = 12
-QUICK = 5  # iterations after which the next step may be longer
+MOST_ITERATIONS = 20
+SLOW = 0.3  # ratio of two changes from which on the matrix is formed anew
+QUICK = 8  # iterations after which the next step may be longer
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients
 SMALLEST_SHARE = 1.0 / 256.0  # of the given step
@@ -197,8 +198,13 @@ class Branch:
         # the tangent leads on also where only the speed is given
         lead = float(now.tangent @ direction)
         u = base + now.tangent * length / lead if abs(lead) > LEAD else base + length * direction
+        matrix: Floats | None = None
+        before = np.inf
         for iteration in range(1, MOST_ITERATIONS + 1):
-            residual, matrix = self._periodicity(u)
+            if matrix is None:
+                residual, matrix = self._periodicity(u)
+            else:  # the matrix costs as much as the flow of all components
+                residual = self._residual(u)
             rest = conditions @ (u - base) - np.array([0.0, length])
             full = np.vstack([matrix, conditions])
             if not np.isfinite(full).all():
@@ -209,7 +215,11 @@ class Branch:
                 break
             u = u + change
             if size < SETTLED:
+                _, matrix = self._periodicity(u)
                 return self._motion(u, matrix, conditions[0], now.tangent), iteration
+            if size > SLOW * before:
+                matrix = None
+            before = size
         raise ModelError("the search for a periodic motion does not converge")
 
     def fold(self, before: PeriodicMotion, after: PeriodicMotion, length: float) -> PeriodicMotion:
@@ -232,6 +242,15 @@ class Branch:
         root = brentq(forward, 1e-6 * length, length, xtol=1e-5 * length)
         forward(root)
         return found[root]
+
+    def _residual(self, u: Floats) -> Floats:
+        """x(T) - x, scaled."""
+        n = len(u) - 2
+        trial = u * self._scale
+        end = self._flow.after(trial[None, :n], self._share * trial[n : n + 1], trial[n + 1 :])[0]
+        if self._back is not None:
+            end = self._back @ end
+        return np.asarray(end / self._scale[:n] - u[:n])
 
     def _periodicity(self, u: Floats) -> tuple[Floats, Floats]:
         """Residual x(T) - x and its Jacobian over the scaled u, all scaled."""
