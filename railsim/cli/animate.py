@@ -41,7 +41,6 @@ def command(
 
     \b
     Example:
-      railsim run coach_manchester curve_r250 --speed 20 --out run.h5
       railsim animate run.h5 --out run.html
     """  # noqa: D301 - click reads the escape  # fmt: skip
     from railsim.animation import write_movie, write_page

@@ -73,7 +73,6 @@ def command(
 
     \b
     Example:
-      railsim run coach_manchester curve_r500 --speed 29 --set settings.output_rate=1000
       railsim assess coach_manchester_curve_r500_29.h5
       railsim assess coach_manchester_curve_r500_29.h5 --standard comfort
     """  # noqa: D301 - click reads the escape

@@ -264,7 +264,7 @@ def modes(
     >>> found = railsim.modes(railsim.load_vehicle("coach_manchester"), speed=30.0)
     >>> mode = found["car body bounce"]
     >>> print(f"{mode.natural_frequency:.2f} Hz, {100 * mode.damping_ratio:.0f} %")
-    0.92 Hz, 12 %
+    0.90 Hz, 11 %
     """
     check_speeds([speed])
     prepared = LinearVehicle(

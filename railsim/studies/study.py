@@ -161,7 +161,7 @@ def study(
     ...     outcome = railsim.study(
     ...         ["coach_manchester"], ["curve_r250"], [20.0], until=10.0, out=folder, workers=1
     ...     )
-    >>> [record["status"] for record in outcome.records]
+    ...     print([record["status"] for record in outcome.records])
     ['complete']
     """
     folder = Path(out)

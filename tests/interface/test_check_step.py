@@ -28,7 +28,8 @@ def test_check_in_json_is_the_difference_of_two_runs(tmp_path, capsys):
         result.inputs() | {"settings": result.settings().replace(step=0.5 * step)}
     ))
     largest = next(row for row in rows if (row["quantity"], row["where"]) == ("Q", "peak"))
-    assert largest["value"] == pytest.approx(result.Q.max(), rel=1e-15)
+    # peaks are those of the loop's own steps, a little above the largest sample
+    assert largest["value"] == pytest.approx(result.Q.max(), rel=1e-4)
     assert largest["half_step_value"] == pytest.approx(other.Q.max(), rel=1e-15)
     assert largest["difference"] == largest["value"] - largest["half_step_value"]
 

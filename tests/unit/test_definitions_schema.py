@@ -64,7 +64,7 @@ def test_schema_refuses_what_the_model_refuses(key, value):
         jsonschema.validate(data, schema)
 
 
-@pytest.mark.parametrize("page", sorted(PAGES))
+@pytest.mark.parametrize("page", sorted(PAGES - {"assess.md"}))  # that one shows parts only
 def test_whole_files_in_the_manual_are_valid(page, tmp_path):
     text = (DOCS / "user" / page).read_text()
     blocks = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)

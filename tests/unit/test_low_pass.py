@@ -87,7 +87,9 @@ def test_a_rate_that_folds_back_is_refused(outputs, rate, message):
 def test_low_passed_run_has_the_percentiles_of_the_fine_one():
     """Dips 0.6 m long and 0.8 mm deep: 200 instantaneous samples a second would be far off."""
     dips = [{"type": "dip", "s": s, "length": 0.6, "depth": 0.8e-3} for s in range(30, 190, 11)]
-    track = railsim.load_track("straight").replace(irregularities=dips)
+    track = railsim.load_track("straight").replace(
+        irregularities=dips, support={"preset": "rigid"}
+    )
     vehicle = railsim.load_vehicle("coach_manchester")
     outputs = {"quantities": ["Q", "wheelset_distance"], "sensors": True}
     fine = Settings(output_rate=1000.0, outputs=outputs, step=0.5e-3)

@@ -281,7 +281,7 @@ def test_unknown_names_suffixes_and_missing_files_are_refused(tmp_path):
         ("S1003", "did you mean 'S1002'"),
         ("none.csv", "cannot be read"),
         ("60E1", "rail profile"),
-        (str(tmp_path), "cannot be read"),
+        (str(tmp_path), "no such profile"),
     ):
         with pytest.raises(InputError, match=words):
             load_profile(name, "wheel")

@@ -14,7 +14,7 @@ from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
 from railsim.profiles import Profile
 from railsim.profiles.builtin import arc_chain_rail
-from railsim.time_step import SCHEMES, choose_step, empty_recorder
+from railsim.time_step import SCHEMES, Stability, empty_recorder
 
 RIGID = {"preset": "rigid"}
 STRAIGHT = load_track("straight").replace(support=RIGID)
@@ -125,7 +125,7 @@ def run_from(prepared, mode, speed, scheme):
     state[places] += AMPLITUDE * (mode.shapes[0] / max(lateral)).real
     system = prepared.system._replace(drive=CONSTANT_SPEED)
     level = level_track_with_friction(system)
-    h = choose_step(model, level, rest, scheme, 1.0 / 200.0)
+    h = Stability(model, level, rest, scheme, lambda _: None).choose(1.0 / 200.0)
     steps = round(1.0 / mode.frequencies[0] / 16.0 / h)
     work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
     time, seen = [], []
