@@ -58,7 +58,7 @@ def rail_line(system, point, s):
 def test_creepage_is_the_velocity_of_the_material_against_the_rail_at_the_patch(coach, start):
     """R 150 m, on the transition and in the circle: kappa (x + c_x) and V (1 - kappa y) count."""
     track = Track.model_validate({
-        "format": "railsim-track/1", "name": "R 150 m",
+        "format": "railsim-track/1", "name": "R 150 m", "support": {"preset": "rigid"},
         "plan": [{"type": "STR", "length": 10.0}, {"type": "CLO", "length": 60.0},
                  {"type": "CIR", "length": 200.0, "radius": 150.0}],
         "cant": [{"type": "CST", "length": 10.0, "cant": 0.0}, {"type": "LIR", "length": 60.0},

@@ -72,7 +72,8 @@ def _radii(curvature):
 
 def _track(wave, plan, **more):
     return Track.model_validate({
-        "format": "railsim-track/1", "name": "twin", "plan": plan, "rounding": ROUNDING, **more,
+        "format": "railsim-track/1", "name": "twin", "plan": plan, "rounding": ROUNDING,
+        "support": {"preset": "rigid"}, **more,
     })
 
 
