@@ -13,14 +13,14 @@ import numpy as np
 from railsim.kernels import jit_outside
 
 MOST_ITERATIONS = 60
-SETTLED = 1e-11  # change of the height below which Newton's method has converged [m]
+SETTLED = 1e-9  # step of Newton's method after which the next is below round-off [m]
 WIDTH_ITERATIONS = 8
 REFERENCE = 60e-6  # penetration at which the terms of the potential are compared [m]
 LEAST_SHARE = -0.4  # of the second term
 
 
 @jit_outside
-def overlap(z, theta, h, lift, du, first, last):
+def overlap(z, theta, h, lift, du):
     """Integral of the overlap over the candidates, and its derivative over z.
 
     The overlap is linear between neighbours, so that the edges of the patch lie between candidates
@@ -32,8 +32,6 @@ def overlap(z, theta, h, lift, du, first, last):
         Height of the wheel and approach of the bodies as a whole [m].
     h, lift, du : ndarray, shape (n,)
         Gap [m], L [1], distance to the next candidate [m].
-    first, last : int
-        Candidates considered, `last` exclusive.
 
     Returns
     -------
@@ -41,31 +39,47 @@ def overlap(z, theta, h, lift, du, first, last):
         Integral [m2] and its derivative, the patch's width [m].
     """
     total = width = 0.0
-    v0 = z - h[first] - theta * lift[first]
-    for i in range(first, last - 1):
-        v1 = z - h[i + 1] - theta * lift[i + 1]
-        high, low = max(v0, v1), min(v0, v1)
-        if high > 0.0:
-            part = du[i] if low >= 0.0 else high / (high - low) * du[i]
-            total += 0.5 * (high + max(low, 0.0)) * part
-            width += part
-        v0 = v1
+    # slices, and no branch or max(): so the compiler takes several intervals at a time
+    h0, h1, lift0, lift1 = h[:-1], h[1:], lift[:-1], lift[1:]
+    for i in range(h0.size):
+        v0 = z - h0[i] - theta * lift0[i]
+        v1 = z - h1[i] - theta * lift1[i]
+        high = v0 if v0 > v1 else v1
+        low = v1 if v0 > v1 else v0
+        over = high if high > 0.0 else 0.0
+        under = low if low > 0.0 else 0.0
+        share = (over - under) / (high - low)
+        part = du[i] * (share if low < 0.0 else 1.0)
+        total += 0.5 * (over + under) * part
+        width += part
     return total, width
 
 
 @jit_outside
-def height_under_load(z, load, k, theta, h, lift, du, first, last):
+def height_under_load(z, load, k, theta, h, lift, du):
     """Height at which the foundation carries a normal load [m].
 
-    Newton's method from `z`; the force is convex over the height, so that after the first step the
-    height falls towards the solution.  `load` in N, `k` in N/m2, the others as `overlap`.
+    Newton's method from `z` for load^(2/3), which is nearly a straight line over the height: three
+    or four steps; for the load itself where that would leave the heights between which the solution
+    is known to lie.  `load` in N, `k` in N/m2, the others as `overlap`.
     """
+    wanted = load / k
+    root_wanted = wanted ** (2.0 / 3.0)
+    low, high = -math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
-        total, width = overlap(z, theta, h, lift, du, first, last)
+        total, width = overlap(z, theta, h, lift, du)
         if width <= 0.0:
+            low = z
             z += 1e-5
             continue
-        step = (k * total - load) / (k * width)
+        if total < wanted:
+            low = z
+        else:
+            high = z
+        root = total ** (1.0 / 3.0)
+        step = 1.5 * (root * root - root_wanted) * root / width
+        if not low < z - step < high:
+            step = (total - wanted) / width
         z -= step
         if abs(step) < SETTLED:
             break
@@ -73,58 +87,70 @@ def height_under_load(z, load, k, theta, h, lift, du, first, last):
 
 
 @jit_outside
-def patch_sums(z, theta, h, lift, du, window, values, first, last, sums):
-    """Integrals over the patch into `sums`.
+def patch_sums(z, theta, h, lift, du, window, to_start, weight):
+    """Integrals over the patch, and the weights of the candidates in its means.
 
     Between neighbours overlap, window and values are linear; the energy is integrated exactly, for
     its second derivative is the stiffness.
 
     Parameters
     ----------
-    z, theta, h, lift, du, first, last
+    z, theta, h, lift, du
         As `overlap`.
     window : ndarray, shape (n,)
         Window of the zone [1].
-    values : ndarray, shape (m, n)
-        What is averaged over the pressure.
-    sums : ndarray, shape (m + 4,)
-        Integrals of v/L and v [m2], of window v^2/(2 L) [m3], window v/L [m2], then of window v/L
-        times each row of `values` (output).
+    to_start, weight : ndarray, shape (n,)
+        Scratch; integrals of window v/L times the share of each candidate in a linear
+        interpolation [m2] (output): they weigh what is averaged over the pressure.
 
     Returns
     -------
-    float
+    along, across, energy, carried : float
+        Integrals of v/L and v [m2], of window v^2/(2 L) [m3] and of window v/L [m2].
+    deepest : float
         Greatest overlap along the normal, v/L [m].
     """
-    sums[:] = 0.0
-    deepest = 0.0
-    for i in range(first, last - 1):
-        v0 = z - h[i] - theta * lift[i]
-        v1 = z - h[i + 1] - theta * lift[i + 1]
-        if v0 <= 0.0 and v1 <= 0.0:
-            continue
-        deepest = max(deepest, v0 / lift[i], v1 / lift[i + 1])
-        begin = 0.0 if v0 > 0.0 else v0 / (v0 - v1)
-        end = 1.0 if v1 > 0.0 else v0 / (v0 - v1)
-        v0, v1 = max(v0, 0.0), max(v1, 0.0)
+    along = across = energy = carried = deepest = 0.0
+    h0, h1, lift0, lift1, w0s, w1s = h[:-1], h[1:], lift[:-1], lift[1:], window[:-1], window[1:]
+    at_end = weight[1:]
+    for i in range(h0.size):
+        v0 = z - h0[i] - theta * lift0[i]
+        v1 = z - h1[i] - theta * lift1[i]
+        edge = v0 / (v0 - v1)
+        begin = edge if v0 <= 0.0 and v1 > 0.0 else 0.0
+        end = edge if v1 <= 0.0 and v0 > 0.0 else 1.0
+        v0 = v0 if v0 > 0.0 else 0.0
+        v1 = v1 if v1 > 0.0 else 0.0
         part = (end - begin) * du[i] / 6.0
-        along = 2.0 * part / (lift[i] + lift[i + 1])
-        sums[0] += 3.0 * along * (v0 + v1)
-        sums[1] += 3.0 * part * (v0 + v1)
+        normal = 2.0 * part / (lift0[i] + lift1[i])
+        along += 3.0 * normal * (v0 + v1)
+        across += 3.0 * part * (v0 + v1)
         # window at both ends of the overlap; integrals of products of three linear functions
-        w0 = window[i] + begin * (window[i + 1] - window[i])
-        w1 = window[i] + end * (window[i + 1] - window[i])
-        sums[2] += 0.25 * along * (w0 * (3.0 * v0 * v0 + 2.0 * v0 * v1 + v1 * v1)
+        w0 = w0s[i] + begin * (w1s[i] - w0s[i])
+        w1 = w0s[i] + end * (w1s[i] - w0s[i])
+        energy += 0.25 * normal * (w0 * (3.0 * v0 * v0 + 2.0 * v0 * v1 + v1 * v1)
                                    + w1 * (v0 * v0 + 2.0 * v0 * v1 + 3.0 * v1 * v1))
         # integral of w v (f0 + (f1 - f0) x): weights of both ends
-        at_start = 0.5 * along * (w0 * (3.0 * v0 + v1) + w1 * (v0 + v1))
-        at_end = 0.5 * along * (w0 * (v0 + v1) + w1 * (v0 + 3.0 * v1))
-        to_end = begin * at_start + end * at_end
-        to_start = at_start + at_end - to_end
-        sums[3] += at_start + at_end
-        for m in range(values.shape[0]):
-            sums[m + 4] += to_start * values[m, i] + to_end * values[m, i + 1]
-    return deepest
+        first = 0.5 * normal * (w0 * (3.0 * v0 + v1) + w1 * (v0 + v1))
+        second = 0.5 * normal * (w0 * (v0 + v1) + w1 * (v0 + 3.0 * v1))
+        late = begin * first + end * second
+        carried += first + second
+        at_end[i] = late
+        to_start[i] = first + second - late
+    weight[0] = 0.0
+    weight[:-1] += to_start[:-1]
+    for i in range(h.size):
+        deepest = max(deepest, (z - h[i]) / lift[i] - theta)
+    return along, across, energy, carried, deepest
+
+
+@jit_outside
+def weighted(weight, values):
+    """Sum of weight times value."""
+    total = 0.0
+    for i in range(weight.size):
+        total += weight[i] * values[i]
+    return total
 
 
 @jit_outside

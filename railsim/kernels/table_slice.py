@@ -18,6 +18,7 @@ from railsim.kernels.elastic_patch import (
     kept_above,
     patch_sums,
     unit_ellipse,
+    weighted,
 )
 from railsim.kernels.non_elliptic import non_elliptic_axes
 
@@ -33,9 +34,6 @@ FAR_AWAY = 1.0  # height of a zone that never touches [m]
 OUT_OF_REACH = 2e-3  # a zone that touches so much later than another carries nothing [m]
 SMALL_AXIS = 1e-4  # of a zone out of reach [m/N^(1/3)]
 LEAST_AXIS = 0.3  # axes without and under endless load over those under the middle one
-
-# rows of the values that are averaged over the pressure; curvatures follow
-V_Y, V_Z, V_SLOPE, V_RADIUS, V_CURVATURE = range(5)
 
 
 class Wheel(NamedTuple):
@@ -97,7 +95,9 @@ class Zone(NamedTuple):
 
     h : gap at z = 0 [m]; lift : 1/cos(contact angle), mean of wheel and rail [1]; du, length :
     distance to the next candidate along the axle, and of the neighbours along the contour [m];
-    c_y : lateral place from the wheelset's centre [m]; radius [m]; window [1].
+    c_y, c_z : place from the wheelset's centre [m]; radius [m]; slope : of the rail, downwards [1];
+    window [1]; wheel_curvature, rail_curvature : averaged, shape (n_width, n) [1/m]; node : of the
+    rail under the candidate.
     """
 
     h: np.ndarray
@@ -105,8 +105,13 @@ class Zone(NamedTuple):
     du: np.ndarray
     length: np.ndarray
     c_y: np.ndarray
+    c_z: np.ndarray
     radius: np.ndarray
+    slope: np.ndarray
     window: np.ndarray
+    wheel_curvature: np.ndarray
+    rail_curvature: np.ndarray
+    node: np.ndarray
 
 
 @jit_outside
@@ -131,15 +136,13 @@ def fill_table_slice(
     n, n_patch = wheel.u.size, values.shape[0]
     c_x, c_y, c_z, stretch = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     h, lift, du, length = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
-    averaged = np.empty((V_CURVATURE + elastic.half_widths.size, n))
-    least = np.empty(n_patch)
+    slope, node, least = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n_patch)
     trace_line(wheel.u, wheel.r, wheel.t, roll, yaw, c_x, c_y, c_z, stretch)
     for k in range(n):
         after, before = min(k + 1, n - 1), max(k - 1, 0)
         du[k] = wheel.u[after] - wheel.u[k]
         across = 0.5 * (wheel.u[after] - wheel.u[before])
         length[k] = across * math.sqrt(1.0 + wheel.t[k] * wheel.t[k])
-        averaged[V_Y, k], averaged[V_Z, k], averaged[V_RADIUS, k] = c_y[k], c_z[k], wheel.r[k]
     for i in range(y_nodes.size):
         y = y_nodes[i]
         for p in range(n_patch):
@@ -162,15 +165,14 @@ def fill_table_slice(
             start, end = near_candidates(y, p, least[p], c_y, c_z, stretch, centre_height, wheel,
                                          rail)
             for k in range(start, end):
-                height, slope, node = rail_height(
+                height, along, node[k] = rail_height(
                     y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope)
                 h[k] = height + centre_height - c_z[k]
-                lift[k] = 0.5 * (stretch[k] + math.sqrt(1.0 + slope * slope))
-                averaged[V_SLOPE, k] = -slope
-                for m in range(elastic.half_widths.size):
-                    averaged[V_CURVATURE + m, k] = wheel.curvature[m, k] + rail.curvature[m, node]
-            zone = Zone(h, lift, du, length, c_y, wheel.r, wheel.window[p])
-            fill_zone(values[p, i], zone, start, end, averaged, elastic, hertz, strips)
+                lift[k] = 0.5 * (stretch[k] + math.sqrt(1.0 + along * along))
+                slope[k] = -along
+            zone = Zone(h, lift, du, length, c_y, c_z, wheel.r, slope, wheel.window[p],
+                        wheel.curvature, rail.curvature, node)
+            fill_zone(values[p, i], zone, start, end, elastic, hertz, strips)
 
 
 @jit_outside
@@ -192,28 +194,24 @@ def near_candidates(y, p, least, c_y, c_z, stretch, centre_height, wheel, rail):
 
 
 @jit_outside
-def fill_zone(out, zone, begin, finish, averaged, elastic, hertz, strips):
+def fill_zone(out, zone, start, end, elastic, hertz, strips):
     """Fields of one zone at one place into `out`, shape (N_FIELD,)."""
-    h, lift, du, window = zone.h, zone.lift, zone.du, zone.window
-    sums = np.empty(averaged.shape[0] + 4)
-    place_sums = np.empty(V_CURVATURE + 4)
-    placed = averaged[:V_CURVATURE]
-    start, end = begin, finish
-    least = h[start:end].min()
+    least = zone.h[start:end].min()
     # ellipse of the averaged curvatures, which gives the foundation its stiffness
     k = FOUNDATION * elastic.E_star
-    z = height_under_load(least + 5e-5, elastic.reference, k, FIRST_THETA, h, lift, du, start, end)
-    patch_sums(z, FIRST_THETA, h, lift, du, window, averaged, start, end, sums)
-    A = 0.5 * sums[0] * sums[3] / (sums[1] * sums[4 + V_RADIUS])
-    B = averaged_curvature(A, sums[4 + V_CURVATURE:] / sums[3], elastic.half_widths, hertz,
-                           elastic.reference, elastic.floor_ratio)
+    h, lift, du = zone.h[start:end], zone.lift[start:end], zone.du[start:end]
+    z = height_under_load(least + 5e-5, elastic.reference, k, FIRST_THETA, h, lift, du)
+    scratch, weight = np.empty(end - start), np.empty(end - start)
+    along, across, _, carried, _ = patch_sums(z, FIRST_THETA, h, lift, du, zone.window[start:end],
+                                              scratch, weight)
+    A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
+    curvature = averaged_over_widths(zone, start, weight) / carried
+    B = averaged_curvature(A, curvature, elastic.half_widths, hertz, elastic.reference,
+                           elastic.floor_ratio)
     _, b1, d1 = unit_ellipse(A, B, hertz)
-    limit = z + MORE_LOAD * sums[1] / sums[0]
-    while h[start] > limit:
-        start += 1
-    while h[end - 1] > limit:
-        end -= 1
-    start, end = max(start - 1, begin), min(end + 1, finish)
+    start, end = within(z + MORE_LOAD * across / along, h, start, end)
+    h, lift, du = zone.h[start:end], zone.lift[start:end], zone.du[start:end]
+    scratch, weight = np.empty(end - start), np.empty(end - start)
     depth = (z - least) / elastic.reference ** (2.0 / 3.0)
     k = (k**4 + (LONG_PATCH * 0.75 / (B * b1**3)) ** 4) ** 0.25
     kappa = d1 - B ** (1.0 / 3.0) * (0.75 / k) ** (2.0 / 3.0)
@@ -222,26 +220,53 @@ def fill_zone(out, zone, begin, finish, averaged, elastic, hertz, strips):
     for j in range(3):
         load = LOADS[j]
         theta = kappa * load ** (2.0 / 3.0)
-        z = least + depth * load ** (2.0 / 3.0)
-        z = height_under_load(z, load, k, theta, h, lift, du, start, end)
-        deepest = patch_sums(z, theta, h, lift, du, window, placed, start, end, place_sums)
+        z = height_under_load(least + depth * load ** (2.0 / 3.0), load, k, theta, h, lift, du)
+        along, across, energy, carried, deepest = patch_sums(
+            z, theta, h, lift, du, zone.window[start:end], scratch, weight)
         heights[j] = z
-        share = place_sums[3] / place_sums[0]
-        energies[j] = k * place_sums[2] + share * 0.4 * kappa * load ** (5.0 / 3.0)
-        mean = place_sums[4:] / place_sums[3]
-        A = 0.5 * place_sums[0] / (place_sums[1] * mean[V_RADIUS])
+        energies[j] = k * energy + carried / along * 0.4 * kappa * load ** (5.0 / 3.0)
+        A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
         B = kept_above((4.0 / 3.0 * k / load) ** 2 * deepest**3, elastic.floor_ratio * A)
         ellipse = unit_ellipse(A, B, hertz)
         axis[j], place[2, j] = ellipse[0], ellipse[1]
+        place[0, j] = weighted(weight, zone.c_y[start:end]) / carried
+        place[1, j] = weighted(weight, zone.c_z[start:end]) / carried
+        place[3, j] = weighted(weight, zone.slope[start:end]) / carried
         if elastic.non_elliptic:
-            a, b = non_elliptic_axes(zone, start, end, mean[V_Y], A, B, ellipse, load,
+            a, b = non_elliptic_axes(zone, start, end, place[0, j], A, B, ellipse, load,
                                      elastic.E_star, strips)
             if a > 0.0:
                 axis[j], place[2, j] = a, b
-        place[0, j], place[1, j], place[3, j] = mean[V_Y], mean[V_Z], mean[V_SLOPE]
     out[G], out[K], out[K2] = fit_energy(heights, energies)
     out[A1] = axis[1]
     over_load(out, place)
+
+
+@jit_outside
+def within(limit, h, start, end):
+    """Range of the candidates from the first to the last whose gap is below a limit, and one more.
+
+    `h`, shape (end - start,), holds the gaps from `start` on [m].
+    """
+    first, last = 0, h.size
+    while h[first] > limit:
+        first += 1
+    while h[last - 1] > limit:
+        last -= 1
+    return start + max(first - 1, 0), start + min(last + 1, h.size)
+
+
+@jit_outside
+def averaged_over_widths(zone, start, weight):
+    """Weighted sums of the relative curvature, for each width over which it is averaged."""
+    sums = np.zeros(zone.wheel_curvature.shape[0])
+    for i in range(weight.size):
+        if weight[i] > 0.0:
+            k = start + i
+            for m in range(sums.size):
+                sums[m] += weight[i] * (zone.wheel_curvature[m, k]
+                                        + zone.rail_curvature[m, zone.node[k]])
+    return sums
 
 
 @jit_outside
