@@ -26,14 +26,14 @@ Floats = NDArray[np.float64]
 Situation = tuple[System, Floats]
 
 SCHEMES = {"fast": FAST, "rk4": RK4}
-# s; beyond them accuracy, not stability, decides
-LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
+# s; beyond them accuracy, not stability, decides; a third of the usual output interval of 5 ms
+LONGEST_STEP = {"fast": 5e-3 / 3.0, "rk4": 0.5e-3}
 # m of track a step: the shortest waves of irregular track, 3 m, are followed in fifty steps
 LONGEST_TRAVEL = 0.06
 SHORTEST_STEP = 1e-6  # s
 # a step is taken if one longer by this factor is stable too: a wheel load of twice the static one
-# raises the frequency of the contact by 2^(1/6) = 1.12
-MARGIN = 1.2
+# raises the frequency of the contact, which goes with the sixth root of the load, by as much
+MARGIN = 2.0 ** (1.0 / 6.0)
 # Where a wheel lifts or strikes a step is divided into parts of at most this length (s): a fiftieth
 # of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
 PART = {FAST: 1e-4, RK4: 2.5e-4}

@@ -189,15 +189,15 @@ def test_error_of_the_step_with_the_table_is_that_with_fastsim(coach):
 
 @pytest.fixture
 def long_patches(monkeypatch):
-    """Runs whose patches are made 60 times as long, over their width, as they are."""
+    """Runs whose patches are made 200 times as long, over their width, as they are."""
     assemble = simulation.assemble
 
     def with_long_patches(*arguments):
         model = assemble(*arguments)
         values = model.system.contact.values.copy()
-        values[..., A1] *= 60.0**0.5  # semi-axes of unit load
-        values[..., B1] /= 60.0**0.5
-        values[..., D_B1] /= 60.0**0.5
+        values[..., A1] *= 200.0**0.5  # semi-axes of unit load
+        values[..., B1] /= 200.0**0.5
+        values[..., D_B1] /= 200.0**0.5
         values.setflags(write=model.system.contact.values.flags.writeable)  # else compiled anew
         contact = model.system.contact._replace(values=values)
         return replace(model, system=model.system._replace(contact=contact))

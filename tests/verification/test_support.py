@@ -7,6 +7,7 @@ from dynamics import Settings, evaluate, load_track, load_vehicle, steady
 from railsim.assembly import work_arrays
 from railsim.definitions.support import PRESETS
 from railsim.definitions.vehicle import Vehicle
+from railsim.kernels.contact_table import K2, K
 from railsim.kernels.support import RATE, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import time_loop
@@ -90,7 +91,7 @@ def over_the_joint(speed, h, scheme="rk4", damping=0.0, stiffness=None, after=0.
     system = with_rails(model.system, dipped_joint, joint_slope)
     if stiffness is not None:
         values = system.contact.values.copy()
-        values[..., 1] = stiffness
+        values[..., K], values[..., K2] = stiffness, 0.0
         values.setflags(write=False)
         system = system._replace(contact=system.contact._replace(values=values))
     n = model.index.n_bodies

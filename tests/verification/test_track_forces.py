@@ -63,9 +63,11 @@ def test_crest_takes_and_sag_gives_the_load_of_m_v2_over_r(coach, sign):
 
 
 def test_free_coach_rolls_down_a_gradient_less_its_resistance(coach):
-    """V' = (m g sin(theta) - W) / (m + sum(I/r0^2)), once the jerk of the start has died.
+    """V' = (m g sin(theta) - W - W_c) / (m + sum(I/r0^2)), once the jerk of the start has died.
 
-    Within 0.1 %: the wheels roll on radii a little off r0, 4 % of the mass turns with them.
+    W_c is what the creep forces take, T_x xi_x + T_y xi_y + M_z phi of all wheels: the spin of
+    conical wheels costs 20 N.  Within 0.02 %: the wheels roll on radii a little off r0, 4 % of the
+    mass turns with them.
     """
     slope, resistance = 0.02, 2000.0
     profile = track(vertical=[{"type": "CST", "length": 1000.0, "gradient": -slope}])
@@ -75,8 +77,10 @@ def test_free_coach_rolls_down_a_gradient_less_its_resistance(coach):
     late = t > 4.0
     rate = 2.0 * np.polyfit(t[late], s[late], 2)[0]
     mass, turning = masses(coach)
-    expected = (mass * G * np.sin(np.arctan(slope)) - resistance) / (mass + turning)
-    assert rate == pytest.approx(expected, rel=1e-3)
+    creep = (result.T_gamma + result.T_gamma_spin)[-1].sum()
+    expected = (mass * G * np.sin(np.arctan(slope)) - resistance - creep) / (mass + turning)
+    assert creep == pytest.approx(20.0, abs=2.0)
+    assert rate == pytest.approx(expected, rel=2e-4)
 
 
 def test_traction_accelerates_the_mass_and_the_turning_wheels(coach):
@@ -245,7 +249,8 @@ def test_slow_run_over_a_twist_gives_the_static_change_of_load():
     level = ramp * (np.abs(s - 37.5) - 17.5) * (s > 20.0)
     rows = [(a, 0.0, -0.5 * b, 0.0, 0.5 * b)
             for a, b in zip(s.tolist(), level.tolist(), strict=True)]
-    twisted = track(irregularities=[{"type": "measured", "rows": rows, "fade": 0.0}])
+    twisted = track(irregularities=[{"type": "measured", "rows": rows, "fade": 0.0}],
+                    support={"preset": "rigid"})
     result = simulate(wagon, twisted, speed=2.0, until=60.0)
     row = int(np.argmin(np.abs(result.distance - 55.0)))
     base = 1.506
@@ -270,4 +275,4 @@ def test_irregular_rails_mirrored_give_the_mirrored_result(coach):
     assert np.max(np.abs(here.Q - there.Q[:, :, ::-1])) < 1e-3
     assert np.max(np.abs(here.Y + there.Y[:, :, ::-1])) < 1e-3
     assert np.max(np.abs(here.wheelset_yaw + there.wheelset_yaw)) < 1e-10
-    assert np.ptp(here.Q) > 2e4
+    assert np.ptp(here.Q) > 1.5e4  # it is no smooth run
