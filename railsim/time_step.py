@@ -26,8 +26,8 @@ Floats = NDArray[np.float64]
 Situation = tuple[System, Floats]
 
 SCHEMES = {"fast": FAST, "rk4": RK4}
-# s; beyond them accuracy, not stability, decides; a third of the usual output interval of 5 ms
-LONGEST_STEP = {"fast": 5e-3 / 3.0, "rk4": 0.5e-3}
+# s; beyond them accuracy, not stability, decides
+LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
 # m of track a step: the shortest waves of irregular track, 3 m, are followed in fifty steps
 LONGEST_TRAVEL = 0.06
 SHORTEST_STEP = 1e-6  # s
