@@ -588,13 +588,21 @@ class Envelope(Definition):
 
 RESULTS = ("travel", "stroke", "length_start", "length_end", "max_force", "min_force")
 """Results that `published` may name, beside the smallest of each angle."""
+def _table_or_word(value: Any) -> str:
+    return "table" if isinstance(value, dict) else "word"
+
+
 Objective = Literal["follow", "constant", "linear", "constant_force", "peak_force"]
 
 
 class Optimise(Definition):
     """Search for parameters."""
 
-    objective: Objective | dict[Objective, Annotated[float, Field(strict=True, ge=0.0)]] = "follow"
+    objective: Annotated[
+        Annotated[Objective, Tag("word")]
+        | Annotated[dict[Objective, Annotated[float, Field(strict=True, ge=0.0)]], Tag("table")],
+        Discriminator(_table_or_word),
+    ] = "follow"
     """What to make small, or a table of objectives with their weights"""
     reference: Text | None = None
     """Mechanism whose ratio is followed at equal height of the output"""

@@ -129,7 +129,10 @@ def sentences(result: Analysis) -> list[str]:
     for s, stable in result.equilibria:
         found.append(f"at rest at {driver(s)}, {'stable' if stable else 'unstable'}")
     if (contact := result.contact) is not None:
-        forces = ", ".join(f"{name} {value:.2f} N" for name, value in contact.force.items())
+        forces = ", ".join(
+            f"{name} {value:.2f} N" if np.isfinite(value) else f"{name} no value"
+            for name, value in contact.force.items()
+        )
         found.append(f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces}")
         found += [contact.reason] if contact.reason else []
         for y, stable in contact.equilibria:
