@@ -35,6 +35,7 @@ QUANTITIES = {
 }
 ANGLE = Quantity("rad", "deg", DEGREES, 3, "angle")
 LENGTH = Quantity("m", "mm", 1e3, 3, "length")
+GAS = Quantity("Pa", "MPa", 1e-6, 3, "pressure of the gas over the outside")
 FORCE = Quantity("N", "N", 1.0, 2, "push")
 TORQUE = Quantity("N m", "N m", 1.0, 3, "torque of the unknown actuator")
 SHOWN = {"m": ("mm", 1e3), "rad": ("deg", DEGREES), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}
@@ -54,6 +55,8 @@ def quantity(name: str, definition: Mechanism) -> Quantity:
         return QUANTITIES[name]
     if name in definition.angles or name.endswith("_pressure_angle"):
         return ANGLE
+    if name.endswith("_pressure"):
+        return GAS
     return LENGTH if name.endswith("_length") else FORCE
 
 

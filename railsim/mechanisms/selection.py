@@ -1,15 +1,12 @@
 """Checks and the choice of components: every row of a catalogue fits, or why not."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from railsim.definitions.mechanism import CatalogueRow, Cylinder, GasSpring
 from railsim.mechanisms.analysis import Analysis, actuator_of
 from railsim.mechanisms.components import cylinder_area, next_size
-from railsim.mechanisms.kinematics import folded
 
 ROUNDING = 1e-5
 """Share of a limit by which rounding may miss it: dimensions have six or seven digits."""
@@ -189,8 +186,3 @@ def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
     first = max(low, needed)
     return [] if first > high else list(np.linspace(first, high, 101))
 
-
-def angle_spread(result: Analysis, name: str) -> Sequence[float]:
-    """Smallest and largest of a named angle, folded [rad]."""
-    values: Any = folded(result.output[name])
-    return float(np.min(values)), float(np.max(values))
