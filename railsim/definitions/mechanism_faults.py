@@ -228,6 +228,8 @@ def _references(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
     for i, selection in enumerate(mechanism.selection):
         yield f"selection.{i}.element", selection.element, "gas spring"
         yield f"selection.{i}.catalogue", selection.catalogue, "catalogue"
+    if mechanism.lid is not None:
+        yield "lid.element", mechanism.lid.element, "gas spring"
     for i, box in enumerate(mechanism.optimise.envelope if mechanism.optimise else ()):
         for j, point in enumerate(box.points):
             yield f"optimise.envelope.{i}.points.{j}", point, "point"
@@ -241,7 +243,7 @@ def _part_references(key: str, part: Any) -> Iterator[tuple[str, str, str]]:
     for field in ("push", "force", "point_mass", "cam", "path"):
         if (point := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", point, "point"
-    for field in ("turn", "torque", "body"):
+    for field in ("turn", "torque", "body", "joint_friction"):
         if (body := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", body, "body"
 
@@ -349,7 +351,9 @@ POSITIVE: dict[Any, tuple[str, ...]] = {
     Cylinder: ("bore", "count", "supply_pressure"),
     GasSpring: ("F1", "progression", "stroke", "extended"),
 }
-NOT_NEGATIVE = {"mass", "inertia", "stiffness", "damping", "friction", "rod", "end_damping"}
+NOT_NEGATIVE = {
+    "mass", "inertia", "stiffness", "damping", "friction", "moment", "rod", "end_damping"
+}  # fmt: skip
 
 
 def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fault]:
@@ -377,6 +381,11 @@ def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fa
             if quantity is not None and not number(quantity, values) > 0.0:
                 value = number(quantity, values)
                 faults.append(_value_fault(f"{key}.{field}", quantity, value, "greater than 0"))
+    if (lid := mechanism.lid) is not None:
+        for field in ("mass", "centre", "lever", "springs", "factor"):
+            quantity = getattr(lid, field)
+            if not (value := number(quantity, values)) > 0.0:
+                faults.append(_value_fault(f"lid.{field}", quantity, value, "greater than 0"))
     driver = mechanism.driver
     begin, end = number(driver.start, values), number(driver.end, values)
     if begin == end:

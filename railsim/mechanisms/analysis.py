@@ -29,6 +29,7 @@ from railsim.mechanisms.forces import (
     inertia,
     pressure_for,
     reactions,
+    rubs,
     table_of,
     unit_work,
 )
@@ -300,13 +301,12 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     definition = model.definition
     sense = int(np.sign(model.end - model.start))
     found: dict[str, Any] = {"force": actuator_force(motion, unknown, Rates(friction=sense))}
-    rubs = any(
-        isinstance(e, GasSpring) and model.number(e.friction) for e in definition.elements.values()
-    )
-    if rubs:
+    if rubs(model):
         found["force_back"] = actuator_force(motion, unknown, Rates(friction=-sense))
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):
         found["pressure"] = pressure_for(motion, unknown, found["force"])
+        if "force_back" in found:
+            found["pressure_back"] = pressure_for(motion, unknown, found["force_back"])
     if definition.output is not None:
         _, r1, _ = motion.point(definition.output.point)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -424,7 +424,8 @@ def _rests(dense: Motion, force: Any) -> tuple[tuple[float, bool], ...]:
 def _reactions(motion: Motion, output: Mapping[str, Any]) -> dict[str, Reaction]:
     definition = motion.model.definition
     forces = {} if definition.solve is None else {definition.solve.unknown: output["force"]}
-    joints, _ = reactions(motion, forces)
+    sense = int(np.sign(motion.model.end - motion.model.start))
+    joints, _ = reactions(motion, forces, Rates(friction=sense))
     found = {}
     for name, rows in joints.items():
         # the second row of a prismatic joint is a torque

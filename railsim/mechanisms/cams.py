@@ -118,9 +118,9 @@ def on_one_arc(motion: Motion, row: int, arc: int, beyond: float) -> Motion | No
     free: Any = replace(motion.model, linkage=linkage._replace(joint=joints, arc_ends=ends))
     low, high = sorted((motion.model.start, motion.model.end))
     s = motion.s[on]
-    side = np.clip([np.min(s) - beyond, np.max(s) + beyond], low, high)
+    begin, end = (float(np.clip(x, low, high)) for x in (np.min(s) - beyond, np.max(s) + beyond))
     start = replace(motion, s=s[:1], q=motion.q[on[:1]], arcs=motion.arcs[on[:1]], known={})
     try:
-        return solve(free, np.linspace(*side, 101), start)
+        return solve(free, np.linspace(begin, end, 101), start)
     except InputError:
         return None

@@ -30,6 +30,7 @@ QUANTITIES = {
     "force": Quantity("N", "N", 1.0, 2, "force of the unknown actuator"),
     "force_back": Quantity("N", "N", 1.0, 2, "the same on the way back"),
     "pressure": Quantity("Pa", "MPa", 1e-6, 5, "pressure that gives this force"),
+    "pressure_back": Quantity("Pa", "MPa", 1e-6, 5, "the same on the way back"),
     "effective_weight": Quantity("N", "N", 1.0, 2, "weight of everything, felt at the output"),
     "effective_mass": Quantity("kg", "kg", 1.0, 3, "mass of everything, felt at the output"),
 }

@@ -133,7 +133,7 @@ def sentences(result: Analysis) -> list[str]:
         found.append(
             f"{change.joint}: from arc {change.before} to {change.after} at "
             f"{driver(change.travel)}, gap {change.gap * 1e3:.4f} mm, jump of the rate "
-            f"{jump * 100.0:+.3f} %"
+            f"{round(jump * 100.0, 3) + 0.0:.3f} %"
         )
     if (contact := result.contact) is not None:
         forces = ", ".join(
