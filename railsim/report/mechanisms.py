@@ -219,15 +219,21 @@ def animation(result: Analysis) -> bytes:
         axes.set_aspect("equal")
         axes.set_xlabel("x / mm")
         axes.set_ylabel("y / mm")
+        title = axes.set_title(_told(result, motion.s[0]))
+        moving: list[Any] = [*made, title]
+        for artist in moving:
+            artist.set_animated(True)  # left out of what stays
+        canvas.draw()  # type: ignore[no-untyped-call]
+        still = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
         for k in range(GIF_FRAMES):
+            canvas.restore_region(still)  # type: ignore[no-untyped-call]
             for line, artist in zip(drawn, made, strict=True):
                 artist.set_data(*(line.xy[k] * 1e3).T)
-            axes.set_title(_told(result, motion.s[k]))
-            if k == 1:
-                figure.set_layout_engine("none")  # settled by the first frame
-            canvas.draw()  # type: ignore[no-untyped-call]
+            title.set_text(_told(result, motion.s[k]))
+            for artist in moving:
+                artist.draw(canvas.get_renderer())  # type: ignore[no-untyped-call]
             pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-            frames.append(Image.fromarray(pixels).convert("RGB").quantize(32))
+            frames.append(Image.fromarray(pixels).convert("L"))
     buffer = BytesIO()
     both = frames + frames[-2:0:-1]
     both[0].save(buffer, "GIF", save_all=True, append_images=both[1:], duration=60, loop=0)
