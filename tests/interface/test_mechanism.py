@@ -3,6 +3,7 @@
 import json
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -432,6 +433,16 @@ def test_air_spring_outside_its_table_is_no_value_in_the_contact_force(capsys):
     data = answer(capsys, "atr95", "--set", "parameters.held_pressure=0.15e6", *FEW)
     assert data["contact"]["force"]["work"] is None
     assert "table" in data["contact"]["reason"]
+
+
+def test_files_of_the_manual_run_and_give_the_forces_it_states(capsys, write):
+    page = (Path(__file__).parents[2] / "docs" / "user" / "mechanisms.md").read_text()
+    flap, gas = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    assert answer(capsys, write(flap))["max_force"] > 0.0
+    file = write(gas, "flap.toml")
+    for case, said in (([], "15.9 N"), (["--case", "winter"], "32.0 N")):
+        assert f"{answer(capsys, file, *case)['output']['force'][0]:.1f} N" == said
+        assert said in page
 
 
 def test_info_shows_parameters_with_their_provenance(capsys):
