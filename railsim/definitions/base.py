@@ -4,9 +4,12 @@ Every definition is frozen and refuses unknown keys.  Numbers are strict: no tex
 nothing infinite.  What may be given once for both sides is always stored as the pair (left, right).
 """
 
+import ast
+import inspect
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -73,9 +76,29 @@ class Definition(BaseModel):
     """Base of everything that a user may write."""
 
     # built when first used: a part of a vehicle is built as part of it, not once more by itself
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+
+@cache
+def meanings(model: type[BaseModel]) -> dict[str, str]:
+    """What the text below each field of a definition says, by the field's name.
+
+    It is read from the source when it is asked for: at import it would cost every command a tenth.
+    """
+    found: dict[str, str] = {}
+    for part in reversed(model.__mro__):
+        if not issubclass(part, Definition):
+            continue
+        (body,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
+        assert isinstance(body, ast.ClassDef)
+        for field, text in pairwise(body.body):
+            match field, text:
+                case (
+                    ast.AnnAssign(target=ast.Name(id=name)),
+                    ast.Expr(value=ast.Constant(value=str(said))),
+                ):
+                    found[name] = inspect.cleandoc(said)
+    return found
 
 
 class FileDefinition(Definition):

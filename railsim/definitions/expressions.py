@@ -9,6 +9,7 @@ here is analytic, or (`atan2`, `hypot`) continued to first order.
 import ast
 import math
 import operator
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -79,7 +80,7 @@ def _check(node: ast.expr) -> None:
     match node:
         case ast.Constant(value=bool() | complex() | str() | bytes() | None):
             pass
-        case ast.Constant(value=int() | float() as value) if math.isfinite(float(value)):
+        case ast.Constant(value=int() | float() as value) if abs(value) <= sys.float_info.max:
             return
         case ast.Name():
             return

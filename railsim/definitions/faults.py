@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, Tag, ValidationError
 
+from railsim.definitions.base import meanings
 from railsim.definitions.sources import Source
 from railsim.errors import Fault, nearest
 
@@ -119,8 +120,9 @@ def _missing(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
     if isinstance(detail["input"], list | tuple):
         return _counted(detail["input"]), _list_of(_annotation_at(model, detail["loc"][:-1]))
     *parents, name = detail["loc"]
-    field = _fields(_annotation_at(model, parents)).get(str(name))
-    meaning = " ".join(field.description.split()) if field and field.description else ""
+    owner = _annotation_at(model, parents)
+    said = meanings(owner).get(str(name), "") if str(name) in _fields(owner) else ""
+    meaning = " ".join(said.split())
     return "missing", f"needed: {meaning}" if meaning else "needed"
 
 

@@ -349,6 +349,15 @@ class Spring(Definition):
     """Length without force [m]"""
 
 
+class JointFriction(Definition):
+    """Dry friction of joints against a body's turning."""
+
+    joint_friction: Name
+    """Body that turns against the ground"""
+    moment: Quantity
+    """Torque against its motion [N m]"""
+
+
 class Damper(Definition):
     """A linear damper between two points."""
 
@@ -402,6 +411,8 @@ class GasSpring(Definition):
     """Temperature of the gas [C]"""
     rod: Quantity | None = None
     """Diameter of the rod [m], for the pressure of the gas"""
+    service: tuple[Quantity, Quantity] = (-30.0, 80.0)
+    """Lowest and highest temperature in service [C]"""
 
 
 Element = Annotated[
@@ -409,10 +420,13 @@ Element = Annotated[
     | Annotated[Force, Tag("a force")]
     | Annotated[Torque, Tag("a torque")]
     | Annotated[Spring, Tag("a spring")]
+    | Annotated[JointFriction, Tag("a joint_friction")]
     | Annotated[Damper, Tag("a damper")]
     | Annotated[Stop, Tag("a stop")]
     | Annotated[GasSpring, Tag("a gas_spring")],
-    _by_key("point_mass", "force", "torque", "spring", "damper", "stop", "gas_spring"),
+    _by_key(
+        "point_mass", "force", "torque", "spring", "joint_friction", "damper", "stop", "gas_spring"
+    ),
 ]
 
 
@@ -575,6 +589,23 @@ class Selection(Definition):
     """The catalogue"""
 
 
+class Lid(Definition):
+    """Quick check of a lid's gas springs by the makers' formula F1 = G D/(b n) 9.8 alpha."""
+
+    element: Name
+    """Gas spring whose `F1` is checked"""
+    mass: Quantity
+    """Mass of the lid G [kg]"""
+    centre: Quantity
+    """Lever of its centre of gravity about the hinge, lid open D [m]"""
+    lever: Quantity
+    """Lever of the springs about the hinge, lid open b [m]"""
+    springs: Quantity = 2.0
+    """Number of springs n"""
+    factor: Quantity = 1.1
+    """Factor of safety alpha"""
+
+
 class Envelope(Definition):
     """A box that points may not leave."""
 
@@ -588,13 +619,21 @@ class Envelope(Definition):
 
 RESULTS = ("travel", "stroke", "length_start", "length_end", "max_force", "min_force")
 """Results that `published` may name, beside the smallest of each angle."""
+def _table_or_word(value: Any) -> str:
+    return "table" if isinstance(value, dict) else "word"
+
+
 Objective = Literal["follow", "constant", "linear", "constant_force", "peak_force"]
 
 
 class Optimise(Definition):
     """Search for parameters."""
 
-    objective: Objective | dict[Objective, Annotated[float, Field(strict=True, ge=0.0)]] = "follow"
+    objective: Annotated[
+        Annotated[Objective, Tag("word")]
+        | Annotated[dict[Objective, Annotated[float, Field(strict=True, ge=0.0)]], Tag("table")],
+        Discriminator(_table_or_word),
+    ] = "follow"
     """What to make small, or a table of objectives with their weights"""
     reference: Text | None = None
     """Mechanism whose ratio is followed at equal height of the output"""
@@ -683,6 +722,8 @@ class Mechanism(FileDefinition):
     """Catalogues of gas springs by name"""
     selection: tuple[Selection, ...] = ()
     """Gas springs to be found in a catalogue"""
+    lid: Lid | None = None
+    """Quick check of a lid's gas springs"""
     optimise: Optimise | None = None
     """Search for parameters"""
     published: dict[Name, Quantity] = Field(default_factory=dict)

@@ -25,6 +25,10 @@ from railsim.errors import Fault, InputError, nearest
 
 LARGEST = 50.0  # m; no mechanism of a vehicle is larger
 OUT_OF_PROPORTION = 100.0
+MOST_TURNED = 12.5  # rad; two turns
+ABSOLUTE_ZERO = -273.15  # C
+PARTS = ("length", "free_length", "stroke", "extended", "bore", "rod", "pin_to_pin", "end_length")
+"""Lengths of actuators and elements."""
 ROWS = {"revolute": 2, "link": 1, "slot": 1, "prismatic": 2, "cam": 1}
 
 
@@ -36,7 +40,8 @@ def mechanism_faults(mechanism: Mechanism) -> list[Fault]:
     for case in (None, *mechanism.cases):
         faults += _value_faults(mechanism, case)
     if faults:
-        return [*_unit_faults(mechanism), *faults]
+        # what else is wrong follows from a length in millimetres or an angle in degrees
+        return _unit_faults(mechanism) or faults
     return [*_freedom_faults(mechanism), *_size_faults(mechanism)]
 
 
@@ -223,6 +228,8 @@ def _references(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
     for i, selection in enumerate(mechanism.selection):
         yield f"selection.{i}.element", selection.element, "gas spring"
         yield f"selection.{i}.catalogue", selection.catalogue, "catalogue"
+    if mechanism.lid is not None:
+        yield "lid.element", mechanism.lid.element, "gas spring"
     for i, box in enumerate(mechanism.optimise.envelope if mechanism.optimise else ()):
         for j, point in enumerate(box.points):
             yield f"optimise.envelope.{i}.points.{j}", point, "point"
@@ -236,7 +243,7 @@ def _part_references(key: str, part: Any) -> Iterator[tuple[str, str, str]]:
     for field in ("push", "force", "point_mass", "cam", "path"):
         if (point := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", point, "point"
-    for field in ("turn", "torque", "body"):
+    for field in ("turn", "torque", "body", "joint_friction"):
         if (body := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", body, "body"
 
@@ -344,7 +351,9 @@ POSITIVE: dict[Any, tuple[str, ...]] = {
     Cylinder: ("bore", "count", "supply_pressure"),
     GasSpring: ("F1", "progression", "stroke", "extended"),
 }
-NOT_NEGATIVE = {"mass", "inertia", "stiffness", "damping", "friction", "rod", "end_damping"}
+NOT_NEGATIVE = {
+    "mass", "inertia", "stiffness", "damping", "friction", "moment", "rod", "end_damping"
+}  # fmt: skip
 
 
 def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fault]:
@@ -359,11 +368,24 @@ def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fa
                 value = number(quantity, values)
                 if value < 0.0 or (field in positive and value == 0.0):
                     allowed = "greater than 0" if field in positive else "0 or greater"
-                    faults.append(Fault("", f"{table}.{name}.{field}", f"{value:g}", allowed))
+                    faults.append(_value_fault(f"{table}.{name}.{field}", quantity, value, allowed))
+            if isinstance(part, GasSpring):
+                faults += _gas_faults(f"{table}.{name}", part, values)
             if isinstance(part, Cam):
                 faults += _arc_faults(f"joints.{name}", part, values)
             if isinstance(part, AirSpring):
                 faults += _table_faults(f"{table}.{name}", part, values)
+    for key, timed in (("motion", mechanism.motion), ("release", mechanism.release)):
+        for field in ("speed", "duration"):
+            quantity = getattr(timed, field, None)
+            if quantity is not None and not number(quantity, values) > 0.0:
+                value = number(quantity, values)
+                faults.append(_value_fault(f"{key}.{field}", quantity, value, "greater than 0"))
+    if (lid := mechanism.lid) is not None:
+        for field in ("mass", "centre", "lever", "springs", "factor"):
+            quantity = getattr(lid, field)
+            if not (value := number(quantity, values)) > 0.0:
+                faults.append(_value_fault(f"lid.{field}", quantity, value, "greater than 0"))
     driver = mechanism.driver
     begin, end = number(driver.start, values), number(driver.end, values)
     if begin == end:
@@ -378,6 +400,28 @@ def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fa
             if not low < high:
                 key = f"optimise.bounds.{name}"
                 faults.append(Fault("", key, f"{low:g}, {high:g}", "the second above the first"))
+    return faults
+
+
+def _value_fault(key: str, quantity: float | str, value: float, allowed: str) -> Fault:
+    """A value out of its range, at the parameter that says it where there is just one."""
+    if isinstance(quantity, Expression):
+        if str(quantity) in quantity.names:
+            return Fault("", f"parameters.{quantity}", f"{value:g} (as {key})", allowed)
+        return Fault("", key, f"'{quantity}' is {value:g}", allowed)
+    return Fault("", key, f"{value:g}", allowed)
+
+
+def _gas_faults(key: str, gas: GasSpring, values: Mapping[str, Any]) -> list[Fault]:
+    faults = []
+    for field, least, allowed in (
+        ("progression", 1.0, "1 or greater: the gas is compressed"),
+        ("temperature", ABSOLUTE_ZERO, f"above {ABSOLUTE_ZERO:g} C"),
+    ):
+        quantity = getattr(gas, field)
+        value = number(quantity, values)
+        if value < least or (field == "temperature" and value == least):
+            faults.append(_value_fault(f"{key}.{field}", quantity, value, allowed))
     return faults
 
 
@@ -404,14 +448,15 @@ def _table_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> list
 
 
 def _unit_faults(mechanism: Mechanism) -> list[Fault]:
-    """Parameters that are lengths and look like millimetres: told where something is wrong."""
-    return [
-        Fault("", f"parameters.{name}", f"{value:g} m, out of proportion", "lengths in metres")
-        for name, value in mechanism.parameters.items()
-        if not isinstance(value, str)
-        and mechanism.unit_of(name) == "m"
-        and abs(value) >= LARGEST
-    ]
+    """Parameters that look like millimetres or degrees: told where something is wrong."""
+    limits = {"m": (LARGEST, "lengths in metres"), "rad": (MOST_TURNED, "angles in radians")}
+    found = []
+    for name, value in mechanism.parameters.items():
+        unit = mechanism.unit_of(name)
+        if not isinstance(value, str) and unit in limits and abs(value) >= limits[unit][0]:
+            words = f"{value:g} {unit}, out of proportion"
+            found.append(Fault("", f"parameters.{name}", words, limits[unit][1]))
+    return found
 
 
 def _freedom_faults(mechanism: Mechanism) -> list[Fault]:
@@ -447,15 +492,33 @@ def sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
     return {key: size for key, size in found.items() if size > 1e-9}
 
 
+def part_sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
+    """Lengths of actuators, elements and the zone by the key that says them [m]."""
+    found = {}
+    for table in ("actuators", "elements"):
+        for name, part in getattr(mechanism, table).items():
+            for field in PARTS:
+                if (quantity := getattr(part, field, None)) is not None:
+                    found[f"{table}.{name}.{field}"] = abs(float(number(quantity, values)))
+            for i, height in enumerate(getattr(part, "heights", ())):
+                found[f"{table}.{name}.heights.{i}"] = abs(float(number(height, values)))
+    if mechanism.zone is not None:
+        for field in ("low", "work", "high"):
+            found[f"zone.{field}"] = abs(float(number(getattr(mechanism.zone, field), values)))
+    return found
+
+
 def _size_faults(mechanism: Mechanism) -> list[Fault]:
     values = parameter_values(mechanism)
     found = sizes(mechanism, values)
     if not found:
         return [Fault("", "bodies", "no lengths", "points at different places")]
     middle = float(np.median(list(found.values())))
-    return [
+    faults = [
         Fault("", key, f"{size:g} m, the others about {middle:.3g} m", "lengths in metres")
-        for key, size in found.items()
+        for key, size in (found | part_sizes(mechanism, values)).items()
         if size > LARGEST or size > OUT_OF_PROPORTION * middle
     ]
+    # the parameters that a user wrote, where they are the cause
+    return (_unit_faults(mechanism) or faults) if faults else []
 

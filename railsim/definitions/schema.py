@@ -8,9 +8,11 @@
 import json
 import re
 import sys
+import typing
 from pathlib import Path
 from typing import Any
 
+from railsim.definitions.base import Definition, meanings
 from railsim.definitions.loading import FORMATS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -25,7 +27,13 @@ def json_schema(format_name: str) -> dict[str, Any]:
     `format`, `extends` and `remove`; the whole is checked when it is loaded.
     """
     model = FORMATS[format_name].model
-    full = _tidy(model.model_json_schema())
+    full = model.model_json_schema()
+    _describe(full, model)
+    known = _parts(model)
+    for name, part in full.get("$defs", {}).items():
+        if name in known:
+            _describe(part, known[name])
+    full = _tidy(full)
     definitions = full.pop("$defs", {})
     return {
         "$schema": DIALECT,
@@ -46,6 +54,29 @@ def json_schema(format_name: str) -> dict[str, Any]:
         "else": {"$ref": f"#/$defs/{model.__name__}"},
         "$defs": {**definitions, model.__name__: full},
     }
+
+
+def _parts(model: type[Definition]) -> dict[str, type[Definition]]:
+    """All definitions that a definition is made of, by their names."""
+    found: dict[str, type[Definition]] = {}
+    waiting: list[Any] = [model]
+    while waiting:
+        one = waiting.pop()
+        if not (isinstance(one, type) and issubclass(one, Definition)):
+            waiting += typing.get_args(one)
+        elif one.__name__ not in found:
+            found[one.__name__] = one
+            waiting += [field.annotation for field in one.model_fields.values()]
+    return found
+
+
+def _describe(schema: dict[str, Any], model: type[Definition]) -> None:
+    """Write into a definition's schema what the texts below its fields say."""
+    said = meanings(model)
+    for name, field in schema.get("properties", {}).items():
+        if name in said and "description" not in field:
+            field["description"] = said[name]
+            schema["properties"][name] = dict(sorted(field.items()))
 
 
 def _tidy(node: Any) -> Any:

@@ -58,6 +58,8 @@ STATUS = {
 ITERATIONS = 40
 CLOSE = 1e-9  # a Newton step below this share of the size leaves an error of its square
 SMALLEST_STEP = 1e-9  # share of the driver's range
+TRANSITION = 1e-3  # share of the size by which arcs with given centres may miss each other
+BEYOND = 1e-3  # share of the driver's range at which a failure is looked at from behind it
 
 
 class Linkage(NamedTuple):
@@ -491,7 +493,11 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
                     if m < 2:
                         change /= linkage.size
                     correction = max(correction, change)
-            smooth = correction <= 0.2 * speed + 1e-9 and speed < 0.5
+            allowed = 0.2 * speed + 1e-9
+            for k in range(arc.shape[0]):
+                if arc_new[k] != arc[k]:
+                    allowed += TRANSITION
+            smooth = correction <= allowed and speed < 0.5
             if sign_new == sign and smooth:
                 at = target
                 step = 2.0 * h
@@ -505,13 +511,17 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
             constraints(linkage, 0, arc, now, at, Phi, J, one, two)
             factor(J, pivots, n)
             if abs(step) < SMALLEST_STEP * reach:
+                beyond = at + BEYOND * reach * np.sign(h)
                 failure[0] = at
-                failure[1] = worst_joint(linkage, arc, now, at + 1e-3 * reach * np.sign(h),
-                                         Phi, J, one, two)
+                failure[1] = worst_joint(linkage, arc, now, beyond, Phi, J, one, two)
                 if sign_new < -1.5:
                     failure[1] = -2.0 - sign_new
                     return BEYOND_CAM, i
-                if sign_new == 0.0:
+                # close to a limit position the two branches are mixed up: look from behind it
+                for k in range(nb + 1):
+                    for m in range(3):
+                        new[k, m] = now[k, m]
+                if newton(linkage, arc, new, beyond, Phi, J, pivots, one, two) == 0.0:
                     return LOST_ASSEMBLY, i
                 if sign_new != sign:
                     return DEAD_POINT, i

@@ -17,6 +17,7 @@ from railsim.definitions.mechanism import (
 )
 from railsim.definitions.mechanism_faults import ends
 from railsim.errors import Fault, InputError, nearest
+from railsim.mechanisms.cams import Transition, cam_rows, transitions
 from railsim.mechanisms.dynamics import FreeMotion, TimedMotion, driven_motion, free_motion
 from railsim.mechanisms.forces import (
     Rates,
@@ -28,6 +29,7 @@ from railsim.mechanisms.forces import (
     inertia,
     pressure_for,
     reactions,
+    rubs,
     table_of,
     unit_work,
 )
@@ -94,6 +96,8 @@ class Analysis:
         Values of the driver at which the unknown force changes its sign; positions of rest of a
         mechanism without an unknown, each with its stability.
     reactions : dict of str to Reaction
+    transitions : tuple of Transition
+        Changes of rollers from arc to arc.
     contact, timed, release : results of the tables [contact], [motion], [release], or None
     case : str or None
         Name of the case.
@@ -107,6 +111,7 @@ class Analysis:
     force_zeros: tuple[float, ...]
     equilibria: tuple[tuple[float, bool], ...]
     reactions: dict[str, Reaction]
+    transitions: tuple[Transition, ...]
     contact: Contact | None
     timed: TimedMotion | None
     release: FreeMotion | None
@@ -203,6 +208,7 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
         _force_zeros(dense),
         _equilibria(dense),
         _reactions(motion, output),
+        transitions(dense),
         _contact(dense, motion, at_zone),
         driven_motion(dense) if definition.motion is not None else None,
         _release(model),
@@ -279,11 +285,13 @@ def outputs(motion: Motion) -> dict[str, Any]:
         if pair is not None:
             found[f"{name}_length"] = motion.length(pair)[0]
             found[f"{name}_force"] = element_push(motion, name)
+            if isinstance(element, GasSpring) and element.rod is not None:
+                area = 0.25 * np.pi * model.number(element.rod) ** 2
+                found[f"{name}_pressure"] = np.abs(found[f"{name}_force"]) / area
     for name in definition.angles:
         found[name] = motion.angle(name)
-    for k, (name, joint) in enumerate(definition.joints.items()):
-        if hasattr(joint, "cam"):
-            found[f"{name}_pressure_angle"] = pressure_angle(motion, name, k)
+    for name, row in cam_rows(motion).items():
+        found[f"{name}_pressure_angle"] = pressure_angle(motion, name, row)
     return found
 
 
@@ -293,13 +301,12 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     definition = model.definition
     sense = int(np.sign(model.end - model.start))
     found: dict[str, Any] = {"force": actuator_force(motion, unknown, Rates(friction=sense))}
-    rubs = any(
-        isinstance(e, GasSpring) and model.number(e.friction) for e in definition.elements.values()
-    )
-    if rubs:
+    if rubs(model):
         found["force_back"] = actuator_force(motion, unknown, Rates(friction=-sense))
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):
         found["pressure"] = pressure_for(motion, unknown, found["force"])
+        if "force_back" in found:
+            found["pressure_back"] = pressure_for(motion, unknown, found["force_back"])
     if definition.output is not None:
         _, r1, _ = motion.point(definition.output.point)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -315,10 +322,8 @@ def pressure_angle(motion: Motion, name: str, row: int) -> Any:
     to arc.
     """
     joint = motion.model.definition.joints[name]
-    rows = [k for k, other in enumerate(motion.model.linkage.joint[:, 0]) if other == 2]
-    cams = [n for n, j in motion.model.definition.joints.items() if hasattr(j, "cam")]
     r, r1, _ = motion.point(joint.cam)  # type: ignore[union-attr]
-    d = r - motion.arc_centre(rows[cams.index(name)])
+    d = r - motion.arc_centre(row)
     along = r1[:, 0] * d[:, 0] + r1[:, 1] * d[:, 1]
     across = r1[:, 0] * d[:, 1] - r1[:, 1] * d[:, 0]
     angle = np.arctan2(across, along)
@@ -419,7 +424,8 @@ def _rests(dense: Motion, force: Any) -> tuple[tuple[float, bool], ...]:
 def _reactions(motion: Motion, output: Mapping[str, Any]) -> dict[str, Reaction]:
     definition = motion.model.definition
     forces = {} if definition.solve is None else {definition.solve.unknown: output["force"]}
-    joints, _ = reactions(motion, forces)
+    sense = int(np.sign(motion.model.end - motion.model.start))
+    joints, _ = reactions(motion, forces, Rates(friction=sense))
     found = {}
     for name, rows in joints.items():
         # the second row of a prismatic joint is a torque

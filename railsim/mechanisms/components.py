@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-KELVIN = 273.15
 T_REFERENCE = 20.0
 """Temperature to which the nominal forces of gas springs refer [C]."""
 
@@ -24,8 +23,7 @@ def gas_spring_force(
     """Push of a gas spring without friction [N].
 
     Linear: `F = F1 (1 + (p - 1) s/S)`; isothermal: `F = F1/(1 - (1 - 1/p) s/S)`; both `F1` extended
-    and `p F1` compressed.  Ideal gas: in proportion to the absolute temperature, 0.34 % per degree
-    at 20 C (catalogues: 0.36 %).
+    and `p F1` compressed.  Temperature: `gas_temperature_factor`.
 
     Parameters
     ----------
@@ -60,10 +58,10 @@ def gas_spring_force(
 
 
 def gas_temperature_factor(temperature: Any) -> Any:
-    """Force at a temperature over that at 20 C, `(T + 273.15)/293.15`.
+    """Force at a temperature over that at 20 C, `1 + 0.0036 (T - 20)`.
 
-    The tables that catalogues print are nearer to 0.36 % per degree: `1 + 0.0036 (T - 20)`, which
-    is used here.
+    0.36 % per degree as makers' catalogues print (Merci, 2017, ch. 3); an ideal gas in a fixed
+    volume has (T + 273.15)/293.15, 0.34 % per degree.
 
     Examples
     --------

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.mechanism import GasSpring, Link, Prismatic, Revolute, Slot, Spring
 from railsim.definitions.mechanism_faults import ends
+from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.kinematics import Motion
 
 Floats = NDArray[np.float64]
@@ -42,13 +43,13 @@ def lines(motion: Motion) -> list[Line]:
             closed = names + names[:1] if len(names) > 2 and not body.outline else names
             xy = np.stack([motion.point(f"{name}.{p}")[0] for p in closed], axis=1)
             found.append(Line("body", name, xy))
-    for row, (name, joint) in enumerate(definition.joints.items()):
+    for name, joint in definition.joints.items():
         if isinstance(joint, Link):
             found.append(_between(motion, "link", name, joint.link))
         elif isinstance(joint, Slot | Prismatic):
             found.append(_guide(motion, name, joint))
         elif not isinstance(joint, Revolute):
-            found.append(_cam(motion, name, row))
+            found.append(_cam(motion, name))
     for name, actuator in definition.actuators.items():
         if (pair := ends(actuator)) is not None:
             found.append(_between(motion, "actuator", name, pair))
@@ -78,18 +79,17 @@ def _guide(motion: Motion, name: str, joint: Slot | Prismatic) -> Line:
     return Line("guide", name, np.stack((base + low * along, base + high * along), axis=1))
 
 
-def _cam(motion: Motion, name: str, row: int) -> Line:
+def _cam(motion: Motion, name: str) -> Line:
     """The path of a roller's centre on its cam."""
     linkage = motion.model.linkage
-    rows = [k for k in range(len(linkage.joint)) if linkage.joint[k, 5] > 0]
-    cams = [j for j, joint in enumerate(motion.model.definition.joints.values())
-            if hasattr(joint, "cam")]  # fmt: skip
-    _, _, _, _, first, count = linkage.joint[rows[cams.index(row)]]
+    _, _, _, _, first, count = linkage.joint[cam_rows(motion)[name]]
     parts = []
     for arc in range(first, first + count):
         u0, v0, u1, v1, turn = linkage.arc_ends[arc]
         begin = np.arctan2(v0, u0)
         swept = (turn * (np.arctan2(v1, u1) - begin)) % (2.0 * np.pi)
+        if u0 == v0 == 0.0:  # an arc without ends: all of its circle
+            swept = 2.0 * np.pi
         angles = begin + turn * np.linspace(0.0, swept, ARC_POINTS)
         radius, k = linkage.arc_radius[0, arc], linkage.arc_point[arc]
         cx, cy = linkage.point[0, k]

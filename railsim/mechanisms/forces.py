@@ -24,6 +24,7 @@ from railsim.definitions.mechanism import (
     GasSpring,
     HandForce,
     HandTorque,
+    JointFriction,
     PointMass,
     Spring,
     Stop,
@@ -34,6 +35,7 @@ from railsim.errors import Fault, InputError
 from railsim.kernels import linkage as kernel
 from railsim.mechanisms.components import AirSpringTable, cylinder_area, gas_spring_force
 from railsim.mechanisms.kinematics import Motion, driver_words
+from railsim.mechanisms.model import Model
 
 STROKE_EDGE = 1e-4
 """Share of a gas spring's stroke by which rounding may take it beyond its ends."""
@@ -184,11 +186,30 @@ def generalised_force(motion: Motion, rates: Rates = AT_REST) -> Any:
         elif isinstance(element, Torque):
             turning = motion.q1[..., model.bodies[element.torque], 2]
             total = total + model.number(element.size) * turning
+        elif isinstance(element, JointFriction):
+            turning = motion.q1[..., model.bodies[element.joint_friction], 2]
+            total = total + friction_torque(motion, element, rates) * turning
         else:
             pair = ends(element)
             assert pair is not None
             total = total + element_push(motion, name, rates) * motion.length(pair)[1]
     return total
+
+
+def friction_torque(motion: Motion, element: JointFriction, rates: Rates) -> Any:
+    """Torque on a body that rubs, against its turning, shape (..., position) [N m]."""
+    turning = motion.q1[..., motion.model.bodies[element.joint_friction], 2]
+    return -motion.model.number(element.moment) * rates.friction * np.sign(np.real(turning))
+
+
+def rubs(model: Model) -> bool:
+    """Whether any element has friction, so that the way back needs another force."""
+    parts = model.definition.elements.values()
+    moments = [e.moment for e in parts if isinstance(e, JointFriction)]
+    return any(
+        np.any(np.real(model.number(quantity)))
+        for quantity in (*moments, *(e.friction for e in parts if isinstance(e, GasSpring)))
+    )
 
 
 def _direction(motion: Motion, point: str, angle: Any, turns: bool) -> tuple[Any, Any]:
@@ -332,6 +353,9 @@ def applied(motion: Motion, forces: dict[str, Any], rates: Rates = AT_REST) -> A
             add(element.force, size * c, size * s)
         elif isinstance(element, Torque):
             total[:, model.bodies[element.torque], 2] += model.number(element.size)
+        elif isinstance(element, JointFriction):
+            k = model.bodies[element.joint_friction]
+            total[:, k, 2] += friction_torque(motion, element, rates)
         else:
             between(ends(element), element_push(motion, name, rates))
     for name, force in forces.items():

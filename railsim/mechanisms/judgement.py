@@ -259,8 +259,3 @@ class Judge:
             (name, scale) for name, scale, margin in found for _ in range(margin.shape[-1])
         ]
         return np.concatenate([margin for _, _, margin in found], axis=-1)
-
-
-def target_positions(definition: Mechanism) -> Positions:
-    """Positions that an optimisation of a mechanism is judged at."""
-    return positions(definition)

@@ -25,6 +25,7 @@ from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 
 Values = Any  # float or complex ndarray, shape (lane, 1)
+OPEN_ARC = 0.99 * np.pi
 STEP = 1e-30
 """Imaginary step: its square vanishes beside any real number."""
 
@@ -289,13 +290,22 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
     found = []
     for i, arc in enumerate(cam.arcs):
         turn = 1.0 if arc.turns == "left" else -1.0
-        begin = shared[i - 1][1] if i > 0 else -turn * np.pi / 2
-        end = shared[i][0] if i < len(shared) else begin + turn * np.pi * 0.99
+        begin = shared[i - 1][1] if i > 0 else None
+        end = shared[i][0] if i < len(shared) else None
         begin = begin if arc.begin is None else _real(number(arc.begin, values))
         end = end if arc.end is None else _real(number(arc.end, values))
-        unit = [np.cos(begin), np.sin(begin), np.cos(end), np.sin(end), turn]
-        found.append((*centres[i], radii[i], [float(x) for x in unit]))
+        # the open end of the first and of the last arc: nearly half a turn on
+        if begin is None and end is not None:
+            begin = end - turn * OPEN_ARC
+        if end is None and begin is not None:
+            end = begin + turn * OPEN_ARC
+        found.append((*centres[i], radii[i], [*_unit(begin), *_unit(end), turn]))
     return found
+
+
+def _unit(angle: float | None) -> tuple[float, float]:
+    """Unit vector of an arc's end; (0, 0), which the kernel passes nowhere, where there is none."""
+    return (0.0, 0.0) if angle is None else (float(np.cos(angle)), float(np.sin(angle)))
 
 
 def _pose(

@@ -30,11 +30,13 @@ QUANTITIES = {
     "force": Quantity("N", "N", 1.0, 2, "force of the unknown actuator"),
     "force_back": Quantity("N", "N", 1.0, 2, "the same on the way back"),
     "pressure": Quantity("Pa", "MPa", 1e-6, 5, "pressure that gives this force"),
+    "pressure_back": Quantity("Pa", "MPa", 1e-6, 5, "the same on the way back"),
     "effective_weight": Quantity("N", "N", 1.0, 2, "weight of everything, felt at the output"),
     "effective_mass": Quantity("kg", "kg", 1.0, 3, "mass of everything, felt at the output"),
 }
 ANGLE = Quantity("rad", "deg", DEGREES, 3, "angle")
 LENGTH = Quantity("m", "mm", 1e3, 3, "length")
+GAS = Quantity("Pa", "MPa", 1e-6, 3, "pressure of the gas over the outside")
 FORCE = Quantity("N", "N", 1.0, 2, "push")
 TORQUE = Quantity("N m", "N m", 1.0, 3, "torque of the unknown actuator")
 SHOWN = {"m": ("mm", 1e3), "rad": ("deg", DEGREES), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}
@@ -54,6 +56,8 @@ def quantity(name: str, definition: Mechanism) -> Quantity:
         return QUANTITIES[name]
     if name in definition.angles or name.endswith("_pressure_angle"):
         return ANGLE
+    if name.endswith("_pressure"):
+        return GAS
     return LENGTH if name.endswith("_length") else FORCE
 
 

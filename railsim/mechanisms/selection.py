@@ -1,15 +1,12 @@
 """Checks and the choice of components: every row of a catalogue fits, or why not."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from railsim.definitions.mechanism import CatalogueRow, Cylinder, GasSpring
 from railsim.mechanisms.analysis import Analysis, actuator_of
-from railsim.mechanisms.components import cylinder_area, next_size
-from railsim.mechanisms.kinematics import folded
+from railsim.mechanisms.components import cylinder_area, lid_force, next_size
 
 ROUNDING = 1e-5
 """Share of a limit by which rounding may miss it: dimensions have six or seven digits."""
@@ -86,11 +83,31 @@ def checks(result: Analysis) -> list[Check]:
                 least = model.number(actuator.pin_to_pin) + stroke
                 note = f"shortest length against pin to pin and the stroke of {stroke * 1e3:g} mm"
                 found.append(Check("pin_to_pin", shortest, least, "above", "m", note))
+    for element, part in definition.elements.items():
+        if isinstance(part, GasSpring):
+            found.append(_service(result, element, part))
+    if (lid := definition.lid) is not None:
+        spring = definition.elements[lid.element]
+        assert isinstance(spring, GasSpring)
+        n = model.number
+        least = lid_force(n(lid.mass), n(lid.centre), n(lid.lever), n(lid.springs), n(lid.factor))
+        note = "F1 against the makers' quick formula G D/(b n) 9.8 alpha"
+        found.append(Check(f"lid_{lid.element}", n(spring.F1), least, "above", "N", note))
     if result.contact is not None:
         values = list(result.contact.force.values())
         note = "static contact force in the zone: the head must not come down"
         found.append(Check("contact_force", float(np.min(values)), 0.0, "above", "N", note))
     return found
+
+
+def _service(result: Analysis, name: str, spring: GasSpring) -> Check:
+    """The temperature of a gas spring against the nearer end of its service range."""
+    n = result.model.number
+    value, (low, high) = n(spring.temperature), (n(x) for x in spring.service)
+    above = value < 0.5 * (low + high)
+    limit, sense = (low, "above") if above else (high, "below")
+    note = "temperature against the range in service"
+    return Check(f"{name}_temperature", value, limit, sense, "C", note)
 
 
 def _area(result: Analysis, cylinder: Cylinder, bore: float | None = None) -> float:
@@ -188,9 +205,3 @@ def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
     low, high = n(row.stroke[0]), n(row.stroke[1])
     first = max(low, needed)
     return [] if first > high else list(np.linspace(first, high, 101))
-
-
-def angle_spread(result: Analysis, name: str) -> Sequence[float]:
-    """Smallest and largest of a named angle, folded [rad]."""
-    values: Any = folded(result.output[name])
-    return float(np.min(values)), float(np.max(values))

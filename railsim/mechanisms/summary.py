@@ -90,6 +90,7 @@ def analysis_data(result: Analysis) -> Data:
         name: {"max": r.max, "at": r.at, "components": [_list(row) for row in r.components.T]}
         for name, r in result.reactions.items()
     }
+    data["transitions"] = [dict(vars(one)) for one in result.transitions]
     data["selection"] = [
         {"catalogue": c.catalogue, "name": c.name, "fits": c.fits, "reasons": list(c.reasons)}
         for c in selection(result)

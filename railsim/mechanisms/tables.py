@@ -128,8 +128,18 @@ def sentences(result: Analysis) -> list[str]:
         found.append(f"force zero at {', '.join(driver(s) for s in result.force_zeros)}")
     for s, stable in result.equilibria:
         found.append(f"at rest at {driver(s)}, {'stable' if stable else 'unstable'}")
+    for change in result.transitions:
+        jump = change.rate_after / change.rate_before - 1.0
+        found.append(
+            f"{change.joint}: from arc {change.before} to {change.after} at "
+            f"{driver(change.travel)}, gap {change.gap * 1e3:.4f} mm, jump of the rate "
+            f"{round(jump * 100.0, 3) + 0.0:.3f} %"
+        )
     if (contact := result.contact) is not None:
-        forces = ", ".join(f"{name} {value:.2f} N" for name, value in contact.force.items())
+        forces = ", ".join(
+            f"{name} {value:.2f} N" if np.isfinite(value) else f"{name} no value"
+            for name, value in contact.force.items()
+        )
         found.append(f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces}")
         found += [contact.reason] if contact.reason else []
         for y, stable in contact.equilibria:

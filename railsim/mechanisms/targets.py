@@ -49,7 +49,15 @@ def reference_of(definition: Mechanism) -> Mechanism | None:
     optimise = definition.optimise
     if optimise is None or optimise.reference is None:
         return None
-    reference = load_mechanism(optimise.reference)
+    try:
+        reference = load_mechanism(optimise.reference)
+    except InputError as error:
+        faults = [
+            fault if fault.file != optimise.reference or fault.key
+            else Fault(definition.name, "optimise.reference", fault.found, fault.allowed)
+            for fault in error.faults
+        ]
+        raise InputError(faults) from None
     values = parameter_values(definition)
     shared = {
         name: float(values[name])

@@ -10,14 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import AirSpring
+from railsim.definitions.mechanism import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
 from railsim.mechanisms.drawing import Line, joint_points, lines, points, working_box
 from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.quantities import quantity
+from railsim.plot.point_names import name_points
 from railsim.plot.style import DISTINCT, LIMIT
 
 if TYPE_CHECKING:
@@ -25,7 +29,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 DASHES: tuple[Any, ...] = (
-    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1))
+    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)),
+    (0, (11, 3)), (0, (1, 3)), (0, (9, 2, 3, 2)),
 )  # fmt: skip
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
@@ -71,8 +76,16 @@ def drawing_figure(result: Analysis) -> Figure:
     every = np.concatenate([xy for xy in points(motion).values()])
     size = float(np.max(np.ptp(every, axis=0)))
     small = max(box[1] - box[0], box[3] - box[2]) < 0.6 * size
-    figure = Figure(figsize=(9.0, 4.6) if small else (6.6, 5.2), layout="constrained")
-    axes = figure.subplots(1, 2, width_ratios=[1.0, 1.25]) if small else [figure.subplots()]
+    flat = box[1] - box[0] > 1.6 * (box[3] - box[2])
+    if small and flat:
+        figure = Figure(figsize=(6.6, 7.4), layout="constrained")
+        axes = figure.subplots(2, 1, height_ratios=[1.5, 1.0])
+    elif small:
+        figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+        axes = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
+    else:
+        figure = Figure(figsize=(6.6, 5.2), layout="constrained")
+        axes = [figure.subplots()]
     scale = quantity("travel", result.definition)
     for k in range(4):
         label = f"{s[k] * scale.scale:.1f} {scale.shown.replace('deg', '°')}"
@@ -84,19 +97,26 @@ def drawing_figure(result: Analysis) -> Figure:
         named.set_xlim(box[0] * 1e3, box[1] * 1e3)
         named.set_ylim(box[2] * 1e3, box[3] * 1e3)
         named.set_title("working parts at the start (grey: at the end)")
-    _name_points(named, motion, box if small else None)
     for one in axes:
         one.set_aspect("equal")
         one.set_xlabel("x / mm")
         one.set_ylabel("y / mm")
-    axes[0].legend(loc="best", title="driver at")
+    axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), title="driver at")
+    if small:
+        mark_points(named, motion, box)
+    else:
+        named.margins(0.12)
+        mark_points(named, motion, None)
     return figure
 
 
-def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> None:
+def draw(
+    axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str
+) -> list[Line2D]:
     """Draw the lines of a mechanism at one of its positions [mm]."""
+    made = []
     for i, line in enumerate(drawn):
-        axes.plot(
+        made += axes.plot(
             *(line.xy[k] * 1e3).T,
             color=colour,
             lw=WIDTHS[line.kind],
@@ -106,26 +126,21 @@ def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> 
             ms=2.5,
             label=label if i == 0 else None,
         )
+    return made
 
 
-def _name_points(axes: Axes, motion: Motion, box: Any) -> None:
-    shown = joint_points(motion)
+def mark_points(axes: Axes, motion: Motion, box: Any) -> None:
+    """Mark and name the points at the first position, those within a box [m] where there is one."""
     known = points(motion)
-    corners = ((5, 5, "left"), (-5, -9, "right"), (5, -9, "left"), (-5, 5, "right"))
-    for i, name in enumerate(dict.fromkeys(shown.values())):
+    named = {}
+    for name in dict.fromkeys(joint_points(motion).values()):
         x, y = known[name][0]
         if box is not None and not (box[0] < x < box[1] and box[2] < y < box[3]):
             continue
         ground = name.startswith("ground.")
         axes.plot(x * 1e3, y * 1e3, "^" if ground else "o", color="k", ms=5 if ground else 3)
-        axes.annotate(
-            name.partition(".")[2] if ground else name,
-            (x * 1e3, y * 1e3),
-            xytext=corners[i % 4][:2],
-            ha=corners[i % 4][2],
-            textcoords="offset points",
-            fontsize=7,
-        )
+        named[name.partition(".")[2] if ground else name] = np.array([x, y]) * 1e3
+    name_points(axes, named, [line.xy[0] * 1e3 for line in lines(motion)])
 
 
 def kinematics_figure(result: Analysis) -> Figure:
@@ -204,26 +219,32 @@ def angles_figure(result: Analysis) -> Figure:
 def cam_figure(result: Analysis) -> Figure:
     """Rate of the rocker on every arc of the cam, with the transitions."""
     motion = result.motion
-    cams = np.flatnonzero(result.model.linkage.joint[:, 5] > 0)
-    row = int(cams[0])
-    names = [n for n, j in result.definition.joints.items() if hasattr(j, "cam")]
-    roller = result.definition.joints[names[0]].cam  # type: ignore[union-attr]
-    body = result.model.bodies[roller.partition(".")[0]]
+    name, row = next(iter(cam_rows(motion).items()))
+    cam = result.definition.joints[name]
+    assert isinstance(cam, Cam)
+    body = roller_body(motion, name)
     first = int(result.model.linkage.joint[row, 4])
+    scale = quantity("travel", result.definition).scale
+    beyond = 0.12 * abs(result.travel)
     figure = Figure(figsize=(7.0, 3.6), layout="constrained")
     axes = figure.subplots()
     travel = _values("travel", result)
     rate = motion.q1[:, body, 2]
-    words = "driver's rate over the rocker's, |ds/dσ|"
+    roller = cam.cam.partition(".")[0]
+    unit = "" if result.definition.driver.angle is not None else " / (m/rad)"
+    words = f"rate of the driver over that of '{roller}'{unit}"
     for i, arc in enumerate(np.unique(motion.arcs[:, row])):
         on = motion.arcs[:, row] == arc
-        arcs = result.definition.joints[names[0]].arcs  # type: ignore[union-attr]
-        label = f"arc {arc - first + 1}, turns {arcs[arc - first].turns}"
-        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.0, **_line(i))
-    for k in np.flatnonzero(np.diff(motion.arcs[:, row])):
-        at = 0.5 * (travel[k] + travel[k + 1])
+        label = f"arc {arc - first + 1}, turns {cam.arcs[arc - first].turns}"
+        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.2, **_line(i))
+        if (alone := on_one_arc(motion, row, int(arc), beyond)) is not None:
+            more = np.abs(1.0 / alone.q1[:, body, 2])
+            axes.plot(alone.s * scale, more, color="0.45", lw=0.8, ls=DASHES[i], zorder=1)
+    for change in result.transitions:
+        at = change.travel * scale
         axes.axvline(at, color="0.4", lw=0.8)
-        axes.annotate(f"{at:.2f}°", (at, 1.0), xycoords=("data", "axes fraction"), fontsize=8,
+        axes.annotate(f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm",
+                      (at, 1.0), xycoords=("data", "axes fraction"), fontsize=8,
                       xytext=(3, -10), textcoords="offset points")  # fmt: skip
     _zone(axes, result, "travel")
     axes.set_xlabel(_label("travel", result, "driver"))
@@ -263,6 +284,10 @@ def pressure_figure(result: Analysis) -> Figure:
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
     axes.plot(_values("height", result), _values("pressure", result), color=MAIN, label="needed")
+    if "pressure_back" in result.output:
+        axes.plot(_values("height", result), _values("pressure_back", result), color=MAIN,
+                  ls=DASHES[2], label="needed on the way back")  # fmt: skip
+        axes.legend()
     if result.contact is not None:
         axes.axhline(result.contact.pressure / 1e6, color=SECOND, ls=DASHES[1], label="held")
         axes.legend()
@@ -376,28 +401,45 @@ def time_figure(result: Analysis) -> Figure:
     return figure
 
 
-def comparison_figure(results: Sequence[Analysis], *, zoom: bool = False) -> Figure:
-    """Ratio and force of several mechanisms over the height; with `zoom`, in the zone only."""
-    figure = Figure(figsize=(7.6, 3.8), layout="constrained")
-    panels = figure.subplots(1, 2)
-    for axes, name in zip(panels, ("ratio", "force"), strict=True):
-        for i, result in enumerate(results):
-            if name not in result.output or "height" not in result.output:
+def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) -> Figure:
+    """Ratio and force of several mechanisms over the height.
+
+    With `zoom`, in the zone only, and below it what they are above the first one.
+    """
+    first = next(iter(results.values()))
+    figure = Figure(figsize=(7.6, 6.4 if zoom else 3.8), layout="constrained")
+    panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
+    for column, name in enumerate(("ratio", "force")):
+        base = _over_height(first, name, zoom)
+        for i, (label, result) in enumerate(results.items()):
+            if (curve := _over_height(result, name, zoom)) is None:
                 continue
-            x, y = _values("height", result), _values(name, result)
-            if zoom and result.zone:
-                low, high = (result.zone[k]["height"] * 1e3 for k in ("low", "high"))
-                inside = (x >= low) & (x <= high)
-                x, y = x[inside], y[inside]
-            label = result.definition.name + (f", {result.case}" if result.case else "")
-            axes.plot(x, y, label=label, **_line(i))
+            panels[0, column].plot(*curve, label=label, **_line(i))
+            if zoom and base is not None:
+                above = curve[1] - np.interp(curve[0], *base)
+                panels[1, column].plot(curve[0], above, **_line(i))
         if not zoom:
-            _zone(axes, results[0], "height")
-        axes.set_xlabel("height over start / mm")
-    panels[0].set_ylabel("ratio dy/dL")
-    panels[1].set_ylabel("force / N")
-    panels[0].legend(fontsize=7.5)
+            _zone(panels[0, column], first, "height")
+        panels[-1, column].set_xlabel("height over start / mm")
+    panels[0, 0].set_ylabel("ratio dy/dL")
+    panels[0, 1].set_ylabel("force / N")
+    if zoom:
+        panels[1, 0].set_ylabel("ratio over the first's")
+        panels[1, 1].set_ylabel("force over the first's / N")
+    panels[0, 0].legend(fontsize=7.5)
     return figure
+
+
+def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Floats] | None:
+    """A result over the height, with `zoom` in the zone only; None where there is none."""
+    if name not in result.output or "height" not in result.output:
+        return None
+    x, y = _values("height", result), _values(name, result)
+    if zoom and result.zone:
+        low, high = (result.zone[k]["height"] * 1e3 for k in ("low", "high"))
+        inside = (x >= low) & (x <= high)
+        x, y = x[inside], y[inside]
+    return x, y
 
 
 def search_figure(optimum: "Optimum") -> Figure:
@@ -423,6 +465,7 @@ def search_figure(optimum: "Optimum") -> Figure:
         before = f"file {optimum.objective_before:.4g}"
         axes.axhline(optimum.objective_before, color=SECOND, ls=DASHES[1], label=before)
     axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("start")
     axes.set_ylabel("objective")
     axes.legend()

@@ -111,7 +111,7 @@ CAPTIONS = {
     "path": "Path of the output.",
     "kinematics": "Angles of the bodies, their rates and accelerations.",
     "angles": "Transmission angles folded to 90 degrees, pressure angles of cams; zone shaded.",
-    "cam": "Rate on the arcs of the cam, with the transitions.",
+    "cam": "Rate on the arcs of the cam with the transitions; thin: each arc beyond its part.",
     "ratio_force": "Ratio and force over length and height; zone shaded, work height dashed.",
     "pressure": "Pressure that holds the mechanism.",
     "contact": "Static contact force at constant pressure; a full circle is a stable rest.",
@@ -120,7 +120,7 @@ CAPTIONS = {
     "cases": "Force of the unknown in all cases.",
     "time": "The motion in time.",
     "comparison": "The mechanisms side by side over the height.",
-    "comparison_zone": "The same in the zone.",
+    "comparison_zone": "The same in the zone, and below it the differences from the first.",
     "search": "Objective at the end of every start of the search.",
 }
 
@@ -164,14 +164,18 @@ def figures(collected: Collected) -> dict[str, Figure]:
     return {name: drawn[name] for name in CAPTIONS if name in drawn}
 
 
-def _compared(collected: Collected) -> list[Analysis]:
-    """Mechanisms side by side: several files, or before and after a search."""
-    if len(collected.results) > 1:
-        return list(collected.results)
+def _compared(collected: Collected) -> dict[str, Analysis]:
+    """Mechanisms side by side by their labels: several files, or before and after a search."""
     optimum = collected.optimum
-    if optimum is None or optimum.before is None:
-        return []
-    return [optimum.before, optimum.after]
+    if optimum is not None and optimum.before is not None:
+        return {"as in the file": optimum.before, "optimised": optimum.after}
+    if len(collected.results) < 2:
+        return {}
+    found: dict[str, Analysis] = {}
+    for result in collected.results:
+        label = result.definition.name + (f", {result.case}" if result.case else "")
+        found[label if label not in found else f"{label} ({len(found) + 1})"] = result
+    return found
 
 
 def as_png(figure: Figure) -> bytes:
@@ -209,18 +213,27 @@ def animation(result: Analysis) -> bytes:
         figure = Figure(figsize=(5.2, 4.6), dpi=80, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.subplots()
+        made = pictures.draw(axes, drawn, 0, "#1d2429", "")
+        axes.set_xlim(x0 - margin, x1 + margin)
+        axes.set_ylim(y0 - margin, y1 + margin)
+        axes.set_aspect("equal")
+        axes.set_xlabel("x / mm")
+        axes.set_ylabel("y / mm")
+        title = axes.set_title(_told(result, motion.s[0]))
+        moving: list[Any] = [*made, title]
+        for artist in moving:
+            artist.set_animated(True)  # left out of what stays
+        canvas.draw()  # type: ignore[no-untyped-call]
+        still = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
         for k in range(GIF_FRAMES):
-            axes.clear()
-            pictures.draw(axes, drawn, k, "#1d2429", "")
-            axes.set_xlim(x0 - margin, x1 + margin)
-            axes.set_ylim(y0 - margin, y1 + margin)
-            axes.set_aspect("equal")
-            axes.set_xlabel("x / mm")
-            axes.set_ylabel("y / mm")
-            axes.set_title(_told(result, motion.s[k]))
-            canvas.draw()  # type: ignore[no-untyped-call]
+            canvas.restore_region(still)  # type: ignore[no-untyped-call]
+            for line, artist in zip(drawn, made, strict=True):
+                artist.set_data(*(line.xy[k] * 1e3).T)
+            title.set_text(_told(result, motion.s[k]))
+            for artist in moving:
+                artist.draw(canvas.get_renderer())  # type: ignore[no-untyped-call]
             pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-            frames.append(Image.fromarray(pixels).convert("RGB").quantize(32))
+            frames.append(Image.fromarray(pixels).convert("L"))
     buffer = BytesIO()
     both = frames + frames[-2:0:-1]
     both[0].save(buffer, "GIF", save_all=True, append_images=both[1:], duration=60, loop=0)
@@ -318,9 +331,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     if definition.tolerances:
         sections.append(_tolerances(scatter(definition)))
     made = tables.parameter_table(result)
-    sections.append(Section("Parameters", list(definition.remarks), [
-        _table(made, words=frozenset({0, 2}))
-    ]))  # fmt: skip
+    sections.append(Section("Parameters", [], [_table(made, words=frozenset({0, 2}))]))
     template = files("railsim.report").joinpath("templates/mechanisms.html").read_text("utf-8")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     source = definition.source or "no source given"
@@ -328,6 +339,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         title=f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else ""),
         lead=f"{source}. Written by railsim {__version__}.",
         verdict=_verdict(result),
+        remarks=definition.remarks,
         player=player(result),
         sections=[s for s in sections if s.texts or s.tables or s.figures],
         method=METHOD,

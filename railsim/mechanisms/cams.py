@@ -1,0 +1,126 @@
+"""Cams of several arcs: where a roller goes from one to the next, and every arc by itself.
+
+Tangent arcs touch, so that equal positions are a double root (ill-conditioned) and equal rates a
+simple one: the change is where the rates agree, and the gap that is left there is told.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from railsim.definitions.mechanism import Cam
+from railsim.errors import InputError
+from railsim.kernels import linkage as kernel
+from railsim.mechanisms.kinematics import Motion, solve
+
+HALVINGS = 48
+
+
+@dataclass(frozen=True)
+class Transition:
+    """Change of a roller from one arc to the next.
+
+    Attributes
+    ----------
+    joint : str
+        The cam.
+    travel : float
+        Driver [rad or m].
+    before, after : int
+        Arcs, counted from 1 in the order of the file.
+    gap : float
+        Distance by which the arc after misses the roller's centre: 0 for tangent arcs [m].
+    rate_before, rate_after : float
+        Rate of the roller's body, dtheta/ds, on either arc.
+    """
+
+    joint: str
+    travel: float
+    before: int
+    after: int
+    gap: float
+    rate_before: float
+    rate_after: float
+
+
+def cam_rows(motion: Motion) -> dict[str, int]:
+    """Row of every cam among the kernel's joints, by its name."""
+    names = [n for n, j in motion.model.definition.joints.items() if isinstance(j, Cam)]
+    rows = np.flatnonzero(motion.model.linkage.joint[:, 0] == kernel.CAM)
+    return dict(zip(names, map(int, rows), strict=True))
+
+
+def roller_body(motion: Motion, joint: str) -> int:
+    """Number of the body that carries the roller of a cam."""
+    cam = motion.model.definition.joints[joint]
+    assert isinstance(cam, Cam)
+    return motion.model.bodies[cam.cam.partition(".")[0]]
+
+
+def transitions(dense: Motion) -> tuple[Transition, ...]:
+    """All changes of arcs along a motion, in its order."""
+    found = []
+    for joint, row in cam_rows(dense).items():
+        for k in np.flatnonzero(np.diff(dense.arcs[:, row])):
+            found.append(_transition(dense, joint, row, int(k)))
+    return tuple(found)
+
+
+def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
+    model = dense.model
+    low, high = float(dense.s[k]), float(dense.s[k + 1])
+    before, after = int(dense.arcs[k, row]), int(dense.arcs[k + 1, row])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if solve(model, [middle]).arcs[0, row] == before:
+            low = middle
+        else:
+            high = middle
+    at = solve(model, [low])
+    arcs = np.repeat(at.arcs, 2, axis=0)
+    arcs[:, row] = before, after
+    n = 3 * model.linkage.n_bodies
+    residual, jacobian = np.zeros((2, n)), np.zeros((2, n, n))
+    twice = np.repeat(at.q, 2, axis=0)
+    kernel.jacobians(model.linkage, np.array([low, low]), twice, arcs, residual, jacobian)
+    unit = np.zeros((2, n, 1))
+    unit[:, -1] = 1.0
+    rates = np.linalg.solve(jacobian, unit)[:, 3 * (roller_body(dense, joint) - 1) + 2, 0]
+    first = int(model.linkage.joint[row, 4])
+    gap = abs(float(residual[1, model.linkage.joint[row, 3]]))
+    return Transition(
+        joint, low, before - first + 1, after - first + 1, gap, float(rates[0]), float(rates[1])
+    )
+
+
+def on_one_arc(motion: Motion, row: int, arc: int, beyond: float) -> Motion | None:
+    """Positions with the roller kept on one arc, also a bit beyond where it leaves it.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions, some of them with the roller on the arc.
+    row, arc : int
+        The cam's row among the kernel's joints; the arc.
+    beyond : float
+        Range of the driver to go on by, within the mechanism's range [rad or m].
+
+    Returns
+    -------
+    Motion or None : None where the links cannot be assembled so far.
+    """
+    on = np.flatnonzero(motion.arcs[:, row] == arc)
+    linkage = motion.model.linkage
+    joints, ends = linkage.joint.copy(), linkage.arc_ends.copy()
+    joints[row, 4:6] = arc, 1
+    ends[arc, :4] = 0.0  # without ends
+    free: Any = replace(motion.model, linkage=linkage._replace(joint=joints, arc_ends=ends))
+    low, high = sorted((motion.model.start, motion.model.end))
+    s = motion.s[on]
+    begin, end = (float(np.clip(x, low, high)) for x in (np.min(s) - beyond, np.max(s) + beyond))
+    start = replace(motion, s=s[:1], q=motion.q[on[:1]], arcs=motion.arcs[on[:1]], known={})
+    try:
+        return solve(free, np.linspace(begin, end, 101), start)
+    except InputError:
+        return None

@@ -1,0 +1,97 @@
+"""Names beside the points of a drawing, where they cover neither each other nor the lines."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+SIZE = 7.0
+"""Of the letters [points]."""
+REACHES = (5.0, 12.0, 20.0, 30.0)
+"""Distances from point to name that are tried, the nearest first [points]."""
+DIRECTIONS = np.radians([20.0, 160.0, -20.0, -160.0, 90.0, -90.0, 55.0, 125.0, -55.0, -125.0])
+LEADER = 10.0
+"""Distance from which a thin line joins name and point [points]."""
+
+
+def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]) -> None:
+    """Write names beside points.
+
+    Parameters
+    ----------
+    axes : Axes
+        With its limits as they stay.
+    named : mapping of str to ndarray, shape (2,)
+        Places by their names, in data.
+    drawn : sequence of ndarray, shape (point, 2)
+        Lines that are better not covered, in data.
+    """
+    figure: Any = axes.figure
+    figure.draw_without_rendering()  # the layout settles, and with it the scale
+    per_point = figure.dpi / 72.0
+    frame = np.array(axes.get_window_extent().extents) / per_point
+    at = {name: axes.transData.transform(xy) / per_point for name, xy in named.items()}
+    ink = np.concatenate([_along(axes.transData.transform(xy) / per_point) for xy in drawn])
+    marks = np.array(list(at.values()))
+    boxes: list[Floats] = []
+    for name, place in at.items():
+        found = [
+            (_cost(box, boxes, frame, ink, marks) + 0.15 * reach, k, offset, box)
+            for k, (reach, offset, box) in enumerate(_candidates(name, place))
+        ]
+        _, _, offset, box = min(found, key=lambda one: one[:2])
+        boxes.append(box)
+        _write(axes, name, named[name], offset)
+
+
+def _along(line: Floats) -> Floats:
+    """Points of a line, 3 points of print apart."""
+    parts = [line[:1]]
+    for a, b in pairwise(line):
+        count = max(int(np.hypot(*(b - a)) / 3.0), 1)
+        parts.append(a + (b - a) * np.linspace(0.0, 1.0, min(count, 400) + 1)[1:, None])
+    return np.concatenate(parts)
+
+
+def _candidates(name: str, place: Floats) -> list[tuple[float, Floats, Floats]]:
+    """Reach, offset of the name's middle, and box x0, y0, x1, y1 of every place tried."""
+    half = np.array([0.29 * SIZE * len(name), 0.6 * SIZE])
+    found = []
+    for reach in REACHES:
+        for direction in DIRECTIONS:
+            unit = np.array([np.cos(direction), np.sin(direction)])
+            offset = unit * reach + np.array([np.sign(round(unit[0], 6)), unit[1]]) * half
+            middle = place + offset
+            found.append((reach, offset, np.concatenate((middle - half, middle + half))))
+    return found
+
+
+def _cost(
+    box: Floats, boxes: Sequence[Floats], frame: Floats, ink: Floats, marks: Floats
+) -> float:
+    def inside(points: Floats) -> int:
+        return int(np.sum(np.all((points > box[:2]) & (points < box[2:]), axis=1)))
+
+    over = sum(bool(np.all((box[:2] < o[2:]) & (box[2:] > o[:2]))) for o in boxes)
+    out = bool(np.any(box[:2] < frame[:2]) or np.any(box[2:] > frame[2:]))
+    return 1000.0 * over + 1000.0 * out + 60.0 * inside(marks) + 1.5 * inside(ink)
+
+
+def _write(axes: Axes, name: str, xy: Floats, offset: Floats) -> None:
+    far = np.hypot(*offset) > LEADER + 0.29 * SIZE * len(name)
+    line = {"arrowstyle": "-", "lw": 0.5, "color": "0.4", "shrinkA": 0.0, "shrinkB": 2.0}
+    text = axes.annotate(
+        name,
+        (float(xy[0]), float(xy[1])),
+        xytext=(float(offset[0]), float(offset[1])),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=SIZE,
+        arrowprops=line if far else None,
+    )
+    text.set_in_layout(False)
