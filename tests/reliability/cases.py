@@ -2,7 +2,9 @@
 
 import os
 import resource
+import sys
 import time
+import traceback
 from contextlib import contextmanager
 
 from railsim.cli import main
@@ -16,6 +18,24 @@ MEGABYTES = 2000.0
 def number(normal: int) -> int:
     """Return how many cases of a suite to try."""
     return max(normal, MORE)
+
+
+def tried(normal: int, case) -> list:
+    """Call `case` with every seed and return what it returns; all failures are told at the end."""
+    outcomes, failed, count = [], [], number(normal)
+    for seed in range(count):
+        try:
+            outcomes.append(case(seed))
+        except Exception as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            words = f"seed {seed}: {type(error).__name__}: {error} ({place.name}:{place.lineno})"
+            failed.append(words[:2000])
+            if MORE:
+                print(f"\n{words[:2000]}", file=sys.stderr, flush=True)
+        if MORE and seed % 50 == 49:
+            print(f"\n{case.__qualname__} {seed + 1} of {count}", file=sys.stderr, flush=True)
+    assert not failed, f"{len(failed)} of {count} cases failed:\n" + "\n".join(failed[:20])
+    return outcomes
 
 
 @contextmanager
