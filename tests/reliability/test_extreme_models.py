@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cases import outcome, tried
 
+from railsim.cli import main
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.result import check_result
 
@@ -34,13 +35,18 @@ def test_extreme_models(tmp_path, capsys):
     def case(seed):
         rng = np.random.default_rng(seed)
         vehicle, track = MODELS[seed % len(MODELS)]
-        places = [("vehicle", *pair) for pair in numbers(load_vehicle(vehicle).model_dump())]
-        places += [("track", *pair) for pair in numbers(load_track(track).model_dump())]
+        places = [
+            (kind, *pair)
+            for kind, file in (("vehicle", load_vehicle(vehicle)), ("track", load_track(track)))
+            for pair in numbers(file.model_dump(exclude_unset=True))
+        ]
         given = ["run", vehicle, track, "--speed", f"{10 ** rng.uniform(-0.3, 2.17):.4g}"]
+        # anywhere, also in the midst of a curve, which strikes the vehicle at once
+        given += ["--start", f"{rng.uniform(0.0, 0.9) * load_track(track).length:.4g}"]
         for at in rng.choice(len(places), rng.integers(1, 4), replace=False):
             kind, path, value = places[at]
             factor = rng.choice([-1.0, 0.0, 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-2, 2)])
-            given += ["--set", f"{kind}.{path}={float(value) * factor!r}"]
+            given += ["--set", f"{kind}.{path}={float(value * factor)!r}"]
         path = tmp_path / "run.h5"
         path.unlink(missing_ok=True)
         given += ["--duration", "0.5", "--out", path, "--overwrite", "--quiet"]
@@ -51,6 +57,10 @@ def test_extreme_models(tmp_path, capsys):
         assert [p.name for p in tmp_path.iterdir()] == (["run.h5"] if status != 2 else [])
         return status
 
+    for vehicle, track in MODELS:  # builds their contact tables, if need be
+        given = ["run", vehicle, track, "--speed", "20", "--duration", "0.1", "--overwrite"]
+        assert main([*given, "--quiet", "--out", str(tmp_path / "run.h5")]) == 0
     statuses = tried(5, case)
-    if len(statuses) >= 50:  # most models of a few random seeds are refused
+    if len(statuses) >= 50:  # not all are refused before anything is computed
         assert {0, 2, 3} == set(statuses)
+        assert statuses.count(2) < 0.8 * len(statuses)
