@@ -31,9 +31,9 @@ def tried(normal: int, case) -> list:
             words = f"seed {seed}: {type(error).__name__}: {error} ({place.name}:{place.lineno})"
             failed.append(words[:2000])
             if MORE:
-                print(f"\n{words[:2000]}", file=sys.stderr, flush=True)
+                print(f"\n{words[:2000]}", file=sys.__stderr__, flush=True)
         if MORE and seed % 50 == 49:
-            print(f"\n{case.__qualname__} {seed + 1} of {count}", file=sys.stderr, flush=True)
+            print(f"\n{case.__qualname__} {seed + 1} of {count}", file=sys.__stderr__, flush=True)
     assert not failed, f"{len(failed)} of {count} cases failed:\n" + "\n".join(failed[:20])
     return outcomes
 

@@ -130,7 +130,7 @@ def test_killed_runs_and_studies(whole, tmp_path):
 
     tried(5, case)
     if MORE:
-        print(f"\nslowest end after a signal: {max(ends):.2f} s", file=sys.stderr)
+        print(f"\nslowest end after a signal: {max(ends):.2f} s", file=sys.__stderr__)
 
 
 def test_signal_is_obeyed_while_python_cannot(tmp_path):
