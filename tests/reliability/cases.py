@@ -9,21 +9,18 @@ from contextlib import contextmanager
 
 from railsim.cli import main
 
-# cases of each suite in the normal run; RAILSIM_CASES=4000 asks for more of every kind
-MORE = int(os.environ.get("RAILSIM_CASES", "0"))
+# cases of each suite in the normal run; RAILSIM_CASES=4000 asks for more of every kind, and
+# RAILSIM_CASES=2000:4000 for those with seeds from 2000 on
+FIRST, MORE = (int(part or 0) for part in os.environ.get("RAILSIM_CASES", "0").rpartition(":")[::2])
 SECONDS = 10.0
 MEGABYTES = 2000.0
 
 
-def number(normal: int) -> int:
-    """Return how many cases of a suite to try."""
-    return max(normal, MORE)
-
-
 def tried(normal: int, case) -> list:
     """Call `case` with every seed and return what it returns; all failures are told at the end."""
-    outcomes, failed, count = [], [], number(normal)
-    for seed in range(count):
+    outcomes, failed, end = [], [], max(normal, MORE)
+    count = end - FIRST
+    for seed in range(FIRST, end):
         try:
             outcomes.append(case(seed))
         except Exception as error:
@@ -32,8 +29,8 @@ def tried(normal: int, case) -> list:
             failed.append(words[:2000])
             if MORE:
                 print(f"\n{words[:2000]}", file=sys.__stderr__, flush=True)
-        if MORE and seed % 50 == 49:
-            print(f"\n{case.__qualname__} {seed + 1} of {count}", file=sys.__stderr__, flush=True)
+        if MORE and seed % 20 == 19:
+            print(f"\n{case.__qualname__} {seed + 1} of {end}", file=sys.__stderr__, flush=True)
     assert not failed, f"{len(failed)} of {count} cases failed:\n" + "\n".join(failed[:20])
     return outcomes
 
