@@ -3,7 +3,8 @@
 Python raises the exception of a signal between any two of its instructions.  If these belong to a
 callback of the import system or of the compiler, or to a finaliser, the exception is printed and
 forgotten ("Exception ignored in ..."); a library that is being loaded may turn it into another one.
-So the signal is remembered as well, and looked at where the work goes on: see `obey`.
+So the signal is remembered as well, and looked at where the work goes on: see `obey`; what Python
+would print of the lost exception is left out.
 
 And Python raises nothing at all for as long as one call outside it takes: compiling the time loop
 is minutes.  So a thread listens too; where the program has not ended `PATIENCE` after a signal, it
@@ -12,6 +13,7 @@ ends it, and leaves no hidden file behind.
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -54,10 +56,18 @@ def remembered_interrupts() -> Iterator[None]:
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 before[number] = signal.signal(number, _hear)
     _heard.clear()
+    told = sys.unraisablehook
+
+    def tell(lost: "sys.UnraisableHookArgs") -> None:
+        if not isinstance(lost.exc_value, Interrupted):
+            told(lost)
+
+    sys.unraisablehook = tell
     try:
         with _listening(set(before)):
             yield
     finally:
+        sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
 
