@@ -2,10 +2,12 @@
 
 import os
 import resource
+import signal
 import sys
 import time
 import traceback
 from contextlib import contextmanager
+from itertools import pairwise
 
 from railsim.cli import main
 
@@ -45,9 +47,30 @@ def bounded(what: str):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < MEGABYTES, f"{what}: memory"
 
 
-def outcome(arguments, capsys, what):
+@contextmanager
+def never_deaf(what: str):
+    """Fail where Ctrl-C would not have been heard for `SECONDS` of CPU time, within the block.
+
+    A model far from all experience may have to be computed with a million steps a second: that
+    takes its time, and is no hang for as long as the program can be told to stop.
+    """
+    heard = [time.process_time()]
+    before = signal.signal(signal.SIGPROF, lambda *_: heard.append(time.process_time()))
+    signal.setitimer(signal.ITIMER_PROF, 0.2, 0.2)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+    heard.append(time.process_time())
+    longest = max(later - earlier for earlier, later in pairwise(heard))
+    assert longest < SECONDS, f"{what}: deaf for {longest:.1f} s"
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < MEGABYTES, f"{what}: memory"
+
+
+def outcome(arguments, capsys, what, bound=bounded):
     """Call a command; return its exit status, which is never that of an unforeseen error."""
-    with bounded(what):
+    with bound(what):
         status = main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     assert "Traceback" not in out + err, f"{what}: {err}"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import outcome, tried
+from cases import never_deaf, outcome, tried
 
 from railsim.cli import main
 from railsim.definitions.loading import load_track, load_vehicle
@@ -52,7 +52,7 @@ def test_extreme_models(tmp_path, capsys):
         path = tmp_path / "run.h5"
         path.unlink(missing_ok=True)
         given += ["--duration", "0.5", "--out", path, "--overwrite", "--quiet"]
-        status = outcome(given, capsys, f"model {seed}: {given}")
+        status = outcome(given, capsys, f"model {seed}: {given}", never_deaf)
         if status != 2:
             result = check_result(path)
             assert (result.status == "complete") == (status == 0)
