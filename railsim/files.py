@@ -35,6 +35,7 @@ _SYSTEM = (Path("/proc"), Path("/sys"), Path("/dev"))
 _SHARED_MEMORY = Path("/dev/shm")  # files there are users' own
 _PARTIAL = re.compile(r"\..+\.[a-z0-9_]{8}\.partial", re.DOTALL)  # as `tempfile` makes them
 _OF_FILES = (*RESULTS, *PICTURES, *TABLES, ".csv", ".json", ".html", ".txt")
+_open_ones: dict[Path, None] = {}  # hidden files of this process
 
 
 def check_file(
@@ -230,6 +231,7 @@ class PartialFile:
                 prefix=_prefix(target.name), suffix=".partial", dir=target.parent
             )
             self.path = Path(name)
+            _open_ones[self.path] = None
             with suppress(OSError):  # a file system without locks
                 fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
@@ -268,6 +270,7 @@ class PartialFile:
         """Remove the hidden file, if it is still there, and let go of its lock; may be repeated."""
         with suppress(FileNotFoundError):
             self.path.unlink()
+        _open_ones.pop(self.path, None)
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
@@ -299,6 +302,13 @@ def whole_file(path: Path) -> Iterator[Path]:
     with PartialFile(path) as partial:
         yield partial.path
         partial.finish()
+
+
+def remove_partial_files() -> None:
+    """Remove all hidden files of this process, which is about to end without further ado."""
+    for path in list(_open_ones):
+        with suppress(OSError):
+            path.unlink()
 
 
 def sweep(folder: Path) -> None:

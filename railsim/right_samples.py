@@ -45,3 +45,10 @@ def low_pass_remark(settings: Settings) -> str:
     if asked.phase == "causal":
         return f"Values are low-passed by a causal Butterworth filter, {asked.frequency:g} Hz."
     return f"Values are low-passed without phase, flat to {asked.frequency:g} Hz."
+
+
+def output_words(settings: Settings) -> str:
+    """How often a run stores its values, in words."""
+    if settings.output_spacing:
+        return f"every {settings.output_spacing:g} m"
+    return f"{settings.output_rate:g} per s"

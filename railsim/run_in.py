@@ -50,6 +50,7 @@ NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that need no run-in
 APPROACH_TIME, APPROACH = 4.0, 30.0  # s and m at least of irregular rails before the start
 LONGEST_APPROACH_TIME, LONGEST_APPROACH = 30.0, 500.0  # s and m at least of changing alignment
 UNCHANGING = 1e-9  # change of curvature (1/m2), cant and grade angle (1/m) below which it is none
+STEPS = 10_000  # in a call: Ctrl-C is heard between calls
 SMOOTH = 10.0  # m before the track's beginning where the approach may begin, beside the vehicle
 
 
@@ -194,12 +195,16 @@ def _run(
     start: float, where: str,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
-    work = work_arrays(system)
+    work, recorder = work_arrays(system), empty_recorder(model, 1)
     divide_strikes(work, scheme, step)
-    status, *_ = time_loop(
-        system, work, state, np.zeros_like(state), np.zeros((3, len(state))),
-        empty_recorder(model, 1), scheme, step, 1, steps, steps + 2, 1, 0,
-    )
+    derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
+    status, done = RUNNING, 0
+    while status == RUNNING and done < steps:
+        status, _, more, _ = time_loop(
+            system, work, state, derivative, stages, recorder, scheme, step, 1 + done,
+            min(STEPS, steps - done), steps + 2, int(done == 0), 0,
+        )
+        done += more
     if status != RUNNING:
         raise InputError([Fault(
             "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "

@@ -28,7 +28,8 @@ from railsim.pace import Pace
 from railsim.profiles import Profile
 from railsim.remarks import run_remarks
 from railsim.result import MemorySink, Result, Sink
-from railsim.right_samples import filtering, low_pass_remark, sampled
+from railsim.result.stored import StoredPeaks, lost_peak
+from railsim.right_samples import filtering, low_pass_remark, output_words, sampled
 from railsim.run_in import start_state
 from railsim.time_step import SCHEMES
 
@@ -252,10 +253,15 @@ def _begun(
     prepared = prepare(vehicle, inputs.track, settings, inputs.speed, inputs.start,
                        inputs.duration, inputs.until, profiles, shared, before)
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
-    sink = filtering(sink, settings)
+    stored = StoredPeaks(sink)
+    sink = filtering(stored, settings)
     sink.begin(plan.coordinates, plan.quantities)
     run = Run(prepared, plan, sink, prepared.state.copy(), prepared.fresh,
               wall_time=time.perf_counter() - began)
+    stored.remark = lambda: lost_peak(
+        stored.largest, run_extremes(run.extremes, prepared.balance.Q0), output_words(settings),
+        filtered=settings.outputs.low_pass is not None,
+    )  # fmt: skip
     run.remarks.extend(filter(None, [low_pass_remark(settings)]))
     return run
 

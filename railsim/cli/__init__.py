@@ -17,7 +17,7 @@ import click
 from railsim.cli.common import echo
 from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
 from railsim.cli.streams import silence, usable_streams
-from railsim.errors import InputError, ModelError, words_of
+from railsim.errors import InputError, ModelError, RailsimError, words_of
 from railsim.threads import use_one_thread
 from railsim.version import __version__
 
@@ -142,6 +142,9 @@ def _status(arguments: list[str]) -> int:
         except ModelError as error:
             echo(f"railsim: {error}", err=True)
             return WRONG_INPUT
+        except RailsimError as error:
+            echo(f"railsim: {error}", err=True)
+            return FAILED
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
             echo(f"railsim: {request}", err=True)

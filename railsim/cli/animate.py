@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
-from railsim.files import check_file
+from railsim.files import TABLE_BYTES, check_file, read_text
 
 if TYPE_CHECKING:
     from railsim.animation import Scene
@@ -99,8 +99,8 @@ def _read(file: Path) -> dict[str, Any]:
     from railsim.errors import Fault, InputError
 
     try:
-        data: Any = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        data: Any = json.loads(read_text(file, TABLE_BYTES))
+    except (ValueError, RecursionError) as error:
         raise InputError([Fault(str(file), "", f"cannot be read ({error})", "")]) from None
     if isinstance(data, list) and data:
         data = data[0]

@@ -14,6 +14,7 @@ from railsim.cli.common import (
     table,
 )
 from railsim.files import check_folder, make_folder, whole_file
+from railsim.text import spreadsheet_cell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -199,7 +200,7 @@ def assessment_csv(assessments: "Sequence[Assessment]") -> str:
     columns = list(dict.fromkeys(column for row in rows for column in row))
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({name: spreadsheet_cell(cell) for name, cell in row.items()} for row in rows)
     return text.getvalue()
 
 

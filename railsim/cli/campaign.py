@@ -15,6 +15,7 @@ def run_campaign(
     assignments: tuple[str, ...],
     workers: int | None,
     scheduler: str | None,
+    resume: bool,
     overwrite: bool,
     as_json: bool,
     quiet: bool,
@@ -33,12 +34,15 @@ def run_campaign(
 
         with tqdm.external_write_mode():
             echo(f"{record['name']}  {record['status']}")
+            for remark in record.get("remarks", ()):
+                echo(f"  remark: {remark}")
 
     with progress_bar(scenario, quiet=quiet) as progress:
         done = campaign(
             scenario, list(vehicles), out=out, assignments=assignments, workers=workers,
-            scheduler=scheduler, overwrite=overwrite, progress=progress,
+            scheduler=scheduler, resume=resume, overwrite=overwrite, progress=progress,
             on_record=None if quiet or as_json else tell,
+            on_remark=lambda text: echo(f"remark: {text}", err=True),
         )  # fmt: skip
     written = write_assessments(Path(out), done.assessments)
     if as_json:

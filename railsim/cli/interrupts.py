@@ -3,19 +3,31 @@
 Python raises the exception of a signal between any two of its instructions.  If these belong to a
 callback of the import system or of the compiler, or to a finaliser, the exception is printed and
 forgotten ("Exception ignored in ..."); a library that is being loaded may turn it into another one.
-So the signal is remembered as well, and looked at where the work goes on: see `obey`.
+So the signal is remembered as well, and looked at where the work goes on: see `obey`; what Python
+would print of the lost exception is left out.
+
+And Python raises nothing at all for as long as one call outside it takes: compiling the time loop
+is minutes.  So a thread listens too; where the program has not ended `PATIENCE` after a signal, it
+ends it, and leaves no hidden file behind.
 """
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
+
+from railsim.cli.common import echo
+from railsim.files import remove_partial_files
 
 # Ctrl-C, and on POSIX what `kill` sends, and what a terminal that is closed
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
+
+PATIENCE = 8.0  # seconds that the program has to end by itself: a study waits for its processes
 
 _heard: list[int] = []
 
@@ -44,11 +56,58 @@ def remembered_interrupts() -> Iterator[None]:
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 before[number] = signal.signal(number, _hear)
     _heard.clear()
+    told = sys.unraisablehook
+
+    def tell(lost: "sys.UnraisableHookArgs") -> None:
+        if not isinstance(lost.exc_value, Interrupted):
+            told(lost)
+
+    sys.unraisablehook = tell
+    try:
+        with _listening(set(before)):
+            yield
+    finally:
+        sys.unraisablehook = told
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _listening(numbers: set[int]) -> Iterator[None]:
+    """Let a thread end the program where a signal of these is not obeyed within the block."""
+    if not numbers:
+        yield
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    ended = threading.Event()
+    listener = threading.Thread(target=_listen, args=(reader, numbers, ended), daemon=True)
+    listener.start()
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        signal.set_wakeup_fd(before)
+        ended.set()
+        os.close(writer)  # the listener reads an end
+        listener.join()
+        os.close(reader)
+
+
+def _listen(reader: int, numbers: set[int], ended: threading.Event) -> None:
+    while heard := os.read(reader, 1):
+        if heard[0] in numbers:
+            if not ended.wait(PATIENCE):
+                _end_now(heard[0])
+            return
+
+
+def _end_now(number: int) -> None:
+    request = Interrupted(number)
+    with suppress(Exception):  # whatever holds the main thread may hold the stream as well
+        remove_partial_files()
+        echo(f"railsim: {request}", err=True)
+    os._exit(request.status)
 
 
 def _hear(number: int, _: FrameType | None) -> None:

@@ -191,17 +191,13 @@ def result_record(result: "Result") -> dict[str, Any]:
 def _assumption_lines(case: "Case") -> list[str]:
     """Return what the run rests on, in the habits of the field."""
     from railsim.definitions.flatten import flatten
+    from railsim.right_samples import output_words
 
     track, settings = case.track, case.settings
     wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)
     wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
     step = "chosen" if settings.step is None else f"{settings.step * 1e3:g} ms"
-    rate = (
-        f"every {settings.output_spacing:g} m"
-        if settings.output_spacing
-        else f"{settings.output_rate:g} per s"
-    )
     return [
         f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
@@ -213,7 +209,7 @@ def _assumption_lines(case: "Case") -> list[str]:
         f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
         f"  support   rails {_support(track)}",
         *_irregularity_lines(track),
-        f"  time      scheme {settings.scheme}, step {step}, output {rate}",
+        f"  time      scheme {settings.scheme}, step {step}, output {output_words(settings)}",
     ]
 
 

@@ -128,8 +128,9 @@ def command(
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """  # noqa: D301 - click reads the escape
     if scenario is not None:
-        return _campaign(scenario, vehicles, (tracks, speeds, grids), out, assignments, how,
-                         as_json=as_json, quiet=quiet)
+        return _campaign(scenario, vehicles, (tracks, speeds, grids), out,
+                         with_load(assignments, load, "vehicle."), how,
+                         resume=resume, as_json=as_json, quiet=quiet)
     from railsim.studies import study
 
     inputs: dict[str, Any] = {
@@ -146,7 +147,12 @@ def command(
 
         stored, base = stored_inputs(Path(out))
         out = out if base == Path.cwd() else str(Path(out).absolute())
-        inputs = stored.model_dump(exclude={"railsim_version", "folder"})
+        if stored.scenario is not None:
+            with chdir(base):
+                return _campaign(stored.scenario, tuple(stored.vehicles), ((),), out,
+                                 tuple(stored.assignments), {**inputs, **how},
+                                 resume=True, as_json=as_json, quiet=quiet)
+        inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
     else:
         _require(vehicles, tracks, speeds)
     # names of files in a study that goes on count from where it was started
@@ -175,6 +181,7 @@ def _campaign(
     assignments: tuple[str, ...],
     how: dict[str, Any],
     *,
+    resume: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -193,7 +200,8 @@ def _campaign(
         raise InputError(faults)
     return run_campaign(
         scenario, vehicles, out, assignments=assignments, workers=how["workers"],
-        scheduler=how["scheduler"], overwrite=how["overwrite"], as_json=as_json, quiet=quiet,
+        scheduler=how["scheduler"], resume=resume, overwrite=how["overwrite"], as_json=as_json,
+        quiet=quiet,
     )  # fmt: skip
 
 

@@ -106,6 +106,8 @@ def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
             allowed = _list_of(_annotation_at(model, detail["loc"]))
             if allowed == "a list" and kind == "too_short":
                 allowed = f"a list of {context['min_length']} at least"
+            elif allowed == "a list":
+                allowed = f"a list of {context['max_length']} at most"
             return _counted(value), allowed
         case "model_type" | "model_attributes_type" | "dict_type":
             return _shown(value), "must be a table"

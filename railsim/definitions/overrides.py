@@ -77,8 +77,10 @@ def _value(written: str, text_expected: bool) -> Any:
         value = tomllib.loads(f"value = {written}")["value"]
     except tomllib.TOMLDecodeError:
         if not written or written[0] in "[{\"'":
-            raise KeyError(f"the value '{written}' is no TOML") from None
+            raise KeyError(f"the value '{written[:60]}' is no TOML") from None
         return written
+    except (ValueError, RecursionError):  # an integer of 5000 digits, a thousand brackets
+        raise KeyError(f"the value '{written[:60]}...' is out of range") from None
     return written if text_expected and not isinstance(value, str | list | dict) else value
 
 

@@ -26,7 +26,7 @@ def key_path(key: str) -> list[str]:
     """
     try:
         node = tomllib.loads(f"{key} = 0")
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         raise KeyError("a dotted path of keys such as bodies.carbody.mass") from None
     parts = []
     while isinstance(node, dict):

@@ -16,10 +16,12 @@ and on the disk.  Every dataset has checksums, the file a digest and a seal (`in
 
 import errno
 import logging
+import math
 import os
+import re
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -104,7 +106,7 @@ class Hdf5Sink(SinkContext):
             if partial is not None:
                 partial.remove()
             if error.errno in FULL:
-                raise _of_file(error, self.path) from None
+                raise OSError(error.errno, os.strerror(error.errno), str(self.path)) from None
             fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another place")
             raise InputError([fault]) from None
         except BaseException:  # an interrupt, before a `with` can see to it
@@ -120,12 +122,16 @@ class Hdf5Sink(SinkContext):
         names = full_coordinates(coordinates)
         for dim, labels in names.items():
             _write_names(self._file, dim, labels)
-        for quantity in sorted(self._quantities.values(), key=lambda q: q.name != "time"):
-            if "time" in quantity.dims:
-                inner = tuple(len(names[dim]) for dim in quantity.dims[1:])
-                self._datasets[quantity.name] = _create(self._file, quantity, inner)
-                self._blocks[quantity.name] = np.empty((ROWS_AT_ONCE, *inner))
-                self._crc[quantity.name] = 0
+        for name in timed(self._quantities):
+            inner = tuple(len(names[dim]) for dim in self._quantities[name].dims[1:])
+            self._blocks[name] = np.empty((ROWS_AT_ONCE, *inner))
+            self._crc[name] = 0
+
+    def _create_datasets(self, length: int | None = None) -> None:
+        """Create what is a function of time; with chunks that fit, where the length is known."""
+        for name in sorted(self._blocks, key=lambda name: name != "time"):
+            inner = self._blocks[name].shape[1:]
+            self._datasets[name] = _create(self._file, self._quantities[name], inner, length)
 
     def append(self, chunk: Mapping[str, Array]) -> None:
         """See `Sink.append`; rows wait until they are worth writing."""
@@ -140,12 +146,12 @@ class Hdf5Sink(SinkContext):
                 self._write_waiting()
 
     def _write_waiting(self) -> None:
-        try:
+        with _told_of_file(self.path):
             self._write_rows()
-        except OSError as error:
-            raise _of_file(error, self.path) from None
 
     def _write_rows(self) -> None:
+        if not self._datasets:
+            self._create_datasets()
         length = self._length + self._waiting
         for name, dataset in self._datasets.items():
             rows = self._blocks[name][: self._waiting]
@@ -162,10 +168,8 @@ class Hdf5Sink(SinkContext):
         groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`; the file now has its name."""
-        try:
+        with _told_of_file(self.path):
             self._finish(attributes, statics, profiles, groups)
-        except OSError as error:
-            raise _of_file(error, self.path) from None
         return open_result(self.path)
 
     def _finish(
@@ -175,6 +179,8 @@ class Hdf5Sink(SinkContext):
         profiles: Mapping[str, Profile],
         groups: Mapping[str, Mapping[str, Any]],
     ) -> None:
+        if not self._datasets:
+            self._create_datasets(self._waiting)
         if self._waiting:
             self._write_rows()
         for name, quantity in self._quantities.items():
@@ -203,10 +209,29 @@ class Hdf5Sink(SinkContext):
         self._partial.remove()
 
 
-def _of_file(error: OSError, path: Path) -> OSError:
-    """Return what the system refused, with the name of the file; HDF5 tells it in many lines."""
-    number = error.errno or errno.EIO
-    return OSError(number, os.strerror(number), str(path))
+@contextmanager
+def _told_of_file(path: Path) -> Iterator[None]:
+    """Let what goes wrong with the disk be told in a line; HDF5 tells it in many."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        found = _of_file(error, path)
+        if found is None:
+            raise
+        raise found from None
+
+
+def _of_file(error: OSError | RuntimeError, path: Path) -> OSError | None:
+    """Return what the system refused, with the name of the file; None for another error.
+
+    HDF5 says it in the midst of its words, and while it flushes or closes a file not even by the
+    right kind of exception.
+    """
+    said = re.search(r"errno = (\d+)", str(error))
+    number = getattr(error, "errno", None) or (int(said[1]) if said else 0)
+    if not number and isinstance(error, OSError):
+        number = errno.EIO
+    return OSError(number, os.strerror(number), str(path)) if number else None
 
 
 def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -237,9 +262,22 @@ def _write_names(file: h5py.Group, dim: str, labels: Sequence[str]) -> None:
     dataset.make_scale(dim)
 
 
-def _create(file: h5py.File, quantity: Quantity, inner: tuple[int, ...]) -> h5py.Dataset:
+def _create(
+    file: h5py.File, quantity: Quantity, inner: tuple[int, ...], length: int | None
+) -> h5py.Dataset:
+    """Create an empty dataset for a quantity that is a function of time.
+
+    Parameters
+    ----------
+    inner : tuple of int
+        Its shape at an instant.
+    length : int or None
+        Number of instants: a chunk is never written in part, and a short run is a small file.
+    """
     # a power of two: whole chunks are written at once
     rows = 2 ** int(np.log2(max(1, min(1024, CHUNK_BYTES // (8 * max(1, int(np.prod(inner))))))))
+    if length is not None:
+        rows = math.ceil(length / math.ceil(length / rows)) if length else 1
     dataset = file.create_dataset(
         quantity.name,
         shape=(0, *inner),

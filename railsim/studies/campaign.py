@@ -1,10 +1,12 @@
 """A scenario for vehicles: all its runs as one job, and the assessment at the end.
 
-A run whose file is there with the same inputs is not computed again.
+It is carried out as a study is: with its journal, index and summary, and a run whose file is there
+with the same inputs is not computed again.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -14,20 +16,14 @@ from railsim.definitions.loading import load_scenario, load_vehicle
 from railsim.definitions.scenario import Scenario, Speed
 from railsim.definitions.vehicle import Service
 from railsim.errors import Fault, InputError, RailsimError
-from railsim.files import check_folder, make_folder
+from railsim.files import check_folder
 from railsim.result import Result, open_result
 from railsim.studies.case import Case, short_name
-from railsim.studies.combine import load_case
-from railsim.studies.execute import (
-    Job,
-    batches,
-    cluster,
-    in_processes,
-    in_this_process,
-    on_cluster,
-)
+from railsim.studies.combine import in_a_name, load_case, name_faults
 from railsim.studies.journal import Record
-from railsim.studies.study import cores
+from railsim.studies.points import Point, check_number
+from railsim.studies.study import carry_out, cores
+from railsim.version import __version__
 
 GRAVITY, CANT_BASE = 9.81, 1.5
 
@@ -43,8 +39,6 @@ class Campaign:
         One for each vehicle.
     results : dict
         Results by the names of their runs.
-    failed : tuple of dict
-        Records of runs without a result.
     computed : int
         Number of runs that were computed now; the others were there.
     """
@@ -52,7 +46,6 @@ class Campaign:
     folder: Path
     assessments: tuple[Assessment, ...]
     results: dict[str, Result]
-    failed: tuple[Record, ...]
     computed: int
 
 
@@ -64,9 +57,11 @@ def campaign(
     assignments: Sequence[str] = (),
     workers: int | None = None,
     scheduler: str | None = None,
+    resume: bool = False,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
+    on_remark: Callable[[str], None] | None = None,
 ) -> Campaign:
     """Run a scenario for vehicles and assess it.
 
@@ -84,12 +79,16 @@ def campaign(
         Processes; by default one for each core.
     scheduler : str, optional
         Address of a dask scheduler whose workers do the runs instead.
+    resume : bool
+        Go on with what is in the folder: runs whose inputs have changed are computed again.
     overwrite : bool
         Compute everything again.
     progress : callable, optional
         Called with the finished fraction now and then.
     on_record : callable, optional
         Called with the record of every run that is done.
+    on_remark : callable, optional
+        Called with every sentence on what was found in the folder.
 
     Raises
     ------
@@ -101,24 +100,43 @@ def campaign(
     check_folder(folder)
     plan = load_scenario(scenario)
     cases = scenario_cases(plan, names, assignments)
-    there, faults = _there(cases, folder, overwrite=overwrite)
-    if faults:
-        raise InputError(faults)
-    make_folder(folder)
-    jobs = [Job(case, (folder / case.file_name).resolve()) for case in cases
-            if case.name not in there]  # fmt: skip
-    failed = []
-    for record in _executed(jobs, workers, scheduler, progress or (lambda _: None)):
-        if on_record is not None:
-            on_record(record)
-        if record["status"] == "failed":
-            failed.append(record)
-    if failed:
-        words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in failed)
-        raise RailsimError(f"{len(failed)} of {len(cases)} runs failed: {words}")
+    inputs = {
+        "railsim_version": __version__,
+        "folder": os.path.relpath(Path.cwd(), folder),  # where names of files begin
+        "scenario": str(scenario),
+        "vehicles": [str(vehicle) for vehicle in names],
+        "tracks": [],
+        "speeds": [],
+        "assignments": list(assignments),
+    }
+    outcome = carry_out(
+        _Cases(cases), inputs, folder, workers=workers, scheduler=scheduler, resume=resume,
+        overwrite=overwrite, longest_first=True, progress=progress, on_record=on_record,
+        on_remark=on_remark,
+    )  # fmt: skip
+    if outcome.failed:
+        words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in outcome.failed)
+        raise RailsimError(f"{len(outcome.failed)} of {len(cases)} runs failed: {words}")
     results = {case.name: open_result(folder / case.file_name) for case in cases}
     assessments = assess(results, plan.standard, method=plan.method)
-    return Campaign(folder, tuple(assessments), results, tuple(failed), len(jobs))
+    return Campaign(folder, tuple(assessments), results, outcome.computed)
+
+
+class _Cases:
+    """Cases that are loaded, as `carry_out` wants them."""
+
+    def __init__(self, cases: Sequence[Case]) -> None:
+        self._cases = {case.name: case for case in cases}
+        self.points = [
+            Point(case.name, case.vehicle.name, case.track.name, case.speed, {}, case.labels,
+                  case.key)
+            for case in cases
+        ]  # fmt: skip
+        if faults := name_faults(self.points):
+            raise InputError(faults)
+
+    def cases(self, points: Sequence[Point]) -> list[Case]:
+        return [self._cases[point.name] for point in points]
 
 
 def scenario_cases(
@@ -132,6 +150,7 @@ def scenario_cases(
     """
     faults: list[Fault] = []
     cases: list[Case] = []
+    check_number([vehicles, list(scenario.parts), *scenario.grid.values()], cores(), lambda: 60.0)
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:
         own = [a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")]
@@ -147,7 +166,7 @@ def scenario_cases(
         for (name, part), point in product(scenario.parts.items(), points):
             texts = [*scenario.assignments, *(f"{key}={v}" for key, v in point.items())]
             speed = part_speed(part.speed, service)
-            label = "_".join([short_name(vehicle), name, *point.values()])
+            label = "_".join([short_name(vehicle), name, *map(in_a_name, point.values())])
             try:
                 case = load_case(
                     vehicle, part.track, speed, until=part.until,
@@ -170,43 +189,3 @@ def part_speed(speed: Speed, service: Service) -> float:
         return speed.admissible * service.admissible_speed
     deficiency = (speed.cant_deficiency or 0.0) * service.cant_deficiency
     return math.sqrt(GRAVITY * (speed.radius or 0.0) * (speed.cant + deficiency) / CANT_BASE)
-
-
-def _there(
-    cases: Sequence[Case], folder: Path, *, overwrite: bool
-) -> tuple[set[str], list[Fault]]:
-    """Names of the runs that are there already, and files that would have to be replaced."""
-    found: set[str] = set()
-    faults: list[Fault] = []
-    for case in cases:
-        path = folder / case.file_name
-        if overwrite or not path.exists():
-            continue
-        try:
-            same = open_result(path).attributes.get("inputs_hash") == case.key
-        except InputError as error:
-            faults += error.faults
-            continue
-        if same:
-            found.add(case.name)
-        else:
-            allowed = "--overwrite computes everything; or another --out"
-            faults.append(Fault("--out", str(path), "a result of other inputs", allowed))
-    return found, faults
-
-
-def _executed(
-    jobs: Sequence[Job],
-    workers: int | None,
-    scheduler: str | None,
-    progress: Callable[[float], None],
-) -> Iterable[Record]:
-    if scheduler is not None:
-        client = cluster(scheduler)
-        threads = max(1, sum(client.nthreads().values()))
-        return on_cluster(batches(jobs, 1, threads), client, progress)
-    # the longest runs first, so that no core is left with one of them at the end
-    jobs = sorted(jobs, key=lambda job: -job.case.track.length / job.case.speed)
-    count = min(workers or cores(), len(jobs))
-    work = batches(jobs, 1, max(1, count))
-    return in_processes(work, count, progress) if count > 1 else in_this_process(work, progress)

@@ -189,7 +189,7 @@ class Plan:
                     self._duration, self._until, point.labels,
                 ))
         if not self._faults:
-            self._tell(_name_faults(self.points))
+            self._tell(name_faults(self.points))
         if self._faults:
             raise InputError(self._faults)
         return found
@@ -273,10 +273,22 @@ def _suffix(point: Mapping[str, str]) -> str:
     last = {key: re.sub(r"^.*\.(?=[^.]*[^.\d])", "", key) for key in point}
     unique = len(set(last.values())) == len(last)
     parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
-    return "".join("_" + re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", p)) for p in parts)
+    return "".join("_" + in_a_name(part) for part in parts)
 
 
-def _name_faults(points: Sequence[Point]) -> list[Fault]:
+def in_a_name(text: str) -> str:
+    """Return what a text is called within the name of a file, which leads to no other folder.
+
+    Examples
+    --------
+    >>> in_a_name("[10, 20]"), in_a_name("../other")
+    ('10-20', '..-other')
+    """
+    return re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", text))
+
+
+def name_faults(points: Sequence[Point]) -> list[Fault]:
+    """Return what is wrong with the names of runs: two of a name, or too long for a file."""
     counts = Counter(point.name for point in points)
     faults = [
         Fault("study", name, f"{count} runs of this name", "give files with different names")

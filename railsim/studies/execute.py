@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError, RailsimError, words_of
-from railsim.files import sweep
+from railsim.files import remove_partial_files, sweep
 from railsim.kernels.time_loop import time_loop
 from railsim.result import Result
 from railsim.studies.case import Case
@@ -338,6 +338,7 @@ def _end_with_parent(stop: Any) -> None:
         parent.join()
         stop.set()
         time.sleep(GRACE)
+        remove_partial_files()
         os._exit(1)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, is_file, make_folder, sweep
@@ -193,6 +193,62 @@ def study(
         "until": until,
         "assignments": list(assignments),
     }
+    outcome = carry_out(
+        plan, inputs, folder, workers=workers, together=together, scheduler=scheduler,
+        resume=resume, overwrite=overwrite, plots=plots, progress=progress, on_record=on_record,
+        on_remark=on_remark,
+    )  # fmt: skip
+    if plots:
+        from railsim.studies.pictures import draw
+
+        draw(outcome)
+    return outcome
+
+
+class Runs(Protocol):
+    """What is to be done, such as `Plan`.
+
+    Attributes
+    ----------
+    points : list of Point
+        What each run is asked for.
+    """
+
+    points: list[Point]
+
+    def cases(self, points: Sequence[Point]) -> list[Case]:
+        """Load what the runs of some points need."""
+
+
+def carry_out(
+    plan: Runs,
+    inputs: Mapping[str, Any],
+    folder: Path,
+    *,
+    workers: int | None = None,
+    together: int = 1,
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    plots: bool = False,
+    longest_first: bool = False,
+    progress: Callable[[float], None] | None = None,
+    on_record: Callable[[Record], None] | None = None,
+    on_remark: Callable[[str], None] | None = None,
+) -> Outcome:
+    """Do the runs of a study or a campaign that are not done, with the journal of its folder.
+
+    Parameters
+    ----------
+    plan : Runs
+        What is to be done.
+    inputs : mapping
+        What was asked for, as the journal and the index keep it, see `Inputs`.
+    longest_first : bool
+        Begin with the longest runs, so that no core is left with one of them at the end.
+
+    Others as in `study`.
+    """
     with ExitStack() as stack:
         known = None
         if is_file(folder / JOURNAL):
@@ -213,6 +269,8 @@ def study(
         for text in state.settle(journal):
             remark(text)
         jobs = [_job(case, folder, plots) for case in state.cases]
+        if longest_first:
+            jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
         keys = {point.name: point.key for point in plan.points}
         status = "interrupted"
         try:
@@ -234,12 +292,7 @@ def study(
         whole = len(plan.points) > MANY and _is_newer(folder / "study.json", journal.path)
         if jobs or state.found or not whole:
             write_index(folder, inputs, status, state.records(journal))
-        outcome = Outcome(folder, state.records(journal), len(jobs))
-    if plots:
-        from railsim.studies.pictures import draw
-
-        draw(outcome)
-    return outcome
+        return Outcome(folder, state.records(journal), len(jobs))
 
 
 class _State:
@@ -259,7 +312,7 @@ class _State:
     """
 
     def __init__(
-        self, folder: Path, plan: Plan, known: Journal | None, *, resume: bool, overwrite: bool
+        self, folder: Path, plan: Runs, known: Journal | None, *, resume: bool, overwrite: bool
     ) -> None:
         self._folder, self._plan = folder, plan
         self._entries = dict(known.entries) if known and not overwrite else {}

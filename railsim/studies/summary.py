@@ -85,6 +85,7 @@ class Inputs(BaseModel):
 
     railsim_version: str = ""
     folder: str = "."
+    scenario: str | None = None
     vehicles: list[str]
     tracks: list[str]
     speeds: list[float | None]

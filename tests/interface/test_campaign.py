@@ -4,8 +4,10 @@ import json
 import math
 
 import pytest
+from example_result import feed
 
 import railsim
+import railsim.studies.run
 from railsim.assessment.sections import track_sections
 from railsim.cli import main
 from railsim.definitions.loading import load_running_limits, load_scenario
@@ -82,3 +84,93 @@ def test_wrong_campaigns_are_refused(tmp_path, capsys):
         assert main(["study", "--scenario", "en14363", "--out", str(tmp_path / "o"), *wrong]) == 2
         assert "Traceback" not in capsys.readouterr().err
     assert not (tmp_path / "o").exists()
+
+
+TWO = """format = "railsim-scenario/1"
+name = "two"
+standard = "wear"
+[grid]
+"track.name" = ["../../outside", "b c"]
+[parts.one]
+track = "straight"
+speed = { fixed = 20.0 }
+"""
+RUNS = ["coach_manchester_one_..-..-outside", "coach_manchester_one_bc"]
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Number of runs before Ctrl-C; results are made up, and nothing is assessed."""
+    left = [99]
+
+    def simulate(*_, sink, **how):
+        if not left[0]:
+            raise KeyboardInterrupt
+        left[0] -= 1
+        return feed(sink, duration=1.0, rate=10.0)
+
+    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    monkeypatch.setattr(railsim.studies.campaign, "assess", lambda *_, **how: [])
+    return left
+
+
+def state(folder):
+    return {run["name"]: run["status"] for run in json.loads(folder.read_text())["runs"]}
+
+
+def test_interrupted_campaign_loses_nothing_and_goes_on(tmp_path, simulated, capsys):
+    scenario, out = tmp_path / "two.toml", tmp_path / "deep" / "out"
+    scenario.write_text(TWO)
+    given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester"]
+    given += ["--out", str(out), "--workers", "1"]
+    simulated[0] = 1
+    assert main(given) == 130
+    assert state(out / "study.json") == dict(zip(RUNS, ["complete", "waiting"], strict=True))
+    assert {path.name for path in tmp_path.iterdir()} == {"two.toml", "deep"}
+    # neither the scenario nor the vehicles need be given again
+    simulated[0] = 1
+    assert main(["study", "--resume", "--out", str(out), "--workers", "1"]) == 0
+    assert state(out / "study.json") == dict.fromkeys(RUNS, "complete")
+    assert len((out / "summary.csv").read_text().splitlines()) == 3
+    (out / f"{RUNS[0]}.h5").write_bytes(b"damaged")
+    simulated[0] = 1
+    assert main([*given, "--resume"]) == 0
+    assert "computed again" in capsys.readouterr().err
+    simulated[0] = 0
+    assert main(given) == 0
+    # another campaign does not go into the same folder
+    assert main([*given, "--set", "track.friction=0.3"]) == 2
+    assert "holds a study with other assignments" in capsys.readouterr().err
+
+
+def test_failed_run_of_a_campaign_is_a_line(tmp_path, monkeypatch, capsys):
+    def simulate(*_, **how):
+        raise railsim.errors.ModelError("no equilibrium")
+
+    monkeypatch.setattr(railsim.studies.run, "simulate", simulate)
+    scenario = tmp_path / "two.toml"
+    scenario.write_text(TWO)
+    given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester", "--quiet"]
+    assert main([*given, "--out", str(tmp_path / "out"), "--workers", "1"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("railsim: 2 of 2 runs failed: ")
+    assert error.count("\n") == 1
+    assert set(state(tmp_path / "out" / "study.json").values()) == {"failed"}
+
+
+def test_campaign_of_a_million_runs_is_told_at_once(tmp_path, capsys):
+    many = [f"{k}" for k in range(1000)]
+    scenario = tmp_path / "many.toml"
+    scenario.write_text(TWO.split("[grid]")[0] + f'[grid]\n"track.friction" = {many}\n'
+                        f'"track.gauge" = {many}\n' + TWO[TWO.index("[parts"):])
+    given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester"]
+    assert main([*given, "--out", str(tmp_path / "out")]) == 2
+    assert "1,000,000 runs, some" in capsys.readouterr().err
+
+
+def test_runs_of_one_name_are_refused(tmp_path, capsys):
+    scenario = tmp_path / "two.toml"
+    scenario.write_text(TWO.replace("b c", "../../outside "))
+    given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester"]
+    assert main([*given, "--out", str(tmp_path / "out")]) == 2
+    assert "2 runs of this name" in capsys.readouterr().err

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+import railsim.cli.interrupts
 import railsim.simulation
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
@@ -38,11 +39,13 @@ def turned_into_another(number):
 
 
 @pytest.fixture(autouse=True)
-def nothing_ignored():
+def nothing_ignored(monkeypatch):
     """A shell that starts the tests in the background has them ignore Ctrl-C."""
     numbers = signal.SIGINT, signal.SIGTERM
     defaults = signal.default_int_handler, signal.SIG_DFL
     before = [signal.signal(*pair) for pair in zip(numbers, defaults, strict=True)]
+    # where it is overdue the process is ended: here that of the tests
+    monkeypatch.setattr(railsim.cli.interrupts, "PATIENCE", 600.0)
     yield
     for pair in zip(numbers, before, strict=True):
         signal.signal(*pair)
@@ -64,7 +67,6 @@ def comes(monkeypatch):
     return during_preparation
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("way", [lost, turned_into_another])
 @pytest.mark.parametrize(
     ("name", "status", "words"),
@@ -77,7 +79,6 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("way", [lost, turned_into_another])
 def test_study_obeys_a_signal_that_python_loses(tmp_path, comes, way):
     comes(way, signal.SIGINT)

@@ -8,6 +8,7 @@ import pytest
 import xarray
 from example_result import COORDINATES, PROFILES, arrays, attributes
 
+import railsim
 from railsim.cli import main
 from railsim.result import Hdf5Sink, MemorySink, open_result
 from railsim.studies import summary
@@ -76,3 +77,27 @@ def test_info_shows_them(files, capsys):
     assert [line.split(maxsplit=1)[1] for line in lines if line.startswith("remark")] == [*REMARKS]
     assert main(["info", files[0], "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["remarks"] == list(REMARKS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("assignment", "words"),
+    [
+        ("output_rate=1000", None),
+        ("output_rate=2", "Between two outputs (2 per s) forces peak: the largest"),
+        ("output_spacing=7", "Between two outputs (every 7 m) forces peak: the largest"),
+        ("outputs.low_pass={ frequency = 5.0, phase = 'causal' }", "The low pass takes "),
+    ],
+)
+def test_what_outputs_and_filters_cost_a_peak_is_said(assignment, words):
+    """A dip of 10 mm: its blow lasts some hundredths of a second."""
+    dip = 'irregularities=[{ type = "dip", s = 25.0, length = 2.0, depth = 0.01 }]'
+    result = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("straight", [dip]),
+        speed=20.0, until=45.0, settings=railsim.load_settings(None, [assignment]),
+    )  # fmt: skip
+    found = [text for text in result.remarks if "in what is stored" in text or "outputs" in text]
+    assert [text.startswith(words or "") for text in found] == [True] * (words is not None)
+    if found:
+        name = found[0].split("the largest ")[1].split()[0].rstrip(":")
+        assert f"{1e-3 * abs(result[name]).max():.2f} kN in" in found[0]

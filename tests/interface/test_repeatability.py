@@ -1,9 +1,11 @@
 """The same inputs give the same bytes, whatever was computed or stored before."""
 
+import numpy as np
 import pytest
 
 import railsim
 import railsim.advance
+import railsim.run_in
 
 
 def run():
@@ -34,3 +36,16 @@ def test_run_with_a_new_contact_table_equals_the_run_with_the_stored_one(tmp_pat
     assert len(list((tmp_path / "tables").glob("*.npy"))) == 1
     for name in new:
         assert new[name].tobytes() == stored[name].tobytes(), name
+
+
+@pytest.mark.slow
+def test_run_in_may_be_interrupted_and_is_the_same_in_pieces(monkeypatch):
+    """A start in a curve: the run-in before it is many calls of the time loop, or one."""
+    track = railsim.load_track("curve_r250")
+    vehicle = railsim.load_vehicle("coach_manchester")
+    how = {"speed": 20.0, "start": 150.0, "duration": 0.1}
+    whole = railsim.simulate(vehicle, track, **how)
+    monkeypatch.setattr(railsim.run_in, "STEPS", 137)
+    pieces = railsim.simulate(vehicle, track, **how)
+    for name in whole:
+        np.testing.assert_array_equal(pieces[name], whole[name])

@@ -2,20 +2,39 @@
 
 import os
 import resource
+import signal
+import sys
 import time
+import traceback
 from contextlib import contextmanager
+from itertools import pairwise
 
 from railsim.cli import main
 
-# cases of each suite in the normal run; RAILSIM_CASES=4000 asks for more of every kind
-MORE = int(os.environ.get("RAILSIM_CASES", "0"))
+# cases of each suite in the normal run; RAILSIM_CASES=4000 asks for more of every kind, and
+# RAILSIM_CASES=2000:4000 for those with seeds from 2000 on
+FIRST, MORE = (int(part or 0) for part in os.environ.get("RAILSIM_CASES", "0").rpartition(":")[::2])
 SECONDS = 10.0
 MEGABYTES = 2000.0
 
 
-def number(normal: int) -> int:
-    """Return how many cases of a suite to try."""
-    return max(normal, MORE)
+def tried(normal: int, case) -> list:
+    """Call `case` with every seed and return what it returns; all failures are told at the end."""
+    outcomes, failed, end = [], [], max(normal, MORE)
+    count = end - FIRST
+    for seed in range(FIRST, end):
+        try:
+            outcomes.append(case(seed))
+        except Exception as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            words = f"seed {seed}: {type(error).__name__}: {error} ({place.name}:{place.lineno})"
+            failed.append(words[:2000])
+            if MORE:
+                print(f"\n{words[:2000]}", file=sys.__stderr__, flush=True)
+        if MORE and seed % 20 == 19:
+            print(f"\n{case.__qualname__} {seed + 1} of {end}", file=sys.__stderr__, flush=True)
+    assert not failed, f"{len(failed)} of {count} cases failed:\n" + "\n".join(failed[:20])
+    return outcomes
 
 
 @contextmanager
@@ -28,13 +47,42 @@ def bounded(what: str):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < MEGABYTES, f"{what}: memory"
 
 
-def outcome(arguments, capsys, what):
+@contextmanager
+def stopped(what: str):
+    """Ask a command to end that goes on; fail where it was deaf for `SECONDS` of CPU time.
+
+    A model far from all experience may have to be computed with a million steps a second: that
+    takes its time, and is no hang for as long as the program can be told to stop.
+    """
+    begin = time.process_time()
+    heard, asked = [begin], []
+
+    def look(*_):
+        heard.append(time.process_time())
+        if heard[-1] - begin > (SECONDS if MORE else 2.0) and not asked:
+            asked.append(True)
+            signal.raise_signal(signal.SIGTERM)
+
+    before = signal.signal(signal.SIGPROF, look)
+    signal.setitimer(signal.ITIMER_PROF, 0.2, 0.2)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+    heard.append(time.process_time())
+    longest = max(later - earlier for earlier, later in pairwise(heard))
+    assert longest < SECONDS, f"{what}: deaf for {longest:.1f} s"
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < MEGABYTES, f"{what}: memory"
+
+
+def outcome(arguments, capsys, what, bound=bounded, allowed=(0, 2, 3)):
     """Call a command; return its exit status, which is never that of an unforeseen error."""
-    with bounded(what):
+    with bound(what):
         status = main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     assert "Traceback" not in out + err, f"{what}: {err}"
     assert "should not happen" not in err, f"{what}: {arguments}\n{err}"
-    assert status in (0, 2, 3), f"{what}: status {status}: {err}"
+    assert status in allowed, f"{what}: status {status}: {err}"
     assert (status == 2) == bool(err.strip()) or status != 2, f"{what}: no word on stderr"
     return status

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from cases import number
+from cases import tried
 from mutations import bytes_damaged
 
 from railsim.kernels import cache
@@ -21,16 +21,18 @@ def fresh():
 
 def test_damaged_files_are_left_out(tmp_path):
     data = np.random.default_rng(0).bytes(5000)
-    lost = 0
-    for seed in range(number(60)):
+
+    def case(seed):
         path = tmp_path / f"{seed}.nbc"
         cache.store(path, data)
         path.write_bytes(bytes_damaged(path.read_bytes(), np.random.default_rng(seed)))
         found = cache.stored(path)
         assert found in (None, data), seed
-        lost += found is None
         assert path.exists() == (found is not None)  # a damaged file is made anew
-    assert lost > 0.9 * number(60)
+        return "lost" if found is None else "kept"
+
+    outcomes = tried(60, case)
+    assert outcomes.count("lost") > 0.9 * len(outcomes)
     assert len(cache.notices) == 1  # said once
 
 

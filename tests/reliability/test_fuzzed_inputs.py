@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from cases import bounded, number, outcome
+from cases import bounded, outcome, tried
 from mutations import HOSTILE, bytes_damaged, text_damaged
 
 import railsim.studies.run
@@ -54,28 +54,30 @@ irregularities = [
 
 def test_damaged_definitions(tmp_path, capsys):
     texts = [(ROOT / path).read_text(encoding="utf-8") for path in DEFINITIONS] + [SETTINGS]
-    statuses = []
-    for seed in range(number(180)):
+
+    def case(seed):
         rng = np.random.default_rng(seed)
         path = tmp_path / "damaged.toml"
         path.write_text(text_damaged(texts[seed % len(texts)], rng), encoding="utf-8")
         command = "info" if seed % 5 == 0 else "validate"
-        statuses.append(outcome([command, path], capsys, f"definition {seed}"))
-    assert {0, 2} == set(statuses)  # the damage is neither always fatal nor always harmless
+        return outcome([command, path], capsys, f"definition {seed}")
+
+    assert {0, 2} == set(tried(180, case))  # the damage is neither always fatal nor always harmless
 
 
 def test_damaged_recordings(tmp_path, capsys):
     rows = [f"{s:.2f},{0.002 * np.sin(s):.6f},{0.001 * np.cos(s):.6f}" for s in range(0, 60, 2)]
     clean = "s,z_left,z_right\n" + "\n".join(rows) + "\n"
     (tmp_path / "track.toml").write_text(TRACK)
-    statuses = []
-    for seed in range(number(60)):
+
+    def case(seed):
         rng = np.random.default_rng(seed)
         data = text_damaged(clean, rng).encode() if seed % 3 else bytes_damaged(clean.encode(), rng)
         (tmp_path / "recorded.csv").write_bytes(data)
         given = ["validate", tmp_path / "track.toml"]
-        statuses.append(outcome(given, capsys, f"recording {seed}"))
-    assert {0, 2} == set(statuses)
+        return outcome(given, capsys, f"recording {seed}")
+
+    assert {0, 2} == set(tried(60, case))
 
 
 @pytest.fixture(scope="module")
@@ -87,20 +89,22 @@ def result(tmp_path_factory):
 def test_damaged_bytes_of_results(result, tmp_path):
     """What is accepted is what was written, to the last bit."""
     whole, clean = result.read_bytes(), check_result(result)
-    refused = 0
-    for seed in range(number(100)):
+
+    def case(seed):
         path = tmp_path / "run.h5"
         path.write_bytes(bytes_damaged(whole, np.random.default_rng(seed)))
         with bounded(f"result {seed}"):
             try:
                 found = check_result(path)
             except InputError:
-                refused += 1
-                continue
+                return "refused"
         assert dict(found.attributes) == dict(clean.attributes), seed
         for name in clean:
             np.testing.assert_array_equal(found[name], clean[name], err_msg=f"{seed}: {name}")
-    assert refused > 0.9 * number(100)
+        return "accepted"
+
+    outcomes = tried(100, case)
+    assert outcomes.count("refused") > 0.9 * len(outcomes)
 
 
 def soft_link(file, name, rng):
@@ -187,7 +191,8 @@ def test_results_made_up_by_others(result, tmp_path, capsys):
     whole = result.read_bytes()
     other = tmp_path / "first.h5"
     other.write_bytes(whole)
-    for seed in range(number(56)):
+
+    def case(seed):
         rng = np.random.default_rng(seed)
         change = CHANGES[seed % len(CHANGES)]
         path = tmp_path / "run.h5"
@@ -207,6 +212,8 @@ def test_results_made_up_by_others(result, tmp_path, capsys):
         for command in commands:
             outcome(command, capsys, what)
 
+    tried(56, case)
+
 
 def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
     def simulate(*_, sink, progress, **how):
@@ -220,7 +227,8 @@ def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
     names = ("study.json", "study.journal")
     whole = {name: (folder / name).read_bytes() for name in names}
     capsys.readouterr()
-    for seed in range(number(50)):
+
+    def case(seed):
         rng = np.random.default_rng(seed)
         for name in names:
             (folder / name).write_bytes(whole[name])
@@ -240,6 +248,8 @@ def test_damaged_files_of_studies(tmp_path, capsys, monkeypatch):
         if status == 0 and seed % 4 != 3:
             index = json.loads((folder / "study.json").read_text())
             assert index["status"] == "complete"
+
+    tried(50, case)
 
 
 def journal_changed(data, rng):
@@ -273,7 +283,8 @@ def test_arguments(tmp_path, capsys, monkeypatch):
 
     for module in ("railsim.studies.run.simulate", "railsim.contact.contact_geometry"):
         monkeypatch.setattr(module, refuse, raising=False)
-    for seed in range(number(60)):
+
+    def case(seed):
         rng = np.random.default_rng(seed)
         words = [WORDS[rng.integers(9)], *rng.choice(WORDS, rng.integers(0, 9))]
         words = [str(word) for word in words if word != "--workers"]
@@ -285,3 +296,5 @@ def test_arguments(tmp_path, capsys, monkeypatch):
         assert "should not happen" not in error, f"{seed}: {words}\n{error}"
         assert "Traceback" not in error, f"{seed}: {words}"
         assert status in (0, 1, 2, 3), f"{seed}: {words}"
+
+    tried(60, case)

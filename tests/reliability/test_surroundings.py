@@ -11,6 +11,7 @@ import pytest
 
 import railsim.cli.info
 from railsim.cli import main
+from railsim.cli.assess import assessment_csv
 from railsim.kernels import cache
 
 sys.path.append(str(Path(__file__).parents[1] / "interface"))
@@ -113,6 +114,40 @@ def test_names_are_shown_literally(tmp_path, capsys):
         assert main(given) == 0
     rows = (tmp_path / "out" / "compare.csv").read_text(encoding="utf-8")
     assert ",'=1+1$x^$," in rows
+
+
+def test_assessments_show_names_literally():
+    class Row:
+        def record(self):
+            return {"run": "=1+1", "value": -0.3}
+
+    class Assessed:
+        vehicle, standard = "@coach", "en14363"
+        zones = (type("Zone", (), {"zone": "1", "rows": [Row()]}),)
+
+        def record(self):
+            return {"comfort": {}, "wear": {}, "safety": {}}
+
+    lines = assessment_csv([Assessed()]).splitlines()
+    assert lines[1] == "'@coach,en14363,1,'=1+1,-0.3"
+
+
+@pytest.mark.parametrize("value", ["9" * 5000, "[" * 3000 + "]" * 3000, "[" * 3000, "a." * 3000])
+def test_values_of_any_length_are_answered(value, capsys):
+    for words in (["--set", f"vehicle.bodies.carbody.mass={value}"], ["--set", f"{value}=1"]):
+        run = ["run", "coach_manchester", "straight", "--speed", "20", *words]
+        assert main(run) == 2
+        error = capsys.readouterr().err
+        assert "--set: " in error
+        assert "unexpected" not in error
+
+
+def test_ten_thousand_dips_are_told_with_what_is_allowed(tmp_path, capsys):
+    dips = ",".join(f"{{type='dip',s={k % 900}.5,length=2.0,depth=1e-3}}" for k in range(10000))
+    head = 'format="railsim-track/1"\nname="d"\nplan=[{type="STR",length=1000.0}]\n'
+    (tmp_path / "dips.toml").write_text(f"{head}irregularities=[{dips}]\n")
+    assert main(["validate", str(tmp_path / "dips.toml")]) == 2
+    assert "10000 values; a list of 1000 at most" in capsys.readouterr().err
 
 
 def test_cache_is_for_its_user_only(tmp_path):

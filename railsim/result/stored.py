@@ -1,0 +1,113 @@
+"""What of a run's peaks is left in what is stored of it.
+
+The time loop looks at every step; a result holds some of them, perhaps filtered.  Where that costs
+a good part of a peak, a remark says how much.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from railsim.notation import QUANTITIES, Quantity
+from railsim.profiles.profile import Profile
+from railsim.result.data import Array, Attributes, Result
+from railsim.result.sinks import ALWAYS, NOTHING, Sink, SinkContext
+
+LOOKED_AT = ("Q", "Y", "sum_Y")
+LOST, LEAST = 0.05, 1e3  # share of a peak, and force [N], that are worth a remark
+
+
+class StoredPeaks(SinkContext):
+    """Hands everything on, and remembers the largest magnitudes.
+
+    Parameters
+    ----------
+    sink : Sink
+        Where the chunks go.
+
+    Attributes
+    ----------
+    largest : dict of str to float
+        Largest magnitudes of the quantities in `LOOKED_AT` so far [SI].
+    remark : callable
+        Returns at the end what there is to remark on, or nothing.
+    """
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self.largest: dict[str, float] = {}
+        self.remark: Callable[[], str] = str
+
+    def begin(
+        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+    ) -> None:
+        """See `Sink.begin`."""
+        self._sink.begin(coordinates, quantities)
+
+    def append(self, chunk: Mapping[str, Array]) -> None:
+        """See `Sink.append`."""
+        for name in LOOKED_AT:
+            if name in chunk and len(chunk[name]):
+                most = float(np.abs(chunk[name]).max())
+                self.largest[name] = max(self.largest.get(name, 0.0), most)
+        self._sink.append(chunk)
+
+    def close(
+        self,
+        attributes: Attributes,
+        statics: Mapping[str, Any] = NOTHING,
+        profiles: Mapping[str, Profile] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+    ) -> Result:
+        """See `Sink.close`."""
+        remarks = "\n".join(filter(None, [str(attributes.get("remarks", "")), self.remark()]))
+        return self._sink.close({**attributes, "remarks": remarks}, statics, profiles, groups)
+
+    def abort(self) -> None:
+        """See `Sink.abort`."""
+        self._sink.abort()
+
+
+def lost_peak(
+    stored: Mapping[str, float], of_steps: Mapping[str, Array], outputs: str, *, filtered: bool
+) -> str:
+    """Sentence on the peak of which most is lost in what is stored; empty where none loses much.
+
+    Parameters
+    ----------
+    stored : mapping of str to float
+        Largest magnitudes in what is stored.
+    of_steps : mapping of str to ndarray
+        Largest and smallest values over all steps.
+    outputs : str
+        How often is stored, in words.
+    filtered : bool
+        Whether what is stored is filtered; then its peaks are those that tables list.
+
+    Examples
+    --------
+    >>> words = lost_peak({"Q": 80e3}, {"Q": np.array([100e3, 0.0])}, "20 per s", filtered=False)
+    >>> words.split(": ")[0], words.split("; ")[1]
+    ('Between two outputs (20 per s) forces peak', 'tables of peaks list the former.')
+    """
+    whole = {name: float(np.nanmax(np.abs(of_steps[name]))) for name in stored}
+    shares = {
+        name: 1.0 - stored[name] / whole[name]
+        for name in stored
+        if whole[name] - stored[name] > LEAST
+    }
+    name = max(shares, key=lambda name: shares[name], default="")
+    if not name or shares[name] <= LOST:
+        return ""
+    quantity, percent = QUANTITIES[name], f"{100.0 * shares[name]:.0f} %"
+    steps, kept = (f"{quantity.text(v)} {quantity.shown_unit}" for v in (whole[name], stored[name]))
+    if filtered:
+        return (
+            f"The low pass takes {percent} off the largest {name}: {steps} over all steps, {kept} "
+            "in what is stored; tables of peaks list the latter."
+        )
+    return (
+        f"Between two outputs ({outputs}) forces peak: the largest {name} is {steps} over all "
+        f"steps, {kept} in the stored histories, {percent} less; tables of peaks list the former."
+    )
