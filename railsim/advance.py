@@ -330,7 +330,7 @@ class _Convoy:
         for run, part in zip(self._runs, self._ensemble.parts, strict=True):
             run.state = self._state[part.state]
             run.fresh, run.due = self._fresh, self._due
-            run.events += self._work.events[part.wheelsets].sum(axis=0)
+            run.events += self._work.events[part.wheelsets, :2].sum(axis=0)
             _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
             run.unloaded += self._work.unloaded[part.wheelsets]
             run.divided += int(self._work.parts[1])

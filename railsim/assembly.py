@@ -233,7 +233,7 @@ def work_arrays(system: System) -> Work:
         support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
         compliance=aligned_zeros(2),
         vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
-        events=aligned_zeros((n_wheelsets, 2), np.int64),
+        events=aligned_zeros((n_wheelsets, 4), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         swing=aligned_zeros(n_wheelsets),
         watch=aligned_zeros(2),

@@ -360,8 +360,8 @@ class Work(NamedTuple):
     compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
                                 [m/(N s)]
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
-    events : int64[w, 2]        of each wheelset: loaded patches so far, and how many of them were
-                                outside the range of the creep law
+    events : int64[w, 4]        of each wheelset: loaded patches so far, and how many of them were
+                                outside the range of the creep law; the same kept over corrections
     swing : float64[w]          largest rate of the contact forces of each wheelset [N/s]
     watch : float64[2]          time for which contact forces are foreseen [s]; share of the static
                                 wheel load by which they may change in a step

@@ -301,6 +301,14 @@ def settle_limits(internal, curves, first, drive, state):
             state[k] = within_table(curves, internal.curve[i], state[k])
 
 
+@jit_inline
+def keep_counts(events, first, to):
+    """Copy the counts of patches: corrections, as many as the worst of all needs, are not counted."""
+    for w in range(events.shape[0]):
+        events[w, to] = events[w, first]
+        events[w, to + 1] = events[w, first + 1]
+
+
 @jit_internal
 def balanced_mechanics(system, work, state, derivative):
     """As `mechanics`; a massless track first takes the rates with which its forces balance."""
@@ -309,7 +317,9 @@ def balanced_mechanics(system, work, state, derivative):
         for _ in range(MOST_CORRECTIONS):
             if status != RUNNING or settle_rates(system, work, state, BALANCED) < BALANCED:
                 break
+            keep_counts(work.events, 0, 2)
             status, where, patches = mechanics(system, work, state, derivative)
+            keep_counts(work.events, 2, 0)
     return status, where, patches
 
 
