@@ -1,6 +1,6 @@
 """Fill the tables of `docs/validation/contact_geometry.md`.
 
-``python docs/generate_contact.py`` takes some minutes: it runs the curving study with twelve
+``python docs/generate_contact.py`` takes some minutes: it runs the curving study with six
 contact tables, boundary elements at a dozen places, and an independent rigid search.
 """
 
@@ -30,7 +30,7 @@ from curving_study import measured, published  # noqa: E402
 from independent_contact import lowest_gap, rail_points  # noqa: E402
 
 LOAD = 60e3
-STEP = 0.25e-3  # s; at 0.5 ms and more the sharpest table flutters in the flange root
+STEP = 0.25e-3  # s, short enough for the finest table too
 PAIRS = {
     "60E1, 1:40": ("60E1", 0.025, (10.228, 26.0265)),
     "60E1, 1:20": ("60E1", 0.05, (10.228, 26.0265)),
@@ -159,13 +159,13 @@ def exact_table() -> str:
     return table(header, body)
 
 
-COARSE = {"ds": 1e-4, "droll": 6e-3, "n_w": 9}
+COARSE = {"ds": 2e-4, "droll": 1.5e-3, "n_w": 9}
 FINE = {  # over the part of the table that the run uses
     "s_min": -0.012,
-    "s_max": 0.010,
-    "ds": 2.5e-5,
+    "s_max": 0.012,
+    "ds": 5e-5,
     "roll_max": 9e-3,
-    "droll": 1.5e-3,
+    "droll": 0.375e-3,
     "n_w": 33,
 }
 VARIANTS = {
@@ -173,13 +173,7 @@ VARIANTS = {
     "60E1, grid twice as coarse": (COARSE, "60E1", 0.025),
     "60E1, grid twice as fine": (FINE, "60E1", 0.025),
     "benchmark rail": ({}, "benchmark", 0.025),
-    "benchmark rail, grid twice as coarse": (COARSE, "benchmark", 0.025),
-    "benchmark rail, grid twice as fine": (FINE, "benchmark", 0.025),
     "60E1, 1:20": ({}, "60E1", 0.05),
-    "minimum sharper, 3 µm": ({"eps": 3e-6}, "60E1", 0.025),
-    "minimum softer, 20 µm": ({"eps": 20e-6}, "60E1", 0.025),
-    "place sought at 60 µm": ({"approach": 60e-6}, "60E1", 0.025),
-    "place sought at 100 µm": ({"approach": 100e-6}, "60E1", 0.025),
     "non-elliptic patches": ({"normal": "kik-piotrowski"}, "60E1", 0.025),
 }
 
@@ -197,7 +191,9 @@ def curving_table() -> str:
             return build_contact_table(wheel, rail, grid=grid, **geometry)
 
         assembly.cached_contact_table = changed
-        track = load_track("curve_r250", [f'rail="{rail}"', f"inclination={inclination}"])
+        track = load_track("curve_r250", [
+            f'rail="{rail}"', f"inclination={inclination}", 'support.preset="rigid"',
+        ])
         vehicle = load_vehicle("coach_manchester")
         result = simulate(vehicle, track, speed=20.0, settings=Settings(step=STEP))
         values = [measured(result, quantity) for quantity in names]
