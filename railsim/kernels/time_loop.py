@@ -303,7 +303,7 @@ def settle_limits(internal, curves, first, drive, state):
 
 @jit_inline
 def keep_counts(events, first, to):
-    """Copy the counts of patches: corrections, as many as the worst of all needs, are not counted."""
+    """Copy the counts of patches: corrections, of which the worst decides, are not counted."""
     for w in range(events.shape[0]):
         events[w, to] = events[w, first]
         events[w, to + 1] = events[w, first + 1]
