@@ -81,7 +81,7 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
 
 
 def test_run_obeys_a_signal_that_python_loses_in_a_run_in(tmp_path, monkeypatch, capsys):
-    """At walking speed a run-in takes as long as a run: it is left after the call of that moment."""
+    """At walking speed a run-in takes as long as a run: it is left after the call in hand."""
     calls, time_loop = [], railsim.run_in.time_loop
 
     def interrupted(*arguments):
