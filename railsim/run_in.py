@@ -14,6 +14,7 @@ the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,19 +44,25 @@ from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
+# called with the time of the run-in that has been simulated, and all of it [s]
+Progress = Callable[[float, float], None]
 
 STRAIGHT = 20.0  # m
 TRANSITION_TIME, SETTLING_TIME = 4.0, 6.0  # s; several periods of the car body
+# m at least, at low speed: some wavelengths of a wheelset, no steep ramp of cant; the way to settle
+# counts from where the last wheelset is in the curve
+TRANSITION, SETTLING = 40.0, 30.0
 NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that need no run-in
 APPROACH_TIME, APPROACH = 4.0, 30.0  # s and m at least of irregular rails before the start
 LONGEST_APPROACH_TIME, LONGEST_APPROACH = 30.0, 500.0  # s and m at least of changing alignment
 UNCHANGING = 1e-9  # change of curvature (1/m2), cant and grade angle (1/m) below which it is none
-STEPS = 10_000  # in a call: Ctrl-C is heard between calls
+STEPS = 10_000  # in a call: Ctrl-C is heard, and progress told, between calls
 SMOOTH = 10.0  # m before the track's beginning where the approach may begin, beside the vehicle
 
 
 def start_state(
-    model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int
+    model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int,
+    progress: Progress | None = None,
 ) -> Floats:
     """State of the undisturbed vehicle at `start`.
 
@@ -65,6 +72,8 @@ def start_state(
         Arc length of the reference body [m].
     step, scheme : float, int
         Time step [s] and scheme of the run.
+    progress : callable, optional
+        Called now and then with the time that has been simulated, and that is to be [s].
 
     Returns
     -------
@@ -82,21 +91,33 @@ def start_state(
     steps = _approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
-        return _arrived(model, balance, track, start, step, scheme, steps)
+        return _arrived(model, balance, track, start, step, scheme, steps, progress)
     except InputError:
         if whole <= steps:
             raise
-    return _arrived(model, balance, track, start, step, scheme, whole)
+    return _arrived(model, balance, track, start, step, scheme, whole, progress)
 
 
 def _arrived(
     model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int,
-    steps: int,
+    steps: int, progress: Progress | None,
 ) -> Floats:
     """State at `start` after so many steps over the real track."""
     speed = float(balance.state[-1])
     place = start - steps * speed * step
-    state = settled(model, balance, track, place, step)
+    before = 0.0
+
+    def settling(done: float, whole: float) -> None:
+        nonlocal before
+        before = whole
+        if progress is not None:
+            progress(done, whole + steps * step)
+
+    def approaching(done: float, whole: float) -> None:
+        if progress is not None:
+            progress(before + done, before + whole)
+
+    state = settled(model, balance, track, place, step, settling)
     if state is None:
         work = _located(model, place)
         state = initial_state(model, balance, place, work.frames)
@@ -107,7 +128,8 @@ def _arrived(
             drive=CONSTANT_SPEED, loads=model.system.loads._replace(
                 body=model.system.loads.body[:0]),
         )
-        _run(model, system, state, step, steps, scheme, start, "on its way there")
+        _run(model, system, state, step, steps, scheme, start, "on its way there",
+             approaching)
     state[-3:] = 0.0, start, speed
     return state
 
@@ -192,7 +214,7 @@ def follow_rails(model: Model, state: Floats) -> None:
 
 def _run(
     model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
-    start: float, where: str,
+    start: float, where: str, progress: Progress | None = None,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
     work, recorder = work_arrays(system), empty_recorder(model, 1)
@@ -205,6 +227,8 @@ def _run(
             min(STEPS, steps - done), steps + 2, int(done == 0), 0,
         )
         done += more
+        if progress is not None:
+            progress(done * step, steps * step)
     if status != RUNNING:
         raise InputError([Fault(
             "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "
@@ -213,7 +237,8 @@ def _run(
 
 
 def settled(
-    model: Model, balance: Equilibrium, track: Track, start: float, step: float
+    model: Model, balance: Equilibrium, track: Track, start: float, step: float,
+    progress: Progress | None = None,
 ) -> Floats | None:
     """State of a vehicle that has settled into the curve at `start`, None on straight track.
 
@@ -223,6 +248,8 @@ def settled(
         Arc length of the reference body [m].
     step : float
         Time step of the fast scheme [s].
+    progress : callable, optional
+        As of `start_state`.
 
     Returns
     -------
@@ -240,8 +267,9 @@ def settled(
     if abs(curvature) < NEGLIGIBLE and abs(cant) < NEGLIGIBLE:
         return None
     speed = float(balance.state[-1])
-    transition = speed * TRANSITION_TIME
-    rest = speed * SETTLING_TIME
+    transition = max(speed * TRANSITION_TIME, TRANSITION)
+    behind = -float(np.min(model.system.frame_offset))
+    rest = max(speed * SETTLING_TIME, behind + SETTLING)
     radius = 1.0 / curvature if abs(curvature) >= NEGLIGIBLE else math.inf
     auxiliary = track.replace(
         plan=[
@@ -263,6 +291,6 @@ def settled(
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)
-    _run(model, system, state, step, steps - 1, FAST, start, f"R {radius:.0f} m")
+    _run(model, system, state, step, steps - 1, FAST, start, f"R {radius:.0f} m", progress)
     state[-3:] = balance.state[-3:]
     return state

@@ -30,6 +30,7 @@ from railsim.remarks import run_remarks
 from railsim.result import MemorySink, Result, Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.right_samples import filtering, low_pass_remark, output_words, sampled
+from railsim.run_in import Progress as RunInProgress
 from railsim.run_in import start_state
 from railsim.time_step import SCHEMES
 
@@ -221,22 +222,66 @@ def outcomes(
     found: list[Result | Exception | None] = [None] * len(vehicles)
     runs: dict[Run, int] = {}
     sinks = [MemorySink() for _ in vehicles] if sinks is None else sinks
+    told = _Told(progress, len(vehicles), inputs)
     for number, (vehicle, sink) in enumerate(zip(vehicles, sinks, strict=True)):
-        if progress is not None:
-            progress(0.0)
+        told.next_run_in()
         try:
-            run = _begun(vehicle, inputs, sink, profiles, before, shared)
+            run = _begun(vehicle, inputs, sink, profiles, before, shared, told.of_run_in)
         except Exception as error:
             found[number] = error
         else:
             runs[run] = number
-    for run in advance(list(runs), settings, progress):
+    for run in advance(list(runs), settings, told.of_runs):
         number = runs[run]
         try:
             found[number] = run.error or _ended(run, vehicles[number], inputs, before)
         except Exception as error:
             found[number] = error
     return [outcome for outcome in found if outcome is not None]
+
+
+class _Told:
+    """The finished fraction of runs, of which run-ins are a part, by simulated time.
+
+    Parameters
+    ----------
+    progress : callable or None
+        Called with the finished fraction of all runs.
+    number : int
+        How many they are.
+    inputs : _Inputs
+        What they have in common.
+    """
+
+    def __init__(self, progress: Progress | None, number: int, inputs: _Inputs) -> None:
+        self._progress, self._number = progress, number
+        end = inputs.track.length if inputs.until is None else inputs.until
+        by_distance = (end - inputs.start) / inputs.speed
+        self._length = min(inputs.duration or math.inf, by_distance)  # of one run [s]
+        self._before = 0.0  # simulated in the run-ins of other runs [s]
+        self._last = 0.0  # and in the last one
+        self._fraction = 0.0
+
+    def next_run_in(self) -> None:
+        """Take note that another run is prepared."""
+        self._before, self._last = self._before + self._last, 0.0
+        self._tell(self._fraction)
+
+    def of_run_in(self, done: float, whole: float) -> None:
+        """Take the time of a run-in that has been simulated, and all of it [s]."""
+        self._last = done
+        self._tell((self._before + done) / (self._number * (whole + self._length)))
+
+    def of_runs(self, fraction: float) -> None:
+        """Take the finished fraction of what follows the run-ins."""
+        run_ins, runs = self._before + self._last, self._number * self._length
+        self._tell(1.0 - (1.0 - fraction) * runs / (run_ins + runs))
+
+    def _tell(self, fraction: float) -> None:
+        # a run-in that has to be longer than expected takes nothing back
+        self._fraction = max(self._fraction, fraction)
+        if self._progress is not None:
+            self._progress(self._fraction)
 
 
 def _begun(
@@ -246,12 +291,13 @@ def _begun(
     profiles: Mapping[str, Profile] | None,
     before: Floats | None,
     shared: SharedTables,
+    on_run_in: RunInProgress,
 ) -> Run:
     """Prepare a run and tell its sink what will come."""
     began = time.perf_counter()
     settings = inputs.settings
     prepared = prepare(vehicle, inputs.track, settings, inputs.speed, inputs.start,
-                       inputs.duration, inputs.until, profiles, shared, before)
+                       inputs.duration, inputs.until, profiles, shared, before, on_run_in)
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
     stored = StoredPeaks(sink)
     sink = filtering(stored, settings)
@@ -368,6 +414,7 @@ def prepare(
     profiles: Mapping[str, Profile] | None = None,
     shared: SharedTables | None = None,
     before: Floats | None = None,
+    on_run_in: RunInProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
@@ -375,7 +422,8 @@ def prepare(
     pace = Pace(model, sampled(settings), track, {speed: balance.state})
     step, _ = pace.at(speed)
     if before is None:
-        state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme])
+        state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme],
+                            on_run_in)
         _disturb(model, settings, state)
     else:
         state = _taken_up(model, before)

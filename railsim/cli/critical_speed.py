@@ -89,6 +89,7 @@ def command(
             points_found = stability_map(
                 inputs.vehicle, inputs.track, inputs.settings, grid, options,
                 folder=folder.path, workers=workers, overwrite=overwrite, progress=progress,
+                on_remark=lambda text: echo(f"remark: {text}", err=True),
             )
         else:
             one = _one(inputs, *grid[0], options, progress)

@@ -1,13 +1,16 @@
 """Critical speeds over conicity and friction, point by point over the cores.
 
 Each point is kept in the folder as it is done, under a name that hashes its inputs: the same
-command goes on where it was interrupted.
+command goes on where it was interrupted.  A kept point holds the CRC-32 of its record; a damaged
+one is computed again.
 """
 
 import hashlib
 import json
+import logging
 import multiprocessing
 import os
+import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
@@ -16,14 +19,17 @@ from typing import Any
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import RailsimError
-from railsim.files import make_folder, whole_file
+from railsim.errors import Fault, InputError, RailsimError
+from railsim.files import TABLE_BYTES, make_folder, read_text, whole_file
 from railsim.stability.critical_speed import critical_speed
 from railsim.threads import one_thread_each
 from railsim.version import __version__
 
 Point = tuple[float | None, float | None]
 Progress = Callable[[float], None]
+Record = dict[str, Any]
+
+_LOG = logging.getLogger(__name__)
 
 
 def stability_map(
@@ -37,7 +43,8 @@ def stability_map(
     workers: int | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,
-) -> list[dict[str, Any]]:
+    on_remark: Callable[[str], None] | None = None,
+) -> list[Record]:
     """Return the record of `critical_speed` at each point, in the order of the grid.
 
     Parameters
@@ -55,15 +62,21 @@ def stability_map(
         Compute everything again.
     progress : callable, optional
         Called with the finished fraction now and then.
+    on_remark : callable, optional
+        Called with a sentence on every kept point that is damaged and computed again; by default
+        these go to the log.
 
     A point that fails has its reason among the remarks.
     """
     jobs = [(vehicle, track, settings, point, options) for point in grid]
     kept = [_kept(folder, job) for job in jobs]
-    found: dict[int, dict[str, Any]] = {}
+    found: dict[int, Record] = {}
     for number, path in enumerate(kept):
         if path is not None and path.exists() and not overwrite:
-            found[number] = json.loads(path.read_text(encoding="utf-8"))
+            try:
+                found[number] = _read(path)
+            except InputError as error:
+                (on_remark or _LOG.warning)(f"{error.faults[0]}: it is computed again")
     tell = progress or (lambda _: None)
     tell(len(found) / len(jobs))
     waiting = [number for number in range(len(jobs)) if number not in found]
@@ -74,7 +87,7 @@ def stability_map(
         if path is not None:
             make_folder(path.parent)
             with whole_file(path) as partial:
-                partial.write_text(json.dumps(record), encoding="utf-8")
+                partial.write_text(_text(record), encoding="utf-8")
         tell(len(found) / len(jobs))
     return [found[number] for number in range(len(jobs))]
 
@@ -99,7 +112,7 @@ def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
 
 def point_record(
     vehicle: Vehicle, track: Track, settings: Settings, point: Point, options: dict[str, Any]
-) -> dict[str, Any]:
+) -> Record:
     """Record of one point."""
     conicity, friction = point
     if friction is not None:
@@ -119,3 +132,32 @@ def _kept(folder: Path | None, job: Any) -> Path | None:
     inputs = [__version__, vehicle.to_toml(), track.to_toml(), settings.to_toml(), point, options]
     text = json.dumps(inputs, sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
+
+
+def _text(record: Record) -> str:
+    """Record of a kept point as JSON, with the CRC-32 of the record's own JSON."""
+    return json.dumps({"crc32": _crc(record), "record": record})
+
+
+def _crc(record: Any) -> str:
+    # what is read is written again in the same words: order and all digits of numbers are kept
+    return f"{zlib.crc32(json.dumps(record).encode()):08x}"
+
+
+def _read(path: Path) -> Record:
+    """Record of a kept point.
+
+    Raises
+    ------
+    InputError : it cannot be read, or is not as it was written.
+    """
+    text = read_text(path, TABLE_BYTES)
+    try:
+        kept = json.loads(text)
+        whole = kept["crc32"] == _crc(kept["record"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        whole = False
+    if not whole:
+        raise InputError([Fault(str(path), "", "not as it was written", "")])
+    record: Record = kept["record"]
+    return record

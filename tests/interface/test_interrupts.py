@@ -7,6 +7,7 @@ import sys
 import pytest
 
 import railsim.cli.interrupts
+import railsim.run_in
 import railsim.simulation
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
@@ -77,6 +78,23 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
     assert main([*RUN, "--out", str(tmp_path / "run.h5")]) == status
     assert capsys.readouterr().err == words
     assert list(tmp_path.iterdir()) == []
+
+
+def test_run_obeys_a_signal_that_python_loses_in_a_run_in(tmp_path, monkeypatch, capsys):
+    """At walking speed a run-in takes as long as a run: it is left after the call in hand."""
+    calls, time_loop = [], railsim.run_in.time_loop
+
+    def interrupted(*arguments):
+        calls.append(1)
+        lost(signal.SIGINT)
+        return time_loop(*arguments)
+
+    monkeypatch.setattr(railsim.run_in, "time_loop", interrupted)
+    run = ["run", "coach_manchester", "curve_r250", "--speed", "2", "--start", "390", "--quiet"]
+    assert main([*run, "--out", str(tmp_path / "run.h5")]) == 130
+    assert capsys.readouterr().err == "railsim: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+    assert len(calls) == 1
 
 
 @pytest.mark.parametrize("way", [lost, turned_into_another])

@@ -26,13 +26,41 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
     assert "friction" in capsys.readouterr().out
     kept = sorted((folder / "points").iterdir())
     assert len(kept) == 2
-    record = json.loads(kept[0].read_text())
-    record["linear"]["speed"] = 12.25  # what is there is not computed again
-    kept[0].write_text(json.dumps(record))
+    (folder / "critical_speed.json").unlink()
+    (folder / "critical_speed.png").unlink()
+    before = [path.stat().st_mtime_ns for path in kept]
+    assert main(command) == 0
+    assert capsys.readouterr().err == ""
+    assert [path.stat().st_mtime_ns for path in kept] == before  # not computed again
+
+
+@pytest.mark.parametrize("damage", [
+    lambda text: text.replace(b'"speed": ', b'"speed": 1', 1),
+    lambda text: text[: len(text) // 2],
+    lambda _: b"",
+    lambda _: b"[" * 100_000,
+    lambda _: b'"crc32"',
+    lambda text: b"\xff" + text,
+    lambda text: json.dumps(json.loads(text)["record"]).encode(),  # as written without a checksum
+])
+def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path, damage):
+    folder = tmp_path / "map"
+    command = ["critical-speed", "coach_manchester", "--method", "linear", "--friction", "0.2,0.4",
+               "--from", "20", "--to", "80", "--workers", "1", "--out", str(folder), "--quiet"]
+    assert main(command) == 0
+    told = capsys.readouterr().out
+    whole = {path: path.read_bytes() for path in (folder / "points").iterdir()}
+    damaged = next(iter(whole))
+    damaged.write_bytes(damage(whole[damaged]))
     (folder / "critical_speed.json").unlink()
     (folder / "critical_speed.png").unlink()
     assert main(command) == 0
-    assert "12.25" in capsys.readouterr().out
+    again = capsys.readouterr()
+    assert again.out == told
+    assert again.err.startswith(f"remark: {damaged}: ")
+    assert again.err.endswith(": it is computed again\n")
+    assert again.err.count("\n") == 1
+    assert {path: path.read_bytes() for path in (folder / "points").iterdir()} == whole
 
 
 def test_curving_over_a_grid(capsys, tmp_path):

@@ -5,6 +5,7 @@ import pytest
 from dynamics import Settings, load_track, load_vehicle
 from rig import test_vehicle
 
+import railsim
 from railsim import run_in, simulation
 from railsim.errors import Fault, InputError
 from railsim.result import open_result
@@ -154,15 +155,39 @@ def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(stra
     way = simulate(coach, track, speed=20.0, until=150.0)
     usual = run_in.settled
 
-    def refused(model, balance, track, start, step):
+    def refused(model, balance, track, start, step, progress):
         if start > 1.0:
             raise InputError([Fault("--start", "", "off the rails", "another place")])
-        return usual(model, balance, track, start, step)
+        return usual(model, balance, track, start, step, progress)
 
     monkeypatch.setattr(run_in, "settled", refused)
     here = simulate(coach, track, speed=20.0, start=140.0, until=150.0)
     rows = way.distance > 140.0 - 1e-6
     np.testing.assert_allclose(here.Y, way.Y[rows], atol=0.01 * np.max(np.abs(way.Y)))
+
+
+@pytest.mark.parametrize("speed", [2.0, 6.0])
+def test_start_in_a_curve_at_walking_speed_is_the_state_on_the_way(speed):
+    """All wheelsets are in the curve by then: 0.2 % of the largest load, wheel by wheel.
+
+    A run-in of ten seconds alone would end before the last wheelset has reached the curve.  On
+    elastic rails: on rigid ones friction at the flange lets the loads vibrate by 5 %.
+    """
+    coach, track = load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    here = simulate(coach, track, speed=speed, start=390.0, duration=0.01)
+    way = simulate(coach, track, speed=speed, start=290.0, until=390.0)
+    np.testing.assert_allclose(here.Q[0], way.Q[-1], atol=2e-3 * np.max(way.Q[-1]))
+
+
+def test_progress_of_a_run_counts_its_run_in():
+    seen = []
+    simulate(load_vehicle("coach_manchester"), load_track("curve_r250"), speed=2.0, start=390.0,
+             duration=2.0, progress=seen.append)
+    assert seen == sorted(seen)
+    assert seen[0] == 0.0
+    assert seen[-1] == 1.0
+    # 112 m in calls of ten thousand steps
+    assert sum(0.0 < fraction < 0.9 for fraction in seen) >= 3
 
 
 # continuation -------------------------------------------------------------------------------------
