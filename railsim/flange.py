@@ -9,20 +9,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.assembly import CONSTANT_SPEED, Model
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.time_step import empty_recorder
+from railsim.kernels.time_loop import FAST
+from railsim.run_in import advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
 
 WIDEST = 1500.0  # m; in wider curves wheelsets run on their treads
-STRAIGHT, TRANSITION_TIME, SETTLING_TIME = 20.0, 3.0, 3.0  # m, s, s
+TIMES = 3.0, 3.0  # in transition and curve, at least [s]
 # The state sought is one of rest and does not depend on the contact damping: with more of it, it is
 # reached also where the wheelset would vibrate.
 MORE_DAMPING = 4.0
@@ -69,19 +69,9 @@ def in_flange_contact(
     system = model.system
     speed = float(rolling[-1])
     rail = system.track.rail
-    auxiliary = track.replace(
-        plan=[
-            {"type": "STR", "length": STRAIGHT},
-            {"type": "CLO", "length": speed * TRANSITION_TIME, "radius_end": 1.0 / curve[0]},
-            {"type": "CIR", "length": speed * SETTLING_TIME, "radius": 1.0 / curve[0]},
-        ],
-        cant=[
-            {"type": "CST", "length": STRAIGHT, "cant": 0.0},
-            {"type": "LIR", "length": speed * TRANSITION_TIME},
-            {"type": "CST", "length": speed * SETTLING_TIME, "cant": curve[1]},
-        ],
-        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
-        friction=tuple(float(np.max(rail[:, row, 0])) for row in (4, 5)),
+    auxiliary = curve_to_settle_in(
+        model, track, speed, *curve,
+        (float(np.max(rail[:, 4, 0])), float(np.max(rail[:, 5, 0]))), TIMES,
     )
     smooth = system._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED,
@@ -93,9 +83,6 @@ def in_flange_contact(
     state = rolling.copy()
     short = 0.5 * step
     steps = math.floor(auxiliary.length / speed / short)
-    status, *_ = time_loop(
-        damped, work_arrays(damped), state, np.zeros_like(state), np.zeros((3, len(state))),
-        empty_recorder(model, 1), FAST, short, 1, steps, steps + 2, 1, 0,
-    )
+    status = advance(model, damped, state, short, steps, FAST)
     state[-4] = 0.0  # of the last step's length: steps of any length are judged from here
     return (smooth, state) if status == RUNNING else None

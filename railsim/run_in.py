@@ -212,11 +212,11 @@ def follow_rails(model: Model, state: Floats) -> None:
         state[rate + 3] += speed * plane[w, ROLL_SLOPE]
 
 
-def _run(
+def advance(
     model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
-    start: float, where: str, progress: Progress | None = None,
-) -> None:
-    """Advance a state; InputError if the vehicle leaves the track."""
+    progress: Progress | None = None,
+) -> int:
+    """Advance a state in calls short enough for signals to be heard; its status is returned."""
     work, recorder = work_arrays(system), empty_recorder(model, 1)
     divide_strikes(work, scheme, step)
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
@@ -229,11 +229,57 @@ def _run(
         done += more
         if progress is not None:
             progress(done * step, steps * step)
+    return int(status)
+
+
+def _run(
+    model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
+    start: float, where: str, progress: Progress | None = None,
+) -> None:
+    """Advance a state; InputError if the vehicle leaves the track."""
+    status = advance(model, system, state, step, steps, scheme, progress)
     if status != RUNNING:
         raise InputError([Fault(
             "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "
             f"{where}, at {state[-1]:g} m/s", "a start on straight track or a lower speed",
         )])
+
+
+def curve_to_settle_in(
+    model: Model, track: Track, speed: float, curvature: float, cant: float,
+    friction: tuple[float, float], times: tuple[float, float] = (TRANSITION_TIME, SETTLING_TIME),
+) -> Track:
+    """Straight, transition and curve on smooth rails, long enough for a vehicle to settle.
+
+    Parameters
+    ----------
+    speed : float
+        [m/s].
+    curvature, cant : float
+        Of the curve [1/m], [m].
+    friction : tuple of float
+        Of left and right rail [1].
+    times : tuple of float
+        Time in the transition and in the curve [s]; at low speed their lengths decide.
+    """
+    transition = max(speed * times[0], TRANSITION)
+    behind = -float(np.min(model.system.frame_offset))
+    rest = max(speed * times[1], behind + SETTLING)
+    radius = 1.0 / curvature if abs(curvature) >= NEGLIGIBLE else math.inf
+    return track.replace(
+        plan=[
+            {"type": "STR", "length": STRAIGHT},
+            {"type": "CLO", "length": transition, "radius_end": radius},
+            {"type": "CIR", "length": rest, "radius": radius},
+        ],
+        cant=[
+            {"type": "CST", "length": STRAIGHT, "cant": 0.0},
+            {"type": "LIR", "length": transition},
+            {"type": "CST", "length": rest, "cant": cant},
+        ],
+        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
+        friction=friction,
+    )
 
 
 def settled(
@@ -267,30 +313,14 @@ def settled(
     if abs(curvature) < NEGLIGIBLE and abs(cant) < NEGLIGIBLE:
         return None
     speed = float(balance.state[-1])
-    transition = max(speed * TRANSITION_TIME, TRANSITION)
-    behind = -float(np.min(model.system.frame_offset))
-    rest = max(speed * SETTLING_TIME, behind + SETTLING)
-    radius = 1.0 / curvature if abs(curvature) >= NEGLIGIBLE else math.inf
-    auxiliary = track.replace(
-        plan=[
-            {"type": "STR", "length": STRAIGHT},
-            {"type": "CLO", "length": transition, "radius_end": radius},
-            {"type": "CIR", "length": rest, "radius": radius},
-        ],
-        cant=[
-            {"type": "CST", "length": STRAIGHT, "cant": 0.0},
-            {"type": "LIR", "length": transition},
-            {"type": "CST", "length": rest, "cant": cant},
-        ],
-        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
-        friction=_friction(track, start),
-    )
+    auxiliary = curve_to_settle_in(model, track, speed, curvature, cant, _friction(track, start))
     system = model.system._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED, loads=model.system.loads._replace(
             body=model.system.loads.body[:0]),
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)
-    _run(model, system, state, step, steps - 1, FAST, start, f"R {radius:.0f} m", progress)
+    where = f"R {1.0 / curvature:.0f} m" if abs(curvature) >= NEGLIGIBLE else "on cant"
+    _run(model, system, state, step, steps - 1, FAST, start, where, progress)
     state[-3:] = balance.state[-3:]
     return state
