@@ -187,6 +187,23 @@ class RootLocus:
             chosen.append(max(reversed(borne), key=borne.count) if borne else "")
         return tuple(numbered(chosen))
 
+    def to_xarray(self) -> Any:
+        """Return eigenvalues, frequencies and damping as an `xarray.Dataset`; needs xarray."""
+        import xarray
+
+        values = self.eigenvalues
+        size = np.abs(values)
+        dims = (self.key, "mode")
+        return xarray.Dataset(
+            {
+                "eigenvalue": (dims, values),
+                "frequency": (dims, values.imag / (2.0 * np.pi)),
+                "natural_frequency": (dims, size / (2.0 * np.pi)),
+                "damping_ratio": (dims, -values.real / size),
+            },
+            {self.key: list(self.values), "mode": list(self.names)},
+        )
+
     def record(self) -> list[dict[str, Any]]:
         """Return one record a value."""
         return [modes.record() for modes in self.sets]

@@ -119,7 +119,7 @@ class LinearVehicle:
         if self.contact.conicity is not None:
             vehicle, profile = on_cones(vehicle, self.contact.conicity)
             known[profile.name] = profile
-        self._track = track
+        self.track = track
         self._path = None
         if self.contact.linearisation == "harmonic" and not held:
             self._path = ContactPath(self.contact.amplitude)
@@ -174,7 +174,7 @@ class LinearVehicle:
             return solver.solve(self._rest, speed)
 
         def along(share: float) -> tuple[System, float]:
-            part = circle(self._track, curvature=share * self.curvature, cant=share * self.cant)
+            part = circle(self.track, curvature=share * self.curvature, cant=share * self.cant)
             system = self.model.system._replace(track=track_tables(part))
             return system, WALKING_PACE + math.sqrt(share) * (speed - WALKING_PACE)
 
