@@ -182,13 +182,16 @@ def _tell_map(
     if as_json:
         print_json(found)
         return
+    kinds = {"linear": "linear (m/s)"}
+    if any(record.get("nonlinear_by_method") for record in found):
+        kinds["nonlinear"] = "non-linear (m/s)"
     rows = []
     for record in found:
         point = [f"{record['at'][name]:g}" for name in values]
         cells = [f"{record[kind]['speed']:.2f}" if record[kind] else "none"
-                 for kind in ("linear", "nonlinear")]
+                 for kind in kinds]
         rows.append([*point, *cells])
-    header = [*values, "linear (m/s)", "non-linear (m/s)"]
+    header = [*values, *kinds.values()]
     echo("\n".join(table(header, rows, numbers=0)))
     for remark in dict.fromkeys(remark for record in found for remark in record["remarks"]):
         echo(f"remark: {remark}")

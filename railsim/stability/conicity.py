@@ -12,7 +12,7 @@ from railsim.contact.geometry import contact_geometry
 from railsim.errors import InputError
 from railsim.linear.vehicle import LinearVehicle
 
-AMPLITUDES = 1e-3 * np.arange(0.25, 8.01, 0.25)  # m
+AMPLITUDES = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
 
 def conicity_over_amplitude(prepared: LinearVehicle) -> dict[str, Any] | None:
