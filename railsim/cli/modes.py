@@ -37,6 +37,8 @@ ANIMATION = "mode.html"
 @click.option("--over", metavar="KEY.PATH=A:B:N",
               help="Root locus over a key of the vehicle, track or settings at --speed.")
 @click.option("--held", is_flag=True, help="Hold the wheelsets.")
+@click.option("--hold", multiple=True, metavar="BODY",
+              help="Hold this body in the moving track frame; may be given several times.")
 @click.option("--linearisation", default="tangent", show_default=True,
               type=click.Choice(["tangent", "harmonic"]),
               help="Contact: its derivative, or its first harmonic for --amplitude.")

@@ -236,6 +236,7 @@ def modes(
     radius: float = math.inf,
     cant: float = 0.0,
     held: bool = False,
+    hold: Sequence[str] = (),
     settings: Settings | None = None,
     profiles: Mapping[str, Profile] | None = None,
 ) -> Modes:
@@ -259,6 +260,8 @@ def modes(
         Of the track on which the vehicle rolls [m].
     held : bool
         Hold the wheelsets: modes of the suspended masses alone.
+    hold : sequence of str
+        Bodies that are fixed to the moving track frame, such as the car above a single bogie.
     settings : Settings, optional
         Creep law and contact.
     profiles : mapping of str to Profile, optional
@@ -287,7 +290,7 @@ def modes(
     prepared = LinearVehicle(
         vehicle, track or load_track("straight"),
         contact=Contact(linearisation, amplitude, conicity), radius=radius, cant=cant, held=held,
-        settings=settings, profiles=profiles,
+        hold=hold, settings=settings, profiles=profiles,
     )
     return modes_at(prepared, speed)
 
@@ -305,7 +308,7 @@ def root_locus(
         [m/s].
     **how
         The other arguments of `modes`: linearisation, amplitude, conicity, radius, cant, held,
-        settings, profiles.
+        hold, settings, profiles.
 
     Returns
     -------

@@ -32,8 +32,12 @@ def curving_figure(found: Curving, title: str) -> Figure:
         mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
         figure = Figure(figsize=(10.2, 10.6 if mapped else 7.4), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
-        rows = figure.subfigures(2, 1, height_ratios=[7.4, 3.2]) if mapped else None
-        axes = (figure if rows is None else rows[0]).subplots(2, 2)
+        upper: Figure | SubFigure = figure
+        if mapped:
+            grid = figure.add_gridspec(2, 1, height_ratios=[7.4, 3.2])
+            upper = figure.add_subfigure(grid[0])
+            _wear_maps(figure.add_subfigure(grid[1]), found, np.argsort(found.radius))
+        axes = upper.subplots(2, 2)
         order = np.argsort(found.radius)
         radius = found.radius[order]
         outer = np.where(radius > 0.0, LEFT, RIGHT)
@@ -53,8 +57,6 @@ def curving_figure(found: Curving, title: str) -> Figure:
                 one.set_xticks(_ticks(radius), [f"{tick:g}" for tick in _ticks(radius)])
                 one.minorticks_off()
         axes[0, 0].legend(fontsize=7.5)
-        if rows is not None:
-            _wear_maps(rows[1], found, order)
     return figure
 
 

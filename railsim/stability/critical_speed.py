@@ -21,7 +21,7 @@ from railsim.profiles import Profile
 from railsim.stability.conicity import conicity_over_amplitude
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.periodic import Branch, PeriodicMotion
-from railsim.stability.ramp import Diagram, Sustained, bifurcation_type, diagram, ramp
+from railsim.stability.ramp import RESOLUTION, Diagram, Sustained, bifurcation_type, diagram, ramp
 from railsim.stability.vehicle_flow import VehicleFlow
 
 Floats = NDArray[np.float64]
@@ -265,6 +265,8 @@ def _by_diagram(
     found.nonlinear["bifurcation"] = lowest
     found.branches += branches
     found.type = bifurcation_type(branches)
+    if lost.parameter and lowest.speed and lowest.speed < lost.parameter - RESOLUTION:
+        found.type = "subcritical"  # the hysteresis may lie between two steps
     if len(branches[0].speed) < points:
         found.remarks.append(
             f"bifurcation: the vehicle derails above {branches[0].speed[-1]:.4g} m/s"

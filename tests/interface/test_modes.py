@@ -47,6 +47,8 @@ def test_root_locus_over_a_key(capsys):
     (["--speeds", "10:20:0"], "--speeds"),
     (["--speeds", "10:20:2", "--over", "track.friction=0.2:0.4:2"], "--over"),
     (["--over", "track.nothing=0.2:0.4:2"], "nothing"),
+    (["--hold", "carbdy"], "carbody"),
+    (["--hold", "front.outer.wheelset"], "--held"),
     (["--radius", "2"], "--radius"),
     (["--cant", "2"], "--cant"),
     (["--conicity", "3"], "--conicity"),
