@@ -268,8 +268,10 @@ def _thinned(values: Array, points: int = 150) -> Array:
     return np.asarray(values[rows], dtype=np.float64)
 
 
-def chosen_mode(modes: Sequence[Mapping[str, Any]], wanted: str | None) -> Mapping[str, Any]:
-    """Mode by name or number (from 1); the first one by default.
+def chosen_mode(
+    modes: Sequence[Mapping[str, Any]], wanted: str | None, option: str = "--mode"
+) -> Mapping[str, Any]:
+    """Mode by name or number (from 1); the first one by default; `option` asks for it.
 
     Raises
     ------
@@ -281,5 +283,5 @@ def chosen_mode(modes: Sequence[Mapping[str, Any]], wanted: str | None) -> Mappi
     if wanted.isdigit() and 1 <= int(wanted) <= len(modes):
         return modes[int(wanted) - 1]
     if wanted not in names:
-        raise InputError([Fault("--mode", wanted, "no such mode", nearest(wanted, names))])
+        raise InputError([Fault(option, wanted, "no such mode", nearest(wanted, names))])
     return modes[names.index(wanted)]

@@ -1,5 +1,6 @@
 """``railsim critical-speed``: linear and non-linear critical speed of a vehicle."""
 
+from collections.abc import Callable
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,10 @@ from railsim.cli.progress import progress_bar
 if TYPE_CHECKING:
     from railsim.cli.analysis import Inputs
     from railsim.stability.critical_speed import CriticalSpeed
+    from railsim.studies.stability_map import MapPoint
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation", "all")
+BY_OPTION = ("conicity", "friction")
 FILES = ("critical_speed.json", "critical_speed.png")
 
 
@@ -43,6 +46,8 @@ FILES = ("critical_speed.json", "critical_speed.png")
               help="Lateral amplitude of the wheelsets in m, for harmonic.")
 @click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")
 @click.option("--friction", metavar="MU or A:B:N", help="Friction; several values: a map.")
+@click.option("--over", multiple=True, metavar="KEY.PATH=A:B:N",
+              help="A map over a key of the vehicle, track or settings; at most two parameters.")
 @click.option("--workers", type=click.IntRange(min=1), metavar="N",
               help="Processes for a map; default: all cores.")
 @click.option("--out", metavar="DIR",
@@ -55,9 +60,9 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @quiet_option
 def command(
     vehicle: str, track: str | None, method: str, low: float, high: float, points: int,
-    conicity: str | None, friction: str | None, workers: int | None, out: str | None,
-    settings: str | None, load: str | None, assignments: tuple[str, ...], overwrite: bool,
-    as_json: bool, quiet: bool, **how: Any,
+    conicity: str | None, friction: str | None, over: tuple[str, ...], workers: int | None,
+    out: str | None, settings: str | None, load: str | None, assignments: tuple[str, ...],
+    overwrite: bool, as_json: bool, quiet: bool, **how: Any,
 ) -> None:
     """Find from which speed a vehicle hunts on ideal straight track.
 
@@ -71,30 +76,35 @@ def command(
       railsim critical-speed coach_manchester --method linear
       railsim critical-speed coach_manchester --method all --out stability --overwrite
       railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
+      railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.analysis import Folder, load_inputs, values_of
+    from railsim.cli.analysis import Folder, load_inputs
 
     inputs = load_inputs(vehicle, track, settings, assignments, load)
-    conicities = values_of(conicity, "--conicity") if conicity else [None]
-    frictions = values_of(friction, "--friction") if friction else [None]
+    ranges = _ranges(conicity, friction, over)
     methods = METHODS[:-1] if method == "all" else ("linear", method)
     options = {"methods": tuple(dict.fromkeys(methods)), "low": low, "high": high,
                "points": points, **how}
-    grid = list(product(conicities, frictions))
+
+    def with_values(changes: list[str]) -> "Inputs":
+        return load_inputs(vehicle, track, settings, [*assignments, *changes], load)
+
+    grid = [_point(inputs, with_values, dict(zip(ranges, values, strict=True)))
+            for values in product(*ranges.values())]
     folder = Folder(out, FILES, overwrite)
     with progress_bar("critical speed", quiet=quiet) as progress:
         if len(grid) > 1:
             from railsim.studies.stability_map import stability_map
 
             points_found = stability_map(
-                inputs.vehicle, inputs.track, inputs.settings, grid, options,
-                folder=folder.path, workers=workers, overwrite=overwrite, progress=progress,
-                on_remark=lambda text: echo(f"remark: {text}", err=True),
+                grid, options, folder=folder.path, workers=workers, overwrite=overwrite,
+                progress=progress, on_remark=lambda text: echo(f"remark: {text}", err=True),
             )
         else:
-            one = _one(inputs, *grid[0], options, progress)
+            one = _one(grid[0], options, progress)
     if len(grid) > 1:
-        _tell_map(folder, inputs, conicities, frictions, points_found, as_json)
+        several = {name: values for name, values in ranges.items() if len(values) > 1}
+        _tell_map(folder, inputs, several, points_found, as_json)
         return
     from railsim.plot.stability import bifurcation_figure
 
@@ -108,20 +118,53 @@ def command(
     folder.tell()
 
 
-def _one(
-    inputs: "Inputs", conicity: float | None, friction: float | None, options: dict[str, Any],
-    progress: Any,
-) -> "CriticalSpeed":
+def _ranges(
+    conicity: str | None, friction: str | None, over: tuple[str, ...]
+) -> dict[str, list[float]]:
+    """Values by parameter; of a map two parameters at most."""
+    from railsim.cli.analysis import values_of
+    from railsim.errors import Fault, InputError
+
+    found = {}
+    for name, text in (("conicity", conicity), ("friction", friction)):
+        if text:
+            found[name] = values_of(text, f"--{name}")
+    for text in over:
+        key, equals, values = text.partition("=")
+        if not equals:
+            raise InputError([Fault("--over", "", f"found '{text}'", "KEY.PATH=first:last:number")])
+        if key in found:
+            raise InputError([Fault("--over", key, "given twice", "each key once")])
+        found[key] = values_of(values, "--over")
+    several = [name for name, values in found.items() if len(values) > 1]
+    if len(several) > 2:
+        raise InputError([Fault("--over", "", f"found {len(several)} parameters with several "
+                                f"values ({', '.join(several)})", "two at most")])
+    return found
+
+
+def _point(
+    inputs: "Inputs", with_values: Callable[[list[str]], "Inputs"], at: dict[str, float]
+) -> "MapPoint":
+    from railsim.studies.stability_map import MapPoint
+
+    changes = [f"{key}={value!r}" for key, value in at.items() if key not in BY_OPTION]
+    here = with_values(changes) if changes else inputs
+    track = here.track
+    if "friction" in at:
+        track = track.replace(friction=at["friction"], friction_table=None)
+    return MapPoint(at, here.vehicle, track, here.settings)
+
+
+def _one(point: "MapPoint", options: dict[str, Any], progress: Any) -> "CriticalSpeed":
     from railsim.stability.critical_speed import critical_speed
 
-    track = inputs.track if friction is None else inputs.track.replace(
-        friction=friction, friction_table=None)
-    return critical_speed(inputs.vehicle, track, settings=inputs.settings, conicity=conicity,
-                          progress=progress, **options)
+    return critical_speed(point.vehicle, point.track, settings=point.settings,
+                          conicity=point.at.get("conicity"), progress=progress, **options)
 
 
 def _tell_map(
-    folder: Any, inputs: "Inputs", conicities: list[Any], frictions: list[Any],
+    folder: Any, inputs: "Inputs", values: dict[str, list[float]],
     found: list[dict[str, Any]], as_json: bool,
 ) -> None:
     """Print, write and draw a map."""
@@ -129,8 +172,6 @@ def _tell_map(
 
     from railsim.plot.stability import map_figure
 
-    values = {name: several for name, several in
-              (("conicity", conicities), ("friction", frictions)) if len(several) > 1}
     shape = [len(several) for several in values.values()]
     speeds = {}
     for kind, words in (("linear", "linear"), ("nonlinear", "non-linear")):
@@ -143,13 +184,16 @@ def _tell_map(
     if as_json:
         print_json(found)
         return
+    kinds = {"linear": "linear (m/s)"}
+    if any(record.get("nonlinear_by_method") for record in found):
+        kinds["nonlinear"] = "non-linear (m/s)"
     rows = []
     for record in found:
         point = [f"{record['at'][name]:g}" for name in values]
         cells = [f"{record[kind]['speed']:.2f}" if record[kind] else "none"
-                 for kind in ("linear", "nonlinear")]
+                 for kind in kinds]
         rows.append([*point, *cells])
-    header = [*values, "linear (m/s)", "non-linear (m/s)"]
+    header = [*values, *kinds.values()]
     echo("\n".join(table(header, rows, numbers=0)))
     for remark in dict.fromkeys(remark for record in found for remark in record["remarks"]):
         echo(f"remark: {remark}")

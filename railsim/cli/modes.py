@@ -19,11 +19,13 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
+    from railsim.animation import Scene
     from railsim.cli.analysis import Folder, Inputs
     from railsim.linear.modes import Modes, RootLocus
 
 SHOWN = 50.0  # Hz, up to which modes are printed
 FILES = ("modes.json", "modes.png")
+ANIMATION = "mode.html"
 
 
 @click.command()
@@ -35,6 +37,8 @@ FILES = ("modes.json", "modes.png")
 @click.option("--over", metavar="KEY.PATH=A:B:N",
               help="Root locus over a key of the vehicle, track or settings at --speed.")
 @click.option("--held", is_flag=True, help="Hold the wheelsets.")
+@click.option("--hold", multiple=True, metavar="BODY",
+              help="Hold this body in the moving track frame; may be given several times.")
 @click.option("--linearisation", default="tangent", show_default=True,
               type=click.Choice(["tangent", "harmonic"]),
               help="Contact: its derivative, or its first harmonic for --amplitude.")
@@ -45,6 +49,8 @@ FILES = ("modes.json", "modes.png")
               help="Radius of the track in m, positive to the right; default straight.")
 @click.option("--cant", type=float, default=0.0, metavar="H", help="Cant of the track in m.")
 @click.option("--out", metavar="DIR", help="Folder for modes.json and modes.png.")
+@click.option("--animate", metavar="NAME",
+              help="Write this mode into --out as a page that plays, mode.html.")
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
 @load_option
 @set_option
@@ -58,6 +64,7 @@ def command(
     speeds: str | None,
     over: str | None,
     out: str | None,
+    animate: str | None,
     settings: str | None,
     load: str | None,
     assignments: tuple[str, ...],
@@ -76,6 +83,7 @@ def command(
     Example:
       railsim modes coach_manchester --speed 30
       railsim modes coach_manchester --speeds 10:80:36 --linearisation harmonic --out modes
+      railsim modes coach_manchester --speed 40 --animate "front hunting" --out modes
       railsim modes coach_manchester --speed 40 --over track.friction=0.1:0.6:11
     """  # noqa: D301 - click reads the escape
     from railsim.cli.analysis import Folder, load_inputs, values_of
@@ -86,7 +94,10 @@ def command(
         raise InputError([Fault("--over", "", "given together with --speeds", "one of the two")])
     assignments = with_load(assignments, load, "vehicle.")
     inputs = load_inputs(vehicle, track, settings, assignments)
-    folder = Folder(out, FILES, overwrite)
+    if animate is not None and (out is None or speeds is not None or over is not None):
+        wrong = "given without --out" if out is None else "given with --speeds or --over"
+        raise InputError([Fault("--animate", "", wrong, "one speed, and --out DIR")])
+    folder = Folder(out, FILES if animate is None else (*FILES, ANIMATION), overwrite)
     with progress_bar("modes", quiet=quiet):
         if over is not None:
             found: Modes | RootLocus = _over(inputs, over, speed, vehicle, track, settings,
@@ -97,7 +108,12 @@ def command(
         else:
             found = modes(inputs.vehicle, inputs.track, speed=speed, settings=inputs.settings,
                           **how)
+    scene = _scene(inputs, found, animate)
     _write(folder, found, inputs)
+    if scene is not None and folder.path is not None:
+        from railsim.animation import write_page
+
+        folder.written.append(write_page(scene, folder.path / ANIMATION, overwrite=True))
     if as_json:
         print_json(found.record())
         return
@@ -125,6 +141,18 @@ def _over(
                              **options)
 
     return parameter_locus(prepared, key, values_of(text, "--over"), speed)
+
+
+def _scene(inputs: "Inputs", found: "Modes | RootLocus", name: str | None) -> "Scene | None":
+    """What ``--animate`` shows; refused where there is no such mode."""
+    from railsim.linear.modes import Modes
+
+    if name is None or not isinstance(found, Modes):
+        return None
+    from railsim.animation import mode_scene
+    from railsim.animation.scene import chosen_mode
+
+    return mode_scene(inputs.vehicle, chosen_mode(found.record()["modes"], name, "--animate"))
 
 
 def _write(folder: "Folder", found: "Modes | RootLocus", inputs: "Inputs") -> None:

@@ -6,6 +6,7 @@ does not use.  The reference body's x, which runs hold, is free here: held, it w
 of infinite mass.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,7 @@ class Coordinates:
         return slice(self.n_positions, self.n_positions + self.n_velocities)
 
 
-def coordinates(model: Model, *, held: bool = False) -> Coordinates:
+def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -> Coordinates:
     """Return the coordinates of a vehicle.
 
     Parameters
@@ -86,11 +87,13 @@ def coordinates(model: Model, *, held: bool = False) -> Coordinates:
     model : Model
     held : bool
         Leave out all coordinates of the wheelsets; axleboxes pitch.
+    hold : sequence of str
+        Bodies that are fixed to the moving track frame where they are in steady rolling.
     """
     positions, velocities = [], []
     n = model.index.n_bodies
     for body, kind in enumerate(model.system.bodies.kind):
-        if kind == WHEELSET and held:
+        if (kind == WHEELSET and held) or model.index.bodies[body] in hold:
             continue
         for component in (4,) if kind == AXLEBOX else range(6):
             if not (kind == WHEELSET and component == 4):
@@ -170,11 +173,16 @@ class FreeVehicle:
         Steady rolling.
     held : bool
         Whether the wheelsets are held.
+    hold : sequence of str
+        Other bodies that are held, as in `coordinates`.
     """
 
-    def __init__(self, model: Model, system: System, state: Floats, *, held: bool = False) -> None:
+    def __init__(
+        self, model: Model, system: System, state: Floats, *, held: bool = False,
+        hold: Sequence[str] = (),
+    ) -> None:
         self.model = model
-        self.coordinates = coordinates(model, held=held)
+        self.coordinates = coordinates(model, held=held, hold=hold)
         self.state = state.copy()
         self.work = work_arrays(system)
         self._derivative = np.zeros_like(state)

@@ -187,6 +187,23 @@ class RootLocus:
             chosen.append(max(reversed(borne), key=borne.count) if borne else "")
         return tuple(numbered(chosen))
 
+    def to_xarray(self) -> Any:
+        """Return eigenvalues, frequencies and damping as an `xarray.Dataset`; needs xarray."""
+        import xarray
+
+        values = self.eigenvalues
+        size = np.abs(values)
+        dims = (self.key, "mode")
+        return xarray.Dataset(
+            {
+                "eigenvalue": (dims, values),
+                "frequency": (dims, values.imag / (2.0 * np.pi)),
+                "natural_frequency": (dims, size / (2.0 * np.pi)),
+                "damping_ratio": (dims, -values.real / size),
+            },
+            {self.key: list(self.values), "mode": list(self.names)},
+        )
+
     def record(self) -> list[dict[str, Any]]:
         """Return one record a value."""
         return [modes.record() for modes in self.sets]
@@ -219,6 +236,7 @@ def modes(
     radius: float = math.inf,
     cant: float = 0.0,
     held: bool = False,
+    hold: Sequence[str] = (),
     settings: Settings | None = None,
     profiles: Mapping[str, Profile] | None = None,
 ) -> Modes:
@@ -242,6 +260,8 @@ def modes(
         Of the track on which the vehicle rolls [m].
     held : bool
         Hold the wheelsets: modes of the suspended masses alone.
+    hold : sequence of str
+        Bodies that are fixed to the moving track frame, such as the car above a single bogie.
     settings : Settings, optional
         Creep law and contact.
     profiles : mapping of str to Profile, optional
@@ -270,7 +290,7 @@ def modes(
     prepared = LinearVehicle(
         vehicle, track or load_track("straight"),
         contact=Contact(linearisation, amplitude, conicity), radius=radius, cant=cant, held=held,
-        settings=settings, profiles=profiles,
+        hold=hold, settings=settings, profiles=profiles,
     )
     return modes_at(prepared, speed)
 
@@ -288,7 +308,7 @@ def root_locus(
         [m/s].
     **how
         The other arguments of `modes`: linearisation, amplitude, conicity, radius, cant, held,
-        settings, profiles.
+        hold, settings, profiles.
 
     Returns
     -------

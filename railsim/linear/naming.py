@@ -19,6 +19,7 @@ Any other mode is called after the body and component with most of its energy.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,14 +58,19 @@ class Parts:
     frames: tuple[int, ...]
     wheelsets: tuple[int, ...]
 
+    @cached_property
+    def _inertia(self) -> Floats:
+        """Mass three times and moments of inertia, float64[n_bodies, 6]."""
+        bodies = self.model.system.bodies
+        return np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia])
+
     def energy_shares(self, shape: Complex) -> Floats:
         """Share of each body and component in the kinetic energy, float64[n_bodies, 6]."""
-        c, bodies = self.coordinates, self.model.system.bodies
-        inertia = np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia])
+        c = self.coordinates
         own = c.velocities
-        energy = np.zeros((len(bodies.kind), 6))
+        energy = np.zeros_like(self._inertia)
         places = c.bodies[own], c.components[own]
-        energy[places] = inertia[places] * np.abs(shape[own]) ** 2
+        energy[places] = self._inertia[places] * np.abs(shape[own]) ** 2
         total = float(energy.sum())
         return energy / total if total > 0.0 else energy
 
@@ -114,7 +120,7 @@ def mode_name(parts: Parts, shape: Complex, eigenvalue: complex, speed: float) -
     shares = parts.energy_shares(shape)
     if abs(eigenvalue) < NEAR_ZERO and shares[:, 0].sum() + shares[:, 4].sum() > 0.9:
         return "rolling"
-    hunting = _hunting_bogie(parts, shape, eigenvalue, speed)
+    hunting = _hunting_bogie(parts, shape, shares, eigenvalue, speed)
     if hunting is not None:
         return f"{hunting} hunting".strip()
     if parts.cars and shares[list(parts.cars)].sum() > 0.5:
@@ -151,11 +157,10 @@ def _phase(parts: Parts, shape: Complex, component: int) -> str:
 
 
 def _hunting_bogie(
-    parts: Parts, shape: Complex, eigenvalue: complex, speed: float
+    parts: Parts, shape: Complex, shares: Floats, eigenvalue: complex, speed: float
 ) -> str | None:
     """Name of the bogie that hunts most, empty without bogies; None where nothing hunts."""
     omega = eigenvalue.imag
-    shares = parts.energy_shares(shape)
     # yaw or roll of a frame takes its wheelsets along
     own = float(shares[list(parts.frames)][:, [3, 5]].sum()) if parts.frames else 0.0
     if omega <= 0.0 or shares[:, [1, 5]].sum() < 0.5 or own > 0.5:

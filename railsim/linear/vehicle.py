@@ -1,7 +1,7 @@
 """A vehicle prepared for linear analysis: definitions to a linearisation at any speed."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.internal import PAD
-from railsim.kernels.system import System
+from railsim.kernels.system import RIGID, System
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
@@ -81,6 +81,8 @@ class LinearVehicle:
         Of the track on which the vehicle rolls [m].
     held : bool
         Hold the wheelsets.
+    hold : sequence of str
+        Bodies that are fixed to the moving track frame where they are in steady rolling.
     settings : Settings, optional
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
@@ -102,6 +104,7 @@ class LinearVehicle:
         radius: float = math.inf,
         cant: float = 0.0,
         held: bool = False,
+        hold: Sequence[str] = (),
         settings: Settings | None = None,
         profiles: Mapping[str, Profile] | None = None,
     ) -> None:
@@ -119,7 +122,7 @@ class LinearVehicle:
         if self.contact.conicity is not None:
             vehicle, profile = on_cones(vehicle, self.contact.conicity)
             known[profile.name] = profile
-        self._track = track
+        self.track = track
         self._path = None
         if self.contact.linearisation == "harmonic" and not held:
             self._path = ContactPath(self.contact.amplitude)
@@ -129,7 +132,9 @@ class LinearVehicle:
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
-        self.coordinates: Coordinates = coordinates(self.model, held=held)
+        _check_hold(self.model, hold)
+        self.hold = tuple(hold)
+        self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
         self._known: dict[float, SteadyState] = {}
         self._rest = balance.state.copy()
         self._rest[-2] = PLACE
@@ -174,7 +179,7 @@ class LinearVehicle:
             return solver.solve(self._rest, speed)
 
         def along(share: float) -> tuple[System, float]:
-            part = circle(self._track, curvature=share * self.curvature, cant=share * self.cant)
+            part = circle(self.track, curvature=share * self.curvature, cant=share * self.cant)
             system = self.model.system._replace(track=track_tables(part))
             return system, WALKING_PACE + math.sqrt(share) * (speed - WALKING_PACE)
 
@@ -182,7 +187,8 @@ class LinearVehicle:
 
     def free(self, speed: float) -> FreeVehicle:
         """Return the vehicle about its steady rolling at a speed [m/s]."""
-        return FreeVehicle(self.model, self.system, self.steady(speed).state, held=self.held)
+        return FreeVehicle(self.model, self.system, self.steady(speed).state, held=self.held,
+                           hold=self.hold)
 
     def linearised(self, speed: float) -> Linearisation:
         """Return the linearisation at a speed [m/s]."""
@@ -191,6 +197,16 @@ class LinearVehicle:
         if self._path is not None:
             matrix = self._path.matrix(vehicle, matrix)
         return vehicle.linearisation(matrix)
+
+
+def _check_hold(model: Model, hold: Sequence[str]) -> None:
+    """Refuse to hold what is no body of its own, or everything."""
+    rigid = [name for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)
+             if kind == RIGID]
+    wrong = [name for name in hold if name not in rigid]
+    if wrong:
+        raise InputError([Fault("--hold", wrong[0], "no such body; --held holds the wheelsets",
+                                ", ".join(rigid))])
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from railsim.plot.style import DISTINCT, styled, wheelset_colours
@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 LEFT, RIGHT = 0, 1
+MAPS = 3  # maps of wear side by side at most
+NUMBERS = 80  # fields of a map in which numbers can be read
 WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 
 
@@ -27,9 +29,15 @@ def curving_figure(found: Curving, title: str) -> Figure:
         What was analysed.
     """
     with styled():
-        figure = Figure(figsize=(10.2, 7.4), layout="constrained")
+        mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
+        figure = Figure(figsize=(10.2, 10.6 if mapped else 7.4), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
-        axes = figure.subplots(2, 2)
+        upper: Figure | SubFigure = figure
+        if mapped:
+            grid = figure.add_gridspec(2, 1, height_ratios=[7.4, 3.2])
+            upper = figure.add_subfigure(grid[0])
+            _wear_maps(figure.add_subfigure(grid[1]), found, np.argsort(found.radius))
+        axes = upper.subplots(2, 2)
         order = np.argsort(found.radius)
         radius = found.radius[order]
         outer = np.where(radius > 0.0, LEFT, RIGHT)
@@ -50,6 +58,36 @@ def curving_figure(found: Curving, title: str) -> Figure:
                 one.minorticks_off()
         axes[0, 0].legend(fontsize=7.5)
     return figure
+
+
+def _wear_maps(figure: SubFigure, found: Curving, order: Places) -> None:
+    """Wear number of the leading outer wheel over radius and cant deficiency for each friction."""
+    number = min(len(found.friction), MAPS)
+    radius, deficiency = found.radius[order], 1e3 * found.cant_deficiency
+    outer = np.where(radius > 0.0, LEFT, RIGHT)
+    wear = np.take_along_axis(
+        found.T_gamma[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[..., 0]
+    largest = float(np.nanmax(wear)) if np.isfinite(wear).any() else 1.0
+    places = np.arange(len(radius))
+    for m, axes in enumerate(figure.subplots(1, number, squeeze=False)[0]):
+        axes.grid(visible=False)
+        picture = axes.pcolormesh(places, np.arange(len(deficiency)), wear[:, :, m].T,
+                                  shading="nearest", vmin=0.0, vmax=largest, cmap="viridis")
+        axes.set_xticks(places, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
+        axes.set_yticks(np.arange(len(deficiency)), [f"{value:g}" for value in deficiency])
+        if wear[:, :, m].size <= NUMBERS:
+            _numbers(axes, wear[:, :, m], largest)
+        axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "",
+                 title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
+    figure.colorbar(picture, ax=figure.axes, label=r"$T_\gamma$ (N)", fraction=0.03)
+
+
+def _numbers(axes: Axes, values: Floats, largest: float) -> None:
+    """Values in their fields, readable on dark and on light."""
+    for (r, i), value in np.ndenumerate(values):
+        words = f"{value:.0f}" if np.isfinite(value) else "none"
+        axes.text(r, i, words, ha="center", va="center", fontsize=7,
+                  color="black" if value > 0.6 * largest or not np.isfinite(value) else "white")
 
 
 def _ticks(radius: Floats) -> list[float]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from railsim.linear.modes import Mode, Modes, RootLocus
@@ -15,6 +16,12 @@ Floats = NDArray[np.float64]
 
 SHOWN = 25.0  # Hz, oscillations up to which are drawn
 BARS = 14  # components of a shape that are drawn
+LEAST_BARS = 5  # rows of a shape, so that bars are of one height
+PHASES = {
+    DISTINCT[0]: "in phase with the first component",
+    DISTINCT[1]: "in opposite phase",
+    "0.6": "spin, which has no displacement",
+}
 DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
 
 
@@ -110,12 +117,27 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
     drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
     with styled():
         rows = max(1, (len(drawn) + 1) // 2)
-        figure = Figure(figsize=(10.2, 0.6 + 2.2 * rows), layout="constrained")
+        figure = Figure(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         grid = figure.add_gridspec(rows, 2)
         for k, mode in enumerate(drawn):
-            _shape(figure.add_subplot(grid[k // 2, k % 2]), mode)
+            axes = figure.add_subplot(grid[k // 2, k % 2])
+            _shape(axes, mode)
+            if k + 2 >= len(drawn):
+                axes.set_xlabel("share of the kinetic energy (%)")
+        figure.legend(
+            handles=[Patch(color=colour, label=label) for colour, label in PHASES.items()],
+            loc="outside lower center", ncol=len(PHASES), fontsize=8,
+        )
     return figure
+
+
+def _phase_colour(value: complex | None, reference: complex) -> str:
+    """Colour of `PHASES`; the spin of a wheelset has a rate and no displacement."""
+    in_phase, opposite, unknown = PHASES
+    if value is None:
+        return unknown
+    return in_phase if (value * np.conj(reference)).real >= 0.0 else opposite
 
 
 def _shape(axes: Axes, mode: Mode) -> None:
@@ -123,15 +145,14 @@ def _shape(axes: Axes, mode: Mode) -> None:
     names = list(mode.participation)[:BARS]
     shares = [100.0 * mode.participation[name] for name in names]
     reference = mode.shape.get(names[0], 1.0 + 0j)
-    in_phase = [
-        (mode.shape.get(name, 0j) * np.conj(reference)).real >= 0.0 for name in names
-    ]
-    colours = [DISTINCT[0] if same else DISTINCT[1] for same in in_phase]
+    colours = [_phase_colour(mode.shape.get(name), reference) for name in names]
     place = np.arange(len(names))
     axes.barh(place, shares, color=colours, height=0.7)
     axes.set_yticks(place, names, fontsize=6.5)
-    axes.invert_yaxis()
-    axes.set_xlabel("share of the kinetic energy (%)")
+    axes.set_ylim(max(len(names), LEAST_BARS) - 0.5, -0.5)
+    axes.set_xlim(0.0, None)
+    axes.grid(visible=False, axis="y")
     axes.set_title(
-        f"{mode.name}: {mode.natural_frequency:.3g} Hz, {100.0 * mode.damping_ratio:.3g} %"
+        f"{mode.name}: {mode.natural_frequency:.3g} Hz, damping {100.0 * mode.damping_ratio:.2f} %",
+        fontsize=8.5,
     )

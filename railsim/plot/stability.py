@@ -1,6 +1,7 @@
 """Pictures of stability: amplitude over speed with its branches, maps of critical speeds."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +12,7 @@ from railsim.stability.critical_speed import CriticalSpeed
 from railsim.stability.ramp import THRESHOLD, Diagram
 
 COLOURS = {"up": DISTINCT[0], "down": DISTINCT[1], "ramp": "0.6", "continuation": DISTINCT[2]}
+SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 WORDS = {
     "up": "steps upwards", "down": "steps downwards", "ramp": "falling ramp",
     "continuation": "continuation, dashed where unstable",
@@ -26,35 +28,72 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
     title : str
         What was analysed.
     """
+    if not found.branches:
+        return _linear_figure(found, title)
     with styled():
-        figure = Figure(figsize=(9.2, 6.0), layout="constrained")
+        figure = Figure(figsize=(10.2, 6.0), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1.0])
+        grid = figure.add_gridspec(2, 2, height_ratios=[2.2, 1.0], width_ratios=[3.0, 1.0])
+        upper = figure.add_subplot(grid[0, 0])
+        lower = figure.add_subplot(grid[1, 0], sharex=upper)
         for branch in found.branches:
             _draw(upper, branch, 1e3 * np.array(branch.amplitude), label=True)
             shown = np.where(np.array(branch.amplitude) > THRESHOLD, branch.frequency, np.nan)
             _draw(lower, branch, shown, label=False)
-        if found.linear is not None:
-            upper.axvline(found.linear["speed"], color=LIMIT, lw=0.9)
-            upper.annotate(
-                f"linear {found.linear['speed']:.1f}", (found.linear["speed"], 1.0),
-                xycoords=("data", "axes fraction"), xytext=(3, -9), textcoords="offset points",
-                fontsize=8, color=LIMIT,
-            )
-        for method, lowest in found.nonlinear.items():
-            if lowest.speed is not None:
-                upper.plot([lowest.speed], [1e3 * lowest.amplitude], "o", ms=5, mfc="none",
-                           color=COLOURS["down" if method == "bifurcation" else method],
-                           label=f"lowest by {method}: {lowest.speed:.2f} m/s")
+        _critical(upper, found)
         upper.set(ylabel="amplitude of the wheelsets (mm)",
                   title=f"Hunting{f', {found.type}' if found.type else ''}")
         upper.set_ylim(0.0, None)
         lower.set(xlabel="speed (m/s)", ylabel="frequency (Hz)")
-        if upper.get_legend_handles_labels()[0]:
-            upper.legend()
-        else:
-            upper.text(0.5, 0.5, "no branch was computed", ha="center", transform=upper.transAxes)
+        if found.conicity_over_amplitude is not None:
+            _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
+        handles, labels = upper.get_legend_handles_labels()
+        if handles:
+            figure.add_subplot(grid[1, 1], frame_on=False, xticks=[], yticks=[]).legend(
+                handles, labels, loc="upper left", fontsize=7.5, borderpad=0.0)
     return figure
+
+
+def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
+    """What there is without a branch: the linear critical speed in words, the conicity."""
+    words = "no linear critical speed in the range"
+    if found.linear is not None:
+        words = (f"linear critical speed {found.linear['speed']:.2f} m/s, {found.linear['mode']}, "
+                 f"{found.linear['frequency']:.2f} Hz")
+    with styled():
+        figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+        figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
+        axes = figure.subplots()
+        if found.conicity_over_amplitude is None:
+            axes.text(0.5, 0.5, "the wheelset does not fit between the rails", ha="center",
+                      transform=axes.transAxes)
+        else:
+            _conicity(axes, found.conicity_over_amplitude)
+            axes.set(ylabel="amplitude of the wheelset (mm)", ylim=(0.0, SMALL_AMPLITUDES))
+            axes.tick_params(labelleft=True)
+    return figure
+
+
+def _critical(axes: Axes, found: CriticalSpeed) -> None:
+    """The linear critical speed as a line, the lowest speeds of sustained hunting as circles."""
+    if found.linear is not None:
+        axes.axvline(found.linear["speed"], color=LIMIT, lw=0.9,
+                     label=f"linear: {found.linear['speed']:.2f} m/s")
+    for method, lowest in found.nonlinear.items():
+        if lowest.speed is not None:
+            axes.plot([lowest.speed], [1e3 * lowest.amplitude], "o", ms=6, mfc="none", ls="none",
+                      color=COLOURS["down" if method == "bifurcation" else method],
+                      label=f"lowest by {method}: {lowest.speed:.2f} m/s")
+
+
+def _conicity(axes: Axes, conicity: Mapping[str, Any]) -> None:
+    """Equivalent conicity, on the amplitudes of the diagram beside it."""
+    values, amplitudes = np.array(conicity["conicity"]), 1e3 * np.array(conicity["amplitude"])
+    axes.plot(values, amplitudes, color="0.25")
+    axes.set(xlabel="equivalent conicity (1)", title="Conicity (EN 15302)")
+    shown = values[amplitudes <= max(axes.get_ylim()[1], SMALL_AMPLITUDES)]
+    axes.set_xlim(0.0, 1.1 * np.max(shown) if len(shown) else None)
+    axes.tick_params(labelleft=False)
 
 
 def _draw(axes: Axes, branch: Diagram, values: np.ndarray, *, label: bool) -> None:

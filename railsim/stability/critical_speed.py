@@ -18,9 +18,10 @@ from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle
 from railsim.profiles import Profile
+from railsim.stability.conicity import conicity_over_amplitude
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.periodic import Branch, PeriodicMotion
-from railsim.stability.ramp import Diagram, Sustained, bifurcation_type, diagram, ramp
+from railsim.stability.ramp import RESOLUTION, Diagram, Sustained, bifurcation_type, diagram, ramp
 from railsim.stability.vehicle_flow import VehicleFlow
 
 Floats = NDArray[np.float64]
@@ -54,6 +55,8 @@ class CriticalSpeed:
     amplitude_limit, instability_limit : dict or None
         Lowest ``speed`` at which an amplitude of 3 mm is exceeded, or half the limit of the
         track-shifting force as rms, and that ``limit``.
+    conicity_over_amplitude : dict or None
+        Equivalent conicity of the leading wheelset, see `railsim.stability.conicity`.
     remarks : list of str
         What a reader must know.
     """
@@ -65,6 +68,7 @@ class CriticalSpeed:
     type: str = ""
     amplitude_limit: dict[str, float] | None = None
     instability_limit: dict[str, float] | None = None
+    conicity_over_amplitude: dict[str, Any] | None = None
     remarks: list[str] = field(default_factory=list)
 
     def record(self) -> dict[str, Any]:
@@ -84,8 +88,29 @@ class CriticalSpeed:
             "instability_limit": self.instability_limit,
             "type": self.type,
             "branches": [branch.record() for branch in self.branches],
+            "conicity_over_amplitude": self.conicity_over_amplitude,
             "remarks": self.remarks,
         }
+
+    def to_xarray(self) -> Any:
+        """Return the branches as an `xarray.Dataset` over ``branch`` and ``point``; needs xarray.
+
+        Branches of fewer points than the longest are filled with NaN.
+        """
+        import xarray
+
+        most = max((len(branch.speed) for branch in self.branches), default=0)
+        filled = {
+            name: np.array([
+                getattr(branch, name) + [np.nan] * (most - len(branch.speed))
+                for branch in self.branches
+            ], dtype=float).reshape(len(self.branches), most)
+            for name in ("speed", "amplitude", "frequency", "sum_Y_rms", "stable")
+        }
+        return xarray.Dataset(
+            {name: (("branch", "point"), values) for name, values in filled.items()},
+            {"branch": [branch.direction for branch in self.branches]},
+        )
 
 
 def critical_speed(
@@ -144,6 +169,7 @@ def critical_speed(
         contact=Contact(linearisation, amplitude, conicity), settings=settings, profiles=profiles,
     )
     found = CriticalSpeed(prepared.contact, remarks=list(prepared.remarks))
+    found.conicity_over_amplitude = conicity_over_amplitude(prepared)
     lost = loss_of_stability(prepared.linearised, low, high)
     _linear(found, prepared, lost, low, high)
     tell = progress or (lambda _: None)
@@ -239,6 +265,8 @@ def _by_diagram(
     found.nonlinear["bifurcation"] = lowest
     found.branches += branches
     found.type = bifurcation_type(branches)
+    if lost.parameter and lowest.speed and lowest.speed < lost.parameter - RESOLUTION:
+        found.type = "subcritical"  # the hysteresis may lie between two steps
     if len(branches[0].speed) < points:
         found.remarks.append(
             f"bifurcation: the vehicle derails above {branches[0].speed[-1]:.4g} m/s"

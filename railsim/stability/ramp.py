@@ -28,7 +28,7 @@ CHANGE = 0.02  # of the amplitude over half of it
 MOST_HALVES = 10  # halves of such a run, at most
 RESOLUTION = 0.1  # m/s
 SETTLING = 2.0  # s between looks at a step of a diagram
-MOST_SETTLING = 12  # looks
+MOST_SETTLING = 60  # looks; 1 m/s above a critical speed a coach's hunting grows by 0.1/s
 
 
 @dataclass(frozen=True)

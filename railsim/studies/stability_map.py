@@ -1,4 +1,4 @@
-"""Critical speeds over conicity and friction, point by point over the cores.
+"""Critical speeds over conicity, friction or any key of the files, point by point over the cores.
 
 Each point is kept in the folder as it is done, under a name that hashes its inputs: the same
 command goes on where it was interrupted.  A kept point holds the CRC-32 of its record; a damaged
@@ -13,6 +13,7 @@ import os
 import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,18 +26,32 @@ from railsim.stability.critical_speed import critical_speed
 from railsim.threads import one_thread_each
 from railsim.version import __version__
 
-Point = tuple[float | None, float | None]
 Progress = Callable[[float], None]
 Record = dict[str, Any]
 
 _LOG = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class MapPoint:
+    """One point of a map: everything that differs between points.
+
+    Attributes
+    ----------
+    at : dict of str to float
+        The parameters by name, ``conicity``, ``friction`` or the path of a key.
+    vehicle, track, settings : Vehicle, Track, Settings
+        With the values of the point, but for its conicity.
+    """
+
+    at: dict[str, float]
+    vehicle: Vehicle
+    track: Track
+    settings: Settings
+
+
 def stability_map(
-    vehicle: Vehicle,
-    track: Track,
-    settings: Settings,
-    grid: Sequence[Point],
+    points: Sequence[MapPoint],
     options: dict[str, Any],
     *,
     folder: Path | None = None,
@@ -45,13 +60,11 @@ def stability_map(
     progress: Progress | None = None,
     on_remark: Callable[[str], None] | None = None,
 ) -> list[Record]:
-    """Return the record of `critical_speed` at each point, in the order of the grid.
+    """Return the record of `critical_speed` at each point, in their order.
 
     Parameters
     ----------
-    vehicle, track, settings : Vehicle, Track, Settings
-    grid : sequence of (conicity, friction)
-        None where the vehicle's wheels or the track's friction stay.
+    points : sequence of MapPoint
     options : dict
         Further arguments of `critical_speed`.
     folder : Path, optional
@@ -68,7 +81,7 @@ def stability_map(
 
     A point that fails has its reason among the remarks.
     """
-    jobs = [(vehicle, track, settings, point, options) for point in grid]
+    jobs = [(point, options) for point in points]
     kept = [_kept(folder, job) for job in jobs]
     found: dict[int, Record] = {}
     for number, path in enumerate(kept):
@@ -110,27 +123,23 @@ def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
             raise
 
 
-def point_record(
-    vehicle: Vehicle, track: Track, settings: Settings, point: Point, options: dict[str, Any]
-) -> Record:
+def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
     """Record of one point."""
-    conicity, friction = point
-    if friction is not None:
-        track = track.replace(friction=friction, friction_table=None)
-    where = {"conicity": conicity, "friction": friction}
+    given = {"conicity": point.at["conicity"]} if "conicity" in point.at else {}
     try:
-        found = critical_speed(vehicle, track, settings=settings, conicity=conicity, **options)
+        found = critical_speed(point.vehicle, point.track, settings=point.settings,
+                               **{**options, **given})
     except RailsimError as error:
-        return {"at": where, "linear": None, "nonlinear": None, "remarks": [str(error)]}
-    return {"at": where, **found.record()}
+        return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [str(error)]}
+    return {"at": point.at, **found.record()}
 
 
-def _kept(folder: Path | None, job: Any) -> Path | None:
+def _kept(folder: Path | None, job: tuple[MapPoint, dict[str, Any]]) -> Path | None:
     if folder is None:
         return None
-    vehicle, track, settings, point, options = job
-    inputs = [__version__, vehicle.to_toml(), track.to_toml(), settings.to_toml(), point, options]
-    text = json.dumps(inputs, sort_keys=True)
+    point, options = job
+    files = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
+    text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
 
 

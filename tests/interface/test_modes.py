@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+import railsim
 from railsim.cli import main
 
 
@@ -46,6 +47,8 @@ def test_root_locus_over_a_key(capsys):
     (["--speeds", "10:20:0"], "--speeds"),
     (["--speeds", "10:20:2", "--over", "track.friction=0.2:0.4:2"], "--over"),
     (["--over", "track.nothing=0.2:0.4:2"], "nothing"),
+    (["--hold", "carbdy"], "carbody"),
+    (["--hold", "front.outer.wheelset"], "--held"),
     (["--radius", "2"], "--radius"),
     (["--cant", "2"], "--cant"),
     (["--conicity", "3"], "--conicity"),
@@ -59,3 +62,32 @@ def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     error = capsys.readouterr().err
     assert words in error
     assert "Traceback" not in error
+
+
+def test_a_mode_is_animated(capsys, tmp_path):
+    folder = tmp_path / "modes"
+    arguments = ["modes", "coach_manchester", "--speed", "30", "--quiet", "--out", str(folder),
+                 "--overwrite"]
+    assert main([*arguments, "--animate", "front hunting"]) == 0
+    assert str(folder / "mode.html") in capsys.readouterr().out
+    assert "front hunting" in (folder / "mode.html").read_text()
+    assert main([*arguments, "--animate", "front huntin"]) == 2
+    assert "front hunting" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [
+    ["--animate", "front hunting"],
+    ["--animate", "front hunting", "--speeds", "10:20:2", "--out", "modes"],
+])
+def test_an_animation_needs_one_speed_and_a_folder(capsys, arguments):
+    assert main(["modes", "coach_manchester", "--quiet", *arguments]) == 2
+    assert "--animate" in capsys.readouterr().err
+
+
+def test_a_root_locus_as_named_arrays():
+    locus = railsim.root_locus(railsim.load_vehicle("coach_manchester"), speeds=[20.0, 30.0])
+    data = locus.to_xarray()
+    mode = data.sel(speed=30.0, mode="front hunting")
+    there = locus.sets[1].modes[locus.names.index("front hunting")]
+    assert float(mode["damping_ratio"]) == pytest.approx(there.damping_ratio)
+    assert float(mode["frequency"]) == pytest.approx(there.frequency)

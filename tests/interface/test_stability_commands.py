@@ -63,6 +63,34 @@ def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path, dam
     assert {path: path.read_bytes() for path in (folder / "points").iterdir()} == whole
 
 
+def test_map_over_any_key_of_the_files(capsys, tmp_path):
+    """Cones twice as steep cost speed, a heavier car a little; both keys stand in each record."""
+    folder = tmp_path / "map"
+    mass = "vehicle.bodies.carbody.mass"
+    assert main(["critical-speed", "coach_manchester", "--method", "linear", "--from", "20", "--to",
+                 "100", "--over", f"{mass}=25e3,45e3", "--conicity", "0.1,0.2", "--workers", "1",
+                 "--json", "--quiet", "--out", str(folder)]) == 0
+    records = json.loads(capsys.readouterr().out)
+    speeds = {(r["at"][mass], r["at"]["conicity"]): r["linear"]["speed"] for r in records}
+    assert len(speeds) == 4
+    assert speeds[25e3, 0.1] > speeds[45e3, 0.1] > 1.2 * speeds[25e3, 0.2] > speeds[45e3, 0.2]
+    assert (folder / "critical_speed.png").stat().st_size > 1000
+
+
+def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
+    """On given cones it is gamma (b0 + R gamma)/(b0 - r0 gamma) at all amplitudes but the largest.
+
+    A cone 1:10 touches the 60E1 where the radius R of its head is 80 mm.
+    """
+    assert main(["critical-speed", "coach_manchester", "--method", "linear", "--conicity", "0.1",
+                 "--json", "--quiet"]) == 0
+    found = json.loads(capsys.readouterr().out)["conicity_over_amplitude"]
+    near = [g for a, g in zip(found["amplitude"], found["conicity"], strict=True) if a < 4e-3]
+    expected = 0.1 * (0.75 + 0.08 * 0.1) / (0.75 - 0.46 * 0.1)
+    assert near == pytest.approx([expected] * len(near), rel=5e-3)
+    assert len(near) > 10
+
+
 def test_curving_over_a_grid(capsys, tmp_path):
     folder = tmp_path / "curving"
     assert main(["curving", "coach_manchester", "--radius", "300,-600", "--cant-deficiency",
@@ -82,6 +110,10 @@ def test_curving_over_a_grid(capsys, tmp_path):
     (["critical-speed", "coach_manchester", "--to", "500"], "--to"),
     (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
     (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
+    (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
+    (["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"], "nothing"),
+    (["critical-speed", "coach_manchester", "--friction", "0.2,0.3", "--conicity", "0.1,0.2",
+      "--over", "vehicle.bodies.carbody.mass=2e4,3e4"], "two at most"),
     (["curving", "coach_manchester", "--radius", "5"], "--radius"),
     (["curving", "coach_manchester", "--radius", "inf"], "--radius"),
     (["curving", "coach_manchester", "--radius", "300", "--cant", "1"], "--cant"),

@@ -8,6 +8,7 @@ from railsim.assembly import assemble, level_track
 from railsim.equilibrium import equilibrium
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
+from railsim.linear.modes import modes
 
 
 def held_modes(vehicle, *, loaded):
@@ -99,3 +100,19 @@ def test_a_change_of_the_bodys_mass_moves_the_bounce_as_a_single_mass_would(coac
     series = 4 * 430e3 * 8 * 1.22e6 / (4 * 430e3 + 8 * 1.22e6)
     assert bounce[1] == pytest.approx(np.sqrt(series / 64e3) / (2 * np.pi), rel=0.01)
     assert bounce[1] / bounce[0] == pytest.approx(np.sqrt(0.5), rel=0.01)
+
+
+def test_a_car_between_held_bogies_bounces_on_its_springs():
+    """f0 = sqrt(4 kz/m)/2 pi: four secondary springs of 430 kN/m; the other elements pull across.
+
+    The bogies alone under a held car are left with modes of their own, none of the car.
+    """
+    car = modes(load_vehicle("benchmark_vehicle1"), speed=20.0, held=True,
+                hold=["front.frame", "rear.frame"])
+    bounce = car["car body bounce"]
+    assert {name.partition(".")[0] for name in bounce.shape} == {"carbody"}
+    assert bounce.natural_frequency == pytest.approx(
+        np.sqrt(4.0 * 430e3 / 32000.0) / (2.0 * np.pi), rel=5e-3)
+    bogies = modes(load_vehicle("benchmark_vehicle1"), speed=20.0, hold=["carbody"])
+    assert not any("carbody" in name for mode in bogies for name in mode.participation)
+    assert any("hunting" in mode.name for mode in bogies)

@@ -1,0 +1,58 @@
+"""Make the pictures of ``docs/user/stability.md``.
+
+``python docs/generate_stability.py`` makes all of them, or those that are named: ``modes``,
+``critical_speed``, ``curving``.  Together they take some minutes on one core.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from railsim import critical_speed, curving, load_track, load_vehicle, root_locus
+from railsim.plot.curving import curving_figure
+from railsim.plot.modes import locus_figure
+from railsim.plot.stability import bifurcation_figure
+from railsim.plot.style import save
+
+IMAGES = Path(__file__).parent / "img"
+COACH = "coach_manchester"
+RADII = (250.0, 300.0, 400.0, 500.0, 700.0, 1000.0, 2000.0, 5000.0)
+DEFICIENCIES = (0.0, 0.05, 0.1, 0.15)
+RIGID = {"preset": "rigid"}
+
+
+def modes_picture() -> Figure:
+    """Root locus of the coach, contact harmonic with 3 mm."""
+    coach = load_vehicle(COACH)
+    locus = root_locus(coach, speeds=np.linspace(10.0, 80.0, 29).tolist(),
+                       linearisation="harmonic")
+    return locus_figure(locus, f"{coach.name}: contact harmonic 3 mm")
+
+
+def critical_speed_picture() -> Figure:
+    """Bifurcation diagram of the coach by all methods, on rigid rails."""
+    coach = load_vehicle(COACH)
+    found = critical_speed(
+        coach, load_track("straight").replace(support=RIGID),
+        methods=("ramp", "bifurcation", "continuation"), low=25.0, points=16,
+    )
+    return bifurcation_figure(found, f"{coach.name}, rigid rails")
+
+
+def curving_picture() -> Figure:
+    """Steady curving of the coach over radius, cant deficiency and friction."""
+    coach = load_vehicle(COACH)
+    found = curving(coach, radius=RADII, cant_deficiency=DEFICIENCIES, friction=(0.2, 0.4))
+    return curving_figure(found, f"{coach.name}: steady curving, cant 150 mm")
+
+
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "modes": modes_picture, "critical_speed": critical_speed_picture, "curving": curving_picture,
+}
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or PICTURES:
+        save(PICTURES[name](), IMAGES / f"{name}.png", overwrite=True)
