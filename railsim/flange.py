@@ -15,7 +15,7 @@ from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.run_in import advance, curve_to_settle_in
+from railsim.settling import advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 

@@ -14,7 +14,6 @@ the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,25 +37,17 @@ from railsim.kernels.rails import (
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.time_step import divide_strikes, empty_recorder
+from railsim.kernels.time_loop import FAST
+from railsim.settling import NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
-# called with the time of the run-in that has been simulated, and all of it [s]
-Progress = Callable[[float, float], None]
 
-STRAIGHT = 20.0  # m
-TRANSITION_TIME, SETTLING_TIME = 4.0, 6.0  # s; several periods of the car body
-# m at least, at low speed: some wavelengths of a wheelset, no steep ramp of cant; the way to settle
-# counts from where the last wheelset is in the curve
-TRANSITION, SETTLING = 40.0, 30.0
-NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that need no run-in
+TIMES = 4.0, 6.0  # s in transition and curve; several periods of the car body
 APPROACH_TIME, APPROACH = 4.0, 30.0  # s and m at least of irregular rails before the start
 LONGEST_APPROACH_TIME, LONGEST_APPROACH = 30.0, 500.0  # s and m at least of changing alignment
 UNCHANGING = 1e-9  # change of curvature (1/m2), cant and grade angle (1/m) below which it is none
-STEPS = 10_000  # in a call: Ctrl-C is heard, and progress told, between calls
 SMOOTH = 10.0  # m before the track's beginning where the approach may begin, beside the vehicle
 
 
@@ -212,26 +203,6 @@ def follow_rails(model: Model, state: Floats) -> None:
         state[rate + 3] += speed * plane[w, ROLL_SLOPE]
 
 
-def advance(
-    model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
-    progress: Progress | None = None,
-) -> int:
-    """Advance a state in calls short enough for signals to be heard; its status is returned."""
-    work, recorder = work_arrays(system), empty_recorder(model, 1)
-    divide_strikes(work, scheme, step)
-    derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
-    status, done = RUNNING, 0
-    while status == RUNNING and done < steps:
-        status, _, more, _ = time_loop(
-            system, work, state, derivative, stages, recorder, scheme, step, 1 + done,
-            min(STEPS, steps - done), steps + 2, int(done == 0), 0,
-        )
-        done += more
-        if progress is not None:
-            progress(done * step, steps * step)
-    return int(status)
-
-
 def _run(
     model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
     start: float, where: str, progress: Progress | None = None,
@@ -243,43 +214,6 @@ def _run(
             "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "
             f"{where}, at {state[-1]:g} m/s", "a start on straight track or a lower speed",
         )])
-
-
-def curve_to_settle_in(
-    model: Model, track: Track, speed: float, curvature: float, cant: float,
-    friction: tuple[float, float], times: tuple[float, float] = (TRANSITION_TIME, SETTLING_TIME),
-) -> Track:
-    """Straight, transition and curve on smooth rails, long enough for a vehicle to settle.
-
-    Parameters
-    ----------
-    speed : float
-        [m/s].
-    curvature, cant : float
-        Of the curve [1/m], [m].
-    friction : tuple of float
-        Of left and right rail [1].
-    times : tuple of float
-        Time in the transition and in the curve [s]; at low speed their lengths decide.
-    """
-    transition = max(speed * times[0], TRANSITION)
-    behind = -float(np.min(model.system.frame_offset))
-    rest = max(speed * times[1], behind + SETTLING)
-    radius = 1.0 / curvature if abs(curvature) >= NEGLIGIBLE else math.inf
-    return track.replace(
-        plan=[
-            {"type": "STR", "length": STRAIGHT},
-            {"type": "CLO", "length": transition, "radius_end": radius},
-            {"type": "CIR", "length": rest, "radius": radius},
-        ],
-        cant=[
-            {"type": "CST", "length": STRAIGHT, "cant": 0.0},
-            {"type": "LIR", "length": transition},
-            {"type": "CST", "length": rest, "cant": cant},
-        ],
-        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
-        friction=friction,
-    )
 
 
 def settled(
@@ -313,7 +247,9 @@ def settled(
     if abs(curvature) < NEGLIGIBLE and abs(cant) < NEGLIGIBLE:
         return None
     speed = float(balance.state[-1])
-    auxiliary = curve_to_settle_in(model, track, speed, curvature, cant, _friction(track, start))
+    auxiliary = curve_to_settle_in(
+        model, track, speed, curvature, cant, _friction(track, start), TIMES
+    )
     system = model.system._replace(
         track=track_tables(auxiliary), drive=CONSTANT_SPEED, loads=model.system.loads._replace(
             body=model.system.loads.body[:0]),

@@ -30,8 +30,8 @@ from railsim.remarks import run_remarks
 from railsim.result import MemorySink, Result, Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.right_samples import filtering, low_pass_remark, output_words, sampled
-from railsim.run_in import Progress as RunInProgress
 from railsim.run_in import start_state
+from railsim.settling import Progress as RunInProgress
 from railsim.time_step import SCHEMES
 
 Floats = NDArray[np.float64]

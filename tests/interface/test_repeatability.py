@@ -45,7 +45,7 @@ def test_run_in_may_be_interrupted_and_is_the_same_in_pieces(monkeypatch):
     vehicle = railsim.load_vehicle("coach_manchester")
     how = {"speed": 20.0, "start": 150.0, "duration": 0.1}
     whole = railsim.simulate(vehicle, track, **how)
-    monkeypatch.setattr(railsim.run_in, "STEPS", 137)
+    monkeypatch.setattr(railsim.settling, "STEPS", 137)
     pieces = railsim.simulate(vehicle, track, **how)
     for name in whole:
         np.testing.assert_array_equal(pieces[name], whole[name])

@@ -1,0 +1,82 @@
+"""A vehicle brought into a curve on an auxiliary track: straight, transition, curve."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.assembly import Model, work_arrays
+from railsim.definitions.track import Track
+from railsim.kernels.status import RUNNING
+from railsim.kernels.system import System
+from railsim.kernels.time_loop import time_loop
+from railsim.time_step import divide_strikes, empty_recorder
+
+Floats = NDArray[np.float64]
+# called with the time that has been simulated, and all of it [s]
+Progress = Callable[[float, float], None]
+
+STRAIGHT = 20.0  # m
+# m at least, at low speed: some wavelengths of a wheelset, no steep ramp of cant; the way to settle
+# counts from where the last wheelset is in the curve
+TRANSITION, SETTLING = 40.0, 30.0
+NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that are none
+STEPS = 10_000  # in a call: Ctrl-C is heard, and progress told, between calls
+
+
+def curve_to_settle_in(
+    model: Model, track: Track, speed: float, curvature: float, cant: float,
+    friction: tuple[float, float], times: tuple[float, float],
+) -> Track:
+    """Straight, transition and curve on smooth rails, long enough for a vehicle to settle.
+
+    Parameters
+    ----------
+    speed : float
+        [m/s].
+    curvature, cant : float
+        Of the curve [1/m], [m].
+    friction : tuple of float
+        Of left and right rail [1].
+    times : tuple of float
+        Time in the transition and in the curve [s]; at low speed their lengths decide.
+    """
+    transition = max(speed * times[0], TRANSITION)
+    behind = -float(np.min(model.system.frame_offset))
+    rest = max(speed * times[1], behind + SETTLING)
+    radius = 1.0 / curvature if abs(curvature) >= NEGLIGIBLE else math.inf
+    return track.replace(
+        plan=[
+            {"type": "STR", "length": STRAIGHT},
+            {"type": "CLO", "length": transition, "radius_end": radius},
+            {"type": "CIR", "length": rest, "radius": radius},
+        ],
+        cant=[
+            {"type": "CST", "length": STRAIGHT, "cant": 0.0},
+            {"type": "LIR", "length": transition},
+            {"type": "CST", "length": rest, "cant": cant},
+        ],
+        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
+        friction=friction,
+    )
+
+
+def advance(
+    model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
+    progress: Progress | None = None,
+) -> int:
+    """Advance a state in calls short enough for signals to be heard; its status is returned."""
+    work, recorder = work_arrays(system), empty_recorder(model, 1)
+    divide_strikes(work, scheme, step)
+    derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
+    status, done = RUNNING, 0
+    while status == RUNNING and done < steps:
+        status, _, more, _ = time_loop(
+            system, work, state, derivative, stages, recorder, scheme, step, 1 + done,
+            min(STEPS, steps - done), steps + 2, int(done == 0), 0,
+        )
+        done += more
+        if progress is not None:
+            progress(done * step, steps * step)
+    return int(status)
