@@ -5,7 +5,7 @@ import pytest
 
 import railsim
 import railsim.advance
-import railsim.run_in
+import railsim.settling
 
 
 def run():
