@@ -38,7 +38,7 @@ MARGIN = 2.0 ** (1.0 / 6.0)
 # of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
 PART = {FAST: 1e-4, RK4: 2.5e-4}
 # share of the static wheel load by which a contact force may change in a step that is not divided:
-# on smooth curves and on ERRI B176 track at 40 m/s no step is
+# on smooth curves no step is, on ERRI B176 track at 40 m/s one in sixteen
 SWING = 0.1
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).parent.parent
 
@@ -15,3 +16,7 @@ def reference_dir():
     if not folder.is_dir():
         pytest.skip(f"no reference data at {folder}")
     return folder
+
+# a first call may compile, and the machine may be busy: time is no property
+settings.register_profile("railsim", deadline=None)
+settings.load_profile("railsim")

@@ -8,6 +8,7 @@ import pytest
 
 import railsim.cli.interrupts
 import railsim.run_in
+import railsim.settling
 import railsim.simulation
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
@@ -82,14 +83,19 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
 
 def test_run_obeys_a_signal_that_python_loses_in_a_run_in(tmp_path, monkeypatch, capsys):
     """At walking speed a run-in takes as long as a run: it is left after the call in hand."""
-    calls, time_loop = [], railsim.run_in.time_loop
+    calls, time_loop = [], railsim.settling.time_loop
 
     def interrupted(*arguments):
         calls.append(1)
         lost(signal.SIGINT)
         return time_loop(*arguments)
 
-    monkeypatch.setattr(railsim.run_in, "time_loop", interrupted)
+    def run_in(*arguments):  # and not where the step is judged
+        monkeypatch.setattr(railsim.settling, "time_loop", interrupted)
+        return advance(*arguments)
+
+    advance = railsim.run_in.advance
+    monkeypatch.setattr(railsim.run_in, "advance", run_in)
     run = ["run", "coach_manchester", "curve_r250", "--speed", "2", "--start", "390", "--quiet"]
     assert main([*run, "--out", str(tmp_path / "run.h5")]) == 130
     assert capsys.readouterr().err == "railsim: interrupted\n"

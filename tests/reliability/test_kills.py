@@ -163,5 +163,8 @@ def test_signal_is_obeyed_while_python_cannot(tmp_path):
         assert os.listdir(tmp_path) == []
 
 
-# a shell that starts the tests in the background has them ignore Ctrl-C
-ALLOWED = "signal.signal(signal.SIGINT, signal.default_int_handler);"
+# a shell that starts the tests in the background has them ignore Ctrl-C, nohup the hang-up
+ALLOWED = (
+    "signal.signal(signal.SIGINT, signal.default_int_handler);"
+    "signal.signal(signal.SIGHUP, signal.SIG_DFL);"
+)
