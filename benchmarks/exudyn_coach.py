@@ -101,39 +101,54 @@ class ExudynCoach:
             rates = state[6 * (n + b) : 6 * (n + b) + 6]
             velocity = TO_EXUDYN @ (rates[:3] + np.array([self.speed, 0.0, 0.0]))
             turning = TO_EXUDYN @ rates[3:]
-            node = self.mbs.AddNode(items.NodeRigidBodyRxyz(
-                referenceCoordinates=[*place, 0.0, 0.0, 0.0],
-                initialCoordinates=[*displacement, roll, -yaw, pitch],
-                initialVelocities=[*velocity, *turning],
-            ))
+            node = self.mbs.AddNode(
+                items.NodeRigidBodyRxyz(
+                    referenceCoordinates=[*place, 0.0, 0.0, 0.0],
+                    initialCoordinates=[*displacement, roll, -yaw, pitch],
+                    initialVelocities=[*velocity, *turning],
+                )
+            )
             self._nodes.append(node)
             reference += [*place, 0.0, 0.0, 0.0]
-            self._bodies.append(self.mbs.AddObject(items.ObjectRigidBody(
-                mass=body.mass, inertia=[i_x, i_z, i_y, 0.0, 0.0, 0.0], nodeNumber=node,
-            )))
+            self._bodies.append(
+                self.mbs.AddObject(
+                    items.ObjectRigidBody(
+                        mass=body.mass, inertia=[i_x, i_z, i_y, 0.0, 0.0, 0.0], nodeNumber=node
+                    )
+                )
+            )
             mass_marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._bodies[-1]))
-            self.mbs.AddLoad(items.LoadMassProportional(
-                markerNumber=mass_marker, loadVector=[0.0, -GRAVITY, 0.0],
-            ))
+            self.mbs.AddLoad(
+                items.LoadMassProportional(
+                    markerNumber=mass_marker, loadVector=[0.0, -GRAVITY, 0.0]
+                )
+            )
         self._reference = np.array(reference)
 
     def _marker(self, name: str, point: np.ndarray) -> int:
         b = self.names.index(name)
         local = TO_EXUDYN @ (point - np.array(self._flat.body(name).position))
-        return int(self.mbs.AddMarker(items.MarkerBodyRigid(
-            bodyNumber=self._bodies[b], localPosition=list(local),
-        )))
+        return int(
+            self.mbs.AddMarker(
+                items.MarkerBodyRigid(bodyNumber=self._bodies[b], localPosition=list(local))
+            )
+        )
 
     def _add_element(self, element: Any) -> None:
         definition = element.definition
         first, second = np.array(element.point1), np.array(element.point2)
         if definition.kind == "spring_damper":
-            self.mbs.AddObject(items.SpringDamper(
-                markerNumbers=[self._marker(element.body1, first),
-                               self._marker(element.body2, second)],
-                referenceLength=float(np.linalg.norm(second - first)),
-                stiffness=definition.stiffness, damping=definition.damping,
-            ))
+            self.mbs.AddObject(
+                items.SpringDamper(
+                    markerNumbers=[
+                        self._marker(element.body1, first),
+                        self._marker(element.body2, second),
+                    ],
+                    referenceLength=float(np.linalg.norm(second - first)),
+                    stiffness=definition.stiffness,
+                    damping=definition.damping,
+                )
+            )
             return
         middle = 0.5 * (first + second)
         stiffness, damping, offset = np.zeros(6), np.zeros(6), np.zeros(6)
@@ -147,13 +162,19 @@ class ExudynCoach:
             offset[1] = self._static_load(element) / k_z
         if definition.kind == "shear_spring":
             stiffness[3], stiffness[5] = definition.bending_stiffness
-        self.mbs.AddObject(items.RigidBodySpringDamper(
-            markerNumbers=[self._marker(element.body1, middle),
-                           self._marker(element.body2, middle)],
-            stiffness=np.diag(stiffness), damping=np.diag(damping), offset=list(offset),
-            # action and reaction on one line; not for axes that would spin with a wheelset
-            useIntrinsicFormulation=definition.kind == "shear_spring",
-        ))
+        self.mbs.AddObject(
+            items.RigidBodySpringDamper(
+                markerNumbers=[
+                    self._marker(element.body1, middle),
+                    self._marker(element.body2, middle),
+                ],
+                stiffness=np.diag(stiffness),
+                damping=np.diag(damping),
+                offset=list(offset),
+                # action and reaction on one line; not for axes that would spin with a wheelset
+                useIntrinsicFormulation=definition.kind == "shear_spring",
+            )
+        )
 
     def _static_load(self, element: Any) -> float:
         """Load that the second body puts on the first one, negative for a wheelset's reaction."""
@@ -167,11 +188,15 @@ class ExudynCoach:
         bodies = np.array(
             [[self.names.index(e.body1), self.names.index(e.body2)] for e in elements]
         )
-        points = np.array([
-            [TO_EXUDYN @ (np.array(point) - np.array(self._flat.body(name).position))
-             for name, point in ((e.body1, e.point1), (e.body2, e.point2))]
-            for e in elements
-        ])
+        points = np.array(
+            [
+                [
+                    TO_EXUDYN @ (np.array(point) - np.array(self._flat.body(name).position))
+                    for name, point in ((e.body1, e.point1), (e.body2, e.point2))
+                ]
+                for e in elements
+            ]
+        )
         stops = Stops(bodies, points, np.array(elements[0].definition.table, dtype=float))
         n = len(self.names)
         state = np.zeros(12 * n + len(system.internal.kind) + 3)
@@ -183,20 +208,40 @@ class ExudynCoach:
 
         def user_forces(mbs, t, number, q, q_t):
             self.evaluations += 1
-            status = forces_of(models, stops, reference, t, np.asarray(q), np.asarray(q_t), forces,
-                               scratch, records)
+            status = forces_of(
+                models,
+                stops,
+                reference,
+                t,
+                np.asarray(q),
+                np.asarray(q_t),
+                forces,
+                scratch,
+                records,
+            )
             if status != RUNNING:
                 raise ValueError(f"status {status} at t = {t}")
             return forces
 
         # compile before the clock runs
-        forces_of(models, stops, reference, 0.0, np.zeros(6 * n), np.zeros(6 * n), forces, scratch,
-                  records)
+        forces_of(
+            models,
+            stops,
+            reference,
+            0.0,
+            np.zeros(6 * n),
+            np.zeros(6 * n),
+            forces,
+            scratch,
+            records,
+        )
         records.count[0] = 0
         zero = np.zeros((6 * n, 6 * n))
-        self.mbs.AddObject(items.ObjectGenericODE2(
-            nodeNumbers=self._nodes, massMatrix=zero, forceUserFunction=user_forces,
-        ))
+        self.mbs.AddObject(
+            items.ObjectGenericODE2(
+                nodeNumbers=self._nodes, massMatrix=zero, forceUserFunction=user_forces
+            )
+        )
 
     def solve(self, method: str, step: float, spectral_radius: float = 0.8) -> dict[str, Any]:
         """Integrate with one of Exudyn's solvers at a constant step [s]."""
@@ -219,7 +264,8 @@ class ExudynCoach:
         begin = time.process_time()
         try:
             self.mbs.SolveDynamic(
-                settings, solverType=getattr(exudyn.DynamicSolverType, method),
+                settings,
+                solverType=getattr(exudyn.DynamicSolverType, method),
                 updateInitialValues=False,
             )
             complete = bool(self.records.count[0] >= len(self.records.yaw) - 1)
@@ -230,12 +276,18 @@ class ExudynCoach:
         rows = int(self.records.count[0])
         Q, Y = self.records.wheel[:rows, ..., 0], self.records.wheel[:rows, ..., 1]
         return {
-            "method": method, "step": step, "cpu": cpu, "evaluations": self.evaluations,
-            "real_time": self.duration / cpu, "success": complete and bool(np.all(np.isfinite(Q))),
+            "method": method,
+            "step": step,
+            "cpu": cpu,
+            "evaluations": self.evaluations,
+            "real_time": self.duration / cpu,
+            "success": complete and bool(np.all(np.isfinite(Q))),
             "outputs": {
                 "time": OUTPUT * np.arange(rows),
                 "distance": self.speed * OUTPUT * np.arange(rows),
-                "Q": Q, "Y": Y, "dQ_over_Q0": (Q - self.Q0) / self.Q0,
+                "Q": Q,
+                "Y": Y,
+                "dQ_over_Q0": (Q - self.Q0) / self.Q0,
                 "wheelset_yaw": self.records.yaw[:rows],
             },
         }

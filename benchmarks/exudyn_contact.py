@@ -67,8 +67,10 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
     s = speed * t
     for k in range(forces.shape[0]):
         forces[k] = 0.0
-    if locate_frames(system.track, system.frame_offset, -1, s, work.frames, work.cell,
-                     work.cell_u) != RUNNING:
+    if (
+        locate_frames(system.track, system.frame_offset, -1, s, work.frames, work.cell, work.cell_u)
+        != RUNNING
+    ):
         return -1
     angles = np.empty(6)
     for b in range(n):
@@ -161,16 +163,23 @@ def bump_stop(forces, stops, k, A, G, q, reference, vector):
             b = stops.body[k, end]
             for j in range(3):
                 arms[end, i] += A[b, i, j] * stops.point[k, end, j]
-        gap = (q[6 * second + i] + reference[6 * second + i] + arms[1, i]
-               - q[6 * first + i] - reference[6 * first + i] - arms[0, i])
+        gap = (
+            q[6 * second + i]
+            + reference[6 * second + i]
+            + arms[1, i]
+            - q[6 * first + i]
+            - reference[6 * first + i]
+            - arms[0, i]
+        )
         way += A[first, i, 2] * gap
     x = abs(way)
     last = stops.table.shape[0] - 2
     i = 0
     while i < last and x > stops.table[i + 1, 0]:
         i += 1
-    slope = ((stops.table[i + 1, 1] - stops.table[i, 1])
-             / (stops.table[i + 1, 0] - stops.table[i, 0]))
+    slope = (stops.table[i + 1, 1] - stops.table[i, 1]) / (
+        stops.table[i + 1, 0] - stops.table[i, 0]
+    )
     force = stops.table[i, 1] + slope * (x - stops.table[i, 0])
     if way < 0.0:
         force = -force

@@ -42,33 +42,50 @@ def measure() -> dict[str, Any]:
     a, b, mu_N, c11, c22, c23, xi_x, xi_y, phi = rows
     out = np.zeros((3, PATCHES))
     work = fastsim_workspace(PATCHES, CELLS, CELLS)
-    found = {"railsim": least_time(
-        lambda: many_fastsim_patches(PATCHES, CELLS, CELLS, rows, G, work, out, 20),
-        200, 20 * PATCHES)}
+    found = {
+        "railsim": least_time(
+            lambda: many_fastsim_patches(PATCHES, CELLS, CELLS, rows, G, work, out, 20),
+            200,
+            20 * PATCHES,
+        )
+    }
     bounds = 1.0 - (1.0 - (2.0 * np.arange(CELLS) + 1.0) / CELLS) ** 2
     columns = -(-PATCHES * CELLS // 8) * 8
     for name, march in (("march, as used", many_marches), ("march, plain", many_marches_plain)):
         found[name] = least_time(
-            lambda march=march: march(work, columns, CELLS, bounds, 20), 200, 20 * PATCHES)
+            lambda march=march: march(work, columns, CELLS, bounds, 20), 200, 20 * PATCHES
+        )
     forces = {}
 
     def in_python() -> None:
-        forces["Python"] = np.array([
-            plain_python(CELLS, CELLS, *(float(v) for v in row[:6]), G,
-                         *(float(v) for v in row[6:]))
-            for row in rows.T
-        ]).T
+        forces["Python"] = np.array(
+            [
+                plain_python(
+                    CELLS, CELLS, *(float(v) for v in row[:6]), G, *(float(v) for v in row[6:])
+                )
+                for row in rows.T
+            ]
+        ).T
 
     def in_numpy() -> None:
         forces["numpy, all patches at once"] = numpy_patches(
-            CELLS, CELLS, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi)
+            CELLS, CELLS, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi
+        )
 
     def in_numpy_one_by_one() -> None:
-        forces["numpy, patch by patch"] = np.concatenate([
-            numpy_patches(CELLS, CELLS, *(v[i:i + 1] for v in rows[:6]), G,
-                          *(v[i:i + 1] for v in rows[6:]))
-            for i in range(PATCHES)
-        ], axis=1)
+        forces["numpy, patch by patch"] = np.concatenate(
+            [
+                numpy_patches(
+                    CELLS,
+                    CELLS,
+                    *(v[i : i + 1] for v in rows[:6]),
+                    G,
+                    *(v[i : i + 1] for v in rows[6:]),
+                )
+                for i in range(PATCHES)
+            ],
+            axis=1,
+        )
 
     found["Python"] = least_time(in_python, 10, PATCHES)
     found["numpy, patch by patch"] = least_time(in_numpy_one_by_one, 10, PATCHES)

@@ -46,10 +46,14 @@ def train(coaches: int) -> Vehicle:
     # every car body needs what holds it along the track: a soft spring to the one ahead
     data["elements"] = {
         f"hold{k}": {
-            "kind": "spring_damper", "stiffness": 1e6, "damping": 1e5,
+            "kind": "spring_damper",
+            "stiffness": 1e6,
+            "damping": 1e5,
             "bodies": [f"coach{k - 1}.carbody", f"coach{k}.carbody"],
-            "points": [[-COACH_LENGTH * (k - 0.5) + 0.5, 0.0, -1.0],
-                       [-COACH_LENGTH * (k - 0.5) - 0.5, 0.0, -1.0]],
+            "points": [
+                [-COACH_LENGTH * (k - 0.5) + 0.5, 0.0, -1.0],
+                [-COACH_LENGTH * (k - 0.5) - 0.5, 0.0, -1.0],
+            ],
         }
         for k in range(1, coaches)
     }
@@ -65,8 +69,12 @@ def evaluation(vehicle: Vehicle, settings: Settings) -> dict[str, Any]:
         lambda: loops.many_mechanics(system, work, state, derivative, CALLS), 100, CALLS
     )
     patches = loops.many_normal_contacts(system, work, state, derivative, 1)
-    return {"wheelsets": len(prepared.model.index.wheelsets), "patches": patches, "time": time,
-            "states": len(state)}
+    return {
+        "wheelsets": len(prepared.model.index.wheelsets),
+        "patches": patches,
+        "time": time,
+        "states": len(state),
+    }
 
 
 def output_rates() -> list[dict[str, Any]]:
@@ -76,8 +84,13 @@ def output_rates() -> list[dict[str, Any]]:
         settings = Settings(output_rate=rate)
         runs = [simulate(vehicle, track, speed=SPEED, settings=settings) for _ in range(3)]
         best = min(runs, key=lambda run: float(run.attributes["cpu_time"]))
-        found.append({"rate": rate, "step": best.attributes["step"],
-                      "real_time": best.attributes["real_time_factor"]})
+        found.append(
+            {
+                "rate": rate,
+                "step": best.attributes["step"],
+                "real_time": best.attributes["real_time_factor"],
+            }
+        )
     return found
 
 
@@ -88,11 +101,14 @@ def long_run(kilometres: float, folder: Path) -> dict[str, Any]:
     for k in range(sections):
         radius = 2000.0 if k % 2 else -2000.0
         plan += [
-            {"type": "STR", "length": 3000.0}, {"type": "CLO", "length": 200.0},
-            {"type": "CIR", "length": 1600.0, "radius": radius}, {"type": "CLO", "length": 200.0},
+            {"type": "STR", "length": 3000.0},
+            {"type": "CLO", "length": 200.0},
+            {"type": "CIR", "length": 1600.0, "radius": radius},
+            {"type": "CLO", "length": 200.0},
         ]
         cant += [
-            {"type": "CST", "length": 3000.0, "cant": 0.0}, {"type": "LIR", "length": 200.0},
+            {"type": "CST", "length": 3000.0, "cant": 0.0},
+            {"type": "LIR", "length": 200.0},
             {"type": "CST", "length": 1600.0, "cant": 0.02 if radius > 0.0 else -0.02},
             {"type": "LIR", "length": 200.0},
         ]
@@ -101,8 +117,18 @@ def long_run(kilometres: float, folder: Path) -> dict[str, Any]:
     text = tomli_w.dumps({"format": "railsim-track/1", "name": "long", "plan": plan, "cant": cant})
     (folder / "long.toml").write_text(text)
     run = run_command(
-        "run", "coach_manchester", "long.toml", "--speed", f"{SPEED:g}", "--out", "long.h5",
-        "--overwrite", "--quiet", "--set", "settings.output_spacing=10.0", folder=folder,
+        "run",
+        "coach_manchester",
+        "long.toml",
+        "--speed",
+        f"{SPEED:g}",
+        "--out",
+        "long.h5",
+        "--overwrite",
+        "--quiet",
+        "--set",
+        "settings.output_spacing=10.0",
+        folder=folder,
     )
     size = (folder / "long.h5").stat().st_size if (folder / "long.h5").exists() else 0
     return {"kilometres": kilometres, "file": size, **run}

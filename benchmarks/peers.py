@@ -37,13 +37,24 @@ from railsim.definitions.settings import Settings
 
 TRACK, SPEED, MIDDLE = "curve_r250", 20.0, 390.0
 SCIPY = (
-    ("RK23", 1e-2), ("RK45", 1e-2), ("DOP853", 1e-2), ("LSODA", 1e-2), ("LSODA", 5e-3),
-    ("LSODA", 2e-3), ("LSODA", 1e-3), ("LSODA", 1e-4), ("BDF", 1e-3),
+    ("RK23", 1e-2),
+    ("RK45", 1e-2),
+    ("DOP853", 1e-2),
+    ("LSODA", 1e-2),
+    ("LSODA", 5e-3),
+    ("LSODA", 2e-3),
+    ("LSODA", 1e-3),
+    ("LSODA", 1e-4),
+    ("BDF", 1e-3),
 )
 SCIPY_ROUGH = (("RK23", 1e-2), ("LSODA", 1e-2), ("LSODA", 3e-3), ("LSODA", 1e-3))
 EXUDYN = (
-    ("VelocityVerlet", 0.5e-3), ("VelocityVerlet", 0.3125e-3), ("VelocityVerlet", 0.25e-3),
-    ("VelocityVerlet", 0.2e-3), ("RK44", 0.625e-3), ("GeneralizedAlpha", 1.25e-3),
+    ("VelocityVerlet", 0.5e-3),
+    ("VelocityVerlet", 0.3125e-3),
+    ("VelocityVerlet", 0.25e-3),
+    ("VelocityVerlet", 0.2e-3),
+    ("RK44", 0.625e-3),
+    ("GeneralizedAlpha", 1.25e-3),
     ("TrapezoidalIndex2", 0.5e-3),
 )
 REPETITIONS = 3
@@ -61,8 +72,12 @@ def errors(outputs: dict[str, np.ndarray], reference: dict[str, np.ndarray]) -> 
         "Y": abs(float(np.max(np.abs(outputs["Y"])) - np.max(np.abs(reference["Y"])))),
     }
     middle = [
-        np.array([[np.interp(MIDDLE, run["distance"], run["Y"][:, w, side]) for side in range(2)]
-                  for w in range(run["Y"].shape[1])])
+        np.array(
+            [
+                [np.interp(MIDDLE, run["distance"], run["Y"][:, w, side]) for side in range(2)]
+                for w in range(run["Y"].shape[1])
+            ]
+        )
         for run in (outputs, reference)
     ]
     found["Y_mid_curve"] = float(np.max(np.abs(middle[0] - middle[1])))
@@ -72,11 +87,16 @@ def errors(outputs: dict[str, np.ndarray], reference: dict[str, np.ndarray]) -> 
 
 
 def railsim_run(vehicle: Any, track: Any, until: float | None, **settings: Any) -> dict[str, Any]:
-    result = simulate(vehicle, track, speed=SPEED, until=until,
-                      settings=Settings.model_validate(settings))
+    result = simulate(
+        vehicle, track, speed=SPEED, until=until, settings=Settings.model_validate(settings)
+    )
     facts = result.attributes
-    return {"cpu": facts["cpu_time"], "real_time": facts["real_time_factor"],
-            "step": facts["step"], "outputs": {name: result[name] for name in result}}
+    return {
+        "cpu": facts["cpu_time"],
+        "real_time": facts["real_time_factor"],
+        "step": facts["step"],
+        "outputs": {name: result[name] for name in result},
+    }
 
 
 def judge(
@@ -116,17 +136,28 @@ def scipy_candidates(track: Any, choice: tuple[tuple[str, float], ...]) -> dict[
     ours, reference = railsim_record(vehicle, track)
     peer = Peer.of(vehicle, track, SPEED)
     n = peer.prepared.model.index.n_bodies
-    size = np.concatenate([
-        np.full(6 * n, LENGTH), np.full(6 * n, VELOCITY),
-        np.full(len(peer.kept) - 12 * n - 3, FORCE), [1.0, 1.0, 1.0],
-    ])
+    size = np.concatenate(
+        [
+            np.full(6 * n, LENGTH),
+            np.full(6 * n, VELOCITY),
+            np.full(len(peer.kept) - 12 * n - 3, FORCE),
+            [1.0, 1.0, 1.0],
+        ]
+    )
 
     def solve(method: str, tolerance: float) -> dict[str, Any]:
         found = peer.solve(method, rtol=tolerance, atol=tolerance * size)
         found = judge(found, reference, ours)
         found["options"] = {"tolerance": tolerance}
-        print("scipy", method, tolerance, f"{found['real_time']:.2f}", found["allowed"],
-              found.get("error"), flush=True)
+        print(
+            "scipy",
+            method,
+            tolerance,
+            f"{found['real_time']:.2f}",
+            found["allowed"],
+            found.get("error"),
+            flush=True,
+        )
         return found
 
     candidates = [solve(method, tolerance) for method, tolerance in choice]
@@ -148,8 +179,15 @@ def exudyn_candidates(until: float) -> dict[str, Any]:
 
     def judged(method: str, step: float) -> dict[str, Any]:
         found = judge(solve(method, step), reference, ours)
-        print("exudyn", method, step, f"{found['real_time']:.2f}", found["allowed"],
-              found.get("error"), flush=True)
+        print(
+            "exudyn",
+            method,
+            step,
+            f"{found['real_time']:.2f}",
+            found["allowed"],
+            found.get("error"),
+            flush=True,
+        )
         return found
 
     candidates = [judged(method, step) for method, step in EXUDYN]
@@ -158,7 +196,10 @@ def exudyn_candidates(until: float) -> dict[str, Any]:
         again = [judged(best["method"], best["step"]) for _ in range(2)]
         best = best_of([best, *again])
     return {
-        "candidates": candidates, "best": best, "railsim": ours, "until": until,
+        "candidates": candidates,
+        "best": best,
+        "railsim": ours,
+        "until": until,
         "models_differ_by": errors(reference, own),
         "peak_dQ_over_Q0": {
             "exudyn": float(np.max(reference["dQ_over_Q0"])),

@@ -54,7 +54,7 @@ class Peer:
         system = self.prepared.model.system
         n = 12 * len(system.bodies.kind) + len(system.internal.kind)
         size = len(self.prepared.state)
-        return np.r_[:n, size - 3:size]
+        return np.r_[:n, size - 3 : size]
 
     def solve(self, method: str, **options: Any) -> dict[str, Any]:
         """Integrate and return CPU time, number of evaluations and the outputs."""
@@ -73,14 +73,22 @@ class Peer:
 
         begin = time.process_time()
         solution = solve_ivp(
-            function, (0.0, self.duration), self.prepared.state[kept], method=method,
-            t_eval=self.output_times, **options,
+            function,
+            (0.0, self.duration),
+            self.prepared.state[kept],
+            method=method,
+            t_eval=self.output_times,
+            **options,
         )
         cpu = time.process_time() - begin
         complete = bool(solution.success) and np.all(np.isfinite(solution.y))
         return {
-            "method": method, "options": options, "cpu": cpu, "evaluations": int(solution.nfev),
-            "real_time": self.duration / cpu, "success": complete,
+            "method": method,
+            "options": options,
+            "cpu": cpu,
+            "evaluations": int(solution.nfev),
+            "real_time": self.duration / cpu,
+            "success": complete,
             "outputs": self.outputs(solution.y.T) if complete else None,
         }
 
@@ -95,8 +103,9 @@ class Peer:
         state = self.prepared.state.copy()
         for values in states:
             state[self.kept] = values
-            time_loop(model.system, work, state, derivative, stages,
-                      recorder, RK4, 1.0, 0, 0, 1, 0, 1)
+            time_loop(
+                model.system, work, state, derivative, stages, recorder, RK4, 1.0, 0, 0, 1, 0, 1
+            )
             found = quantities(model, recorder, 1, self.prepared.balance.Q0)
             rows.append({name: np.array(value) for name, value in found.items()})
         return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

@@ -25,7 +25,9 @@ GROWTH = ("wheelsets", "cells", "output", "length")
 def peer_row(name: str, setting: str, record: dict[str, Any], ours: dict[str, Any]) -> list[str]:
     error = record.get("error")
     return [
-        name, setting, f"{record['real_time']:.1f}",
+        name,
+        setting,
+        f"{record['real_time']:.1f}",
         f"{ours['real_time'] / record['real_time']:.1f}",
         f"{100.0 * error['dQ_over_Q0']:.4f}" if error else "failed",
         f"{1e-3 * max(error['Y'], error['Y_mid_curve']):.4f}" if error else "",
@@ -35,16 +37,28 @@ def peer_row(name: str, setting: str, record: dict[str, Any], ours: dict[str, An
 
 
 def peers(found: dict[str, Any]) -> str:
-    header = ["", "setting", "x real time", "railsim ahead by", "dQ/Q0 (points)", "Y (kN)",
-              "yaw (%)", "as right"]
+    header = [
+        "",
+        "setting",
+        "x real time",
+        "railsim ahead by",
+        "dQ/Q0 (points)",
+        "Y (kN)",
+        "yaw (%)",
+        "as right",
+    ]
     rows = []
     for key, words in (("scipy", "curve"), ("scipy, irregular track", "irregular straight")):
         part = found[key]
         ours = part["railsim"]
         rows.append(peer_row(f"railsim, {words}", f"{1e3 * ours['step']:g} ms", ours, ours))
         rows += [
-            peer_row(f"scipy {record['method']}", f"rtol {record['options']['tolerance']:g}",
-                     record, ours)
+            peer_row(
+                f"scipy {record['method']}",
+                f"rtol {record['options']['tolerance']:g}",
+                record,
+                ours,
+            )
             for record in part["candidates"]
         ]
     part = found["exudyn"]
@@ -69,23 +83,42 @@ def fastsim(found: dict[str, Any]) -> str:
 
 def growth(found: dict[str, Any]) -> list[str]:
     return [
-        table(["wheelsets", "patches", "states", "us per evaluation", "us per wheelset"], [
-            [str(r["wheelsets"]), str(r["patches"]), str(r["states"]), f"{1e6 * r['time']:.2f}",
-             f"{1e6 * r['time'] / r['wheelsets']:.2f}"]
-            for r in found["wheelsets"]
-        ]),
-        table(["FASTSIM's grid", "us per evaluation"], [
-            [f"{r['grid']} x {r['grid']}", f"{1e6 * r['time']:.2f}"] for r in found["cells"]
-        ]),
-        table(["outputs per s", "step (ms)", "x real time"], [
-            [f"{r['rate']:g}", f"{1e3 * r['step']:.3f}", f"{r['real_time']:.0f}"]
-            for r in found["output"]
-        ]),
-        table(["track (km)", "CPU (s)", "peak memory (MB)", "file (MB)"], [
-            [f"{r['kilometres']:g}", f"{r['cpu']:.1f}", f"{r['memory'] / 1e6:.0f}",
-             f"{r['file'] / 1e6:.1f}"]
-            for r in found["length"]
-        ]),
+        table(
+            ["wheelsets", "patches", "states", "us per evaluation", "us per wheelset"],
+            [
+                [
+                    str(r["wheelsets"]),
+                    str(r["patches"]),
+                    str(r["states"]),
+                    f"{1e6 * r['time']:.2f}",
+                    f"{1e6 * r['time'] / r['wheelsets']:.2f}",
+                ]
+                for r in found["wheelsets"]
+            ],
+        ),
+        table(
+            ["FASTSIM's grid", "us per evaluation"],
+            [[f"{r['grid']} x {r['grid']}", f"{1e6 * r['time']:.2f}"] for r in found["cells"]],
+        ),
+        table(
+            ["outputs per s", "step (ms)", "x real time"],
+            [
+                [f"{r['rate']:g}", f"{1e3 * r['step']:.3f}", f"{r['real_time']:.0f}"]
+                for r in found["output"]
+            ],
+        ),
+        table(
+            ["track (km)", "CPU (s)", "peak memory (MB)", "file (MB)"],
+            [
+                [
+                    f"{r['kilometres']:g}",
+                    f"{r['cpu']:.1f}",
+                    f"{r['memory'] / 1e6:.0f}",
+                    f"{r['file'] / 1e6:.1f}",
+                ]
+                for r in found["length"]
+            ],
+        ),
     ]
 
 

@@ -48,10 +48,7 @@ def rigid_table() -> str:
         slope = np.gradient(rail[1], rail[0])
         lateral = np.arange(-0.0080, 0.00801, 2e-4)
         geometry = contact_geometry(
-            load_profile("S1002"),
-            load_profile(rail_name),
-            inclination=inclination,
-            lateral=lateral,
+            load_profile("S1002"), load_profile(rail_name), inclination=inclination, lateral=lateral
         )
         fine = contact_geometry(
             load_profile("S1002"),
@@ -191,9 +188,9 @@ def curving_table() -> str:
             return build_contact_table(wheel, rail, grid=grid, **geometry)
 
         assembly.cached_contact_table = changed
-        track = load_track("curve_r250", [
-            f'rail="{rail}"', f"inclination={inclination}", 'support.preset="rigid"',
-        ])
+        track = load_track(
+            "curve_r250", [f'rail="{rail}"', f"inclination={inclination}", 'support.preset="rigid"']
+        )
         vehicle = load_vehicle("coach_manchester")
         result = simulate(vehicle, track, speed=20.0, settings=Settings(step=STEP))
         values = [measured(result, quantity) for quantity in names]

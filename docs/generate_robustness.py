@@ -28,10 +28,26 @@ def grid():
             largest = np.max([peaks(result) for _, result in cell], axis=0)
             moved = np.max([differences for differences, _ in cell], axis=0)
             ended = sum(result.status != "complete" for _, result in cell)
-            rows.append((f"{radius:g}", f"{friction:g}", f"{100.0 * (largest[0] - 1.0):.1f}",
-                         f"{largest[3]:.3f}", *(f"{value:.2f}" for value in moved), str(ended)))
-    head = ("R (m)", "friction", "dQ/Q0 (%)", "Y/Q", "half step", "half damping", "twice",
-            "not complete")
+            rows.append(
+                (
+                    f"{radius:g}",
+                    f"{friction:g}",
+                    f"{100.0 * (largest[0] - 1.0):.1f}",
+                    f"{largest[3]:.3f}",
+                    *(f"{value:.2f}" for value in moved),
+                    str(ended),
+                )
+            )
+    head = (
+        "R (m)",
+        "friction",
+        "dQ/Q0 (%)",
+        "Y/Q",
+        "half step",
+        "half damping",
+        "twice",
+        "not complete",
+    )
     return table(head, rows)
 
 
@@ -43,11 +59,30 @@ def chosen():
         largest = peaks(result)
         coach, radius, friction, deficiency = case
         moved = [f"{value:.2f}" for value in differences]
-        rows.append((coach, f"{radius:g}", f"{friction:g}", f"{1e3 * deficiency:g}",
-                     f"{100.0 * (largest[0] - 1.0):.1f}", f"{largest[3]:.3f}",
-                     *moved, *[""] * (4 - len(moved))))
-    head = ("coach", "R (m)", "friction", "cant deficiency (mm)", "dQ/Q0 (%)", "Y/Q", "half step",
-            "half damping", "twice", "rk4")
+        rows.append(
+            (
+                coach,
+                f"{radius:g}",
+                f"{friction:g}",
+                f"{1e3 * deficiency:g}",
+                f"{100.0 * (largest[0] - 1.0):.1f}",
+                f"{largest[3]:.3f}",
+                *moved,
+                *[""] * (4 - len(moved)),
+            )
+        )
+    head = (
+        "coach",
+        "R (m)",
+        "friction",
+        "cant deficiency (mm)",
+        "dQ/Q0 (%)",
+        "Y/Q",
+        "half step",
+        "half damping",
+        "twice",
+        "rk4",
+    )
     return table(head, rows)
 
 

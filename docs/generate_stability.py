@@ -27,8 +27,7 @@ RIGID = {"preset": "rigid"}
 def modes_picture() -> Figure:
     """Root locus of the coach, contact harmonic with 3 mm."""
     coach = load_vehicle(COACH)
-    locus = root_locus(coach, speeds=np.linspace(10.0, 80.0, 29).tolist(),
-                       linearisation="harmonic")
+    locus = root_locus(coach, speeds=np.linspace(10.0, 80.0, 29).tolist(), linearisation="harmonic")
     return locus_figure(locus, f"{coach.name}: contact harmonic 3 mm")
 
 
@@ -36,8 +35,11 @@ def critical_speed_picture() -> Figure:
     """Bifurcation diagram of the coach by all methods, on rigid rails."""
     coach = load_vehicle(COACH)
     found = critical_speed(
-        coach, load_track("straight").replace(support=RIGID),
-        methods=("ramp", "bifurcation", "continuation"), low=25.0, points=16,
+        coach,
+        load_track("straight").replace(support=RIGID),
+        methods=("ramp", "bifurcation", "continuation"),
+        low=25.0,
+        points=16,
     )
     return bifurcation_figure(found, f"{coach.name}, rigid rails")
 
@@ -50,7 +52,9 @@ def curving_picture() -> Figure:
 
 
 PICTURES: dict[str, Callable[[], Figure]] = {
-    "modes": modes_picture, "critical_speed": critical_speed_picture, "curving": curving_picture,
+    "modes": modes_picture,
+    "critical_speed": critical_speed_picture,
+    "curving": curving_picture,
 }
 
 if __name__ == "__main__":

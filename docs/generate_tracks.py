@@ -23,8 +23,12 @@ sys.path.insert(0, str(DOCS.parent / "tests" / "verification"))
 from step_halving import changes, half_as_long, irregular_run  # noqa: E402
 
 CASES = [(60.0, 1000.0), (3.0, 300.0)]  # m/s, m
-CHANNELS = {"lateral": "alignment", "vertical": "longitudinal level", "cross_level": "cross level",
-            "gauge": "gauge"}
+CHANNELS = {
+    "lateral": "alignment",
+    "vertical": "longitudinal level",
+    "cross_level": "cross level",
+    "gauge": "gauge",
+}
 BAND = (3.0, 70.0)  # m
 LENGTH, SPACING, SEEDS = 1000.0, 0.25, 50  # m, m, -; a part of the period of 1400 m
 
@@ -56,14 +60,29 @@ def convergence():
 
 def channels(seed):
     """Alignment, level, cross level and gauge of one realisation [m]."""
-    track = Track.model_validate({
-        "format": "railsim-track/1", "name": "t", "plan": [{"type": "STR", "length": LENGTH}],
-        "irregularities": [{"type": "random", "spectrum": "erri_b176_low", "seed": seed,
-                            "wavelengths": list(BAND), "fade": 0.0}],
-    })
+    track = Track.model_validate(
+        {
+            "format": "railsim-track/1",
+            "name": "t",
+            "plan": [{"type": "STR", "length": LENGTH}],
+            "irregularities": [
+                {
+                    "type": "random",
+                    "spectrum": "erri_b176_low",
+                    "seed": seed,
+                    "wavelengths": list(BAND),
+                    "fade": 0.0,
+                }
+            ],
+        }
+    )
     (y_left, z_left, y_right, z_right), _ = displacement(track)(np.arange(0.0, LENGTH, SPACING))
-    return {"lateral": 0.5 * (y_left + y_right), "vertical": 0.5 * (z_left + z_right),
-            "cross_level": (z_right - z_left) / 1.5, "gauge": y_right - y_left}
+    return {
+        "lateral": 0.5 * (y_left + y_right),
+        "vertical": 0.5 * (z_left + z_right),
+        "cross_level": (z_right - z_left) / 1.5,
+        "gauge": y_right - y_left,
+    }
 
 
 def spectra():
@@ -85,10 +104,20 @@ def variance_table(variance):
         unit = (1e3, "mrad") if name == "cross_level" else (1e3, "mm")
         exact = np.sqrt(SPECTRA["erri_b176_low"].band_variance(name, BAND))
         found = np.sqrt(variance[name])
-        body.append((f"{words} ({unit[1]})", f"{unit[0] * exact:.4f}", f"{unit[0] * found:.4f}",
-                     signed(100.0 * (variance[name] / exact**2 - 1.0))))
-    head = ("standard deviation", "from the spectrum's integral", f"mean of {SEEDS} seeds",
-            "difference of the variance (%)")
+        body.append(
+            (
+                f"{words} ({unit[1]})",
+                f"{unit[0] * exact:.4f}",
+                f"{unit[0] * found:.4f}",
+                signed(100.0 * (variance[name] / exact**2 - 1.0)),
+            )
+        )
+    head = (
+        "standard deviation",
+        "from the spectrum's integral",
+        f"mean of {SEEDS} seeds",
+        "difference of the variance (%)",
+    )
     return table(head, body)
 
 

@@ -15,12 +15,7 @@ from railsim.version import __version__
 
 if TYPE_CHECKING:
     from railsim.assessment import assess
-    from railsim.definitions.loading import (
-        load_mechanism,
-        load_settings,
-        load_track,
-        load_vehicle,
-    )
+    from railsim.definitions.loading import load_mechanism, load_settings, load_track, load_vehicle
     from railsim.errors import InputError, ModelError
     from railsim.linear.modes import modes, root_locus
     from railsim.result import Result, mid_curves, open_result, peaks

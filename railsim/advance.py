@@ -207,9 +207,15 @@ class _Convoy:
         """Advance to the end, or to where runs part; return in which groups they go on."""
         while self._left() > 1e-9 or self._due:
             begin = time.perf_counter()
-            before = (self._state.copy(), self._fresh, self._due, self._work.events.copy(),
-                      self._work.extremes.copy(), self._work.unloaded.copy(),
-                      self._work.vibration.copy())
+            before = (
+                self._state.copy(),
+                self._fresh,
+                self._due,
+                self._work.events.copy(),
+                self._work.extremes.copy(),
+                self._work.unloaded.copy(),
+                self._work.vibration.copy(),
+            )
             paces = self._paces()
             if len(set(paces)) > 1 or self._errors():
                 return self._parted(paces, before)
@@ -284,9 +290,19 @@ class _Convoy:
             # more than one call only within one output interval, which records at its begin:
             # Ctrl-C is heard between calls
             status, where, steps, new = time_loop(
-                self._system, self._work, self._state, self._derivative, self._stages,
-                self._ensemble.recorder, self._scheme, step, at, min(most, end - at), every,
-                int(self._fresh), closing,
+                self._system,
+                self._work,
+                self._state,
+                self._derivative,
+                self._stages,
+                self._ensemble.recorder,
+                self._scheme,
+                step,
+                at,
+                min(most, end - at),
+                every,
+                int(self._fresh),
+                closing,
             )
             at, rows = at + steps, rows + new
             self._fresh = self._fresh and steps == 0
@@ -309,9 +325,7 @@ class _Convoy:
             except Exception as error:
                 run.error = error
 
-    def _parted(
-        self, keys: Sequence[object], before: _Before | None = None
-    ) -> list[list[Run]]:
+    def _parted(self, keys: Sequence[object], before: _Before | None = None) -> list[list[Run]]:
         """Runs grouped by equal keys, as they were before; those with an error are at their end."""
         if before is not None:
             work = self._work

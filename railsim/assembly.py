@@ -30,12 +30,7 @@ from railsim.kernels.extremes import EXTREMES, MAX, MIN
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.lanes import LANES
 from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
-from railsim.kernels.support import (
-    SUPPORT_COLUMNS,
-    SUPPORT_ROW,
-    SUPPORT_SIZE,
-    SUPPORT_STEP,
-)
+from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_ROW, SUPPORT_SIZE, SUPPORT_STEP
 from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
@@ -298,11 +293,23 @@ def support_arrays(definition: SupportDefinition) -> Support:
     ballast_y, ballast_z = values.ballast_lateral or (0.0, 0.0), values.ballast_vertical
     k_side, c_side = ballast_z or (0.0, 0.0)
     square = values.ballast_base**2
-    row = np.array([
-        values.rail_mass, values.sleeper_mass, values.sleeper_inertia, k_y, c_y, k_z, c_z,
-        *ballast_y, 2.0 * k_side, 2.0 * c_side, 2.0 * square * k_side, 2.0 * square * c_side,
-        0.5 * CANT_BASE,
-    ])
+    row = np.array(
+        [
+            values.rail_mass,
+            values.sleeper_mass,
+            values.sleeper_inertia,
+            k_y,
+            c_y,
+            k_z,
+            c_z,
+            *ballast_y,
+            2.0 * k_side,
+            2.0 * c_side,
+            2.0 * square * k_side,
+            2.0 * square * c_side,
+            0.5 * CANT_BASE,
+        ]
+    )
     return Support(1, int(values.has_sleeper), int(values.massless), row, variation)
 
 
@@ -345,8 +352,14 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
 def _body_row(body: FlatBody) -> tuple[float, ...]:
     inertia = (1.0, body.pitch_inertia, 1.0) if body.kind == "axlebox" else body.inertia
     radius = 0.5 * sum(body.wheelset.radius) if body.wheelset else 1.0
-    return (max(body.mass, 1e-9), *inertia, body.position[1], body.position[2], radius,
-            float(body.wheelset is not None))
+    return (
+        max(body.mass, 1e-9),
+        *inertia,
+        body.position[1],
+        body.position[2],
+        radius,
+        float(body.wheelset is not None),
+    )
 
 
 def on_common_grid(tables: Sequence[ContactTable]) -> tuple[float, list[Floats]]:
@@ -417,8 +430,14 @@ def _contact(
         wheelset = body.wheelset
         assert wheelset is not None
         for side in range(2):
-            key = (wheelset.profile[side], track.rail[side], wheelset.radius[side],
-                   -body.position[2], wheelset.back_to_back, wheelset.tape_circle_distance)
+            key = (
+                wheelset.profile[side],
+                track.rail[side],
+                wheelset.radius[side],
+                -body.position[2],
+                wheelset.back_to_back,
+                wheelset.tape_circle_distance,
+            )
             wheel = book.profile(wheelset.profile[side], "wheel")
             rail = book.profile(track.rail[side], "rail")
             if key not in known:
@@ -453,9 +472,9 @@ def _contact(
         load=np.full(len(wheelsets), weight / (2.0 * len(wheelsets))),
         values=side_by_side(values),
         shear=np.array([t.shear for t in tables]),
-        coupling=np.array([
-            coupling(t.values, settings.shear_modulus, settings.poisson) for t in tables
-        ]),
+        coupling=np.array(
+            [coupling(t.values, settings.shear_modulus, settings.poisson) for t in tables]
+        ),
         y0=y0,
         dy=first.dy,
         roll0=first.roll0,

@@ -14,9 +14,7 @@ from railsim.simulation import simulate
 FULL, HALF = "step", "half"
 
 
-def half_step(
-    result: Result, *, progress: Callable[[float], None] | None = None
-) -> Result:
+def half_step(result: Result, *, progress: Callable[[float], None] | None = None) -> Result:
     """Run the inputs of a result again at half its step.
 
     Parameters

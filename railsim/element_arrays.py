@@ -28,14 +28,7 @@ from railsim.definitions.flatten import FlatBody, FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
-from railsim.kernels.system import (
-    LINK_SIZE,
-    MOUNT_SIZE,
-    Curves,
-    Links,
-    Loads,
-    Mounts,
-)
+from railsim.kernels.system import LINK_SIZE, MOUNT_SIZE, Curves, Links, Loads, Mounts
 
 Floats = NDArray[np.float64]
 Rows = tuple[tuple[float, float], ...]
@@ -121,15 +114,17 @@ class ElementArrays:
         elif in_series:
             internal = self._state(MAXWELL, (law.damping, law.series_stiffness, 0.0))
         preload = 0.0 if law.preload == "auto" else law.preload
-        self.link_rows.append({
-            "name": element.name,
-            "body": self._pair(element),
-            "point": self._levers(element, point1, point2),
-            "length": float(np.linalg.norm(point2 - point1)),
-            "spring": (law.stiffness, 0.0 if in_series else law.damping, preload),
-            "internal": internal,
-            "curve": (self._curve(law.spring_table), -1 if in_series else damper_curve),
-        })
+        self.link_rows.append(
+            {
+                "name": element.name,
+                "body": self._pair(element),
+                "point": self._levers(element, point1, point2),
+                "length": float(np.linalg.norm(point2 - point1)),
+                "spring": (law.stiffness, 0.0 if in_series else law.damping, preload),
+                "internal": internal,
+                "curve": (self._curve(law.spring_table), -1 if in_series else damper_curve),
+            }
+        )
 
     def _add_mount(self, element: FlatElement, law: Element) -> None:
         point1, point2 = np.array(element.point1), np.array(element.point2)
@@ -139,9 +134,14 @@ class ElementArrays:
             "name": element.name,
             "body": self._pair(element),
             "point": self._levers(element, place, place),
-            "stiffness": _NOTHING, "damping": _NOTHING, "preload": _NOTHING,
-            "rotation": _NOTHING, "rotation_damping": _NOTHING,
-            "friction": np.zeros((3, 2)), "internal": _NONE, "curve": _NONE,
+            "stiffness": _NOTHING,
+            "damping": _NOTHING,
+            "preload": _NOTHING,
+            "rotation": _NOTHING,
+            "rotation_damping": _NOTHING,
+            "friction": np.zeros((3, 2)),
+            "internal": _NONE,
+            "curve": _NONE,
             "flags": (1, 0, 0, 0),
         }
         row |= self._law(law)
@@ -214,13 +214,15 @@ class ElementArrays:
         point = np.array(element.point1) - self._centre(element.body1)
         for is_torque, table in enumerate((law.force_table, law.torque_table)):
             if table is not None:
-                self.load_rows.append({
-                    "name": element.name,
-                    "body": self._number(element.body1),
-                    "point": point,
-                    "flags": (is_torque, int(law.axes == "track")),
-                    "table": np.array(table, dtype=float),
-                })
+                self.load_rows.append(
+                    {
+                        "name": element.name,
+                        "body": self._number(element.body1),
+                        "point": point,
+                        "flags": (is_torque, int(law.axes == "track")),
+                        "table": np.array(table, dtype=float),
+                    }
+                )
 
     def _number(self, name: str) -> int:
         return list(self.bodies).index(name)
@@ -264,8 +266,15 @@ class ElementArrays:
     def mounts(self) -> Mounts:
         """Arrays of all three-axis elements."""
         rows = self.mount_rows
-        floats = ("point", "share", "stiffness", "damping", "preload", "rotation",
-                  "rotation_damping")
+        floats = (
+            "point",
+            "share",
+            "stiffness",
+            "damping",
+            "preload",
+            "rotation",
+            "rotation_damping",
+        )
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
         return Mounts(

@@ -148,9 +148,7 @@ class Ensemble:
         if status == NOT_FINITE:
             concerned = [where in part.state for part in self.parts]
         elif status in OF_WHEELSET:
-            concerned = [
-                part.wheelsets.start <= where < part.wheelsets.stop for part in self.parts
-            ]
+            concerned = [part.wheelsets.start <= where < part.wheelsets.stop for part in self.parts]
         if sum(concerned) != 1:
             return list(range(len(self.parts)))
         return [int(this) for this in concerned]
@@ -170,8 +168,9 @@ def joined_system(models: Sequence[Model]) -> System:
         track=first.track,
         support=first.support,
         contact=_joined_contact(models, bodies),
-        links=_joined([system.links for system in systems], body=bodies, internal=internal,
-                      curve=curves),
+        links=_joined(
+            [system.links for system in systems], body=bodies, internal=internal, curve=curves
+        ),
         mounts=_joined_mounts(systems, body=bodies, internal=internal, curve=curves),
         curves=Curves(
             start=_joined_starts([system.curves.start for system in systems]),
@@ -180,15 +179,21 @@ def joined_system(models: Sequence[Model]) -> System:
         ),
         internal=_joined([system.internal for system in systems], curve=curves),
         loads=_joined([system.loads for system in systems], body=bodies)._replace(
-            start=_joined_starts([system.loads.start for system in systems])),
+            start=_joined_starts([system.loads.start for system in systems])
+        ),
         drive=first.drive,
         gravity=first.gravity,
     )
 
 
 def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bodies:
-    joint = _joined([system.bodies for system in systems], parent=first, references=first,
-                    whole=first, axleboxes=first)
+    joint = _joined(
+        [system.bodies for system in systems],
+        parent=first,
+        references=first,
+        whole=first,
+        axleboxes=first,
+    )
     frames = [
         np.searchsorted(offset, system.frame_offset)[system.bodies.frame] for system in systems
     ]
@@ -202,19 +207,21 @@ def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
     """
     joint = _joined([system.mounts for system in systems], **shifts)
     order = _order_of_mounts(systems)
-    joint = joint._replace(**{
-        name: aligned(getattr(joint, name)[order]) for name in joint._fields if name != "law"
-    })
+    joint = joint._replace(
+        **{name: aligned(getattr(joint, name)[order]) for name in joint._fields if name != "law"}
+    )
     return joint._replace(law=np.flatnonzero((joint.internal >= 0) | (joint.curve >= 0)))
 
 
 def _order_of_mounts(systems: Sequence[System]) -> Ints:
     """Numbers of the mounts, counted vehicle after vehicle, in the order of the joint system."""
     kinds = [
-        np.column_stack([
-            ((mounts.internal < 0) & (mounts.curve < 0)).all(axis=1),
-            mounts.flags[:, (BOTH_ENDS, ROTATES)] != 0,
-        ])
+        np.column_stack(
+            [
+                ((mounts.internal < 0) & (mounts.curve < 0)).all(axis=1),
+                mounts.flags[:, (BOTH_ENDS, ROTATES)] != 0,
+            ]
+        )
         for mounts in (system.mounts for system in systems)
     ]
     return np.lexsort(np.concatenate(kinds).T[::-1])
@@ -226,7 +233,8 @@ def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
     rows: dict[int, tuple[Floats, float, Floats]] = {}
     for model, contact in zip(models, contacts, strict=True):
         for table, row in zip(
-            model.tables, zip(contact.values, contact.shear, contact.coupling, strict=True),
+            model.tables,
+            zip(contact.values, contact.shear, contact.coupling, strict=True),
             strict=True,
         ):
             rows.setdefault(id(table), row)
@@ -234,10 +242,12 @@ def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
     values, shear, coupling = zip(*rows.values(), strict=True)
     return contacts[0]._replace(
         body=np.concatenate([c.body + shift for c, shift in zip(contacts, first, strict=True)]),
-        table=np.concatenate([
-            np.array([number[id(table)] for table in model.tables])[contact.table]
-            for model, contact in zip(models, contacts, strict=True)
-        ]),
+        table=np.concatenate(
+            [
+                np.array([number[id(table)] for table in model.tables])[contact.table]
+                for model, contact in zip(models, contacts, strict=True)
+            ]
+        ),
         load=np.concatenate([c.load for c in contacts]),
         values=side_by_side(values) if len(rows) > len(models[0].tables) else contacts[0].values,
         shear=np.array(shear),
@@ -277,10 +287,12 @@ def _joined(groups: Sequence[Group], **shifts: Ints) -> Group:
         return np.where(array >= 0, array + shifts[name][k], array) if name in shifts else array
 
     kind: Any = type(groups[0])
-    joint: Group = kind(*(
-        aligned(np.concatenate([shifted(name, array, k) for k, array in enumerate(arrays)]))
-        for name, arrays in zip(kind._fields, zip(*groups, strict=True), strict=True)
-    ))
+    joint: Group = kind(
+        *(
+            aligned(np.concatenate([shifted(name, array, k) for k, array in enumerate(arrays)]))
+            for name, arrays in zip(kind._fields, zip(*groups, strict=True), strict=True)
+        )
+    )
     return joint
 
 
@@ -306,9 +318,14 @@ def _places(
     inner = np.arange(internal.start, internal.stop)
     first = 18 * n + 2 * m
     end = first + track * w
-    return np.concatenate([
-        coordinates, 6 * n + coordinates, 12 * n + inner,
-        12 * n + m + coordinates, 18 * n + m + inner,
-        first + np.arange(track * wheelsets.start, track * wheelsets.stop),
-        np.arange(end, end + N_SCALARS),
-    ])
+    return np.concatenate(
+        [
+            coordinates,
+            6 * n + coordinates,
+            12 * n + inner,
+            12 * n + m + coordinates,
+            18 * n + m + inner,
+            first + np.arange(track * wheelsets.start, track * wheelsets.stop),
+            np.arange(end, end + N_SCALARS),
+        ]
+    )

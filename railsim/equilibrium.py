@@ -25,14 +25,7 @@ from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
-from railsim.kernels.support import (
-    DOF,
-    K_BALLAST_Z,
-    K_PAD_Z,
-    RAIL_DOF,
-    RATE,
-    SUPPORT_SIZE,
-)
+from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import AXLEBOX, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
 from railsim.kernels.time_loop import FAST, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
@@ -474,8 +467,21 @@ class _Balance:
         for each in (state, after):
             recorder = empty_recorder(self.model, 1, chosen, patches=True)
             trial, derivative = each.copy(), np.zeros_like(each)
-            status, *_ = time_loop(system, work_arrays(system), trial, derivative,
-                                   np.zeros((3, len(each))), recorder, FAST, 1.0, 0, 0, 1, 0, 1)
+            status, *_ = time_loop(
+                system,
+                work_arrays(system),
+                trial,
+                derivative,
+                np.zeros((3, len(each))),
+                recorder,
+                FAST,
+                1.0,
+                0,
+                0,
+                1,
+                0,
+                1,
+            )
             if status != RUNNING:
                 return []
             deflections.append(recorder.element[0, :, DEFLECTION : DEFLECTION + 3])
@@ -485,8 +491,9 @@ class _Balance:
             curves = (system.links if group == LINK else system.mounts).curve[k]
             for axis, curve in enumerate(curves):
                 if curve >= 0:
-                    nodes = system.curves.x[system.curves.start[curve] :
-                                            system.curves.start[curve + 1]]
+                    nodes = system.curves.x[
+                        system.curves.start[curve] : system.curves.start[curve + 1]
+                    ]
                     ends = np.sort([d[row, axis if group == MOUNT else 0] for d in deflections])
                     if ((nodes >= ends[0]) & (nodes <= ends[1])).any():
                         names.append((index.links if group == LINK else index.mounts)[k])
@@ -506,9 +513,8 @@ class _Balance:
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")
         names = self._alternating(state, change)
         alternate = f"alternating between two branches: {', '.join(names)}; " if names else ""
-        return (
-            f"no static equilibrium; {alternate}largest remaining accelerations: "
-            + ", ".join(parts)
+        return f"no static equilibrium; {alternate}largest remaining accelerations: " + ", ".join(
+            parts
         )
 
 

@@ -70,11 +70,16 @@ def in_flange_contact(
     speed = float(rolling[-1])
     rail = system.track.rail
     auxiliary = curve_to_settle_in(
-        model, track, speed, *curve,
-        (float(np.max(rail[:, 4, 0])), float(np.max(rail[:, 5, 0]))), TIMES,
+        model,
+        track,
+        speed,
+        *curve,
+        (float(np.max(rail[:, 4, 0])), float(np.max(rail[:, 5, 0]))),
+        TIMES,
     )
     smooth = system._replace(
-        track=track_tables(auxiliary), drive=CONSTANT_SPEED,
+        track=track_tables(auxiliary),
+        drive=CONSTANT_SPEED,
         support=system.support._replace(variation=system.support.variation[:0]),
         loads=system.loads._replace(body=system.loads.body[:0]),
     )

@@ -17,15 +17,7 @@ from railsim.kernels import wheel_rail as patch
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Recorder
-from railsim.kernels.wheel_rail import (
-    W_PHI,
-    W_Q,
-    W_T_GAMMA,
-    W_T_GAMMA_SPIN,
-    W_XI_X,
-    W_XI_Y,
-    W_Y,
-)
+from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_T_GAMMA_SPIN, W_XI_X, W_XI_Y, W_Y
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import readings, sensors
 from railsim.time_step import empty_recorder
@@ -123,12 +115,20 @@ def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
     """
     columns: dict[str, int | slice] = {
         name: slice(first, first + 2)
-        for name, first in (("Q", seen.X_Q), ("Y", seen.X_Y), ("Y_over_Q", seen.X_Y_OVER_Q),
-                            ("T_gamma", seen.X_T_GAMMA))
+        for name, first in (
+            ("Q", seen.X_Q),
+            ("Y", seen.X_Y),
+            ("Y_over_Q", seen.X_Y_OVER_Q),
+            ("T_gamma", seen.X_T_GAMMA),
+        )
     }
-    columns |= {"sum_Y": seen.X_SUM_Y, "sum_abs_Y": seen.X_SUM_ABS_Y,
-                "wheelset_lateral": seen.X_LATERAL, "wheelset_roll": seen.X_ROLL,
-                "wheelset_yaw": seen.X_YAW}
+    columns |= {
+        "sum_Y": seen.X_SUM_Y,
+        "sum_abs_Y": seen.X_SUM_ABS_Y,
+        "wheelset_lateral": seen.X_LATERAL,
+        "wheelset_roll": seen.X_ROLL,
+        "wheelset_yaw": seen.X_YAW,
+    }
     found: dict[str, Floats] = {}
     for name, column in columns.items():
         for row, ending in enumerate(("", "_time", "_distance")):
@@ -153,9 +153,7 @@ class OutputPlan:
         The settings name an element that the vehicle does not have, or no quantity.
     """
 
-    def __init__(
-        self, model: Model, settings: Settings, track: Track, vehicle: Vehicle
-    ) -> None:
+    def __init__(self, model: Model, settings: Settings, track: Track, vehicle: Vehicle) -> None:
         self._model = model
         self._sensors = sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
@@ -163,8 +161,10 @@ class OutputPlan:
         self._irregularity = displacement(track)
         known = {
             name: (group, index)
-            for group, names in ((element.LINK, model.index.links),
-                                 (element.MOUNT, model.index.mounts))
+            for group, names in (
+                (element.LINK, model.index.links),
+                (element.MOUNT, model.index.mounts),
+            )
             for index, name in enumerate(names)
         }
         self.elements = _matching(self._asked.elements, list(known))
@@ -179,16 +179,22 @@ class OutputPlan:
             return every
         names = list(QUANTITIES)
         faults = [
-            Fault("settings", "outputs.quantities", f"no quantity is called '{pattern}'",
-                  nearest(pattern, names))
+            Fault(
+                "settings",
+                "outputs.quantities",
+                f"no quantity is called '{pattern}'",
+                nearest(pattern, names),
+            )
             for pattern in patterns
             if not any(fnmatchcase(name, pattern) for name in names)
         ]
         if faults:
             raise InputError(faults)
         return tuple(
-            q for q in every
-            if q.name in NEEDED or q.name not in QUANTITIES
+            q
+            for q in every
+            if q.name in NEEDED
+            or q.name not in QUANTITIES
             or any(fnmatchcase(q.name, pattern) for pattern in patterns)
         )
 
@@ -204,7 +210,8 @@ class OutputPlan:
     def coordinates(self) -> dict[str, Sequence[str]]:
         """Names along the dimensions of the result."""
         names: dict[str, Sequence[str]] = {
-            "wheelset": self._model.index.wheelsets, "body": self._model.index.bodies,
+            "wheelset": self._model.index.wheelsets,
+            "body": self._model.index.bodies,
         }
         if self.elements:
             names["element"] = self.elements
@@ -226,7 +233,10 @@ class OutputPlan:
             values |= _elements(recorder.element[:rows])
         if self._sensors:
             values["sensor_acceleration"], values["sensor_roll_rate"] = readings(
-                self._sensors, values, self._model.index.bodies, self._alignment,
+                self._sensors,
+                values,
+                self._model.index.bodies,
+                self._alignment,
                 recorder.state[:rows, -1],
             )
         if self._asked.contact_patches:
@@ -234,8 +244,10 @@ class OutputPlan:
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
             deflection = rail_deflection(self._model, recorder.state[:rows])
-            values |= {"rail_deflection_lateral": deflection[..., 0],
-                       "rail_deflection_vertical": deflection[..., 1]}
+            values |= {
+                "rail_deflection_lateral": deflection[..., 0],
+                "rail_deflection_vertical": deflection[..., 1],
+            }
         return values
 
     def _track(self, place: Floats) -> dict[str, Floats]:
@@ -253,8 +265,12 @@ class OutputPlan:
 
 def _matching(patterns: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     faults = [
-        Fault("settings", "outputs.elements", f"no element is called '{pattern}'",
-              nearest(pattern, names))
+        Fault(
+            "settings",
+            "outputs.elements",
+            f"no element is called '{pattern}'",
+            nearest(pattern, names),
+        )
         for pattern in patterns
         if not any(fnmatchcase(name, pattern) for name in names)
     ]

@@ -56,16 +56,28 @@ class Pace:
         if given is None:
             return self._stability(speed).choose(interval)
         if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
-            raise InputError([Fault(
-                "settings", "step", f"found {given:g} s",
-                f"a whole part of the output interval {interval:g} s",
-            )])
+            raise InputError(
+                [
+                    Fault(
+                        "settings",
+                        "step",
+                        f"found {given:g} s",
+                        f"a whole part of the output interval {interval:g} s",
+                    )
+                ]
+            )
         stability = self._stability(speed)
         if not stability.holds(given):
-            raise InputError([Fault(
-                "settings", "step", f"found {given:g} s, unstable at {speed:g} m/s",
-                f"at most {stability.choose(interval):g} s",
-            )])
+            raise InputError(
+                [
+                    Fault(
+                        "settings",
+                        "step",
+                        f"found {given:g} s, unstable at {speed:g} m/s",
+                        f"at most {stability.choose(interval):g} s",
+                    )
+                ]
+            )
         return given
 
     def _stability(self, speed: float) -> Stability:
@@ -74,7 +86,10 @@ class Pace:
             state = equilibrium(self._model, speed).state
         level = level_track_with_friction(self._model.system)
         return Stability(
-            self._model, level, state, self._settings.scheme,
+            self._model,
+            level,
+            state,
+            self._settings.scheme,
             lambda step: in_flange_contact(self._model, self._track, state, step),
         )
 

@@ -35,9 +35,13 @@ def run_remarks(run: Run) -> tuple[str, ...]:
         *run.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
         *lifted_wheels(extremes, run.unloaded, wheelsets),
-        *vibration(run.vibration, Q0, wheelsets,
-                   irregular=bool(model.system.track.has_irregularity),
-                   elastic=bool(model.system.support.elastic)),
+        *vibration(
+            run.vibration,
+            Q0,
+            wheelsets,
+            irregular=bool(model.system.track.has_irregularity),
+            elastic=bool(model.system.support.elastic),
+        ),
         *creep_range(int(run.events[1]), int(run.events[0])),
     ]
     return tuple(dict.fromkeys(found))
@@ -104,9 +108,7 @@ def lifted_wheels(
     )
 
 
-def _place(
-    extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str
-) -> str:
+def _place(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str) -> str:
     """Say when and where an extreme value occurs."""
     time, s = (float(extremes[f"{name}_{fact}"][index]) for fact in ("time", "distance"))
     return f"{words}{'' if words.endswith('at') else ','} t = {time:.2f} s, s = {s:.1f} m"

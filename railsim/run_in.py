@@ -52,7 +52,12 @@ SMOOTH = 10.0  # m before the track's beginning where the approach may begin, be
 
 
 def start_state(
-    model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int,
+    model: Model,
+    balance: Equilibrium,
+    track: Track,
+    start: float,
+    step: float,
+    scheme: int,
     progress: Progress | None = None,
 ) -> Floats:
     """State of the undisturbed vehicle at `start`.
@@ -90,8 +95,14 @@ def start_state(
 
 
 def _arrived(
-    model: Model, balance: Equilibrium, track: Track, start: float, step: float, scheme: int,
-    steps: int, progress: Progress | None,
+    model: Model,
+    balance: Equilibrium,
+    track: Track,
+    start: float,
+    step: float,
+    scheme: int,
+    steps: int,
+    progress: Progress | None,
 ) -> Floats:
     """State at `start` after so many steps over the real track."""
     speed = float(balance.state[-1])
@@ -116,11 +127,10 @@ def _arrived(
     if steps:
         follow_rails(model, state)
         system = model.system._replace(
-            drive=CONSTANT_SPEED, loads=model.system.loads._replace(
-                body=model.system.loads.body[:0]),
+            drive=CONSTANT_SPEED,
+            loads=model.system.loads._replace(body=model.system.loads.body[:0]),
         )
-        _run(model, system, state, step, steps, scheme, start, "on its way there",
-             approaching)
+        _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
     state[-3:] = 0.0, start, speed
     return state
 
@@ -167,8 +177,11 @@ def _way_from_constant(
     ways = np.arange(0.0, max(farthest, 0.0) + 0.5, 0.5)
     under = np.arange(float(np.min(offsets)), float(np.max(offsets)) + 0.5, 0.5)
     s = start - ways[:, None] + under
-    changes = [alignment.curvature_rate(s), alignment.cant_angle_rate(s),
-               alignment.grade_angle_rate(s)]
+    changes = [
+        alignment.curvature_rate(s),
+        alignment.cant_angle_rate(s),
+        alignment.grade_angle_rate(s),
+    ]
     constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
     return float(ways[int(np.argmax(constant))] if constant.any() else farthest)
 
@@ -178,11 +191,22 @@ def _located(model: Model, place: float) -> Work:
     system = model.system
     work = work_arrays(system)
     reference = system.bodies.frame[system.bodies.references[0]]
-    if locate_frames(system.track, system.frame_offset, reference, place, work.frames, work.cell,
-                     work.cell_u) != RUNNING:
+    if (
+        locate_frames(
+            system.track, system.frame_offset, reference, place, work.frames, work.cell, work.cell_u
+        )
+        != RUNNING
+    ):
         raise ModelError("the vehicle is longer than the track's table allows")
-    locate_rails(system.track, system.contact.body, system.bodies.frame, work.cell, work.cell_u,
-                 work.plane, work.rail)
+    locate_rails(
+        system.track,
+        system.contact.body,
+        system.bodies.frame,
+        work.cell,
+        work.cell_u,
+        work.plane,
+        work.rail,
+    )
     return work
 
 
@@ -204,20 +228,38 @@ def follow_rails(model: Model, state: Floats) -> None:
 
 
 def _run(
-    model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
-    start: float, where: str, progress: Progress | None = None,
+    model: Model,
+    system: System,
+    state: Floats,
+    step: float,
+    steps: int,
+    scheme: int,
+    start: float,
+    where: str,
+    progress: Progress | None = None,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
     status = advance(model, system, state, step, steps, scheme, progress)
     if status != RUNNING:
-        raise InputError([Fault(
-            "--start", "", f"the vehicle does not stay on the track at s = {start:g} m, "
-            f"{where}, at {state[-1]:g} m/s", "a start on straight track or a lower speed",
-        )])
+        raise InputError(
+            [
+                Fault(
+                    "--start",
+                    "",
+                    f"the vehicle does not stay on the track at s = {start:g} m, "
+                    f"{where}, at {state[-1]:g} m/s",
+                    "a start on straight track or a lower speed",
+                )
+            ]
+        )
 
 
 def settled(
-    model: Model, balance: Equilibrium, track: Track, start: float, step: float,
+    model: Model,
+    balance: Equilibrium,
+    track: Track,
+    start: float,
+    step: float,
     progress: Progress | None = None,
 ) -> Floats | None:
     """State of a vehicle that has settled into the curve at `start`, None on straight track.
@@ -251,8 +293,9 @@ def settled(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
     system = model.system._replace(
-        track=track_tables(auxiliary), drive=CONSTANT_SPEED, loads=model.system.loads._replace(
-            body=model.system.loads.body[:0]),
+        track=track_tables(auxiliary),
+        drive=CONSTANT_SPEED,
+        loads=model.system.loads._replace(body=model.system.loads.body[:0]),
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)

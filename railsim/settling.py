@@ -26,8 +26,13 @@ STEPS = 10_000  # in a call: Ctrl-C is heard, and progress told, between calls
 
 
 def curve_to_settle_in(
-    model: Model, track: Track, speed: float, curvature: float, cant: float,
-    friction: tuple[float, float], times: tuple[float, float],
+    model: Model,
+    track: Track,
+    speed: float,
+    curvature: float,
+    cant: float,
+    friction: tuple[float, float],
+    times: tuple[float, float],
 ) -> Track:
     """Straight, transition and curve on smooth rails, long enough for a vehicle to settle.
 
@@ -57,13 +62,21 @@ def curve_to_settle_in(
             {"type": "LIR", "length": transition},
             {"type": "CST", "length": rest, "cant": cant},
         ],
-        vertical=[], irregularities=[], gauge_widening=None, friction_table=None,
+        vertical=[],
+        irregularities=[],
+        gauge_widening=None,
+        friction_table=None,
         friction=friction,
     )
 
 
 def advance(
-    model: Model, system: System, state: Floats, step: float, steps: int, scheme: int,
+    model: Model,
+    system: System,
+    state: Floats,
+    step: float,
+    steps: int,
+    scheme: int,
     progress: Progress | None = None,
 ) -> int:
     """Advance a state in calls short enough for signals to be heard; its status is returned."""
@@ -73,8 +86,19 @@ def advance(
     status, done = RUNNING, 0
     while status == RUNNING and done < steps:
         status, _, more, _ = time_loop(
-            system, work, state, derivative, stages, recorder, scheme, step, 1 + done,
-            min(STEPS, steps - done), steps + 2, int(done == 0), 0,
+            system,
+            work,
+            state,
+            derivative,
+            stages,
+            recorder,
+            scheme,
+            step,
+            1 + done,
+            min(STEPS, steps - done),
+            steps + 2,
+            int(done == 0),
+            0,
         )
         done += more
         if progress is not None:

@@ -111,9 +111,17 @@ def simulate(
     if before is not None:
         speed, start = float(before[-1]), float(before[-2])
     (outcome,) = outcomes(
-        [vehicle], track, speed=speed, start=start, duration=duration, until=until,
-        settings=settings, sinks=None if sink is None else [sink], progress=progress,
-        profiles=profiles, before=before,
+        [vehicle],
+        track,
+        speed=speed,
+        start=start,
+        duration=duration,
+        until=until,
+        settings=settings,
+        sinks=None if sink is None else [sink],
+        progress=progress,
+        profiles=profiles,
+        before=before,
     )
     if isinstance(outcome, Exception):
         raise outcome
@@ -169,10 +177,20 @@ def simulate_together(
     [2, 2]
     """
     results = []
-    for number, outcome in enumerate(outcomes(
-        vehicles, track, speed=speed, start=start, duration=duration, until=until,
-        settings=settings, sinks=sinks, progress=progress, profiles=profiles,
-    )):
+    for number, outcome in enumerate(
+        outcomes(
+            vehicles,
+            track,
+            speed=speed,
+            start=start,
+            duration=duration,
+            until=until,
+            settings=settings,
+            sinks=sinks,
+            progress=progress,
+            profiles=profiles,
+        )
+    ):
         if isinstance(outcome, Exception):
             outcome.add_note(f"this was vehicle {number + 1} of {len(vehicles)}")
             raise outcome
@@ -296,14 +314,31 @@ def _begun(
     """Prepare a run and tell its sink what will come."""
     began = time.perf_counter()
     settings = inputs.settings
-    prepared = prepare(vehicle, inputs.track, settings, inputs.speed, inputs.start,
-                       inputs.duration, inputs.until, profiles, shared, before, on_run_in)
+    prepared = prepare(
+        vehicle,
+        inputs.track,
+        settings,
+        inputs.speed,
+        inputs.start,
+        inputs.duration,
+        inputs.until,
+        profiles,
+        shared,
+        before,
+        on_run_in,
+    )
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
     stored = StoredPeaks(sink)
     sink = filtering(stored, settings)
     sink.begin(plan.coordinates, plan.quantities)
-    run = Run(prepared, plan, sink, prepared.state.copy(), prepared.fresh,
-              wall_time=time.perf_counter() - began)
+    run = Run(
+        prepared,
+        plan,
+        sink,
+        prepared.state.copy(),
+        prepared.fresh,
+        wall_time=time.perf_counter() - began,
+    )
     stored.remark = lambda: lost_peak(
         stored.largest, run_extremes(run.extremes, prepared.balance.Q0), output_words(settings),
         filtered=settings.outputs.low_pass is not None,
@@ -349,8 +384,11 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
         {
             "state": {"end": run.state} | ({} if before is None else {"start": before}),
             # of quantities that are stored filtered the peaks are those of what is stored
-            **({} if settings.outputs.low_pass is not None else
-               {"peaks": run_extremes(run.extremes, prepared.balance.Q0)}),
+            **(
+                {}
+                if settings.outputs.low_pass is not None
+                else {"peaks": run_extremes(run.extremes, prepared.balance.Q0)}
+            ),
         },
     )
     for remark in result.remarks:
@@ -395,10 +433,15 @@ def check_range(
     if duration is not None and until is not None:
         faults.append(Fault("--duration", "", "given together with --until", "one of the two"))
     if until is not None and not start < until <= track.length:
-        faults.append(Fault(
-            "--until", "", f"found {until:g} m",
-            f"more than the start, {start:g} m, and at most {track.length:g} m, the track's plan",
-        ))
+        faults.append(
+            Fault(
+                "--until",
+                "",
+                f"found {until:g} m",
+                f"more than the start, {start:g} m, and at most {track.length:g} m, "
+                "the track's plan",
+            )
+        )
     if faults:
         raise InputError(faults)
 
@@ -422,13 +465,14 @@ def prepare(
     pace = Pace(model, sampled(settings), track, {speed: balance.state})
     step, _ = pace.at(speed)
     if before is None:
-        state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme],
-                            on_run_in)
+        state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme], on_run_in)
         _disturb(model, settings, state)
     else:
         state = _taken_up(model, before)
     return Preparation(
-        model, balance, state,
+        model,
+        balance,
+        state,
         end_time=math.inf if duration is None else float(state[-3]) + duration,
         end_distance=track.length if until is None else until,
         pace=pace,
@@ -451,16 +495,32 @@ def state_before(
         return np.array(resume, dtype=float)
     faults = []
     if "end" not in resume.groups.get("state", {}):
-        faults.append(Fault("--continue", "", "the result holds no state at its end",
-                            "a result of `railsim run`"))
+        faults.append(
+            Fault(
+                "--continue",
+                "",
+                "the result holds no state at its end",
+                "a result of `railsim run`",
+            )
+        )
     for kind, text in (("vehicle", vehicle.to_toml()), ("track", track.to_toml())):
         if text != resume.attributes[f"{kind}_toml"]:
-            faults.append(Fault("--continue", "", f"the result is of another {kind}",
-                                f"the {kind} and the --set {kind}... of the result"))
+            faults.append(
+                Fault(
+                    "--continue",
+                    "",
+                    f"the result is of another {kind}",
+                    f"the {kind} and the --set {kind}... of the result",
+                )
+            )
     here, there = settings.model_dump(mode="json"), resume.settings().model_dump(mode="json")
     faults += [
-        Fault("--continue", f"settings.{key}", f"found {here[key]}",
-              f"{there[key]}, as in the result (--settings, --set)")
+        Fault(
+            "--continue",
+            f"settings.{key}",
+            f"found {here[key]}",
+            f"{there[key]}, as in the result (--settings, --set)",
+        )
         for key in here
         if key not in OUTPUT_SETTINGS and here[key] != there[key]
     ]
@@ -472,10 +532,16 @@ def state_before(
 def _taken_up(model: Model, before: Floats) -> Floats:
     """State `before` in which a run goes on."""
     if before.shape != (model.n_state,):
-        raise InputError([Fault(
-            "--continue", "", f"a state of {before.size} values",
-            f"{model.n_state} values, those of this vehicle",
-        )])
+        raise InputError(
+            [
+                Fault(
+                    "--continue",
+                    "",
+                    f"a state of {before.size} values",
+                    f"{model.n_state} values, those of this vehicle",
+                )
+            ]
+        )
     return before.copy()
 
 
@@ -484,16 +550,32 @@ def _disturb(model: Model, settings: Settings, state: Floats) -> None:
     n = model.index.n_bodies
     for name, change in settings.initial.items():
         if name not in model.index.bodies:
-            raise InputError([Fault(
-                "settings", f"initial.{name}", "no such body",
-                nearest(name, model.index.bodies),
-            )])
+            raise InputError(
+                [
+                    Fault(
+                        "settings",
+                        f"initial.{name}",
+                        "no such body",
+                        nearest(name, model.index.bodies),
+                    )
+                ]
+            )
         place = model.index.coordinate(name, 0)
         state[place : place + 6] += (
-            change.x, change.y, change.z, change.roll, change.pitch, change.yaw,
+            change.x,
+            change.y,
+            change.z,
+            change.roll,
+            change.pitch,
+            change.yaw,
         )
         state[6 * n + place : 6 * n + place + 6] += (
-            change.vx, change.vy, change.vz, change.vroll, change.vpitch, change.vyaw,
+            change.vx,
+            change.vy,
+            change.vz,
+            change.vroll,
+            change.vpitch,
+            change.vyaw,
         )
 
 

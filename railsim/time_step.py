@@ -103,7 +103,11 @@ class Stability:
     """
 
     def __init__(
-        self, model: Model, system: System, state: Floats, scheme: str,
+        self,
+        model: Model,
+        system: System,
+        state: Floats,
+        scheme: str,
         curving: Callable[[float], Situation | None],
     ) -> None:
         self._model, self._scheme, self._curving = model, scheme, curving
@@ -171,8 +175,21 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
 
     def step(trial: Floats) -> Floats:
         after = trial.copy()
-        status, *_ = time_loop(system, work, after, derivative, stages, recorder, SCHEMES[scheme],
-                               h, 1, 1, _NEVER, 0, 0)
+        status, *_ = time_loop(
+            system,
+            work,
+            after,
+            derivative,
+            stages,
+            recorder,
+            SCHEMES[scheme],
+            h,
+            1,
+            1,
+            _NEVER,
+            0,
+            0,
+        )
         return after if status == RUNNING else np.full_like(after, np.nan)
 
     # without masses the reference scheme balances the track's forces to 0.01 N only

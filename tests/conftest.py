@@ -17,6 +17,7 @@ def reference_dir():
         pytest.skip(f"no reference data at {folder}")
     return folder
 
+
 # a first call may compile, and the machine may be busy: time is no property
 settings.register_profile("railsim", deadline=None)
 settings.load_profile("railsim")

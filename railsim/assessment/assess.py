@@ -265,9 +265,7 @@ def _quality(
 
 
 def _verdict(
-    reports: Sequence[ZoneReport],
-    sections: Sequence[TestSection],
-    derailed: Mapping[str, Result],
+    reports: Sequence[ZoneReport], sections: Sequence[TestSection], derailed: Mapping[str, Result]
 ) -> tuple[str, list[str]]:
     """Verdict and why it is not a pass."""
     why = [f"{name}: {result.status}, {result.attributes.get('status_reason', '')}"

@@ -30,13 +30,7 @@ import numpy as np
 
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection
-from railsim.result.filters import (
-    Floats,
-    band_passed,
-    distance_means,
-    low_passed,
-    window_centres,
-)
+from railsim.result.filters import Floats, band_passed, distance_means, low_passed, window_centres
 
 LOW, HIGH = 0.15, 99.85
 FORCE_FILTER = 20.0  # Hz
@@ -225,9 +219,7 @@ def _quotient(
         found.values["Y_over_Q", wheel] = [float(np.percentile(means, HIGH))]
 
 
-def _quasi_static(
-    part: _Part, found: SectionValues, w: int, inside: slice, place: str
-) -> None:
+def _quasi_static(part: _Part, found: SectionValues, w: int, inside: slice, place: str) -> None:
     turn = found.section.turn
     outer = 0 if turn > 0 else 1
     Q, Y = part.Q[inside, w], part.Y[inside, w]

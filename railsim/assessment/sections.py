@@ -115,9 +115,7 @@ def track_sections(
             speed = speed_at(first + 0.5 * length)
             deficiency = cant_deficiency(speed, radius, cant)
             why = reason or _outside(limits.zones[zone], radius, deficiency, speed, service)
-            found.append(
-                TestSection(zone, first, first + length, radius, deficiency, speed, why)
-            )
+            found.append(TestSection(zone, first, first + length, radius, deficiency, speed, why))
     return found
 
 
@@ -183,9 +181,7 @@ def section_length(zone: Zone, speed: float) -> float:
     return next((length for most, length in zone.section if speed <= most), zone.section_above)
 
 
-def _outside(
-    zone: Zone, radius: float, deficiency: float, speed: float, service: Service
-) -> str:
+def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service: Service) -> str:
     """Why a section is outside its zone's conditions; empty if it is not."""
     low, high = zone.cant_deficiency
     unit = 1.0 if zone.radius is None else service.cant_deficiency

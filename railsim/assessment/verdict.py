@@ -291,12 +291,7 @@ def _high_friction(
 
 
 def _limits(
-    vehicle: Vehicle,
-    service: Service,
-    limits: RunningLimits,
-    Q0: Floats,
-    zone: str,
-    radius: float,
+    vehicle: Vehicle, service: Service, limits: RunningLimits, Q0: Floats, zone: str, radius: float
 ) -> dict[str, Callable[[str], tuple[float, Sourced]]]:
     """Limit of each quantity by place [SI], with its source."""
 

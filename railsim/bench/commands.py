@@ -14,8 +14,18 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 STUDY = (
-    "study", "--vehicles", "coach_manchester", "coach_flexicoil", "--tracks", "curve_r250",
-    "curve_r500", "--speeds", "20", "--workers", "2", "--quiet",
+    "study",
+    "--vehicles",
+    "coach_manchester",
+    "coach_flexicoil",
+    "--tracks",
+    "curve_r250",
+    "curve_r500",
+    "--speeds",
+    "20",
+    "--workers",
+    "2",
+    "--quiet",
 )
 COACH = ("coach_manchester", "curve_r250", "--speed", "20")
 # VmHWM, since the ru_maxrss of a process itself begins with that of the process that started it
@@ -47,7 +57,11 @@ def run_command(*arguments: str, folder: Path, cache: Path | None = None) -> dic
     begin = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", _CHILD, *arguments],
-        cwd=folder, env=environment, capture_output=True, text=True, check=False,
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     wall = time.perf_counter() - begin
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

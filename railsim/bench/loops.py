@@ -51,23 +51,37 @@ def many_frames(system, work, state, derivative, n):
     """Track frames of all bodies."""
     origin = system.bodies.frame[system.bodies.references[0]]
     for _ in range(n):
-        locate_frames(system.track, system.frame_offset, origin, state[-2], work.frames, work.cell,
-                      work.cell_u)
+        locate_frames(
+            system.track,
+            system.frame_offset,
+            origin,
+            state[-2],
+            work.frames,
+            work.cell,
+            work.cell_u,
+        )
 
 
 @jit
 def many_kinematics(system, work, state, derivative, n):
     """Positions, attitudes and velocities of all bodies."""
     for _ in range(n):
-        kinematics(system.bodies, work.frames, state[-1], state, work.relative, work.pose,
-                   work.acceleration)
+        kinematics(
+            system.bodies,
+            work.frames,
+            state[-1],
+            state,
+            work.relative,
+            work.pose,
+            work.acceleration,
+        )
 
 
 @jit
 def many_links(system, work, state, derivative, n):
     """Point-to-point elements."""
     first = 12 * system.bodies.kind.shape[0]
-    inner = state[first:first + system.internal.kind.shape[0]]
+    inner = state[first : first + system.internal.kind.shape[0]]
     for _ in range(n):
         link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
 
@@ -76,10 +90,11 @@ def many_links(system, work, state, derivative, n):
 def many_mounts(system, work, state, derivative, n):
     """Elements with three axes."""
     first = 12 * system.bodies.kind.shape[0]
-    inner = state[first:first + system.internal.kind.shape[0]]
+    inner = state[first : first + system.internal.kind.shape[0]]
     for _ in range(n):
-        mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.laws,
-                     work.pose)
+        mount_forces(
+            system.mounts, system.internal, system.curves, inner, work.drive, work.laws, work.pose
+        )
 
 
 @jit
@@ -104,8 +119,17 @@ def many_creepages(system, work, state, patches, n):
     patch = work.patch
     for _ in range(n):
         creepages(system, work, patches, state[-1], state)
-        kalker_lookup(patches, patch[A], patch[B], system.contact.creep, patch[C11], patch[C22],
-                      patch[C23], patch[C33], patch[BEYOND])
+        kalker_lookup(
+            patches,
+            patch[A],
+            patch[B],
+            system.contact.creep,
+            patch[C11],
+            patch[C22],
+            patch[C23],
+            patch[C33],
+            patch[BEYOND],
+        )
 
 
 @jit
@@ -113,9 +137,25 @@ def many_fastsims(system, work, state, patches, n):
     """FASTSIM of all patches."""
     patch = work.patch
     for _ in range(n):
-        fastsim(patches, system.contact.n_x, system.contact.n_y, patch[A], patch[B], patch[MU_N],
-                patch[C11], patch[C22], patch[C23], system.contact.shear_modulus, patch[XI_X],
-                patch[XI_Y], patch[PHI], work.fastsim, patch[T_X], patch[T_Y], patch[M_Z])
+        fastsim(
+            patches,
+            system.contact.n_x,
+            system.contact.n_y,
+            patch[A],
+            patch[B],
+            patch[MU_N],
+            patch[C11],
+            patch[C22],
+            patch[C23],
+            system.contact.shear_modulus,
+            patch[XI_X],
+            patch[XI_Y],
+            patch[PHI],
+            work.fastsim,
+            patch[T_X],
+            patch[T_Y],
+            patch[M_Z],
+        )
 
 
 @jit
@@ -129,8 +169,18 @@ def many_creep_forces(system, work, state, patches, n):
 def many_dynamics(system, work, state, derivative, n):
     """Accelerations of all bodies."""
     for _ in range(n):
-        dynamics(system.bodies, work.frames, state[-1], system.gravity, state, work.relative,
-                 work.pose, work.rail_force, work.acceleration, derivative)
+        dynamics(
+            system.bodies,
+            work.frames,
+            state[-1],
+            system.gravity,
+            state,
+            work.relative,
+            work.pose,
+            work.rail_force,
+            work.acceleration,
+            derivative,
+        )
 
 
 @jit
@@ -143,8 +193,9 @@ def many_look_ups(system, work, state, derivative, n):
     for _ in range(n):
         yaw = state[6 * b + 5]
         stretched, roll_slope = stretched_roll(state[6 * b + 3])
-        where, iy, ir, iw, ty, tr, tw = locate(contact, table, state[6 * b + 1], state[6 * b + 3],
-                                               stretched, yaw * yaw)
+        where, iy, ir, iw, ty, tr, tw = locate(
+            contact, table, state[6 * b + 1], state[6 * b + 3], stretched, yaw * yaw
+        )
         if where == INSIDE:
             cell_weights(contact, ty, tr, roll_slope, work.weights)
             look_up(contact, table, 0, iy, ir, iw, tw, work.weights, work.look_up)
@@ -156,6 +207,22 @@ def many_look_ups(system, work, state, derivative, n):
 def many_fastsim_patches(patches, n_x, n_y, inputs, shear_modulus, work, out, n):
     """FASTSIM of `patches` equal patches; rows of inputs: a, b, mu_N, c11, c22, c23, xi, phi."""
     for _ in range(n):
-        fastsim(patches, n_x, n_y, inputs[0], inputs[1], inputs[2], inputs[3], inputs[4],
-                inputs[5], shear_modulus, inputs[6], inputs[7], inputs[8], work, out[0], out[1],
-                out[2])
+        fastsim(
+            patches,
+            n_x,
+            n_y,
+            inputs[0],
+            inputs[1],
+            inputs[2],
+            inputs[3],
+            inputs[4],
+            inputs[5],
+            shear_modulus,
+            inputs[6],
+            inputs[7],
+            inputs[8],
+            work,
+            out[0],
+            out[1],
+            out[2],
+        )

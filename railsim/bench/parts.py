@@ -58,9 +58,21 @@ def state_at(vehicle: str, track: str, speed: float, place: float) -> tuple[Prep
     system, state = prepared.model.system, prepared.state.copy()
     step, _ = prepared.pace.at(speed)
     steps = int(place / speed / step)
-    time_loop(system, work_arrays(system), state, np.zeros_like(state),
-              np.zeros((3, len(state))), empty_recorder(prepared.model, 1), FAST, step, 1, steps,
-              1 << 40, 1, 0)
+    time_loop(
+        system,
+        work_arrays(system),
+        state,
+        np.zeros_like(state),
+        np.zeros((3, len(state))),
+        empty_recorder(prepared.model, 1),
+        FAST,
+        step,
+        1,
+        steps,
+        1 << 40,
+        1,
+        0,
+    )
     return prepared, state
 
 
@@ -92,9 +104,7 @@ def right_hand_side_parts(
     def measured(name: str) -> float:
         loop = getattr(loops, name)
         what = patches if name in _BY_PATCHES else derivative
-        found = least_time(
-            lambda: loop(system, work, state, what, CALLS), repetitions, CALLS
-        )
+        found = least_time(lambda: loop(system, work, state, what, CALLS), repetitions, CALLS)
         # forces add up and columns are overwritten: begin anew
         loops.many_right_hand_sides(system, work, state, derivative, 1)
         return found
@@ -125,8 +135,9 @@ def _step_time(prepared: Preparation, state: Floats, repetitions: int) -> float:
 
     def some_steps() -> None:
         trial[:] = state
-        time_loop(system, work, trial, derivative, stages, recorder, FAST, step, 1, CALLS, 1 << 40,
-                  0, 0)
+        time_loop(
+            system, work, trial, derivative, stages, recorder, FAST, step, 1, CALLS, 1 << 40, 0, 0
+        )
 
     return least_time(some_steps, repetitions, CALLS)
 
@@ -144,10 +155,9 @@ def fastsim_grids(
 
         def per_patch(n: int, cells: int = cells, work: Floats = work, calls: int = calls) -> float:
             return least_time(
-                lambda: loops.many_fastsim_patches(
-                    n, cells, cells, inputs, 82e9, work, out, calls
-                ),
-                repetitions, calls * n,
+                lambda: loops.many_fastsim_patches(n, cells, cells, inputs, 82e9, work, out, calls),
+                repetitions,
+                calls * n,
             )
 
         rows.append({"grid": cells, "together": per_patch(patches), "alone": per_patch(1)})
@@ -158,7 +168,16 @@ def patch_inputs(patches: int) -> Floats:
     """Return patches of a curving coach, some of which slide; rows as `many_fastsim_patches`."""
     share = np.linspace(0.1, 1.0, patches)
     one = np.ones(patches)
-    return np.array([
-        6e-3 * one, 4e-3 * one, 0.4 * 60e3 * share, 4.5 * one, 4.0 * one, 1.8 * one,
-        1e-3 * share, -4e-3 * share, 0.5 * share,
-    ])
+    return np.array(
+        [
+            6e-3 * one,
+            4e-3 * one,
+            0.4 * 60e3 * share,
+            4.5 * one,
+            4.0 * one,
+            1.8 * one,
+            1e-3 * share,
+            -4e-3 * share,
+            0.5 * share,
+        ]
+    )

@@ -7,12 +7,7 @@ from typing import Any
 from railsim.bench.commands import commands
 from railsim.bench.ensembles import COACH_IN_CURVE, SIZES, ensembles
 from railsim.bench.machine import SPIN, hardware, vector_instructions, versions
-from railsim.bench.parts import (
-    GRIDS,
-    REPETITIONS,
-    fastsim_grids,
-    right_hand_side_parts,
-)
+from railsim.bench.parts import GRIDS, REPETITIONS, fastsim_grids, right_hand_side_parts
 from railsim.bench.runs import speed_and_error, two_cores
 from railsim.bench.scenarios import OTHERS, STUDY, Scenario
 from railsim.result import Result
@@ -70,7 +65,11 @@ class Plan:
 
 FULL = Plan()
 QUICK = Plan(
-    runs=(STUDY[0], STUDY[2]), repetitions=3, batches=2, ensembles=(1, 8), command_repetitions=1,
+    runs=(STUDY[0], STUDY[2]),
+    repetitions=3,
+    batches=2,
+    ensembles=(1, 8),
+    command_repetitions=1,
     cold=False,
 )
 
@@ -130,8 +129,12 @@ Table = tuple[list[str], list[list[str]]]
 
 def tables(found: dict[str, Any]) -> list[Table]:
     """Return what was found as tables: titles of the columns, rows."""
-    made = [_runs(found["runs"]), _parts(found["parts"]), _fastsim(found["fastsim"]),
-            _ensembles(found["ensembles"])]
+    made = [
+        _runs(found["runs"]),
+        _parts(found["parts"]),
+        _fastsim(found["fastsim"]),
+        _ensembles(found["ensembles"]),
+    ]
     if "two_cores" in found:
         made.append(_two_cores(found["two_cores"]))
     if "commands" in found:
@@ -140,26 +143,43 @@ def tables(found: dict[str, Any]) -> list[Table]:
 
 
 def _runs(records: Sequence[dict[str, Any]]) -> Table:
-    header = ["time loop", "step (ms)", "x real time", "best", "target", "us per step",
-              "dQ/Q0 (points)", "Y (kN)", "Y mid (kN)", "yaw (%)", "peaks (%)"]
+    header = [
+        "time loop",
+        "step (ms)",
+        "x real time",
+        "best",
+        "target",
+        "us per step",
+        "dQ/Q0 (points)",
+        "Y (kN)",
+        "Y mid (kN)",
+        "yaw (%)",
+        "peaks (%)",
+    ]
     rows = []
     for record in records:
         error = record.get("error")
-        rows.append([
-            record["name"],
-            f"{1e3 * record['step']:.3g}",
-            f"{record['real_time']:.0f}",
-            f"{record['real_time_best']:.0f}",
-            "" if record["target"] is None else f"{record['target']:.0f}",
-            f"{1e6 * record['cpu_per_step']:.2f}",
-            *([""] * 5 if error is None else [
-                f"{1e2 * error['dQ_over_Q0']:.4f}",
-                f"{1e-3 * error['Y']:.4f}",
-                f"{1e-3 * error['Y_mid_curve']:.4f}",
-                f"{1e2 * error['yaw']:.3f}",
-                f"{1e2 * error['peaks']:.2f}",
-            ]),
-        ])
+        rows.append(
+            [
+                record["name"],
+                f"{1e3 * record['step']:.3g}",
+                f"{record['real_time']:.0f}",
+                f"{record['real_time_best']:.0f}",
+                "" if record["target"] is None else f"{record['target']:.0f}",
+                f"{1e6 * record['cpu_per_step']:.2f}",
+                *(
+                    [""] * 5
+                    if error is None
+                    else [
+                        f"{1e2 * error['dQ_over_Q0']:.4f}",
+                        f"{1e-3 * error['Y']:.4f}",
+                        f"{1e-3 * error['Y_mid_curve']:.4f}",
+                        f"{1e2 * error['yaw']:.3f}",
+                        f"{1e2 * error['peaks']:.2f}",
+                    ]
+                ),
+            ]
+        )
     return header, rows
 
 
@@ -212,12 +232,20 @@ def _two_cores(found: dict[str, Any]) -> Table:
     before = found["before"]
     quiet = "" if found["quiet"] else " (machine NOT quiet: no figure)"
     rows = [
-        [f"batch of {found['runs']} runs, wall (s)", f"{found['wall_one']:.2f}",
-         f"{found['wall_two']:.2f}", f"{found['ratio']:.2f}{quiet}"],
+        [
+            f"batch of {found['runs']} runs, wall (s)",
+            f"{found['wall_one']:.2f}",
+            f"{found['wall_two']:.2f}",
+            f"{found['ratio']:.2f}{quiet}",
+        ],
         ["ratio that CPU times of whole runs allow", "", "", f"{found['ratio_of_cpu_times']:.2f}"],
         ["ratio that CPU times of time loops allow", "", "", f"{found['ratio_of_loops']:.2f}"],
-        ["cores that an empty loop gets", f"{before['one_core']:.2f}",
-         f"{before['two_cores']:.2f}", f"{2.0 / before['slowdown']:.2f}"],
+        [
+            "cores that an empty loop gets",
+            f"{before['one_core']:.2f}",
+            f"{before['two_cores']:.2f}",
+            f"{2.0 / before['slowdown']:.2f}",
+        ],
     ]
     return ["one and two cores", "one", "two", "ratio"], rows
 

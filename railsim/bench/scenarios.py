@@ -73,15 +73,23 @@ STUDY = (
 
 OTHERS = (
     Scenario(
-        "Manchester coach, R 250 m, RK4 at 0.5 ms", "coach_manchester", "curve_r250", 20.0,
-        settings=(("scheme", "rk4"), ("step", 0.5e-3)), target=35.0,
+        "Manchester coach, R 250 m, RK4 at 0.5 ms",
+        "coach_manchester",
+        "curve_r250",
+        20.0,
+        settings=(("scheme", "rk4"), ("step", 0.5e-3)),
+        target=35.0,
     ),
     Scenario(
         "Manchester coach, R 250 m, 5 m/s", "coach_manchester", "curve_r250", 5.0, target=30.0
     ),
     Scenario(
-        "flexicoil coach, straight, ERRI B176 low, 60 m/s", "coach_flexicoil", "straight", 60.0,
-        irregularity="erri_b176_low", target=100.0,
+        "flexicoil coach, straight, ERRI B176 low, 60 m/s",
+        "coach_flexicoil",
+        "straight",
+        60.0,
+        irregularity="erri_b176_low",
+        target=100.0,
     ),
 )
 """The reference scheme, low speed, high speed on irregular track."""

@@ -31,8 +31,14 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 @json_option
 @quiet_option
 def command(
-    file: str, out: str | None, fps: int, gain: float, overwrite: bool, as_json: bool,
-    quiet: bool, **how: Any,
+    file: str,
+    out: str | None,
+    fps: int,
+    gain: float,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+    **how: Any,
 ) -> None:
     """Write a run, or a mode, as one page that plays, or as a film.
 
@@ -75,12 +81,16 @@ def _scene(
     if file.suffix.lower() != ".json":
         from railsim.result import open_run
 
-        wrong = [Fault(option, "", "belongs to a mode", "give the JSON of railsim modes")
-                 for option, value in (("--vehicle", vehicle), ("--mode", mode)) if value]
+        wrong = [
+            Fault(option, "", "belongs to a mode", "give the JSON of railsim modes")
+            for option, value in (("--vehicle", vehicle), ("--mode", mode))
+            if value
+        ]
         if wrong:
             raise InputError(wrong)
-        return result_scene(open_run(file), frames=frames or (200 if film else FRAMES),
-                            between=between)
+        return result_scene(
+            open_run(file), frames=frames or (200 if film else FRAMES), between=between
+        )
     from railsim.definitions.loading import load_vehicle
 
     data = _read(file)

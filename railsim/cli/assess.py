@@ -5,14 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    json_option,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    table,
-)
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, table
 from railsim.files import check_folder, make_folder, whole_file
 from railsim.text import spreadsheet_cell
 
@@ -297,6 +290,8 @@ def _safety_lines(assessment: "Assessment") -> list[str]:
             for w in report.wheels
         ]  # fmt: skip
         lines += ["", *table(header, rows), ""]
-        lines += table(["bogie", "overturning"],
-                       [[name, f"{value:.3f}"] for name, value in report.overturning.items()])
+        lines += table(
+            ["bogie", "overturning"],
+            [[name, f"{value:.3f}"] for name, value in report.overturning.items()],
+        )
     return lines

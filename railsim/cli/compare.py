@@ -5,14 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    json_option,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    table,
-)
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, table
 from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:

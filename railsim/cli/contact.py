@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    json_option,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    table,
-)
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, table
 from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
@@ -279,10 +272,7 @@ def _table(pair: "Pair", radii: tuple[float, float], normal: str) -> "ContactTab
 
 
 def _loaded(
-    contact_table: "ContactTable",
-    geometry: "ContactGeometry",
-    places: Sequence[float],
-    load: float,
+    contact_table: "ContactTable", geometry: "ContactGeometry", places: Sequence[float], load: float
 ) -> dict[float, "LoadedContact"]:
     """Patches of the right wheel at the given displacements, where the geometry knows them."""
     import numpy as np

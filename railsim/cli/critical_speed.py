@@ -31,27 +31,73 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @click.command(name="critical-speed")
 @click.argument("vehicle", metavar="VEHICLE")
 @click.argument("track", metavar="TRACK", required=False)
-@click.option("--method", default="ramp", show_default=True, type=click.Choice(METHODS),
-              help="The linear critical speed is always found.")
-@click.option("--from", "low", type=float, default=5.0, show_default=True, metavar="V",
-              help="Lowest speed in m/s.")
-@click.option("--to", "high", type=float, default=120.0, show_default=True, metavar="V",
-              help="Highest speed in m/s.")
-@click.option("--points", type=int, default=16, show_default=True, metavar="N",
-              help="Speeds of a bifurcation diagram.")
-@click.option("--linearisation", default="tangent", show_default=True,
-              type=click.Choice(["tangent", "harmonic"]),
-              help="Contact: its derivative, or its first harmonic for --amplitude.")
-@click.option("--amplitude", type=float, default=3e-3, show_default=True, metavar="A",
-              help="Lateral amplitude of the wheelsets in m, for harmonic.")
+@click.option(
+    "--method",
+    default="ramp",
+    show_default=True,
+    type=click.Choice(METHODS),
+    help="The linear critical speed is always found.",
+)
+@click.option(
+    "--from",
+    "low",
+    type=float,
+    default=5.0,
+    show_default=True,
+    metavar="V",
+    help="Lowest speed in m/s.",
+)
+@click.option(
+    "--to",
+    "high",
+    type=float,
+    default=120.0,
+    show_default=True,
+    metavar="V",
+    help="Highest speed in m/s.",
+)
+@click.option(
+    "--points",
+    type=int,
+    default=16,
+    show_default=True,
+    metavar="N",
+    help="Speeds of a bifurcation diagram.",
+)
+@click.option(
+    "--linearisation",
+    default="tangent",
+    show_default=True,
+    type=click.Choice(["tangent", "harmonic"]),
+    help="Contact: its derivative, or its first harmonic for --amplitude.",
+)
+@click.option(
+    "--amplitude",
+    type=float,
+    default=3e-3,
+    show_default=True,
+    metavar="A",
+    help="Lateral amplitude of the wheelsets in m, for harmonic.",
+)
 @click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")
 @click.option("--friction", metavar="MU or A:B:N", help="Friction; several values: a map.")
-@click.option("--over", multiple=True, metavar="KEY.PATH=A:B:N",
-              help="A map over a key of the vehicle, track or settings; at most two parameters.")
-@click.option("--workers", type=click.IntRange(min=1), metavar="N",
-              help="Processes for a map; default: all cores.")
-@click.option("--out", metavar="DIR",
-              help="Folder for critical_speed.json and .png; a map goes on where it stopped.")
+@click.option(
+    "--over",
+    multiple=True,
+    metavar="KEY.PATH=A:B:N",
+    help="A map over a key of the vehicle, track or settings; at most two parameters.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes for a map; default: all cores.",
+)
+@click.option(
+    "--out",
+    metavar="DIR",
+    help="Folder for critical_speed.json and .png; a map goes on where it stopped.",
+)
 @click.option("--settings", metavar="F", help="Settings file: scheme, creep law, contact.")
 @load_option
 @set_option
@@ -59,10 +105,24 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @json_option
 @quiet_option
 def command(
-    vehicle: str, track: str | None, method: str, low: float, high: float, points: int,
-    conicity: str | None, friction: str | None, over: tuple[str, ...], workers: int | None,
-    out: str | None, settings: str | None, load: str | None, assignments: tuple[str, ...],
-    overwrite: bool, as_json: bool, quiet: bool, **how: Any,
+    vehicle: str,
+    track: str | None,
+    method: str,
+    low: float,
+    high: float,
+    points: int,
+    conicity: str | None,
+    friction: str | None,
+    over: tuple[str, ...],
+    workers: int | None,
+    out: str | None,
+    settings: str | None,
+    load: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+    **how: Any,
 ) -> None:
     """Find from which speed a vehicle hunts on ideal straight track.
 
@@ -83,22 +143,34 @@ def command(
     inputs = load_inputs(vehicle, track, settings, assignments, load)
     ranges = _ranges(conicity, friction, over)
     methods = METHODS[:-1] if method == "all" else ("linear", method)
-    options = {"methods": tuple(dict.fromkeys(methods)), "low": low, "high": high,
-               "points": points, **how}
+    options = {
+        "methods": tuple(dict.fromkeys(methods)),
+        "low": low,
+        "high": high,
+        "points": points,
+        **how,
+    }
 
     def with_values(changes: list[str]) -> "Inputs":
         return load_inputs(vehicle, track, settings, [*assignments, *changes], load)
 
-    grid = [_point(inputs, with_values, dict(zip(ranges, values, strict=True)))
-            for values in product(*ranges.values())]
+    grid = [
+        _point(inputs, with_values, dict(zip(ranges, values, strict=True)))
+        for values in product(*ranges.values())
+    ]
     folder = Folder(out, FILES, overwrite)
     with progress_bar("critical speed", quiet=quiet) as progress:
         if len(grid) > 1:
             from railsim.studies.stability_map import stability_map
 
             points_found = stability_map(
-                grid, options, folder=folder.path, workers=workers, overwrite=overwrite,
-                progress=progress, on_remark=lambda text: echo(f"remark: {text}", err=True),
+                grid,
+                options,
+                folder=folder.path,
+                workers=workers,
+                overwrite=overwrite,
+                progress=progress,
+                on_remark=lambda text: echo(f"remark: {text}", err=True),
             )
         else:
             one = _one(grid[0], options, progress)
@@ -138,8 +210,16 @@ def _ranges(
         found[key] = values_of(values, "--over")
     several = [name for name, values in found.items() if len(values) > 1]
     if len(several) > 2:
-        raise InputError([Fault("--over", "", f"found {len(several)} parameters with several "
-                                f"values ({', '.join(several)})", "two at most")])
+        raise InputError(
+            [
+                Fault(
+                    "--over",
+                    "",
+                    f"found {len(several)} parameters with several values ({', '.join(several)})",
+                    "two at most",
+                )
+            ]
+        )
     return found
 
 
@@ -159,13 +239,22 @@ def _point(
 def _one(point: "MapPoint", options: dict[str, Any], progress: Any) -> "CriticalSpeed":
     from railsim.stability.critical_speed import critical_speed
 
-    return critical_speed(point.vehicle, point.track, settings=point.settings,
-                          conicity=point.at.get("conicity"), progress=progress, **options)
+    return critical_speed(
+        point.vehicle,
+        point.track,
+        settings=point.settings,
+        conicity=point.at.get("conicity"),
+        progress=progress,
+        **options,
+    )
 
 
 def _tell_map(
-    folder: Any, inputs: "Inputs", values: dict[str, list[float]],
-    found: list[dict[str, Any]], as_json: bool,
+    folder: Any,
+    inputs: "Inputs",
+    values: dict[str, list[float]],
+    found: list[dict[str, Any]],
+    as_json: bool,
 ) -> None:
     """Print, write and draw a map."""
     import numpy as np
@@ -190,8 +279,7 @@ def _tell_map(
     rows = []
     for record in found:
         point = [f"{record['at'][name]:g}" for name in values]
-        cells = [f"{record[kind]['speed']:.2f}" if record[kind] else "none"
-                 for kind in kinds]
+        cells = [f"{record[kind]['speed']:.2f}" if record[kind] else "none" for kind in kinds]
         rows.append([*point, *cells])
     header = [*values, *kinds.values()]
     echo("\n".join(table(header, rows, numbers=0)))
@@ -203,18 +291,34 @@ def _tell_map(
 def _lines(found: "CriticalSpeed") -> list[str]:
     rows = []
     if found.linear is not None:
-        rows.append(["linear", f"{found.linear['speed']:.2f}",
-                     f"{found.linear['frequency']:.2f}", "", found.linear["mode"]])
+        rows.append(
+            [
+                "linear",
+                f"{found.linear['speed']:.2f}",
+                f"{found.linear['frequency']:.2f}",
+                "",
+                found.linear["mode"],
+            ]
+        )
     else:
         rows.append(["linear", "none", "", "", ""])
     for method, lowest in found.nonlinear.items():
         if lowest.speed is None:
             rows.append([f"non-linear, {method}", "none", "", "", ""])
         else:
-            rows.append([f"non-linear, {method}", f"{lowest.speed:.2f}",
-                         f"{lowest.frequency:.2f}", f"{1e3 * lowest.amplitude:.2f}", ""])
-    for words, limit in (("amplitude above {:g} mm", found.amplitude_limit),
-                         ("rms of sum_Y above {:.3g} kN", found.instability_limit)):
+            rows.append(
+                [
+                    f"non-linear, {method}",
+                    f"{lowest.speed:.2f}",
+                    f"{lowest.frequency:.2f}",
+                    f"{1e3 * lowest.amplitude:.2f}",
+                    "",
+                ]
+            )
+    for words, limit in (
+        ("amplitude above {:g} mm", found.amplitude_limit),
+        ("rms of sum_Y above {:.3g} kN", found.instability_limit),
+    ):
         if limit is not None:
             size = limit["limit"] * (1e3 if "mm" in words else 1e-3)
             rows.append([words.format(size), f"{limit['speed']:.2f}", "", "", ""])

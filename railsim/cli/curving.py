@@ -26,11 +26,17 @@ MARKS = {0: "no steady state", 1: "", 2: "by time integration"}
 
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE")
-@click.option("--radius", required=True, metavar="R,R,... or A:B:N",
-              help="Radii in m, positive to the right.")
+@click.option(
+    "--radius", required=True, metavar="R,R,... or A:B:N", help="Radii in m, positive to the right."
+)
 @click.option("--cant", type=float, default=0.15, show_default=True, metavar="H", help="Cant in m.")
-@click.option("--cant-deficiency", default="0", show_default=True, metavar="I,I,... or A:B:N",
-              help="Cant deficiencies in m.")
+@click.option(
+    "--cant-deficiency",
+    default="0",
+    show_default=True,
+    metavar="I,I,... or A:B:N",
+    help="Cant deficiencies in m.",
+)
 @click.option("--friction", metavar="MU,MU,... or A:B:N", help="Default: the track's.")
 @click.option("--track", metavar="F", help="Rails, gauge, inclination, support; default straight.")
 @click.option("--out", metavar="DIR", help="Folder for curving.json and curving.png.")
@@ -41,9 +47,19 @@ MARKS = {0: "no steady state", 1: "", 2: "by time integration"}
 @json_option
 @quiet_option
 def command(
-    vehicle: str, radius: str, cant: float, cant_deficiency: str, friction: str | None,
-    track: str | None, out: str | None, settings: str | None, load: str | None,
-    assignments: tuple[str, ...], overwrite: bool, as_json: bool, quiet: bool,
+    vehicle: str,
+    radius: str,
+    cant: float,
+    cant_deficiency: str,
+    friction: str | None,
+    track: str | None,
+    out: str | None,
+    settings: str | None,
+    load: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     """Find how a vehicle runs steadily in curves, at every combination of the values given.
 
@@ -62,10 +78,14 @@ def command(
     folder = Folder(out, FILES, overwrite)
     with progress_bar("curving", quiet=quiet) as progress:
         found = curving(
-            inputs.vehicle, inputs.track, radius=values_of(radius, "--radius"), cant=cant,
+            inputs.vehicle,
+            inputs.track,
+            radius=values_of(radius, "--radius"),
+            cant=cant,
             cant_deficiency=values_of(cant_deficiency, "--cant-deficiency"),
             friction=values_of(friction, "--friction") if friction else None,
-            settings=inputs.settings, progress=progress,
+            settings=inputs.settings,
+            progress=progress,
         )
     folder.write_json(FILES[0], found.record())
     if folder.path is not None:
@@ -89,18 +109,42 @@ def _lines(found: "Curving") -> list[str]:
             for m, mu in enumerate(found.friction):
                 place = r, i, m
                 values = [
-                    1e3 * found.lateral[place][0], 1e3 * found.attack[place][0],
-                    1e-3 * found.Q[place][0, outer], 1e-3 * found.Y[place][0, outer],
-                    found.Y_over_Q[place][0, outer], found.T_gamma[place].sum(),
+                    1e3 * found.lateral[place][0],
+                    1e3 * found.attack[place][0],
+                    1e-3 * found.Q[place][0, outer],
+                    1e-3 * found.Y[place][0, outer],
+                    found.Y_over_Q[place][0, outer],
+                    found.T_gamma[place].sum(),
                 ]
                 decimals = (2, 2, 1, 1, 3, 0)
-                cells = ["" if math.isnan(v) else f"{v:.{d}f}"
-                         for v, d in zip(values, decimals, strict=True)]
-                rows.append([f"{radius:g}", f"{1e3 * deficiency:g}", f"{mu:g}",
-                             f"{found.speed[r, i]:.2f}", *cells,
-                             MARKS[int(found.converged[place])]])
-    header = ["radius (m)", "I (mm)", "mu", "V (m/s)", "y (mm)", "attack (mrad)", "Q (kN)",
-              "Y (kN)", "Y/Q", "T_gamma (N)", ""]
-    words = (f"Leading wheelset, its outer wheel, T_gamma of all wheels; cant "
-             f"{1e3 * found.cant:g} mm")
+                cells = [
+                    "" if math.isnan(v) else f"{v:.{d}f}"
+                    for v, d in zip(values, decimals, strict=True)
+                ]
+                rows.append(
+                    [
+                        f"{radius:g}",
+                        f"{1e3 * deficiency:g}",
+                        f"{mu:g}",
+                        f"{found.speed[r, i]:.2f}",
+                        *cells,
+                        MARKS[int(found.converged[place])],
+                    ]
+                )
+    header = [
+        "radius (m)",
+        "I (mm)",
+        "mu",
+        "V (m/s)",
+        "y (mm)",
+        "attack (mrad)",
+        "Q (kN)",
+        "Y (kN)",
+        "Y/Q",
+        "T_gamma (N)",
+        "",
+    ]
+    words = (
+        f"Leading wheelset, its outer wheel, T_gamma of all wheels; cant {1e3 * found.cant:g} mm"
+    )
     return [words, *table(header, rows, numbers=0)]

@@ -204,9 +204,7 @@ def _data(
 
 
 def _lines(
-    results: Sequence["Analysis"],
-    found: Sequence[list[dict[str, Any]]],
-    optimum: "Optimum | None",
+    results: Sequence["Analysis"], found: Sequence[list[dict[str, Any]]], optimum: "Optimum | None"
 ) -> list[str]:
     from railsim.mechanisms import tables
     from railsim.mechanisms.comparison import compare

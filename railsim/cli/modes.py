@@ -31,26 +31,50 @@ ANIMATION = "mode.html"
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE")
 @click.argument("track", metavar="TRACK", required=False)
-@click.option("--speed", type=float, default=20.0, show_default=True, metavar="V",
-              help="Speed in m/s.")
+@click.option(
+    "--speed", type=float, default=20.0, show_default=True, metavar="V", help="Speed in m/s."
+)
 @click.option("--speeds", metavar="A:B:N", help="N speeds from A to B: a root locus.")
-@click.option("--over", metavar="KEY.PATH=A:B:N",
-              help="Root locus over a key of the vehicle, track or settings at --speed.")
+@click.option(
+    "--over",
+    metavar="KEY.PATH=A:B:N",
+    help="Root locus over a key of the vehicle, track or settings at --speed.",
+)
 @click.option("--held", is_flag=True, help="Hold the wheelsets.")
-@click.option("--hold", multiple=True, metavar="BODY",
-              help="Hold this body in the moving track frame; may be given several times.")
-@click.option("--linearisation", default="tangent", show_default=True,
-              type=click.Choice(["tangent", "harmonic"]),
-              help="Contact: its derivative, or its first harmonic for --amplitude.")
-@click.option("--amplitude", type=float, default=3e-3, show_default=True, metavar="A",
-              help="Lateral amplitude of the wheelsets in m, for harmonic.")
+@click.option(
+    "--hold",
+    multiple=True,
+    metavar="BODY",
+    help="Hold this body in the moving track frame; may be given several times.",
+)
+@click.option(
+    "--linearisation",
+    default="tangent",
+    show_default=True,
+    type=click.Choice(["tangent", "harmonic"]),
+    help="Contact: its derivative, or its first harmonic for --amplitude.",
+)
+@click.option(
+    "--amplitude",
+    type=float,
+    default=3e-3,
+    show_default=True,
+    metavar="A",
+    help="Lateral amplitude of the wheelsets in m, for harmonic.",
+)
 @click.option("--conicity", type=float, metavar="G", help="Straight cones of this slope as wheels.")
-@click.option("--radius", type=float, default=math.inf, metavar="R",
-              help="Radius of the track in m, positive to the right; default straight.")
+@click.option(
+    "--radius",
+    type=float,
+    default=math.inf,
+    metavar="R",
+    help="Radius of the track in m, positive to the right; default straight.",
+)
 @click.option("--cant", type=float, default=0.0, metavar="H", help="Cant of the track in m.")
 @click.option("--out", metavar="DIR", help="Folder for modes.json and modes.png.")
-@click.option("--animate", metavar="NAME",
-              help="Write this mode into --out as a page that plays, mode.html.")
+@click.option(
+    "--animate", metavar="NAME", help="Write this mode into --out as a page that plays, mode.html."
+)
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
 @load_option
 @set_option
@@ -100,14 +124,21 @@ def command(
     folder = Folder(out, FILES if animate is None else (*FILES, ANIMATION), overwrite)
     with progress_bar("modes", quiet=quiet):
         if over is not None:
-            found: Modes | RootLocus = _over(inputs, over, speed, vehicle, track, settings,
-                                             assignments, how)
+            found: Modes | RootLocus = _over(
+                inputs, over, speed, vehicle, track, settings, assignments, how
+            )
         elif speeds is not None:
-            found = root_locus(inputs.vehicle, inputs.track, settings=inputs.settings,
-                               speeds=values_of(speeds, "--speeds"), **how)
+            found = root_locus(
+                inputs.vehicle,
+                inputs.track,
+                settings=inputs.settings,
+                speeds=values_of(speeds, "--speeds"),
+                **how,
+            )
         else:
-            found = modes(inputs.vehicle, inputs.track, speed=speed, settings=inputs.settings,
-                          **how)
+            found = modes(
+                inputs.vehicle, inputs.track, speed=speed, settings=inputs.settings, **how
+            )
     scene = _scene(inputs, found, animate)
     _write(folder, found, inputs)
     if scene is not None and folder.path is not None:
@@ -122,8 +153,14 @@ def command(
 
 
 def _over(
-    inputs: "Inputs", over: str, speed: float, vehicle: str, track: str | None,
-    settings: str | None, assignments: tuple[str, ...], how: dict[str, Any],
+    inputs: "Inputs",
+    over: str,
+    speed: float,
+    vehicle: str,
+    track: str | None,
+    settings: str | None,
+    assignments: tuple[str, ...],
+    how: dict[str, Any],
 ) -> "RootLocus":
     """Root locus over one key of the files."""
     from railsim.cli.analysis import load_inputs, values_of
@@ -132,13 +169,15 @@ def _over(
 
     key, _, text = over.partition("=")
     options = dict(how)
-    contact = Contact(options.pop("linearisation"), options.pop("amplitude", AMPLITUDE),
-                      options.pop("conicity"))
+    contact = Contact(
+        options.pop("linearisation"), options.pop("amplitude", AMPLITUDE), options.pop("conicity")
+    )
 
     def prepared(value: float) -> LinearVehicle:
         here = load_inputs(vehicle, track, settings, [*assignments, f"{key}={value!r}"])
-        return LinearVehicle(here.vehicle, here.track, contact=contact, settings=here.settings,
-                             **options)
+        return LinearVehicle(
+            here.vehicle, here.track, contact=contact, settings=here.settings, **options
+        )
 
     return parameter_locus(prepared, key, values_of(text, "--over"), speed)
 
@@ -191,14 +230,20 @@ def _lines(found: "Modes | RootLocus") -> list[str]:
         if mode.natural_frequency > SHOWN:
             continue
         shares = [f"{name} {100 * share:.0f} %" for name, share in mode.participation.items()]
-        rows.append([
-            mode.name, f"{mode.frequency:.3f}", f"{mode.natural_frequency:.3f}",
-            f"{100 * mode.damping_ratio:.2f}", ", ".join(shares[:3]),
-        ])
+        rows.append(
+            [
+                mode.name,
+                f"{mode.frequency:.3f}",
+                f"{mode.natural_frequency:.3f}",
+                f"{100 * mode.damping_ratio:.2f}",
+                ", ".join(shares[:3]),
+            ]
+        )
     header = ["mode", "f (Hz)", "f0 (Hz)", "damping (%)", "kinetic energy"]
     body = table(header[:4], [row[:4] for row in rows])
-    lines = [f"{line}  {row}" for line, row in zip(body, [header[4], *(r[4] for r in rows)],
-                                                    strict=True)]
+    lines = [
+        f"{line}  {row}" for line, row in zip(body, [header[4], *(r[4] for r in rows)], strict=True)
+    ]
     above = sum(mode.natural_frequency > SHOWN for mode in found.oscillations)
     still = sum(mode.exists and not mode.oscillates for mode in found.modes)
     head = f"{found.speed:g} m/s, {_contact_words(found)}"
@@ -215,10 +260,14 @@ def _locus_lines(found: "RootLocus") -> list[str]:
             rows.append([f"{value:g}", "no oscillation", "", ""])
             continue
         name = found.names[modes.modes.index(least)]
-        rows.append([f"{value:g}", name, f"{least.frequency:.3f}",
-                     f"{100 * least.damping_ratio:.2f}"])
+        rows.append(
+            [f"{value:g}", name, f"{least.frequency:.3f}", f"{100 * least.damping_ratio:.2f}"]
+        )
     first = "speed (m/s)" if found.key == "speed" else found.key
     words = f"Least damped oscillation between 0.3 and 40 Hz, {_contact_words(found.sets[0])}"
     remarks = dict.fromkeys(remark for modes in found.sets for remark in modes.remarks)
-    return [words, *table([first, "mode", "f (Hz)", "damping (%)"], rows, numbers=2),
-            *(f"remark: {remark}" for remark in remarks)]
+    return [
+        words,
+        *table([first, "mode", "f (Hz)", "damping (%)"], rows, numbers=2),
+        *(f"remark: {remark}" for remark in remarks),
+    ]

@@ -77,11 +77,7 @@ def command(
 
 
 def _result_figure(
-    file: str,
-    selections: tuple[str, ...],
-    over: str,
-    by: str,
-    between: tuple[float, float] | None,
+    file: str, selections: tuple[str, ...], over: str, by: str, between: tuple[float, float] | None
 ) -> "Figure":
     from railsim.plot.histories import STUDY, histories
     from railsim.result import open_run

@@ -128,9 +128,17 @@ def command(
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """  # noqa: D301 - click reads the escape
     if scenario is not None:
-        return _campaign(scenario, vehicles, (tracks, speeds, grids), out,
-                         with_load(assignments, load, "vehicle."), how,
-                         resume=resume, as_json=as_json, quiet=quiet)
+        return _campaign(
+            scenario,
+            vehicles,
+            (tracks, speeds, grids),
+            out,
+            with_load(assignments, load, "vehicle."),
+            how,
+            resume=resume,
+            as_json=as_json,
+            quiet=quiet,
+        )
     from railsim.studies import study
 
     inputs: dict[str, Any] = {
@@ -149,9 +157,17 @@ def command(
         out = out if base == Path.cwd() else str(Path(out).absolute())
         if stored.scenario is not None:
             with chdir(base):
-                return _campaign(stored.scenario, tuple(stored.vehicles), ((),), out,
-                                 tuple(stored.assignments), {**inputs, **how},
-                                 resume=True, as_json=as_json, quiet=quiet)
+                return _campaign(
+                    stored.scenario,
+                    tuple(stored.vehicles),
+                    ((),),
+                    out,
+                    tuple(stored.assignments),
+                    {**inputs, **how},
+                    resume=True,
+                    as_json=as_json,
+                    quiet=quiet,
+                )
         inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
     else:
         _require(vehicles, tracks, speeds)

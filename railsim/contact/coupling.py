@@ -62,7 +62,8 @@ def coupling(values: Floats, G: float, nu: float) -> Floats:
     for i in range(N_PATCH - 1):
         pair = [i, i + 1]
         present = np.all(
-            stiffness[pair] > NEGLIGIBLE * stiffness[pair].max(axis=1, keepdims=True), axis=0)
+            stiffness[pair] > NEGLIGIBLE * stiffness[pair].max(axis=1, keepdims=True), axis=0
+        )
         if not present.any():
             continue
         apart = np.where(present, np.abs(np.diff(line[pair, :, fields.G], axis=0)[0]), np.inf)

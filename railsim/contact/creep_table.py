@@ -343,10 +343,7 @@ def table_of_nodes(nodes: CreepNodes, nu: float = POISSON) -> CreepTable:
             force[..., component],
             optimize=True,
         )
-    return CreepTable(
-        coefficients.astype(np.float32).ravel(),
-        along_ratio @ scale,
-    )
+    return CreepTable(coefficients.astype(np.float32).ravel(), along_ratio @ scale)
 
 
 def _free_spline(n: int) -> Array:

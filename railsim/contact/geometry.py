@@ -16,12 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from railsim.contact.conicity import equivalent_conicity
-from railsim.contact.curves import (
-    misfits,
-    rail_curve,
-    tape_circle_place,
-    wheel_curve,
-)
+from railsim.contact.curves import misfits, rail_curve, tape_circle_place, wheel_curve
 from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile

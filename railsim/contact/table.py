@@ -80,16 +80,7 @@ from railsim.errors import InputError
 from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
 from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
-from railsim.kernels.contact_table import (
-    A1,
-    B1,
-    D_B1,
-    FINE_ROLL,
-    K2,
-    N_FIELD,
-    K,
-    stretched_roll,
-)
+from railsim.kernels.contact_table import A1, B1, D_B1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
 from railsim.kernels.hertz import unit_load_ellipse
 from railsim.profiles.profile import Profile
 

@@ -394,9 +394,7 @@ def _in_time(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ..
 
 
 TimeRows = Annotated[
-    tuple[tuple[Finite, Finite, Finite, Finite], ...],
-    Field(min_length=1),
-    AfterValidator(_in_time),
+    tuple[tuple[Finite, Finite, Finite, Finite], ...], Field(min_length=1), AfterValidator(_in_time)
 ]
 
 

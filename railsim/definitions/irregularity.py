@@ -9,15 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from railsim.definitions.base import (
-    Definition,
-    Finite,
-    Flag,
-    NonNegative,
-    Positive,
-    Text,
-    rising,
-)
+from railsim.definitions.base import Definition, Finite, Flag, NonNegative, Positive, Text, rising
 
 # Names of the columns of a measured irregularity, beside the arc length.
 COLUMNS = ("y_left", "z_left", "y_right", "z_right")

@@ -97,10 +97,7 @@ FORMATS: dict[str, Format] = {
         free=("loads",),
     ),
     MECHANISM_FORMAT: Format(
-        "mechanism",
-        Mechanism,
-        faults=mechanism_faults,
-        remarks=mechanism_remarks,
+        "mechanism", Mechanism, faults=mechanism_faults, remarks=mechanism_remarks
     ),
     LIMITS_FORMAT: Format("limits", RunningLimits),
     SCENARIO_FORMAT: Format("scenario", Scenario),
@@ -135,9 +132,7 @@ def load_track(path: str | Path, overrides: Iterable[str] | str = ()) -> Track:
     return _loaded(Track, _file_source(path, "track"), overrides)
 
 
-def load_settings(
-    path: str | Path | None = None, overrides: Iterable[str] | str = ()
-) -> Settings:
+def load_settings(path: str | Path | None = None, overrides: Iterable[str] | str = ()) -> Settings:
     """Load settings from a file, or the default ones; as `load_vehicle`."""
     if path is None:
         return _loaded(Settings, Source("settings", {"format": SETTINGS_FORMAT}), overrides)

@@ -101,7 +101,11 @@ class Reading:
             return None
         band = BANDS[part.band] if isinstance(part.band, str) else part.band
         return cls(
-            part.columns, dict(part.units or {}), part.reverse, part.falling_mileage, part.chord,
+            part.columns,
+            dict(part.units or {}),
+            part.reverse,
+            part.falling_mileage,
+            part.chord,
             band,
         )
 

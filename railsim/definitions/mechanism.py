@@ -266,9 +266,7 @@ class AirSpring(Definition):
             raise ValueError(f"{len(self.forces)} rows of 'forces', {len(self.heights)} 'heights'")
         for row in self.forces:
             if len(row) != len(self.pressures):
-                raise ValueError(
-                    f"a row of {len(row)} 'forces', {len(self.pressures)} 'pressures'"
-                )
+                raise ValueError(f"a row of {len(row)} 'forces', {len(self.pressures)} 'pressures'")
         return self
 
 
@@ -619,6 +617,8 @@ class Envelope(Definition):
 
 RESULTS = ("travel", "stroke", "length_start", "length_end", "max_force", "min_force")
 """Results that `published` may name, beside the smallest of each angle."""
+
+
 def _table_or_word(value: Any) -> str:
     return "table" if isinstance(value, dict) else "word"
 

@@ -461,10 +461,7 @@ def _unit_faults(mechanism: Mechanism) -> list[Fault]:
 
 def _freedom_faults(mechanism: Mechanism) -> list[Fault]:
     rows = sum(
-        ROWS[kind]
-        for joint in mechanism.joints.values()
-        for kind in ROWS
-        if hasattr(joint, kind)
+        ROWS[kind] for joint in mechanism.joints.values() for kind in ROWS if hasattr(joint, kind)
     )
     freedoms = 3 * len(mechanism.bodies) - rows
     if freedoms == 1:
@@ -521,4 +518,3 @@ def _size_faults(mechanism: Mechanism) -> list[Fault]:
     ]
     # the parameters that a user wrote, where they are the cause
     return (_unit_faults(mechanism) or faults) if faults else []
-

@@ -71,8 +71,9 @@ def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
     while level:
         inner = []
         for group, path, copies in level:
-            tables = (_members(group, key) for key in ("bodies", "wheelsets", "axleboxes",
-                                                       "elements"))
+            tables = (
+                _members(group, key) for key in ("bodies", "wheelsets", "axleboxes", "elements")
+            )
             total += copies * sum(len(table) for table in tables)
             if total > MOST_PARTS or len(path) > 2 * DEEPEST_ASSEMBLY:
                 key = ".".join(path)

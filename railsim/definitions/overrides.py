@@ -55,9 +55,7 @@ def apply_overrides(
     return changed
 
 
-def _apply(
-    source: Source, text: str, free: Sequence[str], defaults: Mapping[str, Any]
-) -> None:
+def _apply(source: Source, text: str, free: Sequence[str], defaults: Mapping[str, Any]) -> None:
     key, equals, written = text.partition("=")
     if not equals:
         raise KeyError("an assignment key.path=value is needed")

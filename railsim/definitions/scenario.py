@@ -7,14 +7,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from railsim.definitions.base import (
-    Definition,
-    FileDefinition,
-    Finite,
-    Name,
-    Positive,
-    Text,
-)
+from railsim.definitions.base import Definition, FileDefinition, Finite, Name, Positive, Text
 
 SCENARIO_FORMAT = "railsim-scenario/1"
 

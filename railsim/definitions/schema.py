@@ -165,12 +165,7 @@ def _array_words(schema: dict[str, Any]) -> str:
     return f"list of {inner}"
 
 
-_LIMITS = {
-    "minimum": ">= ",
-    "exclusiveMinimum": "> ",
-    "maximum": "<= ",
-    "exclusiveMaximum": "< ",
-}
+_LIMITS = {"minimum": ">= ", "exclusiveMinimum": "> ", "maximum": "<= ", "exclusiveMaximum": "< "}
 
 
 def _limited(schema: dict[str, Any]) -> str:

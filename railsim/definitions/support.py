@@ -26,9 +26,7 @@ from railsim.definitions.base import Definition, Finite, NonNegative, Positive, 
 
 SpringDamper = Annotated[
     tuple[Positive, NonNegative],
-    WithJsonSchema({
-        "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2,
-    }),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
 ]
 Preset = Literal["rigid", "ballasted", "co-running", "p2", "slab"]
 
@@ -53,10 +51,13 @@ FactorRows = Annotated[
     Annotated[tuple[tuple[Finite, Positive, Positive], ...], Field(min_length=1)],
     AfterValidator(_forward),
     BeforeValidator(_both_factors),
-    WithJsonSchema({
-        "type": "array", "minItems": 1,
-        "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
-    }),
+    WithJsonSchema(
+        {
+            "type": "array",
+            "minItems": 1,
+            "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
+        }
+    ),
 ]
 
 
@@ -125,16 +126,24 @@ def _slab() -> SupportValues:
     distance, rail = 0.63, 60.64
     length, stiffness = beam_on_foundation(2.059e11 * 3.217e-5, 40e6 / distance)
     return SupportValues(
-        1.5 * length * rail, (stiffness, 1.5 * length * 52e3 / distance), _CO_RUNNING.pad_lateral)
+        1.5 * length * rail, (stiffness, 1.5 * length * 52e3 / distance), _CO_RUNNING.pad_lateral
+    )
 
 
 _CO_RUNNING = SupportValues(
-    60.0, (150e6, 100e3), (30e6, 150e3), 1400.0, 450.0, (140e6, 1400e3), (70e6, 350e3))
+    60.0, (150e6, 100e3), (30e6, 150e3), 1400.0, 450.0, (140e6, 1400e3), (70e6, 350e3)
+)
 PRESETS: dict[str, SupportValues | None] = {
     "rigid": None,
     "ballasted": SupportValues(
-        0.0, _CO_RUNNING.pad_vertical, _CO_RUNNING.pad_lateral, 0.0, 0.0,
-        _CO_RUNNING.ballast_vertical, _CO_RUNNING.ballast_lateral),
+        0.0,
+        _CO_RUNNING.pad_vertical,
+        _CO_RUNNING.pad_lateral,
+        0.0,
+        0.0,
+        _CO_RUNNING.ballast_vertical,
+        _CO_RUNNING.ballast_lateral,
+    ),
     "co-running": _CO_RUNNING,
     "p2": SupportValues(245.0, (62e6, 55.4e3), _CO_RUNNING.pad_lateral),
     "slab": _slab(),
@@ -187,9 +196,12 @@ class Support(Definition):
             masses = (values.rail_mass, values.sleeper_mass, values.sleeper_inertia)
             if any(masses) != all(masses):
                 raise ValueError(
-                    "'rail_mass', 'sleeper_mass' and 'sleeper_inertia' are all 0 or all positive")
-        elif any(getattr(self, name) is not None
-                 for name in ("sleeper_mass", "sleeper_inertia", "ballast_base")):
+                    "'rail_mass', 'sleeper_mass' and 'sleeper_inertia' are all 0 or all positive"
+                )
+        elif any(
+            getattr(self, name) is not None
+            for name in ("sleeper_mass", "sleeper_inertia", "ballast_base")
+        ):
             raise ValueError("a sleeper needs 'ballast_vertical' and 'ballast_lateral'")
         if values.massless and not self._damped(values):
             raise ValueError("without masses every spring needs a damping above 0")
@@ -197,8 +209,12 @@ class Support(Definition):
 
     @staticmethod
     def _damped(values: SupportValues) -> bool:
-        parts = [values.pad_vertical, values.pad_lateral, values.ballast_vertical,
-                 values.ballast_lateral]
+        parts = [
+            values.pad_vertical,
+            values.pad_lateral,
+            values.ballast_vertical,
+            values.ballast_lateral,
+        ]
         return all(part[1] > 0.0 for part in parts if part is not None)
 
     @property
@@ -207,7 +223,9 @@ class Support(Definition):
         base = PRESETS[self.preset]
         if base is None:
             return None
-        return SupportValues(**{
-            name: getattr(base, name) if getattr(self, name) is None else getattr(self, name)
-            for name in SupportValues.__dataclass_fields__
-        })
+        return SupportValues(
+            **{
+                name: getattr(base, name) if getattr(self, name) is None else getattr(self, name)
+                for name in SupportValues.__dataclass_fields__
+            }
+        )

@@ -147,8 +147,10 @@ def store_file(path: Path, write: Callable[[int], None]) -> bool:
         os.replace(name, path)
     except OSError as error:
         _unwritable.add(path.parent)
-        notice(f"the cache {path.parent} cannot be written ({error.strerror or error}); the next "
-               "run prepares itself anew")
+        notice(
+            f"the cache {path.parent} cannot be written ({error.strerror or error}); the next "
+            "run prepares itself anew"
+        )
         return False
     except BaseException:
         if name is not None:

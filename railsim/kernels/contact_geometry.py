@@ -242,4 +242,3 @@ def rigid_sweep(
         roll[i] = x
         contacts[i, 0] = left
         contacts[i, 1] = right
-

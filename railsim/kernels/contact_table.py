@@ -146,11 +146,16 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, place):
     here = np.einsum("k,wrkf->wrf", weights[:4], nodes)
     slope = np.einsum("k,wrkf->wrf", weights[4:8], nodes)
     value = np.einsum("r,wrf->wf", weights[8:12], here)
-    parts = (value, np.einsum("r,wrf->wf", weights[8:12], slope)[:, :N_GRADIENT],
-             np.einsum("r,wrf->wf", weights[12:16], here)[:, :N_GRADIENT])
-    sums = [*((1.0 - tw) * part[0] + tw * part[1] for part in parts),
-            (value[1] - value[0])[:N_GRADIENT]]
-    out[place:place + LOOK_UP_SIZE] = np.concatenate(sums)
+    parts = (
+        value,
+        np.einsum("r,wrf->wf", weights[8:12], slope)[:, :N_GRADIENT],
+        np.einsum("r,wrf->wf", weights[12:16], here)[:, :N_GRADIENT],
+    )
+    sums = [
+        *((1.0 - tw) * part[0] + tw * part[1] for part in parts),
+        (value[1] - value[0])[:N_GRADIENT],
+    ]
+    out[place : place + LOOK_UP_SIZE] = np.concatenate(sums)
 
 
 _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_nodes
@@ -193,8 +198,13 @@ def under_load(t, first, vertical):
     b1 = t[first + B1] + share * t[first + D_B1]
     middle = t[first + B1] + MIDDLE_SHARE * t[first + D_B1]
     a1 = t[first + A1] * (1.39 * middle + 0.61 * b1) / (0.61 * middle + 1.39 * b1)
-    return (t[first + C_Y] + share * t[first + D_C_Y], t[first + C_Z] + share * t[first + D_C_Z],
-            a1, b1, t[first + TAN_GAMMA] + share * t[first + D_TAN_GAMMA])
+    return (
+        t[first + C_Y] + share * t[first + D_C_Y],
+        t[first + C_Z] + share * t[first + D_C_Z],
+        a1,
+        b1,
+        t[first + TAN_GAMMA] + share * t[first + D_TAN_GAMMA],
+    )
 
 
 @jit
@@ -245,8 +255,10 @@ def coupled_approaches(coupling, table, stiffness, approach):
 def bounds(contact) -> np.ndarray:
     """Usable range of the tables, [[s], [stretched roll], [w]] lower and upper."""
     shape = contact.values.shape
-    return np.array([
-        [contact.y0 + contact.dy, contact.y0 + (shape[4] - 2) * contact.dy],
-        [contact.roll0 + contact.droll, contact.roll0 + (shape[3] - 2) * contact.droll],
-        [0.0, (shape[2] - 1) * contact.dw],
-    ])
+    return np.array(
+        [
+            [contact.y0 + contact.dy, contact.y0 + (shape[4] - 2) * contact.dy],
+            [contact.roll0 + contact.droll, contact.roll0 + (shape[3] - 2) * contact.droll],
+            [0.0, (shape[2] - 1) * contact.dw],
+        ]
+    )

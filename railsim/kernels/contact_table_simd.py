@@ -111,7 +111,8 @@ def _emit(builder, values, first, row, slab, weights, tw, out, place):
         return lanes.add(lanes.splat(tw), builder.fsub(b, a), a)
 
     value, slope_y, slope_roll = (
-        between(force, a, b) for a, b in zip(slabs[0][:3], slabs[1][:3], strict=True))
+        between(force, a, b) for a, b in zip(slabs[0][:3], slabs[1][:3], strict=True)
+    )
     force.store(value, out, place)
     patch.store(between(patch, slabs[0][3], slabs[1][3]), out, ahead(place, _GRADIENT))
     gradients = slope_y, slope_roll, builder.fsub(slabs[1][0], slabs[0][0])

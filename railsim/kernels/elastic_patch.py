@@ -128,8 +128,14 @@ def patch_sums(z, theta, h, lift, du, window, to_start, weight):
         # window at both ends of the overlap; integrals of products of three linear functions
         w0 = w0s[i] + begin * (w1s[i] - w0s[i])
         w1 = w0s[i] + end * (w1s[i] - w0s[i])
-        energy += 0.25 * normal * (w0 * (3.0 * v0 * v0 + 2.0 * v0 * v1 + v1 * v1)
-                                   + w1 * (v0 * v0 + 2.0 * v0 * v1 + 3.0 * v1 * v1))
+        energy += (
+            0.25
+            * normal
+            * (
+                w0 * (3.0 * v0 * v0 + 2.0 * v0 * v1 + v1 * v1)
+                + w1 * (v0 * v0 + 2.0 * v0 * v1 + 3.0 * v1 * v1)
+            )
+        )
         # integral of w v (f0 + (f1 - f0) x): weights of both ends
         first = 0.5 * normal * (w0 * (3.0 * v0 + v1) + w1 * (v0 + v1))
         second = 0.5 * normal * (w0 * (v0 + v1) + w1 * (v0 + 3.0 * v1))
@@ -219,8 +225,9 @@ def averaged_curvature(A, curvature, half_widths, hertz, load, floor_ratio):
             j += 1
         x = (b - half_widths[j]) / (half_widths[j + 1] - half_widths[j])
         x = min(max(x, 0.0), 1.0)
-        B = kept_above(0.5 * (curvature[j] + x * (curvature[j + 1] - curvature[j])),
-                       floor_ratio * A)
+        B = kept_above(
+            0.5 * (curvature[j] + x * (curvature[j + 1] - curvature[j])), floor_ratio * A
+        )
         # the geometric mean damps the iteration, which may swing in the flange root
         b = math.sqrt(b * unit_ellipse(A, B, hertz)[1] * third)
     return B

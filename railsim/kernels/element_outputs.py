@@ -53,7 +53,9 @@ def end_point(pose, b, row, e, point):
     pz = pose[b, 6] * x + pose[b, 7] * y + pose[b, 8] * z
     w1, w2, w3 = pose[b, ANGULAR], pose[b, ANGULAR + 1], pose[b, ANGULAR + 2]
     return (
-        pose[b, POSITION] + px, pose[b, POSITION + 1] + py, pose[b, POSITION + 2] + pz,
+        pose[b, POSITION] + px,
+        pose[b, POSITION + 1] + py,
+        pose[b, POSITION + 2] + pz,
         pose[b, VELOCITY] + w2 * pz - w3 * py,
         pose[b, VELOCITY + 1] + w3 * px - w1 * pz,
         pose[b, VELOCITY + 2] + w1 * py - w2 * px,
@@ -100,10 +102,12 @@ def mount_output(system, work, inner, index, e, out):
         for k in range(3):
             d = pose[i, k] * gx + pose[i, 3 + k] * gy + pose[i, 6 + k] * gz
             rate = pose[i, k] * vx + pose[i, 3 + k] * vy + pose[i, 6 + k] * vz
-            force = (row[index, PRELOAD_X + k] + row[index, STIFFNESS_X + k] * d
-                     + row[index, DAMPING_X + k] * rate
-                     + axis_law(mounts, internal, curves, index, k, d, rate, normal, inner,
-                                work.drive))
+            force = (
+                row[index, PRELOAD_X + k]
+                + row[index, STIFFNESS_X + k] * d
+                + row[index, DAMPING_X + k] * rate
+                + axis_law(mounts, internal, curves, index, k, d, rate, normal, inner, work.drive)
+            )
             out[e, DEFLECTION + k] = d
             out[e, FORCE + k] = force
             out[e, POWER] += force * rate
@@ -124,8 +128,11 @@ def rotation_output(row, index, i, j, pose, e, out):
             r_ab += pose[i, k + a] * pose[j, k + b]
         # m_axis = K_a R_ba - K_b R_ab in the order of `elements.rotation_moment`
         rate = pose[i, axis] * wx + pose[i, 3 + axis] * wy + pose[i, 6 + axis] * wz
-        moment = (row[index, ROTATION_X + a] * r_ba - row[index, ROTATION_X + b] * r_ab
-                  + row[index, ROTATION_DAMPING_X + axis] * rate)
+        moment = (
+            row[index, ROTATION_X + a] * r_ba
+            - row[index, ROTATION_X + b] * r_ab
+            + row[index, ROTATION_DAMPING_X + axis] * rate
+        )
         out[e, ANGLE + axis] = 0.5 * (r_ba - r_ab)
         out[e, MOMENT + axis] = moment
         out[e, POWER] += moment * rate

@@ -47,10 +47,16 @@ from railsim.kernels.system import (
 @jit_inline
 def end_of(body, end, which):
     """Where the rows in `Work.pose` of one end's bodies start, for eight elements."""
-    return (body[which[0], end] * POSE_SIZE, body[which[1], end] * POSE_SIZE,
-            body[which[2], end] * POSE_SIZE, body[which[3], end] * POSE_SIZE,
-            body[which[4], end] * POSE_SIZE, body[which[5], end] * POSE_SIZE,
-            body[which[6], end] * POSE_SIZE, body[which[7], end] * POSE_SIZE)
+    return (
+        body[which[0], end] * POSE_SIZE,
+        body[which[1], end] * POSE_SIZE,
+        body[which[2], end] * POSE_SIZE,
+        body[which[3], end] * POSE_SIZE,
+        body[which[4], end] * POSE_SIZE,
+        body[which[5], end] * POSE_SIZE,
+        body[which[6], end] * POSE_SIZE,
+        body[which[7], end] * POSE_SIZE,
+    )
 
 
 @jit_inline
@@ -122,8 +128,15 @@ def link_forces(links, curves, inner, drive, laws, pose):
         fx, fy, fz = force * nx, force * ny, force * nz
         m1, m2, m3 = cross(a[0], a[1], a[2], fx, fy, fz)
         n1, n2, n3 = cross(b[0], b[1], b[2], fx, fy, fz)
-        add_to_pairs(pose, one, two, PUSH, (zero, zero, fx, fy, fz, m1, m2, m3),
-                     (zero, zero, -fx, -fy, -fz, -n1, -n2, -n3), n)
+        add_to_pairs(
+            pose,
+            one,
+            two,
+            PUSH,
+            (zero, zero, fx, fy, fz, m1, m2, m3),
+            (zero, zero, -fx, -fy, -fz, -n1, -n2, -n3),
+            n,
+        )
 
 
 @jit_inline
@@ -163,8 +176,9 @@ def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
         lane = e - first
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
         normal = pad_load(mounts, e, laws[2 * LANES + lane])
-        laws[(6 + k) * LANES + lane] = axis_law(mounts, internal, curves, e, k, d, rate, normal,
-                                                inner, drive)
+        laws[(6 + k) * LANES + lane] = axis_law(
+            mounts, internal, curves, e, k, d, rate, normal, inner, drive
+        )
 
 
 @jit_inline
@@ -185,8 +199,12 @@ def rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3):
     r31 = R1[2] * R2[0] + R1[5] * R2[3] + R1[8] * R2[6]
     r32 = R1[2] * R2[1] + R1[5] * R2[4] + R1[8] * R2[7]
     wx, wy, wz = turned_back(R1, W2[0] - W1[0], W2[1] - W1[1], W2[2] - W1[2])
-    return turned(R1, k2 * r32 - k3 * r23 + c1 * wx, k3 * r13 - k1 * r31 + c2 * wy,
-                  k1 * r21 - k2 * r12 + c3 * wz)
+    return turned(
+        R1,
+        k2 * r32 - k3 * r23 + c1 * wx,
+        k3 * r13 - k1 * r31 + c2 * wy,
+        k1 * r21 - k2 * r12 + c3 * wz,
+    )
 
 
 @jit_merged
@@ -235,9 +253,12 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         n1, n2, n3 = spread(0.0), spread(0.0), spread(0.0)
         if both_ends:
             d, rate = in_axes_of(R2, W2, g, w)
-            sx, sy, sz = turned(R2, share_2 * (fx_0 + kx * d[0] + cx * rate[0]),
-                                share_2 * (fy_0 + ky * d[1] + cy * rate[1]),
-                                share_2 * (fz_0 + kz * d[2] + cz * rate[2]))
+            sx, sy, sz = turned(
+                R2,
+                share_2 * (fx_0 + kx * d[0] + cx * rate[0]),
+                share_2 * (fy_0 + ky * d[1] + cy * rate[1]),
+                share_2 * (fz_0 + kz * d[2] + cz * rate[2]),
+            )
             n1, n2, n3 = cross(g[0], g[1], g[2], sx, sy, sz)
             fx, fy, fz = fx + sx, fy + sy, fz + sz
         if rotates:
@@ -247,8 +268,15 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         x, y, z = cross(a[0], a[1], a[2], fx, fy, fz)
         m1, m2, m3 = m1 + x, m2 + y, m3 + z
         x, y, z = cross(b[0], b[1], b[2], fx, fy, fz)
-        add_to_pairs(pose, one, two, PUSH, (zero, zero, fx, fy, fz, m1, m2, m3),
-                     (zero, zero, -fx, -fy, -fz, n1 - x, n2 - y, n3 - z), n)
+        add_to_pairs(
+            pose,
+            one,
+            two,
+            PUSH,
+            (zero, zero, fx, fy, fz, m1, m2, m3),
+            (zero, zero, -fx, -fy, -fz, n1 - x, n2 - y, n3 - z),
+            n,
+        )
 
 
 @jit_internal

@@ -13,8 +13,19 @@ from railsim.kernels.wheel_rail import W_Q, W_T_GAMMA, W_Y
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
 (
-    X_Q, X_Q_RIGHT, X_Y, X_Y_RIGHT, X_Y_OVER_Q, X_Y_OVER_Q_RIGHT, X_T_GAMMA, X_T_GAMMA_RIGHT,
-    X_SUM_Y, X_SUM_ABS_Y, X_LATERAL, X_ROLL, X_YAW,
+    X_Q,
+    X_Q_RIGHT,
+    X_Y,
+    X_Y_RIGHT,
+    X_Y_OVER_Q,
+    X_Y_OVER_Q_RIGHT,
+    X_T_GAMMA,
+    X_T_GAMMA_RIGHT,
+    X_SUM_Y,
+    X_SUM_ABS_Y,
+    X_LATERAL,
+    X_ROLL,
+    X_YAW,
 ) = range(13)
 EXTREMES = 16
 # rows

@@ -25,15 +25,7 @@ from numpy.typing import NDArray
 
 from . import fastsim_simd, jit, jit_ordered
 from .aligned import aligned_zeros
-from .fastsim_simd import (
-    BOUNDS,
-    PER_L,
-    RESULTS,
-    W_ACROSS,
-    W_ALONG,
-    W_SUM,
-    Y_PER_L,
-)
+from .fastsim_simd import BOUNDS, PER_L, RESULTS, W_ACROSS, W_ALONG, W_SUM, Y_PER_L
 
 KALKER_U_MAX = 0.92  # the coefficient table covers |a - b| <= 0.92 (a + b): 1/24 <= a/b <= 24
 WORK_ROWS = 16
@@ -196,14 +188,15 @@ def _spread_plain(work, n, ny):
 
 def _gather_plain(work, n, ny):
     """Weighted sums over the strips of each patch into the rows `RESULTS`."""
-    x, y, m = (work[k, :n * ny].reshape(ny, n) for k in (3, 4, 5))
+    x, y, m = (work[k, : n * ny].reshape(ny, n) for k in (3, 4, 5))
     w, along, across = (work[k, :ny] for k in (W_SUM, W_ALONG, W_ACROSS))
     for k, value in zip(RESULTS, (w @ x, w @ y, along @ m, along @ y, across @ x), strict=True):
         work[k, :n] = value
 
 
 _spread, _gather = (
-    (_spread_plain, _gather_plain) if numba.config.DISABLE_JIT
+    (_spread_plain, _gather_plain)
+    if numba.config.DISABLE_JIT
     else (fastsim_simd.spread, fastsim_simd.gather)
 )
 
@@ -243,8 +236,9 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     """
     columns = n * ny
     padded = max((columns + 7) // 8 * 8, _COLUMNS_MIN)
-    _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work[3], work[4], work[5],
-                  work[6])
+    _patch_slopes(
+        n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work[3], work[4], work[5], work[6]
+    )
     _spread(work, n, ny)
     for c in range(columns, padded):
         work[0, c] = work[1, c] = work[2, c] = 0.0
@@ -258,5 +252,6 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
         unit = max(mu_N[i], 0.0) * 8.0 / (math.pi * nx * ny)
         T_x[i] = unit * work[sum_x, i]
         T_y[i] = unit * work[sum_y, i]
-        M_z[i] = unit * (a[i] * (work[running, i] - 0.5 * (nx + 1) * work[along, i])
-                         - b[i] * work[across, i])
+        M_z[i] = unit * (
+            a[i] * (work[running, i] - 0.5 * (nx + 1) * work[along, i]) - b[i] * work[across, i]
+        )

@@ -97,8 +97,10 @@ def _of_one(name):
     def function(typingctx, x):
         def codegen(context, builder, sig, args):
             kind = ir.FunctionType(_VECTOR, [_VECTOR])
-            return builder.call(cgutils.get_or_insert_function(
-                builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
+            return builder.call(
+                cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"),
+                args,
+            )
 
         return lanes(lanes), codegen
 
@@ -185,8 +187,9 @@ def _turned(builder, rows):
             if not k & distance:
                 a, b = these[k], these[k + distance]
                 for place, mask in ((k, first), (k + distance, second)):
-                    mixed[place] = builder.shuffle_vector(a, b, ir.Constant(
-                        ir.VectorType(_INDEX, LANES), mask))
+                    mixed[place] = builder.shuffle_vector(
+                        a, b, ir.Constant(ir.VectorType(_INDEX, LANES), mask)
+                    )
         return mixed
 
     rows = pairs(rows, 1, [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15])
@@ -249,7 +252,8 @@ def add_rows(typingctx, array, rows, column, values, n):
         column = context.cast(builder, args[2], sig.args[2], types.intp)
         count, turned = _back(builder, args[3])
         for k, (place, row) in enumerate(
-                zip(_places(builder, args[1], column), turned, strict=True)):
+            zip(_places(builder, args[1], column), turned, strict=True)
+        ):
             there = builder.icmp_signed(">", args[4], ir.Constant(_INT, k))
             with builder.if_then(there, likely=True):
                 pointer = _pointer(context, builder, sig.args[0], args[0], place)
@@ -312,31 +316,62 @@ def store_lanes(typingctx, array, place, x):
 def eight(index, first):
     """Eight entries of `index` from `first` on; beyond its end the last one again."""
     last = index.shape[0] - 1
-    return (index[min(first, last)], index[min(first + 1, last)], index[min(first + 2, last)],
-            index[min(first + 3, last)], index[min(first + 4, last)], index[min(first + 5, last)],
-            index[min(first + 6, last)], index[min(first + 7, last)])
+    return (
+        index[min(first, last)],
+        index[min(first + 1, last)],
+        index[min(first + 2, last)],
+        index[min(first + 3, last)],
+        index[min(first + 4, last)],
+        index[min(first + 5, last)],
+        index[min(first + 6, last)],
+        index[min(first + 7, last)],
+    )
 
 
 @jit_inline
 def eight_from(first, count):
     """The numbers from `first` on; beyond `count` the last one again."""
     last = count - 1
-    return (min(first, last), min(first + 1, last), min(first + 2, last), min(first + 3, last),
-            min(first + 4, last), min(first + 5, last), min(first + 6, last), min(first + 7, last))
+    return (
+        min(first, last),
+        min(first + 1, last),
+        min(first + 2, last),
+        min(first + 3, last),
+        min(first + 4, last),
+        min(first + 5, last),
+        min(first + 6, last),
+        min(first + 7, last),
+    )
 
 
 @jit_inline
 def eight_of(index, numbers):
     """Entries of `index` at eight places."""
-    return (index[numbers[0]], index[numbers[1]], index[numbers[2]], index[numbers[3]],
-            index[numbers[4]], index[numbers[5]], index[numbers[6]], index[numbers[7]])
+    return (
+        index[numbers[0]],
+        index[numbers[1]],
+        index[numbers[2]],
+        index[numbers[3]],
+        index[numbers[4]],
+        index[numbers[5]],
+        index[numbers[6]],
+        index[numbers[7]],
+    )
 
 
 @jit_inline
 def starts(numbers, size):
     """Where eight rows of a table with rows of `size` start."""
-    return (numbers[0] * size, numbers[1] * size, numbers[2] * size, numbers[3] * size,
-            numbers[4] * size, numbers[5] * size, numbers[6] * size, numbers[7] * size)
+    return (
+        numbers[0] * size,
+        numbers[1] * size,
+        numbers[2] * size,
+        numbers[3] * size,
+        numbers[4] * size,
+        numbers[5] * size,
+        numbers[6] * size,
+        numbers[7] * size,
+    )
 
 
 if numba.config.DISABLE_JIT:

@@ -47,9 +47,9 @@ def add_to_pairs(array, one, two, column, to_one, to_two, n):
 
 def load_lanes(array, place):
     """Eight numbers that follow each other."""
-    return array.reshape(-1)[place:place + LANES].copy()
+    return array.reshape(-1)[place : place + LANES].copy()
 
 
 def store_lanes(array, place, x):
     """Store eight numbers one after the other."""
-    array.reshape(-1)[place:place + LANES] = x
+    array.reshape(-1)[place : place + LANES] = x

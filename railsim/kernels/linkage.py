@@ -147,7 +147,10 @@ def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
             J[i, j] = 0.0
     for k in range(linkage.joint.shape[0]):
         kind, p1, p2, row = (
-            linkage.joint[k, 0], linkage.joint[k, 1], linkage.joint[k, 2], linkage.joint[k, 3]
+            linkage.joint[k, 0],
+            linkage.joint[k, 1],
+            linkage.joint[k, 2],
+            linkage.joint[k, 3],
         )
         if kind == PARALLEL:
             Phi[row] = q[p1, 2] - q[p2, 2] - linkage.value[lane, k, 0]
@@ -221,7 +224,10 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
     for k in range(linkage.joint.shape[0] + 1):
         if k < linkage.joint.shape[0]:
             kind, p1, p2, row = (
-                linkage.joint[k, 0], linkage.joint[k, 1], linkage.joint[k, 2], linkage.joint[k, 3]
+                linkage.joint[k, 0],
+                linkage.joint[k, 1],
+                linkage.joint[k, 2],
+                linkage.joint[k, 3],
             )
             radius = linkage.value[lane, k, 0]
             if kind == CAM:

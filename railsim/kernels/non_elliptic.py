@@ -76,7 +76,8 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
         # the centre's own element: the mean of the logarithm over it
         distance = max(abs(s), length[k] / (2.0 * math.e))
         influence = math.exp(
-            interpolated(math.log(distance / half), strips.start, strips.spacing, strips.strip))
+            interpolated(math.log(distance / half), strips.start, strips.spacing, strips.strip)
+        )
         load_sum += 0.5 * math.pi * squared * length[k]
         depth_sum += half * influence * length[k]
         area += 2.0 * half * length[k]
@@ -130,12 +131,16 @@ def corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips):
     virtual = VIRTUAL_SHARE * delta
     a_virtual, b_virtual = math.sqrt(virtual / A), math.sqrt(virtual / B)
     influence = math.exp(
-        interpolated(math.log(b_virtual / a_virtual), strips.start, strips.spacing, strips.whole))
+        interpolated(math.log(b_virtual / a_virtual), strips.start, strips.spacing, strips.whole)
+    )
     N_virtual = math.pi * E_star * delta * (2.0 * math.pi / 3.0) * a_virtual / influence
     N_hertz = (delta / ellipse[2]) ** 1.5
     third = N_hertz ** (1.0 / 3.0)
-    return (N * N_hertz / N_virtual, a * ellipse[0] * third / a_virtual,
-            b * ellipse[1] * third / b_virtual)
+    return (
+        N * N_hertz / N_virtual,
+        a * ellipse[0] * third / a_virtual,
+        b * ellipse[1] * third / b_virtual,
+    )
 
 
 @jit_outside

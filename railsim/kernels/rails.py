@@ -72,8 +72,9 @@ def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
         i, u = cell[f], cell_u[f]
         for side in range(2):
             m = MU_LEFT + side
-            rail[w, side, FRICTION], _, _ = polynomial(c[i, m, 0], c[i, m, 1], c[i, m, 2],
-                                                       c[i, m, 3], u)
+            rail[w, side, FRICTION], _, _ = polynomial(
+                c[i, m, 0], c[i, m, 1], c[i, m, 2], c[i, m, 3], u
+            )
         if track.has_irregularity:
             locate_displaced(c, i, u, w, plane, rail)
 
@@ -81,14 +82,18 @@ def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
 @jit_merged
 def locate_displaced(c, i, u, w, plane, rail):
     """Plane and rails of wheelset `w` from the displacements in cell `i` of the tables `c`."""
-    y_l, y_l1, y_l2 = polynomial(c[i, Y_LEFT, 0], c[i, Y_LEFT, 1], c[i, Y_LEFT, 2],
-                                 c[i, Y_LEFT, 3], u)
-    z_l, z_l1, z_l2 = polynomial(c[i, Z_LEFT, 0], c[i, Z_LEFT, 1], c[i, Z_LEFT, 2],
-                                 c[i, Z_LEFT, 3], u)
-    y_r, y_r1, y_r2 = polynomial(c[i, Y_RIGHT, 0], c[i, Y_RIGHT, 1], c[i, Y_RIGHT, 2],
-                                 c[i, Y_RIGHT, 3], u)
-    z_r, z_r1, z_r2 = polynomial(c[i, Z_RIGHT, 0], c[i, Z_RIGHT, 1], c[i, Z_RIGHT, 2],
-                                 c[i, Z_RIGHT, 3], u)
+    y_l, y_l1, y_l2 = polynomial(
+        c[i, Y_LEFT, 0], c[i, Y_LEFT, 1], c[i, Y_LEFT, 2], c[i, Y_LEFT, 3], u
+    )
+    z_l, z_l1, z_l2 = polynomial(
+        c[i, Z_LEFT, 0], c[i, Z_LEFT, 1], c[i, Z_LEFT, 2], c[i, Z_LEFT, 3], u
+    )
+    y_r, y_r1, y_r2 = polynomial(
+        c[i, Y_RIGHT, 0], c[i, Y_RIGHT, 1], c[i, Y_RIGHT, 2], c[i, Y_RIGHT, 3], u
+    )
+    z_r, z_r1, z_r2 = polynomial(
+        c[i, Z_RIGHT, 0], c[i, Z_RIGHT, 1], c[i, Z_RIGHT, 2], c[i, Z_RIGHT, 3], u
+    )
     sine = (z_r - z_l) / CANT_BASE
     cosine = sqrt(1.0 - sine * sine)
     plane[w, MIDDLE_Y] = 0.5 * (y_l + y_r)

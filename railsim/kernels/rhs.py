@@ -105,9 +105,17 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
         sp, cp = sine_cosine_lanes(pitch * (1.0 - spins))
         sy, cy = sine_cosine_lanes(yaw)
         # C = Rz(yaw) Rx(roll) Ry(pitch)
-        C = (cy * cp - sy * sr * sp, -sy * cr, cy * sp + sy * sr * cp,
-             sy * cp + cy * sr * sp, cy * cr, sy * sp - cy * sr * cp,
-             -cr * sp, sr, cr * cp)
+        C = (
+            cy * cp - sy * sr * sp,
+            -sy * cr,
+            cy * sp + sy * sr * cp,
+            sy * cp + cy * sr * sp,
+            cy * cr,
+            sy * sp - cy * sr * cp,
+            -cr * sp,
+            sr,
+            cr * cp,
+        )
         store_rows(relative, starts(own, RELATIVE_SIZE), 0, C[:8])
         store_rows(relative, starts(own, RELATIVE_SIZE), 8, (C[8], sr, cr, sp, cp))
         x_f, y_f, z_f, a0, a1, a2, a3, a4 = load_rows(frames, frame, 0, 8)
@@ -124,8 +132,9 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
         w1, w2, w3 = turned(R, u1, u2, u3)
         y, z = y + y_0, z + z_0
         px, py, pz = turned(A, x, y, z)
-        vx, vy, vz = turned(A, speed + f2 * z - f3 * y + vx, f3 * x - f1 * z + vy,
-                            f1 * y - f2 * x + vz)
+        vx, vy, vz = turned(
+            A, speed + f2 * z - f3 * y + vx, f3 * x - f1 * z + vy, f1 * y - f2 * x + vz
+        )
         place = starts(own, POSE_SIZE)
         store_rows(pose, place, 0, R[:8])
         store_rows(pose, place, 8, (R[8], x_f + px, y_f + py, z_f + pz, vx, vy, vz, w1))
@@ -148,11 +157,25 @@ def axlebox_kinematics(bodies, state, pose, rates):
         r8, x, y, z, vx, vy, vz, w1 = load_rows(pose, carrier, 8, 8)
         w2, w3 = load_rows(pose, carrier, 16, 2)
         place = starts(own, POSE_SIZE)
-        store_rows(pose, place, 0, (c * r0 - s * r2, r1, s * r0 + c * r2, c * r3 - s * r5, r4,
-                                    s * r3 + c * r5, c * r6 - s * r8, r7))
+        store_rows(
+            pose,
+            place,
+            0,
+            (
+                c * r0 - s * r2,
+                r1,
+                s * r0 + c * r2,
+                c * r3 - s * r5,
+                r4,
+                s * r3 + c * r5,
+                c * r6 - s * r8,
+                r7,
+            ),
+        )
         store_rows(pose, place, 8, (s * r6 + c * r8, x, y, z, vx, vy, vz, w1 + r1 * rate))
-        store_rows(pose, place, 16, (w2 + r4 * rate, w3 + r7 * rate, zero, zero, zero, zero, zero,
-                                     zero))
+        store_rows(
+            pose, place, 16, (w2 + r4 * rate, w3 + r7 * rate, zero, zero, zero, zero, zero, zero)
+        )
 
 
 @jit_merged
@@ -170,8 +193,11 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
         b = axles[w]
         f = bodies.frame[b]
         sr, cr = C[b, SIN_ROLL], C[b, COS_ROLL]
-        m2 = (pose[b, MOMENT] * pose[b, 1] + pose[b, MOMENT + 1] * pose[b, 4]
-              + pose[b, MOMENT + 2] * pose[b, 7])
+        m2 = (
+            pose[b, MOMENT] * pose[b, 1]
+            + pose[b, MOMENT + 1] * pose[b, 4]
+            + pose[b, MOMENT + 2] * pose[b, 7]
+        )
         about_normal = m2 * sr / cr
         turn = (C[b, 1] * frames[f, OMEGA] + C[b, 4] * frames[f, OMEGA + 1]) / (cr * cr)
         y = state[6 * b + 1] + bodies.row[b, Y_0]
@@ -195,8 +221,13 @@ def axlebox_dynamics(bodies, pose, rates, derivative):
         f1, f2, f3, m1, m2, m3 = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
         _, r1, _, _, r4, _, _, r7 = load_rows(pose, carrier, 0, 8)
         moment = m1 * r1 + m2 * r4 + m3 * r7
-        add_rows(pose, carrier, PUSH, (zero, zero, f1, f2, f3, m1 - moment * r1, m2 - moment * r4,
-                                       m3 - moment * r7), count - first)
+        add_rows(
+            pose,
+            carrier,
+            PUSH,
+            (zero, zero, f1, f2, f3, m1 - moment * r1, m2 - moment * r4, m3 - moment * r7),
+            count - first,
+        )
         rate = load_rows(rates, starts(own, RATES_SIZE), 4, 1)[0]
         acceleration = moment / inertia
         store_rows(derivative, starts(own, 6), 0, (zero, zero, zero, zero, rate, zero))
@@ -217,7 +248,8 @@ def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, 
         own = eight(bodies.whole, first)
         frame = starts(eight_of(bodies.frame, own), FRAME_SIZE)
         mass, i1, i2, i3, y_0, z_0, radius, spins = load_rows(
-            bodies.row, starts(own, BODY_SIZE), 0, 8)
+            bodies.row, starts(own, BODY_SIZE), 0, 8
+        )
         vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
         roll_rate, pitch_rate, yaw_rate = load_rows(rates, starts(own, RATES_SIZE), 3, 3)
         store_rows(derivative, starts(own, 6), 0, (vx, vy, vz, roll_rate, pitch_rate, yaw_rate))
@@ -296,7 +328,8 @@ def speed_change(drive, bodies, frames, state, derivative):
         y = state[6 * b + 1] + bodies.row[b, Y_0]
         z = state[6 * b + 2] + bodies.row[b, Z_0]
         return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
-            1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y)
+            1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y
+        )
     return 0.0
 
 
@@ -348,8 +381,9 @@ def internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
     first = 12 * system.bodies.kind.shape[0]
     for i in range(system.internal.kind.shape[0]):
-        derivative[first + i] = internal_rate(system.internal, system.curves, i, state[first + i],
-                                              work.drive[i, 0], work.drive[i, 1])
+        derivative[first + i] = internal_rate(
+            system.internal, system.curves, i, state[first + i], work.drive[i, 0], work.drive[i, 1]
+        )
 
 
 @jit_merged
@@ -371,18 +405,26 @@ def mechanics(system, work, state, derivative):
     time, s, speed = state[-3], state[-2], state[-1]
     if not speed > STANDSTILL_SPEED:
         return STANDSTILL, 0, 0
-    status = locate_frames(system.track, system.frame_offset, bodies.frame[bodies.references[0]],
-                           s, work.frames, work.cell, work.cell_u)
+    status = locate_frames(
+        system.track,
+        system.frame_offset,
+        bodies.frame[bodies.references[0]],
+        s,
+        work.frames,
+        work.cell,
+        work.cell_u,
+    )
     if status != RUNNING:
         return status, 0, 0
     if system.support.elastic:
         locate_support(system, work, s)
     kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     m = system.internal.kind.shape[0]
-    inner = state[12 * n:12 * n + m]
+    inner = state[12 * n : 12 * n + m]
     link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
-    mount_forces(system.mounts, system.internal, system.curves, inner, work.drive, work.laws,
-                 work.pose)
+    mount_forces(
+        system.mounts, system.internal, system.curves, inner, work.drive, work.laws, work.pose
+    )
     hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:
         load_forces(system.loads, time, bodies, work.frames, work.pose)
@@ -391,8 +433,18 @@ def mechanics(system, work, state, derivative):
     status, where, n_patches = wheel_rail(system, work, speed, state)
     if status != RUNNING:
         return status, where, n_patches
-    dynamics(bodies, work.frames, speed, system.gravity, state, work.relative, work.pose,
-             work.rail_force, work.acceleration, derivative)
+    dynamics(
+        bodies,
+        work.frames,
+        speed,
+        system.gravity,
+        state,
+        work.relative,
+        work.pose,
+        work.rail_force,
+        work.acceleration,
+        derivative,
+    )
     rate = speed_change(system.drive, bodies, work.frames, state, derivative)
     if rate != 0.0:
         apply_speed_change(bodies, work.frames, state, rate, derivative)

@@ -19,8 +19,10 @@ STATUS = {
     WHEEL_LIFT: ("stopped", "{where} lifted a wheel beyond the range of the model"),
     ROLL_RANGE: ("stopped", "{where} rolled beyond the range of the contact table"),
     YAW_RANGE: ("stopped", "{where} yawed beyond the range of the contact table"),
-    NOT_FINITE: ("stopped", "the state of {where} is not finite: the step is too long or the "
-                            "model is unstable"),
+    NOT_FINITE: (
+        "stopped",
+        "the state of {where} is not finite: the step is too long or the model is unstable",
+    ),
     END_OF_TRACK: ("stopped", "the vehicle reached the end of the track's table"),
     STANDSTILL: ("stopped", "the vehicle came to a standstill: creepage is not defined there"),
 }

@@ -52,8 +52,20 @@ SUPPORT_SIZE = 4 * DOF
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
 (
-    M_RAIL, M_SLEEPER, I_SLEEPER, K_PAD_Y, C_PAD_Y, K_PAD_Z, C_PAD_Z, K_BALLAST_Y, C_BALLAST_Y,
-    K_BALLAST_Z, C_BALLAST_Z, K_BALLAST_ROLL, C_BALLAST_ROLL, HALF_BASE,
+    M_RAIL,
+    M_SLEEPER,
+    I_SLEEPER,
+    K_PAD_Y,
+    C_PAD_Y,
+    K_PAD_Z,
+    C_PAD_Z,
+    K_BALLAST_Y,
+    C_BALLAST_Y,
+    K_BALLAST_Z,
+    C_BALLAST_Z,
+    K_BALLAST_ROLL,
+    C_BALLAST_ROLL,
+    HALF_BASE,
 ) = range(14)
 SUPPORT_ROW = 14
 
@@ -118,8 +130,12 @@ def track_forces(support, track, u, first, k, c, out, sign):
         arm = (2.0 * side - 1.0) * base
         i = first + 2 * side
         f_y = (u[i] - u[first + 4]) * sign * track[PADS] * (k * row[K_PAD_Y] + c * row[C_PAD_Y])
-        f_z = ((u[i + 1] - u[first + 5] - arm * u[first + 6]) * sign * track[PADS]
-               * (k * row[K_PAD_Z] + c * row[C_PAD_Z]))
+        f_z = (
+            (u[i + 1] - u[first + 5] - arm * u[first + 6])
+            * sign
+            * track[PADS]
+            * (k * row[K_PAD_Z] + c * row[C_PAD_Z])
+        )
         out[2 * side] += f_y
         out[2 * side + 1] += f_z
         y += f_y
@@ -380,9 +396,10 @@ def step_support(system, work, state, h):
         track_forces(support, track, state, first, 1.0, 0.0, track, -1.0)
         track_forces(support, track, state, first + MEAN_RATE, 0.0, 1.0, track, 0.5)
         for k in range(DOF):
-            track[k] += mass_of(row, k) * (1.5 / h * (state[first + RATE + k]
-                                           + 0.5 * state[first + MEAN_RATE + k])
-                                + 0.5 * state[first + MEAN_CHANGE + k])
+            track[k] += mass_of(row, k) * (
+                1.5 / h * (state[first + RATE + k] + 0.5 * state[first + MEAN_RATE + k])
+                + 0.5 * state[first + MEAN_CHANGE + k]
+            )
         for side in range(2):
             contact = work.support[w, side]
             i = first + 2 * side
@@ -390,13 +407,23 @@ def step_support(system, work, state, h):
             v_y = y_rate + state[i + RATE] + 0.5 * state[i + MEAN_RATE]
             v_z = z_rate + state[i + RATE + 1] + 0.5 * state[i + MEAN_RATE + 1]
             track[2 * side] += (
-                contact[F_Y] + contact[K_Y_Y] * y + contact[K_Y_Z] * z
-                + contact[K_Y_ROLL] * roll + contact[D_Y_Y] * v_y + contact[D_Y_Z] * v_z
-                + contact[D_Y_ROLL] * roll_rate)
+                contact[F_Y]
+                + contact[K_Y_Y] * y
+                + contact[K_Y_Z] * z
+                + contact[K_Y_ROLL] * roll
+                + contact[D_Y_Y] * v_y
+                + contact[D_Y_Z] * v_z
+                + contact[D_Y_ROLL] * roll_rate
+            )
             track[2 * side + 1] += (
-                contact[F_Z] + contact[K_Z_Y] * y + contact[K_Z_Z] * z
-                + contact[K_Z_ROLL] * roll + contact[D_Z_Y] * v_y + contact[D_Z_Z] * v_z
-                + contact[D_Z_ROLL] * roll_rate)
+                contact[F_Z]
+                + contact[K_Z_Y] * y
+                + contact[K_Z_Z] * z
+                + contact[K_Z_ROLL] * roll
+                + contact[D_Z_Y] * v_y
+                + contact[D_Z_Z] * v_z
+                + contact[D_Z_ROLL] * roll_rate
+            )
         solve_track(support, track, work.support[w], 2.25 / h, 1.5, h)
         for k in range(DOF):
             rate = 1.5 * track[k] - 0.5 * state[first + MEAN_RATE + k]

@@ -41,7 +41,14 @@ LINK_SIZE = 16  # whole cache lines
 
 # columns of Mounts.row, see there
 SHARE_1, SHARE_2, STIFFNESS_X, DAMPING_X, PRELOAD_X, ROTATION_X, ROTATION_DAMPING_X = (
-    6, 7, 8, 11, 14, 17, 20)
+    6,
+    7,
+    8,
+    11,
+    14,
+    17,
+    20,
+)
 STIFFNESS_Z, PRELOAD_Z = STIFFNESS_X + 2, PRELOAD_X + 2
 MOUNT_SIZE = 24
 # columns of Mounts.flags
@@ -90,12 +97,12 @@ class Bodies(NamedTuple):
     @property
     def inertia(self) -> np.ndarray:
         """Principal moments of inertia [kg m2]."""
-        return self.row[:, I_1:I_1 + 3]
+        return self.row[:, I_1 : I_1 + 3]
 
     @property
     def nominal(self) -> np.ndarray:
         """Nominal y and z of the centres of gravity [m]."""
-        return self.row[:, Y_0:Y_0 + 2]
+        return self.row[:, Y_0 : Y_0 + 2]
 
     @property
     def radius(self) -> np.ndarray:
@@ -180,7 +187,7 @@ class Links(NamedTuple):
     @property
     def spring(self) -> np.ndarray:
         """Stiffness [N/m], parallel damping [N s/m], preload [N], shape (e, 3)."""
-        return self.row[:, STIFFNESS:PRELOAD + 1]
+        return self.row[:, STIFFNESS : PRELOAD + 1]
 
 
 class Mounts(NamedTuple):
@@ -219,27 +226,27 @@ class Mounts(NamedTuple):
     @property
     def stiffness(self) -> np.ndarray:
         """Stiffnesses, shape (e, 3) [N/m]."""
-        return self.row[:, STIFFNESS_X:STIFFNESS_X + 3]
+        return self.row[:, STIFFNESS_X : STIFFNESS_X + 3]
 
     @property
     def damping(self) -> np.ndarray:
         """Dampings, shape (e, 3) [N s/m]."""
-        return self.row[:, DAMPING_X:DAMPING_X + 3]
+        return self.row[:, DAMPING_X : DAMPING_X + 3]
 
     @property
     def preload(self) -> np.ndarray:
         """Preloads, shape (e, 3) [N]."""
-        return self.row[:, PRELOAD_X:PRELOAD_X + 3]
+        return self.row[:, PRELOAD_X : PRELOAD_X + 3]
 
     @property
     def rotation(self) -> np.ndarray:
         """K_d of the rotational potential, shape (e, 3) [N m]."""
-        return self.row[:, ROTATION_X:ROTATION_X + 3]
+        return self.row[:, ROTATION_X : ROTATION_X + 3]
 
     @property
     def rotation_damping(self) -> np.ndarray:
         """Dampings about the axes, shape (e, 3) [N m s]."""
-        return self.row[:, ROTATION_DAMPING_X:ROTATION_DAMPING_X + 3]
+        return self.row[:, ROTATION_DAMPING_X : ROTATION_DAMPING_X + 3]
 
 
 class Curves(NamedTuple):

@@ -150,8 +150,11 @@ def fill_table_slice(
             least[p] = FAR_AWAY
             for k in range(wheel.first[p], wheel.last[p], STRIDE):
                 if stretch[k] > 0.0:
-                    gap = centre_height - c_z[k] + rail_height(
-                        y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope)[0]
+                    gap = (
+                        centre_height
+                        - c_z[k]
+                        + rail_height(y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope)[0]
+                    )
                     if gap < least[p]:
                         least[p], lowest = gap, k
             out = values[p, i]
@@ -162,16 +165,30 @@ def fill_table_slice(
         for p in range(n_patch):
             if least[p] > nearest + OUT_OF_REACH or least[p] == FAR_AWAY:
                 continue
-            start, end = near_candidates(y, p, least[p], c_y, c_z, stretch, centre_height, wheel,
-                                         rail)
+            start, end = near_candidates(
+                y, p, least[p], c_y, c_z, stretch, centre_height, wheel, rail
+            )
             for k in range(start, end):
                 height, along, node[k] = rail_height(
-                    y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope)
+                    y + c_y[k], rail.Y0, rail.dY, rail.z, rail.slope
+                )
                 h[k] = height + centre_height - c_z[k]
                 lift[k] = 0.5 * (stretch[k] + math.sqrt(1.0 + along * along))
                 slope[k] = -along
-            zone = Zone(h, lift, du, length, c_y, c_z, wheel.r, slope, wheel.window[p],
-                        wheel.curvature, rail.curvature, node)
+            zone = Zone(
+                h,
+                lift,
+                du,
+                length,
+                c_y,
+                c_z,
+                wheel.r,
+                slope,
+                wheel.window[p],
+                wheel.curvature,
+                rail.curvature,
+                node,
+            )
             fill_zone(values[p, i], zone, start, end, elastic, hertz, strips)
 
 
@@ -202,12 +219,14 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
     h, lift, du = zone.h[start:end], zone.lift[start:end], zone.du[start:end]
     z = height_under_load(least + 5e-5, elastic.reference, k, FIRST_THETA, h, lift, du)
     scratch, weight = np.empty(end - start), np.empty(end - start)
-    along, across, _, carried, _ = patch_sums(z, FIRST_THETA, h, lift, du, zone.window[start:end],
-                                              scratch, weight)
+    along, across, _, carried, _ = patch_sums(
+        z, FIRST_THETA, h, lift, du, zone.window[start:end], scratch, weight
+    )
     A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
     curvature = averaged_over_widths(zone, start, weight) / carried
-    B = averaged_curvature(A, curvature, elastic.half_widths, hertz, elastic.reference,
-                           elastic.floor_ratio)
+    B = averaged_curvature(
+        A, curvature, elastic.half_widths, hertz, elastic.reference, elastic.floor_ratio
+    )
     _, b1, d1 = unit_ellipse(A, B, hertz)
     start, end = within(z + MORE_LOAD * across / along, h, start, end)
     h, lift, du = zone.h[start:end], zone.lift[start:end], zone.du[start:end]
@@ -222,7 +241,8 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
         theta = kappa * load ** (2.0 / 3.0)
         z = height_under_load(least + depth * load ** (2.0 / 3.0), load, k, theta, h, lift, du)
         along, across, energy, carried, deepest = patch_sums(
-            z, theta, h, lift, du, zone.window[start:end], scratch, weight)
+            z, theta, h, lift, du, zone.window[start:end], scratch, weight
+        )
         heights[j] = z
         energies[j] = k * energy + carried / along * 0.4 * kappa * load ** (5.0 / 3.0)
         A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
@@ -233,8 +253,9 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
         place[1, j] = weighted(weight, zone.c_z[start:end]) / carried
         place[3, j] = weighted(weight, zone.slope[start:end]) / carried
         if elastic.non_elliptic:
-            a, b = non_elliptic_axes(zone, start, end, place[0, j], A, B, ellipse, load,
-                                     elastic.E_star, strips)
+            a, b = non_elliptic_axes(
+                zone, start, end, place[0, j], A, B, ellipse, load, elastic.E_star, strips
+            )
             if a > 0.0:
                 axis[j], place[2, j] = a, b
     out[G], out[K], out[K2] = fit_energy(heights, energies)
@@ -264,8 +285,9 @@ def averaged_over_widths(zone, start, weight):
         if weight[i] > 0.0:
             k = start + i
             for m in range(sums.size):
-                sums[m] += weight[i] * (zone.wheel_curvature[m, k]
-                                        + zone.rail_curvature[m, zone.node[k]])
+                sums[m] += weight[i] * (
+                    zone.wheel_curvature[m, k] + zone.rail_curvature[m, zone.node[k]]
+                )
     return sums
 
 

@@ -15,13 +15,7 @@ import numpy as np
 from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.extremes import note_extremes, note_unloaded
-from railsim.kernels.internal import (
-    MAXWELL_CURVE,
-    PAD,
-    advanced,
-    constant_decays,
-    within_table,
-)
+from railsim.kernels.internal import MAXWELL_CURVE, PAD, advanced, constant_decays, within_table
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import (
@@ -99,8 +93,13 @@ def record(recorder, row, system, state, derivative, work, n_patches):
         record_patches(recorder.patch, row, work, n_patches)
     if recorder.chosen.shape[0] > 0:
         first = 12 * system.bodies.kind.shape[0]
-        element_outputs(system, work, state[first:first + system.internal.kind.shape[0]],
-                        recorder.chosen, recorder.element[row])
+        element_outputs(
+            system,
+            work,
+            state[first : first + system.internal.kind.shape[0]],
+            recorder.chosen,
+            recorder.element[row],
+        )
 
 
 @jit_internal
@@ -174,9 +173,11 @@ def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     inverse = 1.0 / (a11 * c11 + a21 * c12 + a31 * c13)
     rate[v + 1] = before[v + 1] + inverse * (c11 * d1 + c12 * d2 + c13 * d3)
     rate[v + 2] = before[v + 2] + inverse * (
-        (a23 * a31 - a21 * a33) * d1 + (a11 * a33 - a13 * a31) * d2 + (a13 * a21 - a11 * a23) * d3)
+        (a23 * a31 - a21 * a33) * d1 + (a11 * a33 - a13 * a31) * d2 + (a13 * a21 - a11 * a23) * d3
+    )
     rate[v + 3] = before[v + 3] + inverse * (
-        (a21 * a32 - a22 * a31) * d1 + (a12 * a31 - a11 * a32) * d2 + (a11 * a22 - a12 * a21) * d3)
+        (a21 * a32 - a22 * a31) * d1 + (a12 * a31 - a11 * a32) * d2 + (a11 * a22 - a12 * a21) * d3
+    )
 
 
 @jit_inline
@@ -193,8 +194,17 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     mass = 1.0 / bodies.row[b, MASS]
     along = jacobian[b, J_ALONG]
     if along > 0.0:
-        soften_slip(rate, before, v, v + 4, jacobian[b, J_ALONG_LEVER] / along, along, mass,
-                    1.0 / bodies.row[b, I_2], h)
+        soften_slip(
+            rate,
+            before,
+            v,
+            v + 4,
+            jacobian[b, J_ALONG_LEVER] / along,
+            along,
+            mass,
+            1.0 / bodies.row[b, I_2],
+            h,
+        )
     soften_across(jacobian, b, rate, before, v, mass, 1.0 / bodies.row[b, I_1], h)
     soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
 
@@ -204,7 +214,7 @@ def remember(system, work, state, derivative, h):
     """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
-    rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
+    rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
     for k in range(6 * n):
         before[k] = 0.0
     for b in range(n):
@@ -232,7 +242,7 @@ def step_fast(system, work, state, derivative, decay, h):
     bodies, C = system.bodies, work.relative
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
-    rate, before = derivative[6 * n:12 * n], state[first:first + 6 * n]
+    rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
     frames, half = work.frames, 0.5 * h * state[-1] * state[-1]
     if system.support.elastic:
         note_wheelsets(system, work, state)
@@ -254,11 +264,13 @@ def step_fast(system, work, state, derivative, decay, h):
             d1 -= half * (C[b, 0] * e1 + C[b, 3] * e2 + C[b, 6] * e3)
             d2 -= half * (C[b, 1] * e1 + C[b, 4] * e2 + C[b, 7] * e3)
             d3 -= half * (C[b, 2] * e1 + C[b, 5] * e2 + C[b, 8] * e3)
-            d1, d2, d3 = euler_rates(C[b, SIN_ROLL], C[b, COS_ROLL], C[b, SIN_PITCH],
-                                     C[b, COS_PITCH], d1, d2, d3)
+            d1, d2, d3 = euler_rates(
+                C[b, SIN_ROLL], C[b, COS_ROLL], C[b, SIN_PITCH], C[b, COS_PITCH], d1, d2, d3
+            )
         for k in range(3):
-            state[q + k] += h * (state[v + k] + (h + shift) * rate[q + k]
-                                 - (0.5 * h + shift) * before[q + k])
+            state[q + k] += h * (
+                state[v + k] + (h + shift) * rate[q + k] - (0.5 * h + shift) * before[q + k]
+            )
         state[q + 3] += h * (derivative[q + 3] + d1)
         state[q + 4] += h * (derivative[q + 4] + d2)
         state[q + 5] += h * (derivative[q + 5] + d3)
@@ -272,8 +284,9 @@ def step_fast(system, work, state, derivative, decay, h):
         k = 12 * n + i
         drive = work.drive[i, 0] + 0.5 * ratio * (work.drive[i, 0] - state[drives + i])
         state[drives + i] = work.drive[i, 0]
-        state[k] = advanced(system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h,
-                            decay[i])
+        state[k] = advanced(
+            system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h, decay[i]
+        )
     state[-4] = h
     advance_place(system.drive, state, derivative, h)
     if system.support.elastic:
@@ -344,8 +357,9 @@ def step_rk4(system, work, state, derivative, stages, h):
             total[k] += weight * rate[k]
     for k in range(state.shape[0]):
         state[k] += h / 6.0 * total[k]
-    settle_limits(system.internal, system.curves, 12 * system.bodies.kind.shape[0], work.drive,
-                  state)
+    settle_limits(
+        system.internal, system.curves, 12 * system.bodies.kind.shape[0], work.drive, state
+    )
     return RUNNING, 0
 
 
@@ -371,8 +385,21 @@ def all_finite(state):
 
 
 @jit
-def time_loop(system, work, state, derivative, stages, recorder, scheme, h, first_step, n_steps,
-              every, fresh, closing):
+def time_loop(
+    system,
+    work,
+    state,
+    derivative,
+    stages,
+    recorder,
+    scheme,
+    h,
+    first_step,
+    n_steps,
+    every,
+    fresh,
+    closing,
+):
     """Advance by `n_steps` steps of length `h` [s], recording every `every`-th state.
 
     Parameters

@@ -67,8 +67,11 @@ def cell_of(track, s):
 @jit_inline
 def polynomial(c0, c1, c2, c3, u):
     """Cubic polynomial and its first two derivatives."""
-    return (c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + u * 3.0 * c3),
-            2.0 * c2 + 6.0 * u * c3)
+    return (
+        c0 + u * (c1 + u * (c2 + u * c3)),
+        c1 + u * (2.0 * c2 + u * 3.0 * c3),
+        2.0 * c2 + 6.0 * u * c3,
+    )
 
 
 @jit_merged
@@ -115,19 +118,50 @@ def track_frames(track, cell, cell_u, origin, frames):
         sf, cf = sine_cosine_lanes(phi)
         east, north = x - x_0, y - y_0
         row = starts(which, FRAME_SIZE)
-        store_rows(frames, row, 0, (
-            cosine * east + sine * north, cosine * north - sine * east, z - z_0,
-            cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf,
-            sp * ct, sp * st * sf + cp * cf))
-        store_rows(frames, row, 8, (
-            sp * st * cf - cp * sf, -st, ct * sf, ct * cf,
-            phi_1 - psi_1 * st,
-            theta_1 * cf + psi_1 * ct * sf,
-            psi_1 * ct * cf - theta_1 * sf,
-            phi_2 - psi_2 * st - psi_1 * theta_1 * ct))
-        store_rows(frames, row, 16, (
-            theta_2 * cf - theta_1 * phi_1 * sf + psi_2 * ct * sf
-            - psi_1 * theta_1 * st * sf + psi_1 * phi_1 * ct * cf,
-            psi_2 * ct * cf - psi_1 * theta_1 * st * cf - psi_1 * phi_1 * ct * sf
-            - theta_2 * sf - theta_1 * phi_1 * cf))
-
+        store_rows(
+            frames,
+            row,
+            0,
+            (
+                cosine * east + sine * north,
+                cosine * north - sine * east,
+                z - z_0,
+                cp * ct,
+                cp * st * sf - sp * cf,
+                cp * st * cf + sp * sf,
+                sp * ct,
+                sp * st * sf + cp * cf,
+            ),
+        )
+        store_rows(
+            frames,
+            row,
+            8,
+            (
+                sp * st * cf - cp * sf,
+                -st,
+                ct * sf,
+                ct * cf,
+                phi_1 - psi_1 * st,
+                theta_1 * cf + psi_1 * ct * sf,
+                psi_1 * ct * cf - theta_1 * sf,
+                phi_2 - psi_2 * st - psi_1 * theta_1 * ct,
+            ),
+        )
+        store_rows(
+            frames,
+            row,
+            16,
+            (
+                theta_2 * cf
+                - theta_1 * phi_1 * sf
+                + psi_2 * ct * sf
+                - psi_1 * theta_1 * st * sf
+                + psi_1 * phi_1 * ct * cf,
+                psi_2 * ct * cf
+                - psi_1 * theta_1 * st * cf
+                - psi_1 * phi_1 * ct * sf
+                - theta_2 * sf
+                - theta_1 * phi_1 * cf,
+            ),
+        )

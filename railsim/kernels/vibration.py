@@ -25,8 +25,12 @@ def high_pass(h):
     """Coefficients of the filter at the step `h` [s]: b0 = -b1/2 = b2, a1, a2; fading in a step."""
     k = tan(pi * min(CUT_OFF * h, 0.4))
     scale = 1.0 / (1.0 + sqrt(2.0) * k + k * k)
-    return (scale, 2.0 * (k * k - 1.0) * scale, (1.0 - sqrt(2.0) * k + k * k) * scale,
-            exp(-h / MEMORY))
+    return (
+        scale,
+        2.0 * (k * k - 1.0) * scale,
+        (1.0 - sqrt(2.0) * k + k * k) * scale,
+        exp(-h / MEMORY),
+    )
 
 
 @jit_merged

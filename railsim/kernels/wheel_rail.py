@@ -112,9 +112,38 @@ from railsim.kernels.track_frame import OMEGA
 # place of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal and C
 # in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
 (
-    A, B, NORMAL, MU_N, ANGLE_SIN, ANGLE_COS, C_X, C_Y, C_Z, XI_X, XI_Y, PHI,
-    C11, C22, C23, C33, T_X, T_Y, M_Z, PENETRATION, BEYOND, NORMAL_STIFFNESS, NORMAL_DAMPING,
-    LEAD, FOOT_X, FOOT_Y, FOOT_Z, TURN_Y, TURN_Z, NORMAL_Y, NORMAL_Z, PATCH_SPEED,
+    A,
+    B,
+    NORMAL,
+    MU_N,
+    ANGLE_SIN,
+    ANGLE_COS,
+    C_X,
+    C_Y,
+    C_Z,
+    XI_X,
+    XI_Y,
+    PHI,
+    C11,
+    C22,
+    C23,
+    C33,
+    T_X,
+    T_Y,
+    M_Z,
+    PENETRATION,
+    BEYOND,
+    NORMAL_STIFFNESS,
+    NORMAL_DAMPING,
+    LEAD,
+    FOOT_X,
+    FOOT_Y,
+    FOOT_Z,
+    TURN_Y,
+    TURN_Z,
+    NORMAL_Y,
+    NORMAL_Z,
+    PATCH_SPEED,
 ) = range(32)
 PATCH_ROWS = 32
 
@@ -167,8 +196,10 @@ def normal_contact(system, work, speed, state):
         z_rate = state[6 * n_bodies + 6 * b + 2] - speed * plane[w, SLOPE_Z]
         y, z = cosine * y + sine * z, cosine * z - sine * y
         turn = speed * plane[w, ROLL_SLOPE]
-        y_rate, z_rate = (cosine * y_rate + sine * z_rate + turn * z,
-                          cosine * z_rate - sine * y_rate - turn * y)
+        y_rate, z_rate = (
+            cosine * y_rate + sine * z_rate + turn * z,
+            cosine * z_rate - sine * y_rate - turn * y,
+        )
         # rates of the Euler angles were left here by the kinematics
         yaw, yaw_rate = state[6 * b + 5], work.acceleration[b, 5]
         # a yawed axle on sloping rails is rolled against their plane
@@ -183,8 +214,7 @@ def normal_contact(system, work, speed, state):
         if ahead > 0.0 and system.track.has_irregularity:
             own = smoothed + 6 * b
             place = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
-            foresee(system.track, place, speed, w, plane, work.rail, state, own, ahead,
-                    work.coming)
+            foresee(system.track, place, speed, w, plane, work.rail, state, own, ahead, work.coming)
         for side in range(2):
             status, n = wheel_contact(system, work, w, side, speed, n)
             if status != RUNNING:
@@ -253,10 +283,15 @@ def wheel_contact(system, work, w, side, speed, n):
         if p <= -NEAR:
             continue
         k = patch * LOOK_UP_SIZE
-        p_rate = (z_rate - t[k + G_Y] * y_rate - t[k + G_ROLL] * roll_rate
-                  - t[k + G_W] * 2.0 * yaw * yaw_rate)
-        p_change = (coming[side, COMING_Z] - sign * (t[k + G_Y] * coming[side, COMING_Y]
-                    + t[k + G_ROLL] * coming[side, COMING_ROLL]))
+        p_rate = (
+            z_rate
+            - t[k + G_Y] * y_rate
+            - t[k + G_ROLL] * roll_rate
+            - t[k + G_W] * 2.0 * yaw * yaw_rate
+        )
+        p_change = coming[side, COMING_Z] - sign * (
+            t[k + G_Y] * coming[side, COMING_Y] + t[k + G_ROLL] * coming[side, COMING_ROLL]
+        )
         if p <= 0.0:
             p += ahead * (p_rate + max(p_change, 0.0))
             if p > 0.0:
@@ -277,8 +312,9 @@ def wheel_contact(system, work, w, side, speed, n):
         force[b, 0] -= q_y * aside_slope + q_yaw * bend
         force[b, 1] += q_y
         force[b, 2] -= vertical
-        force[b, 3] += sign * (vertical * t[k + G_ROLL] - per_K * t[k + K_ROLL]
-                               - per_K2 * t[k + K2_ROLL])
+        force[b, 3] += sign * (
+            vertical * t[k + G_ROLL] - per_K * t[k + K_ROLL] - per_K2 * t[k + K2_ROLL]
+        )
         force[b, 5] += q_yaw
         normal += vertical
         lateral -= q_y
@@ -370,20 +406,38 @@ def creepages(system, work, n, speed, state):
         slope = work.rail[w, side, RAIL_SLOPE]
         cx = patch[FOOT_X, k] - slope * cy
         roll_slope = plane[w, ROLL_SLOPE]
-        turn_z = (w1 * (y + cy) - w2 * (x + cx) + plane[w, SLOPE_Z]
-                  + roll_slope * (y + cy - plane[w, MIDDLE_Y]))
+        turn_z = (
+            w1 * (y + cy)
+            - w2 * (x + cx)
+            + plane[w, SLOPE_Z]
+            + roll_slope * (y + cy - plane[w, MIDDLE_Y])
+        )
         cx -= turn_z * cz
         more = w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z])
         turn_y = slope + more
         cx -= (patch[LEAD, k] + cy) * more
         # velocity of the wheel's material against that of the rail, along the rail and across it
-        rail_y, rail_z = (work.rail_motion[w, side, MOTION_Y_RATE],
-                          work.rail_motion[w, side, MOTION_Z_RATE])
+        rail_y, rail_z = (
+            work.rail_motion[w, side, MOTION_Y_RATE],
+            work.rail_motion[w, side, MOTION_Z_RATE],
+        )
         vx = speed * (1.0 + w2 * z - w3 * y) + state[v] + a2 * cz - a3 * cy
-        vy = (state[v + 1] + speed * (w3 * x - w1 * z) + a3 * cx - a1 * cz
-              - cosine * rail_y + sine * rail_z)
-        vz = (state[v + 2] + speed * (w1 * y - w2 * x) + a1 * cy - a2 * cx
-              - sine * rail_y - cosine * rail_z)
+        vy = (
+            state[v + 1]
+            + speed * (w3 * x - w1 * z)
+            + a3 * cx
+            - a1 * cz
+            - cosine * rail_y
+            + sine * rail_z
+        )
+        vz = (
+            state[v + 2]
+            + speed * (w1 * y - w2 * x)
+            + a1 * cy
+            - a2 * cx
+            - sine * rail_y
+            - cosine * rail_z
+        )
         rolling = speed * (1.0 + w2 * (z + cz) - w3 * (y + cy)) + state[v]
         patch[C_X, k] = cx
         patch[C_Y, k] = cy
@@ -478,8 +532,11 @@ def add_damping(jacobian, b, patch, k, across):
     jacobian[b, J_SLIP + 5] += across * arm * arm
     damping = patch[NORMAL_DAMPING, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
-    f_y, f_z, f_roll = (damping * (s + share * c), damping * (c - share * s),
-                        damping * (lever + share * arm))
+    f_y, f_z, f_roll = (
+        damping * (s + share * c),
+        damping * (c - share * s),
+        damping * (lever + share * arm),
+    )
     jacobian[b, J_NORMAL] += f_y * s
     jacobian[b, J_NORMAL + 1] += f_y * c
     jacobian[b, J_NORMAL + 2] += f_y * lever
@@ -529,9 +586,16 @@ def add_creep_forces(system, work, n, speed):
         along, across = 0.0, 0.0
         if patch[MU_N, k] > 0.0:
             along, across = creep_slopes(
-                patch[A, k] * patch[B, k], patch[C11, k], patch[C22, k], patch[C23, k],
-                contact.reduction * contact.shear_modulus, patch[MU_N, k], patch[XI_X, k],
-                patch[XI_Y, k], patch[PHI, k])
+                patch[A, k] * patch[B, k],
+                patch[C11, k],
+                patch[C22, k],
+                patch[C23, k],
+                contact.reduction * contact.shear_modulus,
+                patch[MU_N, k],
+                patch[XI_X, k],
+                patch[XI_Y, k],
+                patch[PHI, k],
+            )
             along, across = along / speed, across / speed
         if system.support.elastic:
             add_slopes(work.support, w, side, patch, k, across)
@@ -561,8 +625,15 @@ def wheel_rail(system, work, speed, state):
     status, wheelset, n : int
         Status code, the wheelset it concerns, number of active patches.
     """
-    locate_rails(system.track, system.contact.body, system.bodies.frame, work.cell, work.cell_u,
-                 work.plane, work.rail)
+    locate_rails(
+        system.track,
+        system.contact.body,
+        system.bodies.frame,
+        work.cell,
+        work.cell_u,
+        work.plane,
+        work.rail,
+    )
     if system.support.elastic:
         rail_motions(system, work, state)
         begin_support(work.support)
@@ -571,8 +642,7 @@ def wheel_rail(system, work, speed, state):
         return status, w, n
     for k in range(system.contact.body.shape[0]):
         b = system.contact.body[k]
-        complete_normal_force(b, system.bodies, work.frames, work.relative, state,
-                              work.rail_force)
+        complete_normal_force(b, system.bodies, work.frames, work.relative, state, work.rail_force)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
         third = cube_root(patch[NORMAL, k])
@@ -580,17 +650,53 @@ def wheel_rail(system, work, speed, state):
         patch[B, k] *= third
     creepages(system, work, n, speed, state)
     contact = system.contact
-    kalker_lookup(n, patch[A], patch[B], contact.creep, patch[C11], patch[C22], patch[C23],
-                  patch[C33], patch[BEYOND])
+    kalker_lookup(
+        n,
+        patch[A],
+        patch[B],
+        contact.creep,
+        patch[C11],
+        patch[C22],
+        patch[C23],
+        patch[C33],
+        patch[BEYOND],
+    )
     if contact.friction_rest < 1.0:
-        falling_friction(n, patch[MU_N], patch[XI_X], patch[XI_Y], patch[PATCH_SPEED],
-                         contact.friction_rest, contact.friction_decay)
+        falling_friction(
+            n,
+            patch[MU_N],
+            patch[XI_X],
+            patch[XI_Y],
+            patch[PATCH_SPEED],
+            contact.friction_rest,
+            contact.friction_decay,
+        )
     creep_forces(
-        contact.law, n, contact.n_x, contact.n_y, patch[A], patch[B], patch[MU_N],
-        patch[C11], patch[C22], patch[C23], patch[C33], contact.shear_modulus,
-        contact.reduction, contact.slip_reduction, patch[XI_X], patch[XI_Y], patch[PHI],
-        contact.law_table, contact.law_scale, work.offsets, work.fastsim, patch[T_X],
-        patch[T_Y], patch[M_Z], patch[BEYOND],
+        contact.law,
+        n,
+        contact.n_x,
+        contact.n_y,
+        patch[A],
+        patch[B],
+        patch[MU_N],
+        patch[C11],
+        patch[C22],
+        patch[C23],
+        patch[C33],
+        contact.shear_modulus,
+        contact.reduction,
+        contact.slip_reduction,
+        patch[XI_X],
+        patch[XI_Y],
+        patch[PHI],
+        contact.law_table,
+        contact.law_scale,
+        work.offsets,
+        work.fastsim,
+        patch[T_X],
+        patch[T_Y],
+        patch[M_Z],
+        patch[BEYOND],
     )
     add_creep_forces(system, work, n, speed)
     return RUNNING, 0, n
@@ -619,8 +725,13 @@ def complete_normal_force(b, bodies, frames, C, state, force):
     x = state[6 * b]
     y = state[6 * b + 1] + bodies.row[b, Y_0]
     z = state[6 * b + 2] + bodies.row[b, Z_0]
-    along = (force[b, 1] * (w3 * x - w1 * z) + force[b, 2] * (w1 * y - w2 * x)
-             + mx * w1 + my * w2 + mz * w3)
+    along = (
+        force[b, 1] * (w3 * x - w1 * z)
+        + force[b, 2] * (w1 * y - w2 * x)
+        + mx * w1
+        + my * w2
+        + mz * w3
+    )
     force[b, 0] = (force[b, 0] - along) / (1.0 + w2 * z - w3 * y)
     force[b, 3] = mx
     force[b, 4] = my

@@ -38,5 +38,9 @@ def circle(
     return track.replace(
         plan=[element],
         cant=[{"type": "CST", "length": LENGTH, "cant": cant}],
-        vertical=[], irregularities=[], gauge_widening=None, friction_table=None, friction=both,
+        vertical=[],
+        irregularities=[],
+        gauge_widening=None,
+        friction_table=None,
+        friction=both,
     )

@@ -26,7 +26,12 @@ Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 TRACK_PARTS = (
-    "rail.left.y", "rail.left.z", "rail.right.y", "rail.right.z", "sleeper.y", "sleeper.z",
+    "rail.left.y",
+    "rail.left.z",
+    "rail.right.y",
+    "rail.right.z",
+    "sleeper.y",
+    "sleeper.z",
     "sleeper.roll",
 )
 STEP, RATE_STEP, FORCE_STEP = 1e-8, 1e-7, 1.0  # m and rad, m/s and rad/s, N
@@ -134,7 +139,8 @@ def track_places(model: Model) -> tuple[list[int], list[str]]:
     first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(model.index.wheelsets)
     moving = DOF if support.sleeper else RAIL_DOF
     places = [
-        first + SUPPORT_SIZE * w + k for w in range(len(model.index.wheelsets))
+        first + SUPPORT_SIZE * w + k
+        for w in range(len(model.index.wheelsets))
         for k in range(moving)
     ]
     return places, [
@@ -178,7 +184,12 @@ class FreeVehicle:
     """
 
     def __init__(
-        self, model: Model, system: System, state: Floats, *, held: bool = False,
+        self,
+        model: Model,
+        system: System,
+        state: Floats,
+        *,
+        held: bool = False,
         hold: Sequence[str] = (),
     ) -> None:
         self.model = model
@@ -232,9 +243,7 @@ class FreeVehicle:
             solved = np.linalg.solve(matrix[np.ix_(w, w)], matrix[np.ix_(w, y)])
             # their rate stands in the equations of the displacements as well as in all others
             matrix = matrix[np.ix_(y, y)] - matrix[np.ix_(y, w)] @ solved
-            return Linearisation(
-                tuple(c.names[k] for k in y), matrix, x[y], float(self.state[-1])
-            )
+            return Linearisation(tuple(c.names[k] for k in y), matrix, x[y], float(self.state[-1]))
         return Linearisation(c.names, matrix, x, float(self.state[-1]))
 
     def linearised(self) -> Linearisation:

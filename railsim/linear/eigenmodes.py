@@ -70,8 +70,9 @@ class Eigenmodes:
     def taken(self, order: Sequence[int] | NDArray[np.intp]) -> "Eigenmodes":
         """Return some of the modes, in this order."""
         chosen = np.asarray(order, dtype=int)
-        return Eigenmodes(self.linearisation, self.eigenvalues[chosen], self.shapes[chosen],
-                          self.left[chosen])
+        return Eigenmodes(
+            self.linearisation, self.eigenvalues[chosen], self.shapes[chosen], self.left[chosen]
+        )
 
 
 def eigenmodes(linearisation: Linearisation) -> Eigenmodes:
@@ -162,7 +163,8 @@ def _partners(
     scores = shared - apart
     rows, columns = linear_sum_assignment(-scores)
     pairs = {
-        int(i): int(j) for i, j in zip(rows, columns, strict=True)
+        int(i): int(j)
+        for i, j in zip(rows, columns, strict=True)
         if shared[i, j] > UNRELATED or apart[i, j] < EQUAL
     }
     unclear = any(shared[i, j] < SAME and apart[i, j] > EQUAL for i, j in pairs.items())

@@ -80,10 +80,16 @@ class ContactPath:
                 try:
                     x, pose = self._on_path(vehicle, body, y, guess)
                 except ModelError as error:
-                    raise InputError([Fault(
-                        "--amplitude", "", f"found {1e3 * self.amplitude:g} mm, but {error}",
-                        "a smaller amplitude",
-                    )]) from None
+                    raise InputError(
+                        [
+                            Fault(
+                                "--amplitude",
+                                "",
+                                f"found {1e3 * self.amplitude:g} mm, but {error}",
+                                "a smaller amplitude",
+                            )
+                        ]
+                    ) from None
                 self._known[body, y] = pose
                 before = y
                 share = 4.0 * side * sine / (ANGLES * self.amplitude)
@@ -110,10 +116,12 @@ class ContactPath:
             value = rest(pose)
             if np.max(np.abs(value)) < BALANCED:
                 break
-            slopes = np.array([
-                (rest(pose + STEP * unit) - rest(pose - STEP * unit)) / (2.0 * STEP)
-                for unit in np.eye(2)
-            ]).T
+            slopes = np.array(
+                [
+                    (rest(pose + STEP * unit) - rest(pose - STEP * unit)) / (2.0 * STEP)
+                    for unit in np.eye(2)
+                ]
+            ).T
             pose = pose - np.linalg.solve(slopes, value)
         else:
             raise ModelError("the contact path is not found")

@@ -123,10 +123,12 @@ class Modes:
     @property
     def oscillations(self) -> tuple[Mode, ...]:
         """Modes that oscillate, by rising frequency."""
-        return tuple(sorted(
-            (mode for mode in self.modes if mode.exists and mode.oscillates),
-            key=lambda mode: mode.natural_frequency,
-        ))
+        return tuple(
+            sorted(
+                (mode for mode in self.modes if mode.exists and mode.oscillates),
+                key=lambda mode: mode.natural_frequency,
+            )
+        )
 
     @property
     def least_damped(self) -> Mode | None:
@@ -288,9 +290,15 @@ def modes(
     """
     check_speeds([speed])
     prepared = LinearVehicle(
-        vehicle, track or load_track("straight"),
-        contact=Contact(linearisation, amplitude, conicity), radius=radius, cant=cant, held=held,
-        hold=hold, settings=settings, profiles=profiles,
+        vehicle,
+        track or load_track("straight"),
+        contact=Contact(linearisation, amplitude, conicity),
+        radius=radius,
+        cant=cant,
+        held=held,
+        hold=hold,
+        settings=settings,
+        profiles=profiles,
     )
     return modes_at(prepared, speed)
 
@@ -317,18 +325,27 @@ def root_locus(
     check_speeds(speeds)
     settings, profiles = how.pop("settings", None), how.pop("profiles", None)
     contact = Contact(
-        how.pop("linearisation", "tangent"), how.pop("amplitude", AMPLITUDE),
+        how.pop("linearisation", "tangent"),
+        how.pop("amplitude", AMPLITUDE),
         how.pop("conicity", None),
     )
     prepared = LinearVehicle(
-        vehicle, track or load_track("straight"), contact=contact, settings=settings,
-        profiles=profiles, **how,
+        vehicle,
+        track or load_track("straight"),
+        contact=contact,
+        settings=settings,
+        profiles=profiles,
+        **how,
     )
     sets = followed(prepared.linearised, list(speeds), FOLLOWED)
     parts = parts_of(prepared.model, prepared.coordinates)
-    return RootLocus("speed", tuple(speeds), tuple(
-        _named(prepared, parts, found, speed) for found, speed in zip(sets, speeds, strict=True)
-    ))
+    return RootLocus(
+        "speed",
+        tuple(speeds),
+        tuple(
+            _named(prepared, parts, found, speed) for found, speed in zip(sets, speeds, strict=True)
+        ),
+    )
 
 
 def parameter_locus(
@@ -397,10 +414,14 @@ def _named(
         positions = shape[c.positions]
         largest = positions[int(np.argmax(np.abs(positions)))]
         shown = positions / largest if largest else positions
-        listed.append(Mode(
-            name, complex(value), _participation(parts, shape),
-            dict(zip(c.names[: c.n_positions], shown.tolist(), strict=True)),
-        ))
+        listed.append(
+            Mode(
+                name,
+                complex(value),
+                _participation(parts, shape),
+                dict(zip(c.names[: c.n_positions], shown.tolist(), strict=True)),
+            )
+        )
     return Modes(speed, prepared.contact, tuple(listed), prepared.remarks, parameter)
 
 

@@ -100,7 +100,10 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
         if len(cars) > 1 and len(cars) == len(rigid):
             cars = []  # bogies alone
     return Parts(
-        model, coordinates, tuple(cars), tuple(b for b in rigid if b not in cars),
+        model,
+        coordinates,
+        tuple(cars),
+        tuple(b for b in rigid if b not in cars),
         tuple(int(b) for b in model.system.contact.body),
     )
 

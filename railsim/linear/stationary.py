@@ -50,9 +50,7 @@ class Standing:
         return float(np.max((self.Q0 - self.Q) / self.Q0))
 
 
-def on_cant(
-    balance: Equilibrium, track: Track, cant: float, *, held: bool = False
-) -> Standing:
+def on_cant(balance: Equilibrium, track: Track, cant: float, *, held: bool = False) -> Standing:
     """Return the vehicle standing on canted straight track.
 
     Parameters

@@ -76,8 +76,7 @@ class SteadyRolling:
     def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
         self.model = model
         self.system = system._replace(
-            drive=CONSTANT_SPEED,
-            loads=system.loads._replace(body=system.loads.body[:0]),
+            drive=CONSTANT_SPEED, loads=system.loads._replace(body=system.loads.body[:0])
         )
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
@@ -128,7 +127,8 @@ class SteadyRolling:
             The state lies outside the range of the model.
         """
         status, where, self.patches = right_hand_side(
-            self.system, self.work, state, self._derivative)
+            self.system, self.work, state, self._derivative
+        )
         if status != RUNNING:
             sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
             raise NotConverged(f"no steady state: {sentence}")
@@ -244,9 +244,9 @@ def _conditions(
             spin = kind == WHEELSET and component == 4
             unknowns.append((6 * n if spin else 0) + 6 * body + component)
             equations.append(6 * n + 6 * body + component)
-            inertias.append(float(
-                bodies.mass[body] if component < 3 else bodies.inertia[body, component - 3]
-            ))
+            inertias.append(
+                float(bodies.mass[body] if component < 3 else bodies.inertia[body, component - 3])
+            )
     if not held:
         track, _ = track_places(model)
         unknowns += track
@@ -295,8 +295,7 @@ def led(
         share = min(1.0, done + step)
         system, speed = along(share)
         solver = SteadyRolling(model, system)
-        for guess in ([now + (now - before) * (share - done) / length, now]
-                      if done > 0.0 else [now]):
+        for guess in [now + (now - before) * (share - done) / length, now] if done > 0.0 else [now]:
             try:
                 found = solver.solve(guess, speed)
                 break

@@ -55,11 +55,18 @@ class Contact:
         """Return what is wrong with it."""
         found = []
         if self.linearisation not in LINEARISATIONS:
-            found.append(Fault("--linearisation", "", f"found '{self.linearisation}'",
-                               " or ".join(LINEARISATIONS)))
+            found.append(
+                Fault(
+                    "--linearisation",
+                    "",
+                    f"found '{self.linearisation}'",
+                    " or ".join(LINEARISATIONS),
+                )
+            )
         if not (math.isfinite(self.amplitude) and self.amplitude > 0.0):
-            found.append(Fault("--amplitude", "", f"found {self.amplitude:g} m",
-                               "a positive number of m"))
+            found.append(
+                Fault("--amplitude", "", f"found {self.amplitude:g} m", "a positive number of m")
+            )
         low, high = CONICITIES
         if self.conicity is not None and not low <= self.conicity <= high:
             found.append(
@@ -126,9 +133,7 @@ class LinearVehicle:
         self._path = None
         if self.contact.linearisation == "harmonic" and not held:
             self._path = ContactPath(self.contact.amplitude)
-        assembled = assemble(
-            vehicle, circle(track), settings or Settings(), known, SharedTables()
-        )
+        assembled = assemble(vehicle, circle(track), settings or Settings(), known, SharedTables())
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
@@ -187,8 +192,9 @@ class LinearVehicle:
 
     def free(self, speed: float) -> FreeVehicle:
         """Return the vehicle about its steady rolling at a speed [m/s]."""
-        return FreeVehicle(self.model, self.system, self.steady(speed).state, held=self.held,
-                           hold=self.hold)
+        return FreeVehicle(
+            self.model, self.system, self.steady(speed).state, held=self.held, hold=self.hold
+        )
 
     def linearised(self, speed: float) -> Linearisation:
         """Return the linearisation at a speed [m/s]."""
@@ -201,12 +207,20 @@ class LinearVehicle:
 
 def _check_hold(model: Model, hold: Sequence[str]) -> None:
     """Refuse to hold what is no body of its own, or everything."""
-    rigid = [name for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)
-             if kind == RIGID]
+    rigid = [
+        name
+        for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)
+        if kind == RIGID
+    ]
     wrong = [name for name in hold if name not in rigid]
     if wrong:
-        raise InputError([Fault("--hold", wrong[0], "no such body; --held holds the wheelsets",
-                                ", ".join(rigid))])
+        raise InputError(
+            [
+                Fault(
+                    "--hold", wrong[0], "no such body; --held holds the wheelsets", ", ".join(rigid)
+                )
+            ]
+        )
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

@@ -8,13 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.expressions import Expression
-from railsim.definitions.mechanism import (
-    AUTO,
-    AirSpring,
-    Cylinder,
-    GasSpring,
-    Mechanism,
-)
+from railsim.definitions.mechanism import AUTO, AirSpring, Cylinder, GasSpring, Mechanism
 from railsim.definitions.mechanism_faults import ends
 from railsim.errors import Fault, InputError, nearest
 from railsim.mechanisms.cams import Transition, cam_rows, transitions

@@ -11,15 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import (
-    AUTO,
-    Cam,
-    Link,
-    Mechanism,
-    Prismatic,
-    Revolute,
-    Slot,
-)
+from railsim.definitions.mechanism import AUTO, Cam, Link, Mechanism, Prismatic, Revolute, Slot
 from railsim.definitions.mechanism_faults import number, parameter_values, place, point_names
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
@@ -308,9 +300,7 @@ def _unit(angle: float | None) -> tuple[float, float]:
     return (0.0, 0.0) if angle is None else (float(np.cos(angle)), float(np.sin(angle)))
 
 
-def _pose(
-    definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays
-) -> NDArray[np.float64]:
+def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> NDArray[np.float64]:
     """Pose to start from: given coordinates, else carried on through revolute joints."""
     pose = np.zeros((len(arrays.bodies), 3))
     placed = {"ground"}

@@ -26,6 +26,7 @@ from railsim.mechanisms.model import build
 
 Floats = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class Effort:
     """How far a start is followed: rounds, steps in each, and the relative gain that ends it."""
@@ -140,11 +141,7 @@ class Optimum:
 
 
 def optimise(
-    definition: Mechanism,
-    *,
-    starts: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
+    definition: Mechanism, *, starts: int | None = None, seed: int | None = None, workers: int = 1
 ) -> Optimum:
     """Search for the best parameters within their bounds.
 
@@ -189,9 +186,7 @@ def best_of(starts: Sequence[Start]) -> Start:
     return min(usable, key=lambda start: start.violation)
 
 
-def first_points(
-    judge: Judge, count: int, seed: int
-) -> list[tuple[Floats, dict[str, float]]]:
+def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict[str, float]]]:
     """Parameters from which the starts begin: the file's own, then drawn evenly from the bounds.
 
     Draws that cannot be assembled are drawn again, `DRAWS` times; the values of `assemblies` take
@@ -237,9 +232,7 @@ def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
     return bool(np.all(rate * rate[0] > 0.0))
 
 
-def _search(
-    definition: Mechanism, judge: Judge, jobs: Sequence[Any], workers: int
-) -> list[Start]:
+def _search(definition: Mechanism, judge: Judge, jobs: Sequence[Any], workers: int) -> list[Start]:
     """All starts, the most promising ones to the end; over processes where there are many."""
     if workers <= 1 or len(jobs) < 4:
         rough = Judge(definition, EVERY)
@@ -314,13 +307,16 @@ class _Problem:
             self.evaluations += 1
             try:
                 found = self.judge(self.judge.lower + u * self.span, self.choice)
-                self.known = key, Judgement(
-                    found.residuals,
-                    found.jacobian * self.span,
-                    found.peak,
-                    found.peak_gradient * self.span,
-                    found.margins,
-                    found.slopes * self.span,
+                self.known = (
+                    key,
+                    Judgement(
+                        found.residuals,
+                        found.jacobian * self.span,
+                        found.peak,
+                        found.peak_gradient * self.span,
+                        found.margins,
+                        found.slopes * self.span,
+                    ),
                 )
             except InputError:
                 self.known = key, None

@@ -50,11 +50,7 @@ def optimised_text(
     provenance = data.setdefault("provenance", {})
     provenance["set"] = [name for name in dict.fromkeys(changed) if name not in best]
     provenance["optimised"] = best
-    head = {
-        "format": MECHANISM_FORMAT,
-        "extends": base,
-        "name": f"{definition.name}, optimised",
-    }
+    head = {"format": MECHANISM_FORMAT, "extends": base, "name": f"{definition.name}, optimised"}
     count = len(optimum.starts)
     lead = (
         f"# Found by {count} starts with seed {optimum.seed}: objective {optimum.objective:.6g}"

@@ -189,9 +189,7 @@ def _gas_spring(
         ]  # fmt: skip
         chosen = fitting[0] if fitting else None
         if chosen is None:
-            why.append(
-                f"{shortest * 1e3:.1f} to {longest * 1e3:.1f} mm is no range of its lengths"
-            )
+            why.append(f"{shortest * 1e3:.1f} to {longest * 1e3:.1f} mm is no range of its lengths")
     said = () if chosen is None else (f"stroke {chosen * 1e3:g} mm",)
     return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why) or said)
 

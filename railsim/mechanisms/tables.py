@@ -97,9 +97,7 @@ def check_table(checks: Sequence[Check]) -> Texts:
 
 def selection_table(choices: Sequence[Choice]) -> Texts:
     """One row for each row of a catalogue."""
-    rows = [
-        [c.catalogue, c.name, "yes" if c.fits else "no", "; ".join(c.reasons)] for c in choices
-    ]
+    rows = [[c.catalogue, c.name, "yes" if c.fits else "no", "; ".join(c.reasons)] for c in choices]
     return ["catalogue", "row", "fits", "stroke, or why not"], rows
 
 
@@ -216,9 +214,7 @@ def optimum_table(optimum: "Optimum") -> Texts:
 
 def active_table(optimum: "Optimum") -> Texts:
     """Limits that hold the optimum."""
-    rows = [
-        [a.name, a.side, f"{a.slack:.3g}", f"{a.multiplier:.4g}"] for a in optimum.active
-    ]
+    rows = [[a.name, a.side, f"{a.slack:.3g}", f"{a.multiplier:.4g}"] for a in optimum.active]
     return ["active limit", "side", "slack / SI", "multiplier / SI"], rows
 
 

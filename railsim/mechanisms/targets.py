@@ -53,7 +53,8 @@ def reference_of(definition: Mechanism) -> Mechanism | None:
         reference = load_mechanism(optimise.reference)
     except InputError as error:
         faults = [
-            fault if fault.file != optimise.reference or fault.key
+            fault
+            if fault.file != optimise.reference or fault.key
             else Fault(definition.name, "optimise.reference", fault.found, fault.allowed)
             for fault in error.faults
         ]

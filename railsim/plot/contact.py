@@ -181,11 +181,7 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
         for panel, values, label in panels:
             for side, name in enumerate(SIDES):
                 panel.plot(
-                    y,
-                    values[:, side],
-                    color=SIDE_COLOURS[name],
-                    ls=SIDE_LINES[name],
-                    label=name,
+                    y, values[:, side], color=SIDE_COLOURS[name], ls=SIDE_LINES[name], label=name
                 )
             panel.set_ylabel(label)
         axes[0, 1].legend(loc="upper center")
@@ -318,9 +314,7 @@ def _explain_lines(figure: Figure, top: float, labels: Sequence[str]) -> None:
         for line, label in zip(TABLE_LINES, labels, strict=False)
     ]
     handles = [*zones, *lines]
-    figure.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0.05, top), ncols=len(handles)
-    )
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.05, top), ncols=len(handles))
 
 
 def _draw_ellipses(axes: Axes, contact: LoadedContact, line: str) -> None:

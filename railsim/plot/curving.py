@@ -41,14 +41,32 @@ def curving_figure(found: Curving, title: str) -> Figure:
         order = np.argsort(found.radius)
         radius = found.radius[order]
         outer = np.where(radius > 0.0, LEFT, RIGHT)
-        _lines(axes[0, 0], found, order, 1e3 * found.attack[..., 0],
-               "angle of attack, leading wheelset (mrad)")
-        guiding = np.abs(np.take_along_axis(
-            found.Y[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[..., 0])
-        _lines(axes[0, 1], found, order, 1e-3 * guiding[np.argsort(order)],
-               "guiding force Y of the leading outer wheel (kN)")
-        _lines(axes[1, 0], found, order, np.nansum(found.T_gamma, axis=(-2, -1)),
-               r"wear number $T_\gamma$ of all wheels (N)")
+        _lines(
+            axes[0, 0],
+            found,
+            order,
+            1e3 * found.attack[..., 0],
+            "angle of attack, leading wheelset (mrad)",
+        )
+        guiding = np.abs(
+            np.take_along_axis(found.Y[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[
+                ..., 0
+            ]
+        )
+        _lines(
+            axes[0, 1],
+            found,
+            order,
+            1e-3 * guiding[np.argsort(order)],
+            "guiding force Y of the leading outer wheel (kN)",
+        )
+        _lines(
+            axes[1, 0],
+            found,
+            order,
+            np.nansum(found.T_gamma, axis=(-2, -1)),
+            r"wear number $T_\gamma$ of all wheels (N)",
+        )
         _steering(axes[1, 1], found, order)
         for one in axes.flat:
             one.set_xlabel("radius (m)")
@@ -66,19 +84,30 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Places) -> None:
     radius, deficiency = found.radius[order], 1e3 * found.cant_deficiency
     outer = np.where(radius > 0.0, LEFT, RIGHT)
     wear = np.take_along_axis(
-        found.T_gamma[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1)[..., 0]
+        found.T_gamma[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1
+    )[..., 0]
     largest = float(np.nanmax(wear)) if np.isfinite(wear).any() else 1.0
     places = np.arange(len(radius))
     for m, axes in enumerate(figure.subplots(1, number, squeeze=False)[0]):
         axes.grid(visible=False)
-        picture = axes.pcolormesh(places, np.arange(len(deficiency)), wear[:, :, m].T,
-                                  shading="nearest", vmin=0.0, vmax=largest, cmap="viridis")
+        picture = axes.pcolormesh(
+            places,
+            np.arange(len(deficiency)),
+            wear[:, :, m].T,
+            shading="nearest",
+            vmin=0.0,
+            vmax=largest,
+            cmap="viridis",
+        )
         axes.set_xticks(places, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
         axes.set_yticks(np.arange(len(deficiency)), [f"{value:g}" for value in deficiency])
         if wear[:, :, m].size <= NUMBERS:
             _numbers(axes, wear[:, :, m], largest)
-        axes.set(xlabel="radius (m)", ylabel="cant deficiency (mm)" if m == 0 else "",
-                 title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}")
+        axes.set(
+            xlabel="radius (m)",
+            ylabel="cant deficiency (mm)" if m == 0 else "",
+            title=rf"$T_\gamma$ (N), leading outer wheel, friction {found.friction[m]:g}",
+        )
     figure.colorbar(picture, ax=figure.axes, label=r"$T_\gamma$ (N)", fraction=0.03)
 
 
@@ -86,8 +115,15 @@ def _numbers(axes: Axes, values: Floats, largest: float) -> None:
     """Values in their fields, readable on dark and on light."""
     for (r, i), value in np.ndenumerate(values):
         words = f"{value:.0f}" if np.isfinite(value) else "none"
-        axes.text(r, i, words, ha="center", va="center", fontsize=7,
-                  color="black" if value > 0.6 * largest or not np.isfinite(value) else "white")
+        axes.text(
+            r,
+            i,
+            words,
+            ha="center",
+            va="center",
+            fontsize=7,
+            color="black" if value > 0.6 * largest or not np.isfinite(value) else "white",
+        )
 
 
 def _ticks(radius: Floats) -> list[float]:
@@ -96,20 +132,30 @@ def _ticks(radius: Floats) -> list[float]:
     return [step for step in steps if 0.9 * np.min(radius) <= step <= 1.1 * np.max(radius)]
 
 
-def _lines(
-    axes: Axes, found: Curving, order: Places, values: Floats, words: str
-) -> None:
+def _lines(axes: Axes, found: Curving, order: Places, values: Floats, words: str) -> None:
     """Values over radius; friction by colour, cant deficiency by line."""
     styles: list[Any] = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5))]
     for m, mu in enumerate(found.friction):
         for i, deficiency in enumerate(found.cant_deficiency):
             shown = np.where(found.converged[:, i, m] > 0, values[:, i, m], np.nan)[order]
-            axes.plot(found.radius[order], shown, color=DISTINCT[m % len(DISTINCT)],
-                      ls=styles[i % len(styles)], marker=".", ms=4,
-                      label=f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm")
+            axes.plot(
+                found.radius[order],
+                shown,
+                color=DISTINCT[m % len(DISTINCT)],
+                ls=styles[i % len(styles)],
+                marker=".",
+                ms=4,
+                label=f"friction {mu:g}, cant deficiency {1e3 * deficiency:g} mm",
+            )
             timed = found.converged[:, i, m][order] == 2
-            axes.plot(found.radius[order][timed], shown[timed], "o", ms=6, mfc="none",
-                      color=DISTINCT[m % len(DISTINCT)])
+            axes.plot(
+                found.radius[order][timed],
+                shown[timed],
+                "o",
+                ms=6,
+                mfc="none",
+                color=DISTINCT[m % len(DISTINCT)],
+            )
     axes.set_title(words)
 
 
@@ -117,7 +163,13 @@ def _steering(axes: Axes, found: Curving, order: Places) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
-        axes.plot(found.radius[order], 1e3 * found.lateral[order, 0, 0, w], color=colours[name],
-                  marker=".", ms=4, label=name)
+        axes.plot(
+            found.radius[order],
+            1e3 * found.lateral[order, 0, 0, w],
+            color=colours[name],
+            marker=".",
+            ms=4,
+            label=name,
+        )
     axes.set_title("lateral displacement (mm), first deficiency and friction")
     axes.legend(fontsize=7.5)

@@ -110,9 +110,7 @@ def drawing_figure(result: Analysis) -> Figure:
     return figure
 
 
-def draw(
-    axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str
-) -> list[Line2D]:
+def draw(axes: Axes, drawn: Sequence[Line], k: int, colour: str, label: str) -> list[Line2D]:
     """Draw the lines of a mechanism at one of its positions [mm]."""
     made = []
     for i, line in enumerate(drawn):

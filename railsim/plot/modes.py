@@ -55,8 +55,13 @@ def locus_figure(locus: RootLocus, title: str) -> Figure:
             frequency.plot(values, size / (2.0 * np.pi), **style)
             plane.plot(eigenvalues[:, k].real, eigenvalues[:, k].imag / (2.0 * np.pi), **style)
             known = np.flatnonzero(np.isfinite(size))
-            plane.plot(eigenvalues[known[-1], k].real, eigenvalues[known[-1], k].imag / (2 * np.pi),
-                       ">", ms=3.5, color=colour)
+            plane.plot(
+                eigenvalues[known[-1], k].real,
+                eigenvalues[known[-1], k].imag / (2 * np.pi),
+                ">",
+                ms=3.5,
+                color=colour,
+            )
         _frame(damping, frequency, plane, locus)
     return figure
 
@@ -72,8 +77,11 @@ def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> Non
     frequency.set_ylim(0.0, None)
     plane.axvline(0.0, color=LIMIT, lw=0.8)
     arrow = "speed" if locus.key == "speed" else "the parameter"
-    plane.set(xlabel="growth Re λ (1/s)", ylabel="frequency Im λ/2π (Hz)",
-              title=f"Root locus; heads show where {arrow} goes")
+    plane.set(
+        xlabel="growth Re λ (1/s)",
+        ylabel="frequency Im λ/2π (Hz)",
+        title=f"Root locus; heads show where {arrow} goes",
+    )
     plane.set_xlim(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1])
     plane.set_ylim(0.0, None)
 
@@ -93,8 +101,9 @@ def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str
     for k in chosen:
         name = names[k]
         if "hunting" in name:
-            shade = (DISTINCT[1], "#f0a13c", "#8c2d19")[min(2, sum(
-                "hunting" in names[j] for j in found))]
+            shade = (DISTINCT[1], "#f0a13c", "#8c2d19")[
+                min(2, sum("hunting" in names[j] for j in found))
+            ]
             found[k] = (shade, 2.0)
         elif name.startswith(("car", "lower", "upper")):
             found[k] = (next(bright, "0.4"), 1.3)
@@ -127,7 +136,9 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
                 axes.set_xlabel("share of the kinetic energy (%)")
         figure.legend(
             handles=[Patch(color=colour, label=label) for colour, label in PHASES.items()],
-            loc="outside lower center", ncol=len(PHASES), fontsize=8,
+            loc="outside lower center",
+            ncol=len(PHASES),
+            fontsize=8,
         )
     return figure
 

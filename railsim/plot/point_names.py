@@ -70,9 +70,7 @@ def _candidates(name: str, place: Floats) -> list[tuple[float, Floats, Floats]]:
     return found
 
 
-def _cost(
-    box: Floats, boxes: Sequence[Floats], frame: Floats, ink: Floats, marks: Floats
-) -> float:
+def _cost(box: Floats, boxes: Sequence[Floats], frame: Floats, ink: Floats, marks: Floats) -> float:
     def inside(points: Floats) -> int:
         return int(np.sum(np.all((points > box[:2]) & (points < box[2:]), axis=1)))
 

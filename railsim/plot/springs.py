@@ -69,8 +69,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     load = curve["load"] * 1e-3
     deflection.plot(load, curve["deflection"] * 1e3, color=MAIN)
     _mark(
-        deflection,
-        [(case.load * 1e-3, case.deflection * 1e3, case.name) for case in result.cases],
+        deflection, [(case.load * 1e-3, case.deflection * 1e3, case.name) for case in result.cases]
     )
     deflection.set_ylabel("deflection $\\Delta z$ / mm")
     rotation.plot(load, np.degrees(curve["rotation"]), color=MAIN)

@@ -14,7 +14,9 @@ from railsim.stability.ramp import THRESHOLD, Diagram
 COLOURS = {"up": DISTINCT[0], "down": DISTINCT[1], "ramp": "0.6", "continuation": DISTINCT[2]}
 SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 WORDS = {
-    "up": "steps upwards", "down": "steps downwards", "ramp": "falling ramp",
+    "up": "steps upwards",
+    "down": "steps downwards",
+    "ramp": "falling ramp",
     "continuation": "continuation, dashed where unstable",
 }
 
@@ -41,8 +43,10 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
             shown = np.where(np.array(branch.amplitude) > THRESHOLD, branch.frequency, np.nan)
             _draw(lower, branch, shown, label=False)
         _critical(upper, found)
-        upper.set(ylabel="amplitude of the wheelsets (mm)",
-                  title=f"Hunting{f', {found.type}' if found.type else ''}")
+        upper.set(
+            ylabel="amplitude of the wheelsets (mm)",
+            title=f"Hunting{f', {found.type}' if found.type else ''}",
+        )
         upper.set_ylim(0.0, None)
         lower.set(xlabel="speed (m/s)", ylabel="frequency (Hz)")
         if found.conicity_over_amplitude is not None:
@@ -50,7 +54,8 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
         handles, labels = upper.get_legend_handles_labels()
         if handles:
             figure.add_subplot(grid[1, 1], frame_on=False, xticks=[], yticks=[]).legend(
-                handles, labels, loc="upper left", fontsize=7.5, borderpad=0.0)
+                handles, labels, loc="upper left", fontsize=7.5, borderpad=0.0
+            )
     return figure
 
 
@@ -58,15 +63,22 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
     """What there is without a branch: the linear critical speed in words, the conicity."""
     words = "no linear critical speed in the range"
     if found.linear is not None:
-        words = (f"linear critical speed {found.linear['speed']:.2f} m/s, {found.linear['mode']}, "
-                 f"{found.linear['frequency']:.2f} Hz")
+        words = (
+            f"linear critical speed {found.linear['speed']:.2f} m/s, {found.linear['mode']}, "
+            f"{found.linear['frequency']:.2f} Hz"
+        )
     with styled():
         figure = Figure(figsize=(7.2, 4.4), layout="constrained")
         figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
         axes = figure.subplots()
         if found.conicity_over_amplitude is None:
-            axes.text(0.5, 0.5, "the wheelset does not fit between the rails", ha="center",
-                      transform=axes.transAxes)
+            axes.text(
+                0.5,
+                0.5,
+                "the wheelset does not fit between the rails",
+                ha="center",
+                transform=axes.transAxes,
+            )
         else:
             _conicity(axes, found.conicity_over_amplitude)
             axes.set(ylabel="amplitude of the wheelset (mm)", ylim=(0.0, SMALL_AMPLITUDES))
@@ -77,13 +89,24 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
 def _critical(axes: Axes, found: CriticalSpeed) -> None:
     """The linear critical speed as a line, the lowest speeds of sustained hunting as circles."""
     if found.linear is not None:
-        axes.axvline(found.linear["speed"], color=LIMIT, lw=0.9,
-                     label=f"linear: {found.linear['speed']:.2f} m/s")
+        axes.axvline(
+            found.linear["speed"],
+            color=LIMIT,
+            lw=0.9,
+            label=f"linear: {found.linear['speed']:.2f} m/s",
+        )
     for method, lowest in found.nonlinear.items():
         if lowest.speed is not None:
-            axes.plot([lowest.speed], [1e3 * lowest.amplitude], "o", ms=6, mfc="none", ls="none",
-                      color=COLOURS["down" if method == "bifurcation" else method],
-                      label=f"lowest by {method}: {lowest.speed:.2f} m/s")
+            axes.plot(
+                [lowest.speed],
+                [1e3 * lowest.amplitude],
+                "o",
+                ms=6,
+                mfc="none",
+                ls="none",
+                color=COLOURS["down" if method == "bifurcation" else method],
+                label=f"lowest by {method}: {lowest.speed:.2f} m/s",
+            )
 
 
 def _conicity(axes: Axes, conicity: Mapping[str, Any]) -> None:
@@ -136,9 +159,15 @@ def map_figure(
             for method, values in speeds.items():
                 column = values[:, number] if len(names) > 1 else values
                 words = method if second is None else f"{method}, {names[1]} {second:g}"
-                axes.plot(axes_values[names[0]], column, marker="o", ms=3.5,
-                          color=DISTINCT[number % len(DISTINCT)],
-                          ls="-" if method == "linear" else (0, (4, 2)), label=words)
+                axes.plot(
+                    axes_values[names[0]],
+                    column,
+                    marker="o",
+                    ms=3.5,
+                    color=DISTINCT[number % len(DISTINCT)],
+                    ls="-" if method == "linear" else (0, (4, 2)),
+                    label=words,
+                )
         axes.set(xlabel=names[0], ylabel="critical speed (m/s)")
         axes.set_ylim(0.0, None)
         axes.legend()

@@ -92,8 +92,14 @@ def _draw_view(
         if across == 0 and (limits is None or limits[0] < x < limits[1]):
             above = 18 if upright == 2 else 10  # points; out of the way of springs
             label = axes.annotate(
-                unformatted(body.name), (x, y), (0, above), textcoords="offset points", ha="center",
-                fontsize=7, color=BODY, zorder=6,
+                unformatted(body.name),
+                (x, y),
+                (0, above),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7,
+                color=BODY,
+                zorder=6,
             )
             label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     axes.set_title(TITLES[view] + (", leading end" if limits else ""))

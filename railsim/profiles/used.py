@@ -35,9 +35,7 @@ def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:
     return faults
 
 
-def _wheel_profiles(
-    group: Vehicle | Assembly, path: tuple[str, ...]
-) -> Iterator[tuple[str, str]]:
+def _wheel_profiles(group: Vehicle | Assembly, path: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     for name, wheelset in group.wheelsets.items():
         for profile in wheelset.profile:
             yield ".".join((*path, "wheelsets", name, "profile")), profile

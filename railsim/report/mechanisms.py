@@ -268,8 +268,7 @@ def player(result: Analysis) -> dict[str, Any]:
                 "dash": DASHES.get(line.kind),
                 "colour": COLOURS.get(line.kind, "#1d2429"),
                 "places": [
-                    " ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in place)
-                    for place in line.xy
+                    " ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in place) for place in line.xy
                 ],
             }
             for line in drawn

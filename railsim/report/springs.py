@@ -29,13 +29,7 @@ from railsim.springs.tables import (
     search_table,
 )
 from railsim.springs.tolerance import RideHeight, ride_heights
-from railsim.springs.verification import (
-    Fatigue,
-    Verification,
-    dynamic_loads,
-    fatigue,
-    verify,
-)
+from railsim.springs.verification import Fatigue, Verification, dynamic_loads, fatigue, verify
 from railsim.version import __version__
 
 if TYPE_CHECKING:
@@ -245,8 +239,7 @@ def _inputs(suspension: TrailingArmSuspension) -> Section:
             ["wanted there / mm", f"{suspension.target.deflection * 1e3:.6g}"],
         ]
     return Section(
-        "Inputs",
-        tables=[Table(["spring", *names], rows), Table(["arm and loads", ""], general)],
+        "Inputs", tables=[Table(["spring", *names], rows), Table(["arm and loads", ""], general)]
     )
 
 
@@ -286,9 +279,7 @@ def _checks(result: Verification) -> Section:
 
 
 def _fatigue(
-    suspension: TrailingArmSuspension,
-    result: Mapping[str, Fatigue],
-    drawn: Mapping[str, bytes],
+    suspension: TrailingArmSuspension, result: Mapping[str, Fatigue], drawn: Mapping[str, bytes]
 ) -> Section:
     loads = dynamic_loads(suspension)
     text = (
@@ -335,9 +326,7 @@ def _or_dash(value: float | None, scale: float) -> str:
 
 
 def _typeset(
-    texts: Texts,
-    words: frozenset[int] = frozenset({0}),
-    failed: frozenset[int] = frozenset(),
+    texts: Texts, words: frozenset[int] = frozenset({0}), failed: frozenset[int] = frozenset()
 ) -> Table:
     """A table of the page from one in ASCII, with true signs."""
 

@@ -129,9 +129,7 @@ def low_passed(x: Floats, rate: float, corner: float, *, causal: bool = False) -
     return band_passed(x, rate, 0.0, corner, causal=causal)
 
 
-def band_passed(
-    x: Floats, rate: float, low: float, high: float, *, causal: bool = False
-) -> Floats:
+def band_passed(x: Floats, rate: float, low: float, high: float, *, causal: bool = False) -> Floats:
     """Butterworth band pass of order 4.
 
     Parameters

@@ -334,4 +334,3 @@ def _write_profile(file: h5py.File, name: str, profile: Profile) -> None:
     for fact in ("name", "kind", "source", "inclination"):
         dataset.attrs[fact] = getattr(profile, fact)
     dataset.attrs["notes"] = "\n".join(profile.notes)
-

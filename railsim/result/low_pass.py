@@ -110,9 +110,7 @@ class _Symmetric:
     """Symmetric filter over a stream; at both ends it goes on as its odd mirror image."""
 
     def __init__(self, rate: float, end_of_pass: float, begin_of_stop: float, every: int) -> None:
-        length, beta = signal.kaiserord(
-            ATTENUATION, (begin_of_stop - end_of_pass) / (0.5 * rate)
-        )
+        length, beta = signal.kaiserord(ATTENUATION, (begin_of_stop - end_of_pass) / (0.5 * rate))
         self._half = max(1, length // 2)
         corner = 0.5 * (end_of_pass + begin_of_stop)
         taps = signal.firwin(2 * self._half + 1, corner, window=("kaiser", beta), fs=rate)

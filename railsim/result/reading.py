@@ -397,4 +397,3 @@ class _Reader:
             inclination=float(inclination),
             notes=tuple(str(facts.get("notes", "")).splitlines()),
         )
-

@@ -254,10 +254,7 @@ def _deflection_errors(task: Task, frame: Arm) -> Pair:
 
 
 def _frame(
-    task: Task,
-    springs: Sequence[_Spring],
-    K_V: Sequence[Floats | float],
-    start: Floats | float,
+    task: Task, springs: Sequence[_Spring], K_V: Sequence[Floats | float], start: Floats | float
 ) -> Arm:
     arm = task.suspension.arm
     starts = (start, start - task.gap)

@@ -29,12 +29,19 @@ def conicity_over_amplitude(prepared: LinearVehicle) -> dict[str, Any] | None:
     rails = [known[name] for name in track.rail]
     try:
         geometry = contact_geometry(
-            (wheels[0], wheels[1]), (rails[0], rails[1]), wheelset.radius, track.gauge,
-            track.inclination, wheelset.back_to_back,
+            (wheels[0], wheels[1]),
+            (rails[0], rails[1]),
+            wheelset.radius,
+            track.gauge,
+            track.inclination,
+            wheelset.back_to_back,
         )
     except InputError:
         return None
     values = geometry.equivalent_conicity(AMPLITUDES)
     there = np.isfinite(values)
-    return {"wheelset": body.name, "amplitude": AMPLITUDES[there].tolist(),
-            "conicity": values[there].tolist()}
+    return {
+        "wheelset": body.name,
+        "amplitude": AMPLITUDES[there].tolist(),
+        "conicity": values[there].tolist(),
+    }

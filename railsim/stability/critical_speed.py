@@ -101,10 +101,13 @@ class CriticalSpeed:
 
         most = max((len(branch.speed) for branch in self.branches), default=0)
         filled = {
-            name: np.array([
-                getattr(branch, name) + [np.nan] * (most - len(branch.speed))
-                for branch in self.branches
-            ], dtype=float).reshape(len(self.branches), most)
+            name: np.array(
+                [
+                    getattr(branch, name) + [np.nan] * (most - len(branch.speed))
+                    for branch in self.branches
+                ],
+                dtype=float,
+            ).reshape(len(self.branches), most)
             for name in ("speed", "amplitude", "frequency", "sum_Y_rms", "stable")
         }
         return xarray.Dataset(
@@ -165,8 +168,11 @@ def critical_speed(
     _check(methods, low, high, points)
     settings = settings or Settings()
     prepared = LinearVehicle(
-        vehicle, track or load_track("straight"),
-        contact=Contact(linearisation, amplitude, conicity), settings=settings, profiles=profiles,
+        vehicle,
+        track or load_track("straight"),
+        contact=Contact(linearisation, amplitude, conicity),
+        settings=settings,
+        profiles=profiles,
     )
     found = CriticalSpeed(prepared.contact, remarks=list(prepared.remarks))
     found.conicity_over_amplitude = conicity_over_amplitude(prepared)
@@ -219,8 +225,10 @@ def _linear(
         modes = lost.modes[number]
         value = complex(modes.eigenvalues[0])
         name = mode_name(parts, modes.shapes[0], value, modes.linearisation.parameter)
-        return (f"{name}, {modes.frequencies[0]:.3g} Hz, damping "
-                f"{100.0 * modes.damping_ratios[0]:.3g} % at {modes.linearisation.parameter:g} m/s")
+        return (
+            f"{name}, {modes.frequencies[0]:.3g} Hz, damping "
+            f"{100.0 * modes.damping_ratios[0]:.3g} % at {modes.linearisation.parameter:g} m/s"
+        )
 
     if lost.parameter is not None:
         mode = lost.modes[0]
@@ -242,7 +250,11 @@ Range = tuple[float, float]
 
 
 def _by_ramp(
-    found: CriticalSpeed, motion: VehicleMotion, lost: LossOfStability, speeds: Range, points: int,
+    found: CriticalSpeed,
+    motion: VehicleMotion,
+    lost: LossOfStability,
+    speeds: Range,
+    points: int,
     progress: Progress,
 ) -> None:
     lowest, branch = ramp(motion, speeds[0], speeds[1], progress)
@@ -255,7 +267,11 @@ def _by_ramp(
 
 
 def _by_diagram(
-    found: CriticalSpeed, motion: VehicleMotion, lost: LossOfStability, speeds: Range, points: int,
+    found: CriticalSpeed,
+    motion: VehicleMotion,
+    lost: LossOfStability,
+    speeds: Range,
+    points: int,
     progress: Progress,
 ) -> None:
     low = speeds[0]
@@ -270,12 +286,17 @@ def _by_diagram(
     if len(branches[0].speed) < points:
         found.remarks.append(
             f"bifurcation: the vehicle derails above {branches[0].speed[-1]:.4g} m/s"
-            if branches[0].speed else "bifurcation: the vehicle derails at the lower end"
+            if branches[0].speed
+            else "bifurcation: the vehicle derails at the lower end"
         )
 
 
 def _by_continuation(
-    found: CriticalSpeed, motion: VehicleMotion, lost: LossOfStability, speeds: Range, points: int,
+    found: CriticalSpeed,
+    motion: VehicleMotion,
+    lost: LossOfStability,
+    speeds: Range,
+    points: int,
     progress: Progress,
 ) -> None:
     if lost.parameter is None:
@@ -309,10 +330,12 @@ def _by_continuation(
     lowest = min(folds, key=lambda fold: fold.speed, default=None)
     if lowest is not None and lowest.speed < lost.parameter:
         found.nonlinear["continuation"] = Sustained(
-            lowest.speed, lowest.amplitude, lowest.frequency)
+            lowest.speed, lowest.amplitude, lowest.frequency
+        )
     else:
         found.nonlinear["continuation"] = Sustained(
-            lost.parameter, 0.0, float(lost.modes[0].frequencies[0]))
+            lost.parameter, 0.0, float(lost.modes[0].frequencies[0])
+        )
 
 
 def _append(line: Diagram, now: PeriodicMotion) -> None:
@@ -358,10 +381,10 @@ def _limits(found: CriticalSpeed, prepared: LinearVehicle) -> None:
         ("instability_limit", force, "sum_Y_rms"),
     ):
         beyond = [
-            speed for branch in found.branches
+            speed
+            for branch in found.branches
             for speed, value in zip(branch.speed, getattr(branch, attribute), strict=True)
             if value > limit
         ]
         if beyond:
             setattr(found, name, {"speed": min(beyond), "limit": limit})
-

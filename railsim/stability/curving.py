@@ -98,10 +98,17 @@ class Curving:
 
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
     VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
-        "Q": ("wheelset", "side"), "Y": ("wheelset", "side"), "Y_over_Q": ("wheelset", "side"),
-        "dQ_over_Q0": ("wheelset", "side"), "T_gamma": ("wheelset", "side"),
-        "contact_y": ("wheelset", "side"), "lateral": ("wheelset",), "attack": ("wheelset",),
-        "sum_Y": ("wheelset",), "steering": ("bogie",), "car_roll": (),
+        "Q": ("wheelset", "side"),
+        "Y": ("wheelset", "side"),
+        "Y_over_Q": ("wheelset", "side"),
+        "dQ_over_Q0": ("wheelset", "side"),
+        "T_gamma": ("wheelset", "side"),
+        "contact_y": ("wheelset", "side"),
+        "lateral": ("wheelset",),
+        "attack": ("wheelset",),
+        "sum_Y": ("wheelset",),
+        "steering": ("bogie",),
+        "car_roll": (),
     }
 
     def record(self) -> dict[str, Any]:
@@ -125,9 +132,12 @@ class Curving:
         import xarray
 
         coords = {
-            "radius": self.radius, "cant_deficiency": self.cant_deficiency,
-            "friction": self.friction, "wheelset": list(self.wheelsets),
-            "side": ["left", "right"], "bogie": list(self.bogies),
+            "radius": self.radius,
+            "cant_deficiency": self.cant_deficiency,
+            "friction": self.friction,
+            "wheelset": list(self.wheelsets),
+            "side": ["left", "right"],
+            "bogie": list(self.bogies),
         }
         variables: dict[str, Any] = {
             name: ((*self.DIMS, *dims), getattr(self, name)) for name, dims in self.VALUES.items()
@@ -219,8 +229,14 @@ def _check(
     faults = []
     for value in radius:
         if not (math.isfinite(value) and abs(value) >= SMALLEST_RADIUS):
-            faults.append(Fault("--radius", "", f"found {value:g} m",
-                                f"{SMALLEST_RADIUS:g} m at least, negative to the left"))
+            faults.append(
+                Fault(
+                    "--radius",
+                    "",
+                    f"found {value:g} m",
+                    f"{SMALLEST_RADIUS:g} m at least, negative to the left",
+                )
+            )
     if not 0.0 <= cant <= LARGEST_CANT:
         faults.append(Fault("--cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
     for value in friction:
@@ -230,10 +246,14 @@ def _check(
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
         if not all(low <= v <= high for v in speeds) or not math.isfinite(value):
-            faults.append(Fault(
-                "--cant-deficiency", "", f"found {value:g} m with a cant of {cant:g} m",
-                f"a sum that gives speeds of {low:g} to {high:g} m/s",
-            ))
+            faults.append(
+                Fault(
+                    "--cant-deficiency",
+                    "",
+                    f"found {value:g} m with a cant of {cant:g} m",
+                    f"a sum that gives speeds of {low:g} to {high:g} m/s",
+                )
+            )
     for name, values in (("--radius", radius), ("--cant-deficiency", deficiency)):
         if not len(values):
             faults.append(Fault(name, "", "no value", "one at least"))
@@ -259,7 +279,11 @@ class _Search:
     """Steady states of one vehicle, each sought from the nearest known one."""
 
     def __init__(
-        self, vehicle: Vehicle, track: Track, cant: float, settings: Settings,
+        self,
+        vehicle: Vehicle,
+        track: Track,
+        cant: float,
+        settings: Settings,
         profiles: Mapping[str, Profile] | None,
     ) -> None:
         self.track, self.cant = track, cant
@@ -279,8 +303,9 @@ class _Search:
     def point(self, radius: float, deficiency: float, friction: float) -> dict[str, Any]:
         """Values at one point of the grid."""
         speed = _speed(radius, self.cant, deficiency)
-        goal = _Known(1.0 / radius, math.copysign(self.cant, radius), speed**2, friction,
-                      self._last.state)
+        goal = _Known(
+            1.0 / radius, math.copysign(self.cant, radius), speed**2, friction, self._last.state
+        )
         for start in (self._last, self._rest):
             if start.curvature * goal.curvature < 0.0:
                 continue
@@ -298,7 +323,8 @@ class _Search:
                 return a + share * (b - a)
 
             system = self._system(
-                between(start.curvature, goal.curvature), between(start.cant, goal.cant),
+                between(start.curvature, goal.curvature),
+                between(start.cant, goal.cant),
                 between(start.friction, goal.friction),
             )
             return system, math.sqrt(between(start.square, goal.square))
@@ -328,8 +354,21 @@ class _Search:
         before = np.zeros_like(self.Q0)
         for second in range(int(SETTLING)):
             state[-2] = PLACE
-            status, *_ = time_loop(system, work, state, derivative, stages, recorder, FAST, step,
-                                   1, round(1.0 / step), 1 << 40, int(second == 0), 0)
+            status, *_ = time_loop(
+                system,
+                work,
+                state,
+                derivative,
+                stages,
+                recorder,
+                FAST,
+                step,
+                1,
+                round(1.0 / step),
+                1 << 40,
+                int(second == 0),
+                0,
+            )
             if status != RUNNING:
                 return self._values(solver, state, FAILED)
             now = work.wheel[:, :, W_Y].copy()
@@ -348,17 +387,23 @@ class _Search:
         with np.errstate(divide="ignore", invalid="ignore"):
             quotient = Y / Q * np.array([-1.0, 1.0])
         values = {
-            "Q": Q, "Y": Y, "Y_over_Q": quotient, "dQ_over_Q0": (Q - self.Q0) / self.Q0,
+            "Q": Q,
+            "Y": Y,
+            "Y_over_Q": quotient,
+            "dQ_over_Q0": (Q - self.Q0) / self.Q0,
             "T_gamma": wheel[:, :, W_T_GAMMA],
             "contact_y": _contact_places(solver, len(wheelsets)),
-            "lateral": state[6 * wheelsets + 1], "attack": state[6 * wheelsets + 5],
-            "sum_Y": Y.sum(axis=1), "steering": state[[6 * b + 5 for b in frames]],
+            "lateral": state[6 * wheelsets + 1],
+            "attack": state[6 * wheelsets + 5],
+            "sum_Y": Y.sum(axis=1),
+            "steering": state[[6 * b + 5 for b in frames]],
             "car_roll": state[6 * cars[0] + 3] if cars else np.nan,
         }
         if how == FAILED:
             values = {name: np.full(np.shape(value), np.nan) for name, value in values.items()}
         return {name: np.array(value, dtype=float) for name, value in values.items()} | {
-            "converged": how}
+            "converged": how
+        }
 
 
 def _contact_places(solver: SteadyRolling, wheelsets: int) -> Floats:
@@ -375,8 +420,12 @@ def _contact_places(solver: SteadyRolling, wheelsets: int) -> Floats:
 
 
 def _gathered(
-    search: _Search, found: dict[tuple[int, int, int], dict[str, Any]], radius: Sequence[float],
-    cant: float, deficiency: Sequence[float], friction: Sequence[float],
+    search: _Search,
+    found: dict[tuple[int, int, int], dict[str, Any]],
+    radius: Sequence[float],
+    cant: float,
+    deficiency: Sequence[float],
+    friction: Sequence[float],
 ) -> Curving:
     shape = len(radius), len(deficiency), len(friction)
     arrays = {}
@@ -390,9 +439,13 @@ def _gathered(
         converged[place] = values["converged"]
     index = search.model.index
     return Curving(
-        np.array(radius, dtype=float), np.array(deficiency, dtype=float),
-        np.array(friction, dtype=float), cant,
-        np.array([[_speed(r, cant, i) for i in deficiency] for r in radius]), converged,
-        wheelsets=index.wheelsets, bogies=tuple(index.bodies[b] for b in search.parts.frames),
+        np.array(radius, dtype=float),
+        np.array(deficiency, dtype=float),
+        np.array(friction, dtype=float),
+        cant,
+        np.array([[_speed(r, cant, i) for i in deficiency] for r in radius]),
+        converged,
+        wheelsets=index.wheelsets,
+        bogies=tuple(index.bodies[b] for b in search.parts.frames),
         **arrays,
     )

@@ -156,8 +156,19 @@ class VehicleMotion:
         system = self.system._replace(drive=Drive(TABLE, table, np.zeros(3)))
         steps = max(1, round(duration / self.step))
         status, where, _, rows = time_loop(
-            system, self.work, state, self._derivative, self._stages, self._recorder, self.scheme,
-            self.step, 0, steps, self.every, fresh, 0,
+            system,
+            self.work,
+            state,
+            self._derivative,
+            self._stages,
+            self._recorder,
+            self.scheme,
+            self.step,
+            0,
+            steps,
+            self.every,
+            fresh,
+            0,
         )
         if status != RUNNING or not np.isfinite(state).all():
             sentence = STATUS[status][1] if status != RUNNING else "the state is not finite"
@@ -165,6 +176,8 @@ class VehicleMotion:
             raise LeftRange(sentence.format(where=names[where] if where < len(names) else where))
         wheel = self._recorder.wheel[:rows, :, :, W_Y]
         return Stretch(
-            state, offset + self.step * self.every * np.arange(rows),
-            self._recorder.state[:rows][:, self._places].copy(), wheel.sum(axis=2),
+            state,
+            offset + self.step * self.every * np.arange(rows),
+            self._recorder.state[:rows][:, self._places].copy(),
+            wheel.sum(axis=2),
         )

@@ -102,9 +102,7 @@ class Branch:
         Changes of period [s] and speed [m/s] that count as much in the arc length.
     """
 
-    def __init__(
-        self, flow: Flow, scale: Floats, period_scale: float, speed_scale: float
-    ) -> None:
+    def __init__(self, flow: Flow, scale: Floats, period_scale: float, speed_scale: float) -> None:
         self._flow = flow
         self._scale = np.concatenate([scale, [period_scale, speed_scale]])
         self._share = 1.0 if flow.mirror is None else 0.5
@@ -127,8 +125,13 @@ class Branch:
         scaled = shape / self._scale[:-2]
         tangent = np.concatenate([scaled.real, [0.0, 0.0]])
         return PeriodicMotion(
-            state, 1.0 / frequency, speed, 0.0, np.zeros(0, complex),
-            tangent / np.linalg.norm(tangent), -scaled.imag / np.linalg.norm(scaled.imag),
+            state,
+            1.0 / frequency,
+            speed,
+            0.0,
+            np.zeros(0, complex),
+            tangent / np.linalg.norm(tangent),
+            -scaled.imag / np.linalg.norm(scaled.imag),
         )
 
     def followed(
@@ -266,9 +269,7 @@ class Branch:
         matrix[:, :n] -= np.eye(n)
         return ends[0] - u[:n], matrix
 
-    def _motion(
-        self, u: Floats, matrix: Floats, along: Floats, before: Floats
-    ) -> PeriodicMotion:
+    def _motion(self, u: Floats, matrix: Floats, along: Floats, before: Floats) -> PeriodicMotion:
         """Return what was found at u; the tangent goes on in the sense of the one before."""
         n = len(u) - 2
         right = np.zeros(n + 2)
@@ -280,7 +281,9 @@ class Branch:
         # in half a period of a symmetric motion the trivial one is 1 as well, not -1
         multipliers = np.delete(multipliers, np.argmin(np.abs(multipliers - 1.0)))
         return PeriodicMotion(
-            state, float(period), speed,
+            state,
+            float(period),
+            speed,
             self._flow.amplitude(state, float(period), speed),
             multipliers ** round(1.0 / self._share),
             tangent / np.linalg.norm(tangent),

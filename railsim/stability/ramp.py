@@ -91,8 +91,10 @@ class Diagram:
 
     def record(self) -> dict[str, Any]:
         """Return the branch as plain data."""
-        return {name: getattr(self, name) for name in (
-            "direction", "speed", "amplitude", "frequency", "sum_Y_rms", "stable")}
+        return {
+            name: getattr(self, name)
+            for name in ("direction", "speed", "amplitude", "frequency", "sum_Y_rms", "stable")
+        }
 
 
 def excited(motion: Motion, speed: float) -> Stretch:
@@ -175,8 +177,11 @@ def _lowest(motion: Motion, branch: Diagram, low: float) -> Sustained:
 
 def _state_at(branch: Diagram, speed: float) -> Floats:
     """State of the slowest point of a branch that hunts at a speed or above."""
-    chosen = [k for k, v in enumerate(branch.speed)
-              if v >= speed - 1e-9 and branch.amplitude[k] > THRESHOLD]
+    chosen = [
+        k
+        for k, v in enumerate(branch.speed)
+        if v >= speed - 1e-9 and branch.amplitude[k] > THRESHOLD
+    ]
     return branch.states[chosen[-1]]
 
 
@@ -276,7 +281,8 @@ def bifurcation_type(branches: Sequence[Diagram], resolution: float = 1.5) -> st
     if not any(a > THRESHOLD for a in (*up.amplitude, *down.amplitude)):
         return "none"
     differ = [
-        v for v, a in zip(down.speed, down.amplitude, strict=True)
+        v
+        for v, a in zip(down.speed, down.amplitude, strict=True)
         if a > THRESHOLD and a > resolution * size.get(v, a)
     ]
     return "subcritical" if differ else "supercritical"

@@ -111,8 +111,19 @@ class VehicleFlow:
         for state, duration, speed in zip(states, durations, speeds, strict=True):
             full = self.full(state, float(speed))
             status, *_ = time_loop(
-                self._system, self._work, full, self._derivative, self._stages, self._recorder,
-                self._motion.scheme, float(duration) / steps, 1, steps, 1 << 40, 0, 0,
+                self._system,
+                self._work,
+                full,
+                self._derivative,
+                self._stages,
+                self._recorder,
+                self._motion.scheme,
+                float(duration) / steps,
+                1,
+                steps,
+                1 << 40,
+                0,
+                0,
             )
             if status != RUNNING:
                 full[:-N_SCALARS] = np.nan
@@ -136,7 +147,18 @@ class VehicleFlow:
         every = max(1, steps // OBSERVED)
         full = self.full(state, speed)
         _, _, _, rows = time_loop(
-            self._system, self._work, full, self._derivative, self._stages, self._recorder,
-            self._motion.scheme, duration / steps, 0, OBSERVED * every, every, 0, 0,
+            self._system,
+            self._work,
+            full,
+            self._derivative,
+            self._stages,
+            self._recorder,
+            self._motion.scheme,
+            duration / steps,
+            0,
+            OBSERVED * every,
+            every,
+            0,
+            0,
         )
         return np.asarray(self._recorder.state[:rows].copy())

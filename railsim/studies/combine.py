@@ -19,14 +19,7 @@ from railsim.errors import Fault, InputError
 from railsim.profiles.used import profile_faults
 from railsim.simulation import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
-from railsim.studies.points import (
-    Fingerprints,
-    Grid,
-    Overrides,
-    Point,
-    check_number,
-    point_key,
-)
+from railsim.studies.points import Fingerprints, Grid, Overrides, Point, check_number, point_key
 
 T = TypeVar("T", bound=FileDefinition)
 LONGEST_NAME = 250  # bytes of a file's name, ending included; file systems allow 255
@@ -135,8 +128,9 @@ class Plan:
     ) -> None:
         grid = grid or {}
         if not (vehicles and tracks and speeds and all(grid.values())):
-            raise InputError([Fault("study", "", "no combination",
-                                    "give a vehicle, a track, a speed")])
+            raise InputError(
+                [Fault("study", "", "no combination", "give a vehicle, a track, a speed")]
+            )
         self._grid, self._settings = grid, settings
         self._start, self._duration, self._until = start, duration, until
         self._faults: dict[Fault, None] = {}
@@ -161,7 +155,10 @@ class Plan:
                     fingerprint("vehicle", vehicle, overrides["vehicle"]),
                     fingerprint("track", track, overrides["track"]),
                     fingerprint("settings", settings, overrides["settings"]),
-                    first, start, duration, until,
+                    first,
+                    start,
+                    duration,
+                    until,
                 )
                 name = run_name(vehicle, track, 0.0 if first is None else first) + suffix
                 told = math.nan if first is None else first
@@ -184,10 +181,19 @@ class Plan:
                 how = point.speed, self._start, self._duration, self._until
                 self._tell(_range_faults(track, *how))
             if vehicle and track and settings and point.speed is not None:
-                found.append(Case(
-                    point.name, vehicle, track, settings, point.speed, self._start,
-                    self._duration, self._until, point.labels,
-                ))
+                found.append(
+                    Case(
+                        point.name,
+                        vehicle,
+                        track,
+                        settings,
+                        point.speed,
+                        self._start,
+                        self._duration,
+                        self._until,
+                        point.labels,
+                    )
+                )
         if not self._faults:
             self._tell(name_faults(self.points))
         if self._faults:

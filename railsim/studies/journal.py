@@ -257,8 +257,12 @@ class Records(Sequence[Record]):
                     raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
             except (ValueError, RecursionError, AttributeError) as error:
                 name = entry.name if isinstance(entry, Entry) else ""
-                fault = Fault(str(self._path), name, f"a record that cannot be used ({error})",
-                              "remove the journal: results that are there are kept")
+                fault = Fault(
+                    str(self._path),
+                    name,
+                    f"a record that cannot be used ({error})",
+                    "remove the journal: results that are there are kept",
+                )
                 raise InputError([fault]) from None
             yield record
 

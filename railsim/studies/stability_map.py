@@ -127,8 +127,9 @@ def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
     """Record of one point."""
     given = {"conicity": point.at["conicity"]} if "conicity" in point.at else {}
     try:
-        found = critical_speed(point.vehicle, point.track, settings=point.settings,
-                               **{**options, **given})
+        found = critical_speed(
+            point.vehicle, point.track, settings=point.settings, **{**options, **given}
+        )
     except RailsimError as error:
         return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [str(error)]}
     return {"at": point.at, **found.record()}

@@ -370,7 +370,8 @@ class _State:
         lost = [
             case.name
             for case in self.cases
-            if self._entries.get(case.name) and case.file_name not in self._there
+            if self._entries.get(case.name)
+            and case.file_name not in self._there
             and self._entries[case.name].size
         ]
         for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
@@ -382,10 +383,13 @@ class _State:
     def records(self, journal: Journal) -> Records:
         """Return the records of all runs, done or waiting, in the order of the combinations."""
         waiting = {point.name: case for point, case in self._waiting.items()}
-        return Records(journal.path, [
-            journal.entries.get(point.name) or waiting_record(waiting[point.name])
-            for point in self._plan.points
-        ])
+        return Records(
+            journal.path,
+            [
+                journal.entries.get(point.name) or waiting_record(waiting[point.name])
+                for point in self._plan.points
+            ],
+        )
 
 
 def _files(folder: Path) -> dict[str, os.stat_result]:

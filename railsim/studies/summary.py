@@ -29,6 +29,7 @@ FACTS = (
     "patches_out_of_range",
 )  # fmt: skip
 
+
 def waiting_record(case: Case) -> Record:
     """Return the record of a run that has not been done yet."""
     return {
@@ -151,8 +152,12 @@ def checked(model: type[M], data: Any, file: str) -> M:
     except ValidationError as error:
         details = error.errors(include_url=False)[:MOST_FAULTS]
         raise InputError(
-            Fault(file, ".".join(map(str, detail["loc"])), repr(detail["input"])[:60],
-                  detail["msg"].lower())
+            Fault(
+                file,
+                ".".join(map(str, detail["loc"])),
+                repr(detail["input"])[:60],
+                detail["msg"].lower(),
+            )
             for detail in details
         ) from None
 
@@ -221,4 +226,3 @@ def _row(record: Record) -> dict[str, Any]:
         for name, value in curve["largest"].items():
             row[f"{name}_{ending}"] = value
     return row
-

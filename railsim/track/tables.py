@@ -27,10 +27,7 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
 def track_tables(
-    track: Track,
-    before: float = BEFORE,
-    after: float = AFTER,
-    cell_length: float | None = None,
+    track: Track, before: float = BEFORE, after: float = AFTER, cell_length: float | None = None
 ) -> TrackTables:
     """Tables of a track over arc length.
 

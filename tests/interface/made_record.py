@@ -40,8 +40,19 @@ def curve(radius, length, run=120.0, clothoid=80.0):
 
 
 def made(
-    on, speed, *, rate=1000.0, until=None, Y=None, Q=None, lateral=None, without=(),
-    status="complete", settings="{}", T_gamma=None, vehicle=None,
+    on,
+    speed,
+    *,
+    rate=1000.0,
+    until=None,
+    Y=None,
+    Q=None,
+    lateral=None,
+    without=(),
+    status="complete",
+    settings="{}",
+    T_gamma=None,
+    vehicle=None,
 ):
     """A run whose wheel forces and body accelerations are given functions.
 

@@ -12,8 +12,10 @@ RANDOM = 'type="random", spectrum="erri_b176_low"'
 AT = 'bodies=["carbody", "front.frame"], point=[9.5, 1.0, -0.9]'
 BETWEEN = 'bodies=["carbody", "front.frame"], points=[[9.5, 1.0, -0.9], [9.5, 1.0, -0.5]]'
 PAD = f'kind="friction", {AT}'
-AIR = (f'kind="airspring", {AT}, bellows_stiffness=4e5, reservoir_stiffness=2e5, '
-       'orifice_damping=1e4, horizontal_stiffness=[1e5, 1e5]')
+AIR = (
+    f'kind="airspring", {AT}, bellows_stiffness=4e5, reservoir_stiffness=2e5, '
+    "orifice_damping=1e4, horizontal_stiffness=[1e5, 1e5]"
+)
 LOAD = 'kind="applied_force", bodies=["carbody"]'
 STOP = f'kind="bump_stop", {AT}, axis="y"'
 LINK = f'kind="spring_damper", {BETWEEN}'
@@ -26,8 +28,11 @@ TRACKS = [
     ("friction_table = []", "friction_table", "0 values; a list of 1 at least"),
     ("gauge_widening = [[0.0, 15.0]]", "gauge_widening.0.1", "15.0; must be less than or"),
     ('cant_rotation = "outer"', "cant_rotation", "'outer'; must be 'centre' or 'inner_rail'"),
-    ('vertical = [{type="CST", length=5.0, gradient=12.0}]', "vertical.0.gradient",
-     "12.0; must be less than or equal to 0.3"),
+    (
+        'vertical = [{type="CST", length=5.0, gradient=12.0}]',
+        "vertical.0.gradient",
+        "12.0; must be less than or equal to 0.3",
+    ),
     ('vertical = [{type="CST", length=-5.0}]', "vertical.0.length", "-5.0; must be greater"),
 ]
 IRREGULARITIES = [
@@ -53,8 +58,11 @@ IRREGULARITIES = [
     (f"{RANDOM}, begin=50.0, end=50.0", "", "'end' must lie behind 'begin'"),
     (f"{RANDOM}, coefficients={{lateral=1e-7}}", "", "'coefficients' belong to spectrum"),
     ('type="random", spectrum="own"', "", "'coefficients' belong to spectrum"),
-    ('type="random", spectrum="own", coefficients={lateral=-1e-7}', ".coefficients.lateral",
-     "-1e-07; must be greater than or equal to 0"),
+    (
+        'type="random", spectrum="own", coefficients={lateral=-1e-7}',
+        ".coefficients.lateral",
+        "-1e-07; must be greater than or equal to 0",
+    ),
     (f"{RANDOM}, fade=-1.0", ".fade", "-1.0; must be greater than or equal to 0"),
     ('type="measured"', "", "either 'file' or 'rows' is needed"),
     ('type="measured", file="none.csv"', ".file", "no file 'none.csv'"),
@@ -63,8 +71,11 @@ IRREGULARITIES = [
 ELEMENTS = [
     (f"{PAD}, friction_force=[0, 0, 1e3]", "", "friction along z needs 'stick_stiffness' along z"),
     (PAD, "", "'friction_force' or 'friction_coefficient' is needed"),
-    (f"{PAD}, friction_coefficient=[0, 0, -0.1], stick_stiffness=[0, 0, 1e6]",
-     ".friction_coefficient.2", "-0.1; must be greater than or equal to 0"),
+    (
+        f"{PAD}, friction_coefficient=[0, 0, -0.1], stick_stiffness=[0, 0, 1e6]",
+        ".friction_coefficient.2",
+        "-0.1; must be greater than or equal to 0",
+    ),
     (AIR.replace("4e5", "0.0"), ".bellows_stiffness", "0.0; must be greater than 0"),
     (AIR.replace("[1e5, 1e5]", "[1, 1, 1]"), ".horizontal_stiffness", "3 values; a list of 2"),
     (AIR.replace("orifice_damping=1e4, ", ""), ".orifice_damping", "missing; needed: Damping of"),
@@ -87,10 +98,16 @@ SETTINGS = [
     ('drive = {mode = "table"}', "drive", "'speed_table' belongs to mode"),
     ("drive = {speed_table = [[0.0, 20.0]]}", "drive", "'speed_table' belongs to mode"),
     ("drive = {resistance = [1.0, 0.0, 0.0]}", "drive", "belong to mode"),
-    ('drive = {mode = "table", speed_table = [[0.0, -3.0]]}', "drive.speed_table.0.1",
-     "-3.0; must be greater than 0"),
-    ('drive = {mode = "table", speed_table = [[9.0, 5.0], [0.0, 5.0]]}', "drive.speed_table",
-     "must increase"),
+    (
+        'drive = {mode = "table", speed_table = [[0.0, -3.0]]}',
+        "drive.speed_table.0.1",
+        "-3.0; must be greater than 0",
+    ),
+    (
+        'drive = {mode = "table", speed_table = [[9.0, 5.0], [0.0, 5.0]]}',
+        "drive.speed_table",
+        "must increase",
+    ),
     ('drive = {mode = "free", resistance = [1.0]}', "drive.resistance", "1 value; a list of 3"),
     ("outputs = {contact_patch = true}", "outputs.contact_patch", "did you mean 'contact_patches'"),
     ("outputs = {track = 1}", "outputs.track", "1; must be a valid boolean"),
@@ -129,16 +146,30 @@ def test_wrong_track_is_told(tmp_path, capsys, monkeypatch, text, key, words):
 def test_wrong_irregularity_is_told(tmp_path, capsys, monkeypatch, text, key, words):
     head = 'format = "railsim-track/1"\nname = "t"\nplan = [{type="STR", length=200.0}]\n'
     text = f"{head}irregularities = [{{{DIP}}}, {{{text}}}]\n"
-    check(tmp_path, capsys, monkeypatch, {"track": text}, "track.toml",
-          f"irregularities.1{key}: ", words)
+    check(
+        tmp_path,
+        capsys,
+        monkeypatch,
+        {"track": text},
+        "track.toml",
+        f"irregularities.1{key}: ",
+        words,
+    )
 
 
 @pytest.mark.parametrize(("text", "key", "words"), ELEMENTS)
 def test_wrong_element_is_told(tmp_path, capsys, monkeypatch, text, key, words):
     head = 'format = "railsim-vehicle/1"\nname = "v"\nextends = "coach_manchester"\n'
     text = f"{head}[elements]\nadded = {{{text}}}\n"
-    check(tmp_path, capsys, monkeypatch, {"vehicle": text}, "vehicle.toml",
-          f"elements.added{key}: ", words)
+    check(
+        tmp_path,
+        capsys,
+        monkeypatch,
+        {"vehicle": text},
+        "vehicle.toml",
+        f"elements.added{key}: ",
+        words,
+    )
 
 
 @pytest.mark.parametrize(("text", "key", "words"), SETTINGS)
@@ -161,8 +192,10 @@ def test_wrong_setting_is_told(tmp_path, capsys, monkeypatch, text, key, words):
 )
 def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words):
     (tmp_path / "m.csv").write_text(csv)
-    text = ('format = "railsim-track/1"\nname = "t"\nplan = [{type="STR", length=200.0}]\n'
-            'irregularities = [{type="measured", file="m.csv"}]\n')
+    text = (
+        'format = "railsim-track/1"\nname = "t"\nplan = [{type="STR", length=200.0}]\n'
+        'irregularities = [{type="measured", file="m.csv"}]\n'
+    )
     check(tmp_path, capsys, monkeypatch, {"track": text}, f"{tmp_path / 'm.csv'}", "", words)
 
 
@@ -176,8 +209,10 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
         (["--until", "1001"], "--until: found 1001 m"),
         (["--duration", "0"], "--duration: found 0 s; a positive number"),
         (["--duration", "1", "--until", "40"], "--duration: given together with --until"),
-        (["--set", 'settings.outputs.elements=["nothing*"]'],
-         "outputs.elements: no element is called 'nothing*'"),
+        (
+            ["--set", 'settings.outputs.elements=["nothing*"]'],
+            "outputs.elements: no element is called 'nothing*'",
+        ),
         (["--set", "settings.initial.carbdy.y=0.1"], "initial.carbdy: no such body; did you mean"),
         (["--set", "settings.drive.mode=fast"], "drive.mode: 'fast'; must be 'constant'"),
         (["--set", "settings.step=0.0007"], "step: found 0.0007 s; a whole part of the output"),

@@ -14,8 +14,15 @@ from railsim.bench.scenarios import STUDY
 from railsim.cli import main
 
 TINY = replace(
-    shortened(QUICK, 10.0), runs=shortened(QUICK, 10.0).runs[:1], batch=(), repetitions=2,
-    part_repetitions=3, grids=(5, 10), ensembles=(1, 3), command_repetitions=0, spins=1000,
+    shortened(QUICK, 10.0),
+    runs=shortened(QUICK, 10.0).runs[:1],
+    batch=(),
+    repetitions=2,
+    part_repetitions=3,
+    grids=(5, 10),
+    ensembles=(1, 3),
+    command_repetitions=0,
+    spins=1000,
 )
 
 

@@ -62,8 +62,18 @@ until = 560.0
 @pytest.mark.slow
 def test_small_campaign_ends_in_its_assessment_and_is_not_done_twice(tmp_path, capsys):
     (tmp_path / "small.toml").write_text(SMALL)
-    arguments = ["study", "--scenario", str(tmp_path / "small.toml"), "--vehicles",
-                 "coach_manchester", "--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]
+    arguments = [
+        "study",
+        "--scenario",
+        str(tmp_path / "small.toml"),
+        "--vehicles",
+        "coach_manchester",
+        "--out",
+        str(tmp_path / "out"),
+        "--workers",
+        "1",
+        "--quiet",
+    ]
     assert main(arguments) == 0
     assert "zone 4: 3 of 25 sections" in capsys.readouterr().out
     data = json.loads((tmp_path / "out" / "assessment.json").read_text())
@@ -74,8 +84,10 @@ def test_small_campaign_ends_in_its_assessment_and_is_not_done_twice(tmp_path, c
 
 def test_wrong_campaigns_are_refused(tmp_path, capsys):
     bare = tmp_path / "bare.toml"
-    bare.write_text('format = "railsim-vehicle/1"\nextends = "coach_manchester"\n'
-                    'remove = ["service"]\nname = "bare"\n')
+    bare.write_text(
+        'format = "railsim-vehicle/1"\nextends = "coach_manchester"\n'
+        'remove = ["service"]\nname = "bare"\n'
+    )
     with pytest.raises(InputError, match="service"):
         scenario_cases(load_scenario("en14363"), [bare])
     for wrong in (
@@ -161,8 +173,10 @@ def test_failed_run_of_a_campaign_is_a_line(tmp_path, monkeypatch, capsys):
 def test_campaign_of_a_million_runs_is_told_at_once(tmp_path, capsys):
     many = [f"{k}" for k in range(1000)]
     scenario = tmp_path / "many.toml"
-    scenario.write_text(TWO.split("[grid]")[0] + f'[grid]\n"track.friction" = {many}\n'
-                        f'"track.gauge" = {many}\n' + TWO[TWO.index("[parts"):])
+    scenario.write_text(
+        TWO.split("[grid]")[0] + f'[grid]\n"track.friction" = {many}\n'
+        f'"track.gauge" = {many}\n' + TWO[TWO.index("[parts") :]
+    )
     given = ["study", "--scenario", str(scenario), "--vehicles", "coach_manchester"]
     assert main([*given, "--out", str(tmp_path / "out")]) == 2
     assert "1,000,000 runs, some" in capsys.readouterr().err

@@ -25,9 +25,9 @@ def test_check_in_json_is_the_difference_of_two_runs(tmp_path, capsys):
     rows = json.loads(capsys.readouterr().out)["half_step"]
     result = railsim.open_result(path)
     step = float(result.attributes["step"])
-    other = railsim.simulate(**(
-        result.inputs() | {"settings": result.settings().replace(step=0.5 * step)}
-    ))
+    other = railsim.simulate(
+        **(result.inputs() | {"settings": result.settings().replace(step=0.5 * step)})
+    )
     largest = next(row for row in rows if (row["quantity"], row["where"]) == ("Q", "peak"))
     # peaks are those of the loop's own steps, a little above the largest sample
     assert largest["value"] == pytest.approx(result.Q.max(), rel=1e-4)

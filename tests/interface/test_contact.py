@@ -38,9 +38,7 @@ def test_json_has_the_names_units_and_signs_of_the_interface(capsys):
     assert y[0] == pytest.approx(-0.008)
     assert y[-1] == pytest.approx(0.008)
     np.testing.assert_allclose(
-        lists["delta_r"],
-        lists["rolling_radius_right"] - lists["rolling_radius_left"],
-        atol=1e-15,
+        lists["delta_r"], lists["rolling_radius_right"] - lists["rolling_radius_left"], atol=1e-15
     )
     # shifted to the right: right wheel on its larger radius towards the flange, steeper there
     right = y > 0.001

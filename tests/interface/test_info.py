@@ -81,9 +81,11 @@ def test_irregularities_are_shown(capsys):
 
 def test_friction_and_widening_along_the_track_are_shown(capsys, tmp_path):
     path = tmp_path / "t.toml"
-    path.write_text('format = "railsim-track/1"\nname = "t"\ncant_rotation = "inner_rail"\n'
-                    'plan = [{type="STR", length=50.0}]\nfriction_table = [[0.0, 0.3]]\n'
-                    'gauge_widening = [[0.0, 0.0], [50.0, 0.012]]\n')
+    path.write_text(
+        'format = "railsim-track/1"\nname = "t"\ncant_rotation = "inner_rail"\n'
+        'plan = [{type="STR", length=50.0}]\nfriction_table = [[0.0, 0.3]]\n'
+        "gauge_widening = [[0.0, 0.0], [50.0, 0.012]]\n"
+    )
     text = "\n".join(lines_of(capsys, str(path)))
     assert "friction by table" in text
     assert "gauge widened by up to 12 mm" in text

@@ -108,7 +108,9 @@ def test_study_obeys_a_signal_that_python_loses(tmp_path, comes, way):
     comes(way, signal.SIGINT)
     assert main([*STUDY, "--out", str(tmp_path)]) == 130
     assert {path.name for path in tmp_path.iterdir()} == {
-        "study.journal", "study.json", "summary.csv",
+        "study.journal",
+        "study.json",
+        "summary.csv",
     }
 
 

@@ -18,14 +18,31 @@ def test_modes_at_one_speed(capsys):
 
 def test_root_locus_in_json_and_folder(capsys, tmp_path):
     folder = tmp_path / "modes"
-    arguments = ["modes", "coach_manchester", "--speeds", "20:30:2", "--linearisation", "harmonic",
-                 "--out", str(folder), "--json", "--quiet"]
+    arguments = [
+        "modes",
+        "coach_manchester",
+        "--speeds",
+        "20:30:2",
+        "--linearisation",
+        "harmonic",
+        "--out",
+        str(folder),
+        "--json",
+        "--quiet",
+    ]
     assert main(arguments) == 0
     records = json.loads(capsys.readouterr().out)
     assert [record["speed"] for record in records] == [20.0, 30.0]
     mode = records[0]["modes"][0]
-    assert set(mode) == {"name", "frequency", "natural_frequency", "damping_ratio", "eigenvalue",
-                         "participation", "shape"}
+    assert set(mode) == {
+        "name",
+        "frequency",
+        "natural_frequency",
+        "damping_ratio",
+        "eigenvalue",
+        "participation",
+        "shape",
+    }
     assert records[0]["amplitude"] == 3e-3
     assert json.loads((folder / "modes.json").read_text()) == records
     assert (folder / "modes.png").stat().st_size > 1000
@@ -34,29 +51,36 @@ def test_root_locus_in_json_and_folder(capsys, tmp_path):
 
 
 def test_root_locus_over_a_key(capsys):
-    assert main(["modes", "coach_manchester", "--over", "track.friction=0.2:0.4:2", "--json",
-                 "--quiet"]) == 0
+    assert (
+        main(
+            ["modes", "coach_manchester", "--over", "track.friction=0.2:0.4:2", "--json", "--quiet"]
+        )
+        == 0
+    )
     records = json.loads(capsys.readouterr().out)
     assert [record["parameter"]["value"] for record in records] == [0.2, 0.4]
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["--speed", "0"], "--speed"),
-    (["--speed", "nan"], "--speed"),
-    (["--speeds", "10:20"], "--speeds"),
-    (["--speeds", "10:20:0"], "--speeds"),
-    (["--speeds", "10:20:2", "--over", "track.friction=0.2:0.4:2"], "--over"),
-    (["--over", "track.nothing=0.2:0.4:2"], "nothing"),
-    (["--hold", "carbdy"], "carbody"),
-    (["--hold", "front.outer.wheelset"], "--held"),
-    (["--radius", "2"], "--radius"),
-    (["--cant", "2"], "--cant"),
-    (["--conicity", "3"], "--conicity"),
-    (["--linearisation", "harmonic", "--amplitude", "0.2"], "--amplitude"),
-    (["--linearisation", "harmonic", "--amplitude", "-1"], "--amplitude"),
-    (["--set", "vehicle.bodies.carbody.mas=3"], "mas"),
-    (["--radius", "100", "--speed", "60"], "no steady state"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--speed", "0"], "--speed"),
+        (["--speed", "nan"], "--speed"),
+        (["--speeds", "10:20"], "--speeds"),
+        (["--speeds", "10:20:0"], "--speeds"),
+        (["--speeds", "10:20:2", "--over", "track.friction=0.2:0.4:2"], "--over"),
+        (["--over", "track.nothing=0.2:0.4:2"], "nothing"),
+        (["--hold", "carbdy"], "carbody"),
+        (["--hold", "front.outer.wheelset"], "--held"),
+        (["--radius", "2"], "--radius"),
+        (["--cant", "2"], "--cant"),
+        (["--conicity", "3"], "--conicity"),
+        (["--linearisation", "harmonic", "--amplitude", "0.2"], "--amplitude"),
+        (["--linearisation", "harmonic", "--amplitude", "-1"], "--amplitude"),
+        (["--set", "vehicle.bodies.carbody.mas=3"], "mas"),
+        (["--radius", "100", "--speed", "60"], "no steady state"),
+    ],
+)
 def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     assert main(["modes", "coach_manchester", "--quiet", *arguments]) == 2
     error = capsys.readouterr().err
@@ -66,8 +90,16 @@ def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
 
 def test_a_mode_is_animated(capsys, tmp_path):
     folder = tmp_path / "modes"
-    arguments = ["modes", "coach_manchester", "--speed", "30", "--quiet", "--out", str(folder),
-                 "--overwrite"]
+    arguments = [
+        "modes",
+        "coach_manchester",
+        "--speed",
+        "30",
+        "--quiet",
+        "--out",
+        str(folder),
+        "--overwrite",
+    ]
     assert main([*arguments, "--animate", "front hunting"]) == 0
     assert str(folder / "mode.html") in capsys.readouterr().out
     assert "front hunting" in (folder / "mode.html").read_text()
@@ -75,10 +107,13 @@ def test_a_mode_is_animated(capsys, tmp_path):
     assert "front hunting" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [
-    ["--animate", "front hunting"],
-    ["--animate", "front hunting", "--speeds", "10:20:2", "--out", "modes"],
-])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--animate", "front hunting"],
+        ["--animate", "front hunting", "--speeds", "10:20:2", "--out", "modes"],
+    ],
+)
 def test_an_animation_needs_one_speed_and_a_folder(capsys, arguments):
     assert main(["modes", "coach_manchester", "--quiet", *arguments]) == 2
     assert "--animate" in capsys.readouterr().err

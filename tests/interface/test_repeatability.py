@@ -20,9 +20,7 @@ def test_calls_within_an_output_interval_change_nothing(monkeypatch):
     runs = []
     for most in (railsim.advance.STEPS, 7):  # of 80 steps from one output to the next
         monkeypatch.setattr(railsim.advance, "STEPS", most)
-        runs.append(
-            railsim.simulate(vehicle, track, speed=20.0, until=20.0, settings=settings)
-        )
+        runs.append(railsim.simulate(vehicle, track, speed=20.0, until=20.0, settings=settings))
     whole, cut = runs
     assert len(whole.time) == 11
     for name in whole:

@@ -10,14 +10,24 @@ from railsim.errors import InputError
 
 @pytest.fixture(scope="module")
 def result():
-    settings = Settings(outputs={
-        "elements": ["front.outer.primary.*", "front.anti_roll_bar",
-                     "front.outer.primary_vertical_damper.left"],
-        "contact_patches": True, "track": True,
-    })
+    settings = Settings(
+        outputs={
+            "elements": [
+                "front.outer.primary.*",
+                "front.anti_roll_bar",
+                "front.outer.primary_vertical_damper.left",
+            ],
+            "contact_patches": True,
+            "track": True,
+        }
+    )
     return railsim.simulate(
-        railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250"),
-        speed=20.0, start=380.0, duration=1.0, settings=settings,
+        railsim.load_vehicle("coach_manchester"),
+        railsim.load_track("curve_r250"),
+        speed=20.0,
+        start=380.0,
+        duration=1.0,
+        settings=settings,
     )
 
 
@@ -57,8 +67,13 @@ def test_track_is_seen_at_each_wheelset(result):
 def test_unknown_element_is_refused_with_the_nearest_name():
     settings = Settings(outputs={"elements": ["front.outer.primery.left"]})
     with pytest.raises(InputError, match=r"front.outer.primary.left"):
-        railsim.simulate(railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"),
-                         speed=20.0, duration=0.1, settings=settings)
+        railsim.simulate(
+            railsim.load_vehicle("coach_manchester"),
+            railsim.load_track("straight"),
+            speed=20.0,
+            duration=0.1,
+            settings=settings,
+        )
 
 
 def test_requested_outputs_reach_the_file(result, tmp_path):

@@ -65,8 +65,7 @@ def test_run_that_is_continued_twice_equals_an_undisturbed_one(written, tmp_path
             np.testing.assert_array_equal(part[name], there)
         rows += len(part.time) - 1  # the instant where two parts meet is in both
     assert rows == len(whole.time) - 1
-    np.testing.assert_array_equal(
-        parts[-1].groups["state"]["end"], whole.groups["state"]["end"])
+    np.testing.assert_array_equal(parts[-1].groups["state"]["end"], whole.groups["state"]["end"])
 
 
 def test_continued_run_runs_again_from_itself(tmp_path):

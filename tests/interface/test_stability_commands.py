@@ -9,19 +9,55 @@ from railsim.cli import main
 
 def test_linear_critical_speed(capsys, tmp_path):
     folder = tmp_path / "out"
-    assert main(["critical-speed", "coach_manchester", "--method", "linear", "--json", "--quiet",
-                 "--linearisation", "harmonic", "--out", str(folder)]) == 0
+    assert (
+        main(
+            [
+                "critical-speed",
+                "coach_manchester",
+                "--method",
+                "linear",
+                "--json",
+                "--quiet",
+                "--linearisation",
+                "harmonic",
+                "--out",
+                str(folder),
+            ]
+        )
+        == 0
+    )
     record = json.loads(capsys.readouterr().out)
     assert record["linear"]["mode"].endswith("hunting")
-    assert {"linear", "nonlinear", "amplitude_limit", "instability_limit", "type",
-            "branches"} <= set(record)
+    assert {
+        "linear",
+        "nonlinear",
+        "amplitude_limit",
+        "instability_limit",
+        "type",
+        "branches",
+    } <= set(record)
     assert (folder / "critical_speed.png").stat().st_size > 1000
 
 
 def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
     folder = tmp_path / "map"
-    command = ["critical-speed", "coach_manchester", "--method", "linear", "--friction", "0.2,0.4",
-               "--from", "20", "--to", "80", "--workers", "1", "--out", str(folder), "--quiet"]
+    command = [
+        "critical-speed",
+        "coach_manchester",
+        "--method",
+        "linear",
+        "--friction",
+        "0.2,0.4",
+        "--from",
+        "20",
+        "--to",
+        "80",
+        "--workers",
+        "1",
+        "--out",
+        str(folder),
+        "--quiet",
+    ]
     assert main(command) == 0
     assert "friction" in capsys.readouterr().out
     kept = sorted((folder / "points").iterdir())
@@ -34,19 +70,39 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
     assert [path.stat().st_mtime_ns for path in kept] == before  # not computed again
 
 
-@pytest.mark.parametrize("damage", [
-    lambda text: text.replace(b'"speed": ', b'"speed": 1', 1),
-    lambda text: text[: len(text) // 2],
-    lambda _: b"",
-    lambda _: b"[" * 100_000,
-    lambda _: b'"crc32"',
-    lambda text: b"\xff" + text,
-    lambda text: json.dumps(json.loads(text)["record"]).encode(),  # as written without a checksum
-])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text.replace(b'"speed": ', b'"speed": 1', 1),
+        lambda text: text[: len(text) // 2],
+        lambda _: b"",
+        lambda _: b"[" * 100_000,
+        lambda _: b'"crc32"',
+        lambda text: b"\xff" + text,
+        lambda text: json.dumps(
+            json.loads(text)["record"]
+        ).encode(),  # as written without a checksum
+    ],
+)
 def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path, damage):
     folder = tmp_path / "map"
-    command = ["critical-speed", "coach_manchester", "--method", "linear", "--friction", "0.2,0.4",
-               "--from", "20", "--to", "80", "--workers", "1", "--out", str(folder), "--quiet"]
+    command = [
+        "critical-speed",
+        "coach_manchester",
+        "--method",
+        "linear",
+        "--friction",
+        "0.2,0.4",
+        "--from",
+        "20",
+        "--to",
+        "80",
+        "--workers",
+        "1",
+        "--out",
+        str(folder),
+        "--quiet",
+    ]
     assert main(command) == 0
     told = capsys.readouterr().out
     whole = {path: path.read_bytes() for path in (folder / "points").iterdir()}
@@ -67,9 +123,31 @@ def test_map_over_any_key_of_the_files(capsys, tmp_path):
     """Cones twice as steep cost speed, a heavier car a little; both keys stand in each record."""
     folder = tmp_path / "map"
     mass = "vehicle.bodies.carbody.mass"
-    assert main(["critical-speed", "coach_manchester", "--method", "linear", "--from", "20", "--to",
-                 "100", "--over", f"{mass}=25e3,45e3", "--conicity", "0.1,0.2", "--workers", "1",
-                 "--json", "--quiet", "--out", str(folder)]) == 0
+    assert (
+        main(
+            [
+                "critical-speed",
+                "coach_manchester",
+                "--method",
+                "linear",
+                "--from",
+                "20",
+                "--to",
+                "100",
+                "--over",
+                f"{mass}=25e3,45e3",
+                "--conicity",
+                "0.1,0.2",
+                "--workers",
+                "1",
+                "--json",
+                "--quiet",
+                "--out",
+                str(folder),
+            ]
+        )
+        == 0
+    )
     records = json.loads(capsys.readouterr().out)
     speeds = {(r["at"][mass], r["at"]["conicity"]): r["linear"]["speed"] for r in records}
     assert len(speeds) == 4
@@ -82,8 +160,21 @@ def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
 
     A cone 1:10 touches the 60E1 where the radius R of its head is 80 mm.
     """
-    assert main(["critical-speed", "coach_manchester", "--method", "linear", "--conicity", "0.1",
-                 "--json", "--quiet"]) == 0
+    assert (
+        main(
+            [
+                "critical-speed",
+                "coach_manchester",
+                "--method",
+                "linear",
+                "--conicity",
+                "0.1",
+                "--json",
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)["conicity_over_amplitude"]
     near = [g for a, g in zip(found["amplitude"], found["conicity"], strict=True) if a < 4e-3]
     expected = 0.1 * (0.75 + 0.08 * 0.1) / (0.75 - 0.46 * 0.1)
@@ -93,8 +184,25 @@ def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
 
 def test_curving_over_a_grid(capsys, tmp_path):
     folder = tmp_path / "curving"
-    assert main(["curving", "coach_manchester", "--radius", "300,-600", "--cant-deficiency",
-                 "0,0.1", "--friction", "0.3", "--out", str(folder), "--json", "--quiet"]) == 0
+    assert (
+        main(
+            [
+                "curving",
+                "coach_manchester",
+                "--radius",
+                "300,-600",
+                "--cant-deficiency",
+                "0,0.1",
+                "--friction",
+                "0.3",
+                "--out",
+                str(folder),
+                "--json",
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     record = json.loads(capsys.readouterr().out)
     assert record["converged"] == [[[1], [1]], [[1], [1]]]
     assert record["dims"]["Q"] == ["radius", "cant_deficiency", "friction", "wheelset", "side"]
@@ -105,22 +213,38 @@ def test_curving_over_a_grid(capsys, tmp_path):
     assert (folder / "curving.png").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["critical-speed", "coach_manchester", "--from", "60", "--to", "50"], "--from"),
-    (["critical-speed", "coach_manchester", "--to", "500"], "--to"),
-    (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
-    (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
-    (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
-    (["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"], "nothing"),
-    (["critical-speed", "coach_manchester", "--friction", "0.2,0.3", "--conicity", "0.1,0.2",
-      "--over", "vehicle.bodies.carbody.mass=2e4,3e4"], "two at most"),
-    (["curving", "coach_manchester", "--radius", "5"], "--radius"),
-    (["curving", "coach_manchester", "--radius", "inf"], "--radius"),
-    (["curving", "coach_manchester", "--radius", "300", "--cant", "1"], "--cant"),
-    (["curving", "coach_manchester", "--radius", "300", "--cant-deficiency", "-0.15"],
-     "--cant-deficiency"),
-    (["curving", "coach_manchester", "--radius", "300", "--friction", "-1"], "--friction"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["critical-speed", "coach_manchester", "--from", "60", "--to", "50"], "--from"),
+        (["critical-speed", "coach_manchester", "--to", "500"], "--to"),
+        (["critical-speed", "coach_manchester", "--friction", "a"], "--friction"),
+        (["critical-speed", "coach_manchester", "--points", "1"], "--points"),
+        (["critical-speed", "coach_manchester", "--over", "friction"], "--over"),
+        (["critical-speed", "coach_manchester", "--over", "track.nothing=1:2:2"], "nothing"),
+        (
+            [
+                "critical-speed",
+                "coach_manchester",
+                "--friction",
+                "0.2,0.3",
+                "--conicity",
+                "0.1,0.2",
+                "--over",
+                "vehicle.bodies.carbody.mass=2e4,3e4",
+            ],
+            "two at most",
+        ),
+        (["curving", "coach_manchester", "--radius", "5"], "--radius"),
+        (["curving", "coach_manchester", "--radius", "inf"], "--radius"),
+        (["curving", "coach_manchester", "--radius", "300", "--cant", "1"], "--cant"),
+        (
+            ["curving", "coach_manchester", "--radius", "300", "--cant-deficiency", "-0.15"],
+            "--cant-deficiency",
+        ),
+        (["curving", "coach_manchester", "--radius", "300", "--friction", "-1"], "--friction"),
+    ],
+)
 def test_wrong_input_is_told_in_a_line(capsys, arguments, words):
     assert main([*arguments, "--quiet"]) == 2
     error = capsys.readouterr().err

@@ -322,8 +322,9 @@ def test_a_million_runs_are_told_at_once(tmp_path, simulated, capsys):
     assert not (tmp_path / "study").exists()
 
 
-def test_full_disk_ends_a_study_in_a_line_and_keeps_what_is_done(tmp_path, simulated, monkeypatch,
-                                                                 capsys):
+def test_full_disk_ends_a_study_in_a_line_and_keeps_what_is_done(
+    tmp_path, simulated, monkeypatch, capsys
+):
     simulate = railsim.studies.run.simulate
 
     def full(*inputs, speed, **how):
@@ -375,8 +376,9 @@ def test_grid_may_vary_places_in_tables(tmp_path):
     assert [case.settings.drive.speed_table[1] for case in cases] == [(300.0, 10.0), (300.0, 12.0)]
     assert cases[0].name == f"{COACH}_{CURVE}_20_speed_table.1.1=10"
     with pytest.raises(InputError) as caught:
-        combinations([COACH], [CURVE], [20.0], {"settings.drive.speed_table.2.1": ["9"]},
-                     settings=settings)
+        combinations(
+            [COACH], [CURVE], [20.0], {"settings.drive.speed_table.2.1": ["9"]}, settings=settings
+        )
     assert str(caught.value).startswith(
         "--grid: settings.drive.speed_table.2.1: no member '2' in drive.speed_table; allowed"
     )
@@ -455,7 +457,10 @@ def test_compiled_code_is_seen(tmp_path):
         environment = os.environ | variables
         return subprocess.run(
             [sys.executable, "-c", before + look],
-            env=environment, capture_output=True, text=True, check=True,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
         ).stdout.strip()
 
     assert seen(compile_it) == "True"
@@ -503,7 +508,11 @@ def test_processes_end_after_a_study_that_was_killed(tmp_path):
 
 def test_python_takes_single_values_too(tmp_path, simulated):
     outcome = railsim.study(
-        COACH, CURVE, 20.0, grid={"track.rail": "54E1", "track.friction": 0.3}, out=tmp_path,
+        COACH,
+        CURVE,
+        20.0,
+        grid={"track.rail": "54E1", "track.friction": 0.3},
+        out=tmp_path,
         workers=1,
     )
     (record,) = outcome.records
@@ -535,8 +544,19 @@ def children(process):
 def test_killed_worker_costs_nothing_but_time(tmp_path):
     """Its runs begin again, those of the others too where the pool goes down."""
     given = arguments(tmp_path, 20, 21, 22)[:-2]
-    process = started([*given, "--set", "settings.scheme=rk4", "--set", "settings.step=1e-4",
-                       "--until", "400", "--workers", "2"])
+    process = started(
+        [
+            *given,
+            "--set",
+            "settings.scheme=rk4",
+            "--set",
+            "settings.step=1e-4",
+            "--until",
+            "400",
+            "--workers",
+            "2",
+        ]
+    )
     while not list(tmp_path.glob(".*.partial")):
         time.sleep(0.05)
     os.kill(children(process)[0], signal.SIGKILL)

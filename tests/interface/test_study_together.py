@@ -124,7 +124,9 @@ def test_interrupt_leaves_whole_files_only(tmp_path, monkeypatch):
     monkeypatch.setattr(railsim.studies.run, "outcomes", interrupted)
     assert main(arguments(tmp_path, 40e3, 42e3)) == 130
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "study.journal", "study.json", "summary.csv",
+        "study.journal",
+        "study.json",
+        "summary.csv",
     ]
     assert [run["status"] for run in runs(tmp_path)] == ["waiting", "waiting"]
 

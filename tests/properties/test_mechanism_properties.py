@@ -110,9 +110,7 @@ def test_turned_and_scaled_linkages_move_alike(ground, crank, coupler, rocker, t
 @given(LENGTH, LENGTH, LENGTH, LENGTH)
 def test_friction_takes_as_much_on_either_way(ground, crank, coupler, rocker):
     motion = moved(four_bar(ground, crank, coupler, rocker))
-    there, back, plain = (
-        generalised_force(motion, Rates(friction=sense)) for sense in (1, -1, 0)
-    )
+    there, back, plain = (generalised_force(motion, Rates(friction=sense)) for sense in (1, -1, 0))
     assert plain - there == pytest.approx(1.5, rel=1e-9)
     assert back - plain == pytest.approx(1.5, rel=1e-9)
 

@@ -24,12 +24,20 @@ def test_coach_agrees_with_the_published_study(results, coach, quantity):
     assert found == pytest.approx(expected, rel=TOLERANCE[quantity])
 
 
-@pytest.mark.parametrize("quantity", [
-    pytest.param(q, marks=pytest.mark.xfail(
-        reason="yaw: -9.30 % against -7.29 %, 2.004 points", strict=False))
-    if q == "wheelset_yaw" else q
-    for q in TOLERANCE
-])
+@pytest.mark.parametrize(
+    "quantity",
+    [
+        pytest.param(
+            q,
+            marks=pytest.mark.xfail(
+                reason="yaw: -9.30 % against -7.29 %, 2.004 points", strict=False
+            ),
+        )
+        if q == "wheelset_yaw"
+        else q
+        for q in TOLERANCE
+    ],
+)
 def test_difference_between_the_suspensions_agrees(results, quantity):
     """Flexicoil minus Manchester in per cent: within 2 points, and right in sign above 0.5 %."""
     expected = 100.0 * (published("flexicoil")[quantity] / published("manchester")[quantity] - 1.0)

@@ -38,9 +38,7 @@ def by_lift(values):
 @pytest.fixture(scope="module")
 def lifts():
     names = (*LIFTS, "atr95", "atr95_lift_6")
-    return {
-        name: analyse(load_mechanism(name, ["sampling.points=401"])) for name in names
-    }
+    return {name: analyse(load_mechanism(name, ["sampling.points=401"])) for name in names}
 
 
 def at_places(result, name):
@@ -129,10 +127,7 @@ def test_a8_errors_against_lift_5_printed_and_reconstructed(name, error, printed
     [
         ("atr95_lift_2", {"c": 0.134611, "alpha1_in": 81.197}),
         ("atr95_lift_3", {"c": 0.144212, "alpha1_in": 6.4475, "a1": 0.071782}),
-        (
-            "atr95_lift_4",
-            {"c": -0.152042, "alpha1_in": 108.147, "a1": 0.129213, "a2": 0.118508},
-        ),
+        ("atr95_lift_4", {"c": -0.152042, "alpha1_in": 108.147, "a1": 0.129213, "a2": 0.118508}),
     ],
 )
 def test_a9_local_optima_from_the_printed_values_reconstructed(name, optimum):
@@ -185,9 +180,7 @@ def test_a14_pressure_of_the_air_spring_from_the_printed_table(lifts, height, fo
     assert found == pytest.approx(pressure, abs=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("height", "pressure", "force"), [(110, 0.45, 1412.5), (210, 0.35, 590.0)]
-)
+@pytest.mark.parametrize(("height", "pressure", "force"), [(110, 0.45, 1412.5), (210, 0.35, 590.0)])
 def test_a15_force_of_the_air_spring_from_the_printed_table(lifts, height, pressure, force):
     result = lifts["atr95"]
     table = table_of(result.motion, result.definition.actuators["lift"])

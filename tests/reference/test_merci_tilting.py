@@ -79,8 +79,7 @@ def source_equation_19(case, *, slips):
 
 
 @pytest.mark.parametrize(
-    ("case", "with_slips", "right"),
-    [(None, 205.96, 128.43), ("bordolese_5000", 256.38, 136.99)],
+    ("case", "with_slips", "right"), [(None, 205.96, 128.43), ("bordolese_5000", 256.38, 136.99)]
 )
 def test_b4_equation_19_with_its_slips_gives_the_printed_range(case, with_slips, right):
     assert source_equation_19(case, slips=True) == pytest.approx(with_slips, abs=0.05)

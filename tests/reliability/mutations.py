@@ -58,7 +58,9 @@ def text_damaged(text, rng):
                 lines[at], lines[other] = lines[other], lines[at]
             case 7:
                 place = int(rng.integers(len(lines[at]) + 1))
-                lines[at] = lines[at][:place] + str(rng.choice(list("[]{}\"'#,=\x00\x1b\n"))) + (
-                    lines[at][place:]
+                lines[at] = (
+                    lines[at][:place]
+                    + str(rng.choice(list("[]{}\"'#,=\x00\x1b\n")))
+                    + (lines[at][place:])
                 )
     return "\n".join(lines) + "\n"

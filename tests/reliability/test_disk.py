@@ -69,10 +69,13 @@ def test_full_disk_leaves_no_half_result(small_disk):
     assert set(tried(40, case)) == {True, False}
 
 
-@pytest.mark.parametrize(("command", "room"), [
-    *product(["plot", "compare"], [0, 4 * KB, 60 * KB]),
-    ("info", 4 * KB),  # a picture, as by plot
-])
+@pytest.mark.parametrize(
+    ("command", "room"),
+    [
+        *product(["plot", "compare"], [0, 4 * KB, 60 * KB]),
+        ("info", 4 * KB),  # a picture, as by plot
+    ],
+)
 def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
     a, b = (str(example_result(duration=2.0).to_hdf5(tmp_path / f"{n}.h5")) for n in "ab")
     leave(small_disk, room)

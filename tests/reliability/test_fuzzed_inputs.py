@@ -126,8 +126,14 @@ def other_rank(file, name, rng):
 
 def other_type(file, name, rng):
     del file[name]
-    kinds = [np.array(["a", "b"], dtype="S1"), np.zeros(3, dtype=complex), np.zeros(4, dtype="i2"),
-             np.array([b"x"], dtype=object), np.zeros(3, dtype=[("a", "f8")]), np.zeros(3, bool)]
+    kinds = [
+        np.array(["a", "b"], dtype="S1"),
+        np.zeros(3, dtype=complex),
+        np.zeros(4, dtype="i2"),
+        np.array([b"x"], dtype=object),
+        np.zeros(3, dtype=[("a", "f8")]),
+        np.zeros(3, bool),
+    ]
     data = kinds[rng.integers(len(kinds))]
     kind = h5py.string_dtype() if data.dtype == object else data.dtype
     file.create_dataset(name, data=data, dtype=kind)

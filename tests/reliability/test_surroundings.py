@@ -24,8 +24,9 @@ def called(arguments, shell="", **environment):
     """Run railsim in a shell; return status, output and errors."""
     line = f'"{sys.executable}" -m railsim {" ".join(arguments)} {shell}'
     variables = {key: value for key, value in (os.environ | environment).items() if value}
-    done = subprocess.run(["sh", "-c", line], env=variables, capture_output=True, text=True,
-                          errors="replace")
+    done = subprocess.run(
+        ["sh", "-c", line], env=variables, capture_output=True, text=True, errors="replace"
+    )
     assert "Traceback" not in done.stderr, done.stderr
     assert "Exception ignored" not in done.stderr, done.stderr
     return done

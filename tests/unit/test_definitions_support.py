@@ -25,17 +25,20 @@ def test_ballasted_is_co_running_without_masses():
         assert getattr(without, name) == getattr(with_masses, name)
 
 
-@pytest.mark.parametrize("wrong", [
-    {"preset": "rigid", "rail_mass": 60.0},
-    {"preset": "rigid", "variation": [[0.0, 2.0]]},
-    {"preset": "ballasted", "rail_mass": 60.0},
-    {"preset": "ballasted", "pad_vertical": [150e6, 0.0]},
-    {"preset": "ballasted", "pad_vertical": [0.0, 100e3]},
-    {"preset": "p2", "ballast_lateral": [70e6, 350e3]},
-    {"preset": "p2", "sleeper_mass": 200.0},
-    {"preset": "ballasted", "variation": [[10.0, 1.0], [0.0, 2.0]]},
-    {"preset": "soft"},
-])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"preset": "rigid", "rail_mass": 60.0},
+        {"preset": "rigid", "variation": [[0.0, 2.0]]},
+        {"preset": "ballasted", "rail_mass": 60.0},
+        {"preset": "ballasted", "pad_vertical": [150e6, 0.0]},
+        {"preset": "ballasted", "pad_vertical": [0.0, 100e3]},
+        {"preset": "p2", "ballast_lateral": [70e6, 350e3]},
+        {"preset": "p2", "sleeper_mass": 200.0},
+        {"preset": "ballasted", "variation": [[10.0, 1.0], [0.0, 2.0]]},
+        {"preset": "soft"},
+    ],
+)
 def test_contradictions_are_refused(wrong):
     with pytest.raises(ValidationError):
         Support.model_validate(wrong)

@@ -44,8 +44,15 @@ def collect(table, one, two, total):
         values = load_rows(table, starts(eight_from(first, n), 8), 0, 8)
         a, b, c, d, e, f, g, h = values
         rest = (1.0 - a, 1.0 - b, 1.0 - c, 1.0 - d, 1.0 - e, 1.0 - f, 1.0 - g, 1.0 - h)
-        add_to_pairs(total, starts(eight(one, first), 8), starts(eight(two, first), 8), 0, values,
-                     rest, count)
+        add_to_pairs(
+            total,
+            starts(eight(one, first), 8),
+            starts(eight(two, first), 8),
+            0,
+            values,
+            rest,
+            count,
+        )
 
 
 @jit
@@ -63,8 +70,12 @@ def elementary(x, out):
     rows = starts(eight_from(0, LANES), 1)
     (v,) = load_rows(x, rows, 0, 1)
     s, c = sine_cosine_lanes(v)
-    store_rows(out, starts(eight_from(0, LANES), 4), 0, (
-        s, c, square_root(v * v), where_beyond(v, 1.0, -v, v / 4.0)))
+    store_rows(
+        out,
+        starts(eight_from(0, LANES), 4),
+        0,
+        (s, c, square_root(v * v), where_beyond(v, 1.0, -v, v / 4.0)),
+    )
 
 
 @pytest.mark.parametrize("n", [1, 7, 8, 9, 23])

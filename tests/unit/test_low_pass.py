@@ -87,25 +87,33 @@ def test_a_rate_that_folds_back_is_refused(outputs, rate, message):
 def test_low_passed_run_has_the_percentiles_of_the_fine_one():
     """Dips 0.6 m long and 0.8 mm deep: 200 instantaneous samples a second would be far off."""
     dips = [{"type": "dip", "s": s, "length": 0.6, "depth": 0.8e-3} for s in range(30, 190, 11)]
-    track = railsim.load_track("straight").replace(
-        irregularities=dips, support={"preset": "rigid"}
-    )
+    track = railsim.load_track("straight").replace(irregularities=dips, support={"preset": "rigid"})
     vehicle = railsim.load_vehicle("coach_manchester")
     outputs = {"quantities": ["Q", "wheelset_distance"], "sensors": True}
     fine = Settings(output_rate=1000.0, outputs=outputs, step=0.5e-3)
-    slow = Settings(output_rate=200.0, step=0.5e-3,
-                    outputs={**outputs, "low_pass": {"frequency": 80.0}})
+    slow = Settings(
+        output_rate=200.0, step=0.5e-3, outputs={**outputs, "low_pass": {"frequency": 80.0}}
+    )
     from railsim.result.filters import low_passed
 
-    runs = {rate: railsim.simulate(vehicle, track, speed=40.0, until=220.0, settings=settings)
-            for rate, settings in ((1000.0, fine), (200.0, slow))}
+    runs = {
+        rate: railsim.simulate(vehicle, track, speed=40.0, until=220.0, settings=settings)
+        for rate, settings in ((1000.0, fine), (200.0, slow))
+    }
     values = [
         np.percentile(low_passed(run.Q, rate, 20.0)[round(rate) : -round(rate / 2)], 99.85, axis=0)
         for rate, run in runs.items()
     ]
     np.testing.assert_allclose(values[1], values[0], rtol=3e-3)
-    assert set(runs[200.0]) == {"time", "distance", "Q", "Q0", "wheelset_distance",
-                                "sensor_acceleration", "sensor_roll_rate"}
+    assert set(runs[200.0]) == {
+        "time",
+        "distance",
+        "Q",
+        "Q0",
+        "wheelset_distance",
+        "sensor_acceleration",
+        "sensor_roll_rate",
+    }
     assert "flat to 80 Hz" in runs[200.0].remarks[0]
     middle = runs[1000.0].coordinates["sensor"].index("floor_middle")
     assert np.std(runs[1000.0].sensor_acceleration[300:, middle, 2]) > 1e-3
@@ -114,5 +122,10 @@ def test_low_passed_run_has_the_percentiles_of_the_fine_one():
 def test_unknown_quantity_is_refused_with_the_nearest_name():
     settings = Settings(outputs={"quantities": ["sum_YY"]})
     with pytest.raises(InputError, match=r"outputs.quantities.*sum_Y"):
-        railsim.simulate(railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"),
-                         speed=20.0, duration=0.1, settings=settings)
+        railsim.simulate(
+            railsim.load_vehicle("coach_manchester"),
+            railsim.load_track("straight"),
+            speed=20.0,
+            duration=0.1,
+            settings=settings,
+        )

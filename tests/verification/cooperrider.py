@@ -23,7 +23,13 @@ C, MU_N, PHI, PSI = 6.563e6, 10.0e3, 0.60252, 0.54219
 K0, CLEARANCE = 14.60e6, 9.1e-3
 
 NAMES = (
-    "leading.y", "leading.yaw", "trailing.y", "trailing.yaw", "frame.y", "frame.yaw", "frame.roll",
+    "leading.y",
+    "leading.yaw",
+    "trailing.y",
+    "trailing.yaw",
+    "frame.y",
+    "frame.yaw",
+    "frame.roll",
 )
 NAMES = (*NAMES, *(f"{name}'" for name in NAMES))
 
@@ -97,10 +103,12 @@ class Periods:
         self.steps = steps
 
     def after(self, states, durations, speeds):
-        return np.array([
-            path(x, v, v, duration / self.steps, self.steps)[-1]
-            for x, duration, v in zip(states, durations, speeds, strict=True)
-        ])
+        return np.array(
+            [
+                path(x, v, v, duration / self.steps, self.steps)[-1]
+                for x, duration, v in zip(states, durations, speeds, strict=True)
+            ]
+        )
 
     def amplitude(self, state, duration, speed):
         y = path(state, speed, speed, duration / self.steps / 2.0, 2 * self.steps)[:, 0]
@@ -120,6 +128,6 @@ class Rolling:
     def stretch(self, state, begin, end, duration):
         steps = round(duration / self.step)
         seen = path(state, begin, end, self.step, steps)
-        rows = seen[:-1:self.every, [0, 2]]
+        rows = seen[: -1 : self.every, [0, 2]]
         time = self.step * self.every * np.arange(len(rows))
         return Stretch(seen[-1], time, rows, np.zeros_like(rows))

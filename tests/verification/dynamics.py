@@ -67,9 +67,19 @@ def advance(system, state, h, n_steps, scheme="rk4", model=None):
     """State after `n_steps` steps; asserts that the run went through."""
     after = state.copy()
     status, _, steps, _ = time_loop(
-        system, work_arrays(system), after, np.zeros_like(state), np.zeros((3, len(state))),
-        empty_recorder(model, 1), SCHEMES[scheme], h, 1, n_steps, NEVER,
-        1, 0,
+        system,
+        work_arrays(system),
+        after,
+        np.zeros_like(state),
+        np.zeros((3, len(state))),
+        empty_recorder(model, 1),
+        SCHEMES[scheme],
+        h,
+        1,
+        n_steps,
+        NEVER,
+        1,
+        0,
     )
     assert (status, steps) == (0, n_steps)
     return after
@@ -130,8 +140,13 @@ def energy(system, state):
         total += 0.5 * mass * velocity @ velocity
         total += 0.5 * np.sum(system.bodies.inertia[b] * v[3:] ** 2)
         total -= mass * system.gravity * pose[b][0][2]
-    return total + _link_energy(system, pose) + _mount_energy(system, pose) + _contact_energy(
-        system, work, state) + _track_energy(system, state)
+    return (
+        total
+        + _link_energy(system, pose)
+        + _mount_energy(system, pose)
+        + _contact_energy(system, work, state)
+        + _track_energy(system, state)
+    )
 
 
 def _tracks(system, state):

@@ -75,11 +75,7 @@ def lowest_gap(
     rotation = np.array(
         [[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
     ) @ np.array(
-        [
-            [1.0, 0.0, 0.0],
-            [0.0, np.cos(roll), -np.sin(roll)],
-            [0.0, np.sin(roll), np.cos(roll)],
-        ]
+        [[1.0, 0.0, 0.0], [0.0, np.cos(roll), -np.sin(roll)], [0.0, np.sin(roll), np.cos(roll)]]
     )
 
     def gaps(profile_y, profile_z, theta):

@@ -39,9 +39,7 @@ def length_1(A, p):
         c = d1 * np.sin(A) - np.sqrt(
             d1**2 * np.sin(A) ** 2 - (a1**2 + d1**2 - a2**2 - 2 * a1 * d1 * np.cos(A))
         )
-        return np.arctan2(
-            a1 * np.sin(A) - c * np.cos(A), a1 * np.cos(A) + c * np.sin(A) - d1
-        )
+        return np.arctan2(a1 * np.sin(A) - c * np.cos(A), a1 * np.cos(A) + c * np.sin(A) - d1)
 
     al3 = p["alpha3_in"] + rocker(A) - rocker(p["alpha1_in"])
     return np.sqrt(a3**2 + d2**2 + 2 * a3 * d2 * np.cos(al3))

@@ -11,13 +11,7 @@ from dynamics import Settings, absolute_frame, evaluate, load_track, load_vehicl
 
 from railsim.assembly import assemble, level_track
 from railsim.definitions.vehicle import Vehicle
-from railsim.kernels.internal import (
-    AIR,
-    PAD,
-    advanced,
-    constant_decays,
-    curve_value,
-)
+from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, time_loop
 from railsim.time_step import empty_recorder
@@ -40,13 +34,19 @@ class Rig:
         data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
         wheelset = data["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"]
         body = {"mass": 1e3, "inertia": [1e3, 1e3, 1e3], "position": [0.0, 0.0, -1.0]}
-        vehicle = Vehicle.model_validate({
-            "format": "railsim-vehicle/1", "name": "rig", "wheelsets": {"wheelset": wheelset},
-            "bodies": {"frame": body, "probe": body},
-            "elements": {"tested": {"bodies": ["frame", "probe"], "preload": 0.0, **element}
-                         if element["kind"] == "spring_damper" else
-                         {"bodies": ["frame", "probe"], "point": [0.0, 0.0, -1.0], **element}},
-        })
+        vehicle = Vehicle.model_validate(
+            {
+                "format": "railsim-vehicle/1",
+                "name": "rig",
+                "wheelsets": {"wheelset": wheelset},
+                "bodies": {"frame": body, "probe": body},
+                "elements": {
+                    "tested": {"bodies": ["frame", "probe"], "preload": 0.0, **element}
+                    if element["kind"] == "spring_damper"
+                    else {"bodies": ["frame", "probe"], "point": [0.0, 0.0, -1.0], **element}
+                },
+            }
+        )
         model = assemble(vehicle, load_track("straight"), Settings())
         self.system = level_track(model.system)
         self.state = np.zeros(model.n_state)
@@ -75,9 +75,16 @@ class Rig:
             self.force(axis, deflection(time[k] + 0.5 * h), rate(time[k] + 0.5 * h))
             for i in range(len(internal.kind)):
                 at = 12 * self.n + i
-                self.state[at] = advanced(internal, curves, i, self.state[at],
-                                          self.work.drive[i, 0], self.work.drive[i, 1], h,
-                                          decay[i])
+                self.state[at] = advanced(
+                    internal,
+                    curves,
+                    i,
+                    self.state[at],
+                    self.work.drive[i, 0],
+                    self.work.drive[i, 1],
+                    h,
+                    decay[i],
+                )
         return forces
 
 
@@ -108,8 +115,9 @@ class WorkOfDissipation:
 
     def __init__(self, model):
         self.system = model.system
-        self.inner = slice(12 * model.index.n_bodies, 12 * model.index.n_bodies
-                           + len(model.system.internal.kind))
+        self.inner = slice(
+            12 * model.index.n_bodies, 12 * model.index.n_bodies + len(model.system.internal.kind)
+        )
         self.total = 0.0
         self._before = None
 
@@ -125,13 +133,16 @@ class WorkOfDissipation:
 
     def _deflections(self, state):
         system, pose = self.system, poses(self.system, state)
-        links = np.array([
-            np.linalg.norm(pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p)
-            for (i, j), (p, q) in zip(system.links.body, system.links.point, strict=True)
-        ])
+        links = np.array(
+            [
+                np.linalg.norm(pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p)
+                for (i, j), (p, q) in zip(system.links.body, system.links.point, strict=True)
+            ]
+        )
         mounts = []
-        for (i, j), (p, q), flags in zip(system.mounts.body, system.mounts.point,
-                                         system.mounts.flags, strict=True):
+        for (i, j), (p, q), flags in zip(
+            system.mounts.body, system.mounts.point, system.mounts.flags, strict=True
+        ):
             gap = pose[j][0] + pose[j][1] @ q - pose[i][0] - pose[i][1] @ p
             second = pose[j][1].T @ gap if flags[1] else pose[i][1].T @ gap
             mounts.append([pose[i][1].T @ gap, second])
@@ -167,8 +178,9 @@ class WorkOfDissipation:
         total = 0.0
         for c, new, old in zip(self.system.mounts.rotation_damping, now, before, strict=True):
             turn = (new - old) @ (0.5 * (new + old)).T
-            angle = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
-                                    turn[1, 0] - turn[0, 1]])
+            angle = 0.5 * np.array(
+                [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+            )
             total += float(c @ angle**2) / h
         return total
 
@@ -192,8 +204,20 @@ def step_by_step(model, state, h, n_steps, scheme="rk4"):
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     recorder = empty_recorder(model, 1)
     for step in range(n_steps):
-        status, *_ = time_loop(model.system, work, state, derivative, stages, recorder,
-                               RK4 if scheme == "rk4" else FAST, h, 1, 1, 1 << 40,
-                               int(step == 0), 0)
+        status, *_ = time_loop(
+            model.system,
+            work,
+            state,
+            derivative,
+            stages,
+            recorder,
+            RK4 if scheme == "rk4" else FAST,
+            h,
+            1,
+            1,
+            1 << 40,
+            int(step == 0),
+            0,
+        )
         assert status == 0
         yield state

@@ -47,17 +47,25 @@ def speed(radius, deficiency):
 def run(case, support=None, **settings):
     """Result of a case."""
     coach, radius, friction, deficiency = case
-    return simulate(load_vehicle(coach), curve(radius, friction, support),
-                    speed=speed(radius, deficiency), settings=Settings(**settings))
+    return simulate(
+        load_vehicle(coach),
+        curve(radius, friction, support),
+        speed=speed(radius, deficiency),
+        settings=Settings(**settings),
+    )
 
 
 def peaks(result):
     """Largest Q, |Y|, |sum of Y| over Q0, and Y/Q."""
     Q0 = float(result.Q0.mean())
-    return np.array([
-        result.Q.max() / Q0, np.abs(result.Y).max() / Q0, np.abs(result.sum_Y).max() / Q0,
-        np.nanmax(result.Y_over_Q),
-    ])
+    return np.array(
+        [
+            result.Q.max() / Q0,
+            np.abs(result.Y).max() / Q0,
+            np.abs(result.sum_Y).max() / Q0,
+            np.nanmax(result.Y_over_Q),
+        ]
+    )
 
 
 def excess(result, other):
@@ -73,8 +81,10 @@ def excess(result, other):
 def ways(case, support=None, reference=False):
     """Excess of the run at half the step, at half and at twice the contact damping; of `rk4`."""
     result = run(case, support)
-    settings = [{"step": 0.5 * result.attributes["step"]},
-                *({"contact_damping": damping} for damping in DAMPING)]
+    settings = [
+        {"step": 0.5 * result.attributes["step"]},
+        *({"contact_damping": damping} for damping in DAMPING),
+    ]
     if reference:
         settings.append(REFERENCE)
     return [excess(result, run(case, support, **way)) for way in settings], result

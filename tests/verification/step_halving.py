@@ -5,16 +5,29 @@ from dynamics import Settings, load_track, load_vehicle
 
 from railsim.simulation import simulate
 
-QUANTITIES = ("dQ_over_Q0", "Y", "sum_Y", "Y_over_Q", "T_gamma", "wheelset_lateral",
-              "wheelset_yaw", "body_acceleration")
+QUANTITIES = (
+    "dQ_over_Q0",
+    "Y",
+    "sum_Y",
+    "Y_over_Q",
+    "T_gamma",
+    "wheelset_lateral",
+    "wheelset_yaw",
+    "body_acceleration",
+)
 RANDOM = {"type": "random", "spectrum": "erri_b176_low", "seed": 1}
 
 
 def irregular_run(speed, until, **settings):
     """`coach_flexicoil` on ERRI B176 "low" irregularities, from the track's beginning."""
     track = load_track("straight").replace(irregularities=[RANDOM])
-    return simulate(load_vehicle("coach_flexicoil"), track, speed=speed, until=until,
-                    settings=Settings(**settings))
+    return simulate(
+        load_vehicle("coach_flexicoil"),
+        track,
+        speed=speed,
+        until=until,
+        settings=Settings(**settings),
+    )
 
 
 def half_as_long(result):

@@ -299,8 +299,9 @@ def test_wear_laws():
     """W1."""
     worn = 1e9 * pearce_sherratt_1991(np.array([50.0, 150.0, 250.0]), 0.92)
     np.testing.assert_allclose(worn, [0.01359, 0.02717, 0.1560], rtol=5e-4)
-    np.testing.assert_allclose(1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0])), [26.5, 55.0, 1466],
-                               rtol=5e-4)
+    np.testing.assert_allclose(
+        1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0])), [26.5, 55.0, 1466], rtol=5e-4
+    )
     damage = 1e6 * WholeLifeRailModel()(np.array([40.0, 65.0, 120.0]))
     np.testing.assert_allclose(damage, [5.0, 10.0, 5.0], rtol=1e-9)
 

@@ -4,14 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from independent_contact import (
-    evaluate,
-    forces,
-    lowest_gap,
-    potential,
-    rail_points,
-    under_load,
-)
+from independent_contact import evaluate, forces, lowest_gap, potential, rail_points, under_load
 
 from railsim.contact import build_contact_table, cached_contact_table, hertz
 from railsim.contact.elastic import loaded_contact
@@ -53,9 +46,7 @@ def random_places(n, seed):
 
 
 def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
-    table = build_contact_table(
-        load_profile("S1002"), load_profile("60E1"), grid=FINE_YAW
-    )
+    table = build_contact_table(load_profile("S1002"), load_profile("60E1"), grid=FINE_YAW)
     rail = rail_points()
     errors = []
     for y, roll, yaw in random_places(30, seed=1):
@@ -69,9 +60,7 @@ def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
 @pytest.mark.parametrize("seed", range(3))
 def test_heights_of_worn_profiles_agree_too(seed):
     wheel, rail = worn(seed), rail_points(inclination=0.05)
-    table = build_contact_table(
-        wheel, load_profile("60E1"), inclination=0.05, grid=FINE_YAW
-    )
+    table = build_contact_table(wheel, load_profile("60E1"), inclination=0.05, grid=FINE_YAW)
     errors = []
     for y, roll, yaw in random_places(12, seed):
         height = lowest_gap(wheel.y, wheel.z, *rail, y, roll, yaw, 0.46)[0]
@@ -163,11 +152,20 @@ def test_worn_and_conformal_pairs_have_forces_without_jumps(pair):
     assert largest_change(5e-6) == pytest.approx(0.5 * largest_change(1e-5), rel=0.15)
 
 
-@pytest.mark.parametrize("degrees", [
-    pytest.param(15.0, marks=pytest.mark.xfail(
-        reason="a patch shared by tread and flange root is turned by up to 11 mrad", strict=False)),
-    30.0, 45.0,
-])
+@pytest.mark.parametrize(
+    "degrees",
+    [
+        pytest.param(
+            15.0,
+            marks=pytest.mark.xfail(
+                reason="a patch shared by tread and flange root is turned by up to 11 mrad",
+                strict=False,
+            ),
+        ),
+        30.0,
+        45.0,
+    ],
+)
 def test_patch_under_load_lies_on_the_common_normal_of_two_circles(degrees):
     # concave wheel on convex rail, both circles in the cross-section: the line through the
     # centres is the common normal, whatever the load
@@ -193,8 +191,9 @@ def test_patch_under_load_lies_on_the_common_normal_of_two_circles(degrees):
     }
     for patch in patches.values():
         # Hertz' approach on the ellipse of rolling radius and relative curvature
-        ellipse = hertz(0.5 * np.cos(theta) / 0.46, 0.5 / R_rail - 0.5 / R_wheel, patch.N,
-                        2 * 82e9 * 1.28, 0.28)
+        ellipse = hertz(
+            0.5 * np.cos(theta) / 0.46, 0.5 / R_rail - 0.5 / R_wheel, patch.N, 2 * 82e9 * 1.28, 0.28
+        )
         loaded = np.arcsin(offset * np.sin(theta) / (offset + ellipse.approach))
         # turned from the angle of first touch as far as the line of centres, to a fifth of it
         assert patch.angle - theta == pytest.approx(loaded - theta, rel=0.2, abs=1.3e-3)
@@ -229,7 +228,10 @@ def test_zones_share_a_contact_on_their_border_instead_of_counting_it_twice():
     rail_angle = np.linspace(-1.45, 1.45, 4001)
     rail = Profile("round rail", "rail", 0.02 * np.sin(rail_angle), 0.02 * (1 - np.cos(rail_angle)))
     table = build_contact_table(
-        arc, rail, gauge=1.42, inclination=0.0,
+        arc,
+        rail,
+        gauge=1.42,
+        inclination=0.0,
         grid=TableGrid(s_min=-0.02, s_max=0.0, roll_max=0.003, n_w=2),
     )
     places = np.arange(-0.018, -0.005, 1e-4)

@@ -34,7 +34,8 @@ def peaks(result):
 
 def test_halving_the_step_moves_no_peak_by_half_a_per_cent(run, default):
     assert peaks(run(step=0.5 * default.attributes["step"])) == pytest.approx(
-        peaks(default), rel=5e-3)
+        peaks(default), rel=5e-3
+    )
 
 
 def test_default_scheme_agrees_with_the_reference_scheme(run, default):
@@ -45,7 +46,8 @@ def test_default_scheme_agrees_with_the_reference_scheme(run, default):
     assert np.abs(default.Y).max() == pytest.approx(np.abs(reference.Y).max(), abs=50.0)
     assert np.max(np.abs(default.Y[middle] - reference.Y[middle])) < 50.0
     assert default.wheelset_yaw[middle, 0] == pytest.approx(
-        reference.wheelset_yaw[middle, 0], rel=1e-3)
+        reference.wheelset_yaw[middle, 0], rel=1e-3
+    )
 
 
 @pytest.mark.xfail(reason="sum_abs_Y moves by 0.9 %, 0.5 % asked", strict=False)
@@ -55,8 +57,14 @@ def test_doubling_the_contact_tables_grid_moves_no_peak_by_half_a_per_cent(
     usual = TableGrid()
     # half the spacing in all three directions, over the range that this run needs
     finer = dataclasses.replace(
-        usual, s_min=-0.012, s_max=0.010, ds=usual.ds / 2, roll_max=9e-3, droll=usual.droll / 2,
-        yaw_max=usual.yaw_max / 2**0.5, n_w=usual.n_w,
+        usual,
+        s_min=-0.012,
+        s_max=0.010,
+        ds=usual.ds / 2,
+        roll_max=9e-3,
+        droll=usual.droll / 2,
+        yaw_max=usual.yaw_max / 2**0.5,
+        n_w=usual.n_w,
     )
 
     def fine_table(wheel, rail, **geometry):

@@ -40,14 +40,17 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "kind"), [
-    ("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical"),
-])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")]
+)
 def test_three_methods_agree_on_a_coach(name, kind):
     """Non-linear critical speed by ramp, bifurcation and continuation within 0.5 m/s."""
     found = critical_speed(
-        load_vehicle(name), RIGID,
-        methods=("ramp", "bifurcation", "continuation"), low=25.0, points=6,
+        load_vehicle(name),
+        RIGID,
+        methods=("ramp", "bifurcation", "continuation"),
+        low=25.0,
+        points=6,
     )
     speeds = [lowest.speed for lowest in found.nonlinear.values()]
     assert len(speeds) == 3
@@ -58,14 +61,20 @@ def test_three_methods_agree_on_a_coach(name, kind):
     assert float(branches.amplitude.max()) > 1e-3
 
 
-@pytest.mark.parametrize(("name", "kind"), [
-    ("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical"),
-])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")]
+)
 def test_a_diagram_alone_tells_how_hunting_begins(name, kind):
     """As continuation does; the hysteresis of the Flexicoil coach, 0.2 m/s, lies between steps."""
     critical = critical_speed(load_vehicle(name), RIGID, methods=("linear",)).linear["speed"]
-    found = critical_speed(load_vehicle(name), RIGID, methods=("bifurcation",),
-                           low=critical - 3.0, high=critical + 3.0, points=4)
+    found = critical_speed(
+        load_vehicle(name),
+        RIGID,
+        methods=("bifurcation",),
+        low=critical - 3.0,
+        high=critical + 3.0,
+        points=4,
+    )
     assert found.type == kind
 
 
@@ -73,8 +82,9 @@ def test_without_critical_speed_in_the_range_the_least_damped_modes_are_told():
     coach = load_vehicle("coach_manchester")
     found = critical_speed(coach, RIGID, methods=("linear",), low=10.0, high=20.0)
     assert found.linear is None
-    assert any("no linear critical speed" in remark and "at 20 m/s" in remark
-               for remark in found.remarks)
+    assert any(
+        "no linear critical speed" in remark and "at 20 m/s" in remark for remark in found.remarks
+    )
     unstable = critical_speed(coach, RIGID, methods=("linear",), low=60.0, high=70.0)
     assert any("unstable at the lower end" in remark for remark in unstable.remarks)
 

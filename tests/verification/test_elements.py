@@ -10,6 +10,7 @@ X, Y, Z = range(3)
 
 def triangle(amplitude, frequency):
     """Zigzag from 0 upwards, and its rate."""
+
     def position(t):
         phase = (t * frequency + 0.25) % 1.0
         return amplitude * (1.0 - 4.0 * abs(phase - 0.5))
@@ -64,8 +65,13 @@ def test_loop_of_constant_friction_has_masings_area(motion):
 def test_loop_of_leaf_spring_friction_grows_with_the_load():
     """A figure between F = +-mu |N(z)| with elastic flanks; its area by the shoelace formula."""
     mu, k, k_t, N, A = 0.1, 1e6, 4e6, -5e4, 0.02
-    rig = Rig(kind="friction", friction_coefficient=[0.0, 0.0, mu], stiffness=[0.0, 0.0, k],
-              stick_stiffness=[0.0, 0.0, k_t], preload=[0.0, 0.0, N])
+    rig = Rig(
+        kind="friction",
+        friction_coefficient=[0.0, 0.0, mu],
+        stiffness=[0.0, 0.0, k],
+        stick_stiffness=[0.0, 0.0, k_t],
+        preload=[0.0, 0.0, N],
+    )
     d, f = last_period(rig, Z, triangle(A, 1.0), 1.0)
 
     def limit(z):
@@ -157,16 +163,28 @@ def test_flat_blow_off_table_holds_its_force():
 def test_air_spring_has_its_static_and_its_fast_stiffness():
     """Slowly area + k1 k2/(k1 + k2), fast area + k1, and Nishimura's formula in between."""
     k1, k2, c, area = 700e3, 350e3, 60e3, 60e3
-    law = {"kind": "airspring", "bellows_stiffness": k1, "reservoir_stiffness": k2,
-           "orifice_damping": c, "area_stiffness": area, "horizontal_stiffness": [1e5, 1e5],
-           "preload": [0.0, 0.0, 0.0]}
+    law = {
+        "kind": "airspring",
+        "bellows_stiffness": k1,
+        "reservoir_stiffness": k2,
+        "orifice_damping": c,
+        "area_stiffness": area,
+        "horizontal_stiffness": [1e5, 1e5],
+        "preload": [0.0, 0.0, 0.0],
+    }
     held = Rig(**law).history(Z, np.arange(0.0, 5.0, 0.01), lambda t: 0.01, lambda t: 0.0)
     assert held[0] == pytest.approx(0.01 * (area + k1), rel=1e-9)
     assert held[-1] == pytest.approx(0.01 * (area + k1 * k2 / (k1 + k2)), rel=1e-9)
     for frequency in (0.1, 1.0, 3.0, 10.0, 100.0):
         steps = 400
-        d, f = last_period(Rig(**law), Z, harmonic(0.01, frequency), frequency,
-                           periods=2 + int(2 * frequency), steps=steps)
+        d, f = last_period(
+            Rig(**law),
+            Z,
+            harmonic(0.01, frequency),
+            frequency,
+            periods=2 + int(2 * frequency),
+            steps=steps,
+        )
         s = 2j * np.pi * frequency
         expected = area + k1 * (k2 + c * s) / (k1 + k2 + c * s)
         # the drive is held over a step: an error of second order in omega h
@@ -176,8 +194,14 @@ def test_air_spring_has_its_static_and_its_fast_stiffness():
 @pytest.mark.parametrize(("axis", "name"), [(X, "x"), (Y, "y"), (Z, "z")])
 def test_bump_stop_is_free_within_its_clearance_and_follows_its_table_beyond(axis, name):
     rig = Rig(kind="bump_stop", axis=name, table=[[0.0, 0.0], [0.02, 0.0], [0.03, 5e3]])
-    for d, force in ((0.0, 0.0), (0.0199, 0.0), (-0.0199, 0.0), (0.025, 2.5e3), (-0.03, -5e3),
-                     (0.05, 15e3)):
+    for d, force in (
+        (0.0, 0.0),
+        (0.0199, 0.0),
+        (-0.0199, 0.0),
+        (0.025, 2.5e3),
+        (-0.03, -5e3),
+        (0.05, 15e3),
+    ):
         assert rig.force(axis, d) == pytest.approx(force, abs=1e-6)
 
 

@@ -81,8 +81,13 @@ def test_energy_is_constant_on_undamped_elastic_rails():
 
     The rails ring at 700 to 1500 Hz, which RK4 damps with the fifth power of the step.
     """
-    support = {"preset": "co-running", "pad_vertical": [150e6, 0.0], "pad_lateral": [30e6, 0.0],
-               "ballast_vertical": [140e6, 0.0], "ballast_lateral": [70e6, 0.0]}
+    support = {
+        "preset": "co-running",
+        "pad_vertical": [150e6, 0.0],
+        "pad_lateral": [30e6, 0.0],
+        "ballast_vertical": [140e6, 0.0],
+        "ballast_lateral": [70e6, 0.0],
+    }
     vehicle = undamped(load_vehicle("coach_manchester"))
     track = load_track("straight").replace(**FRICTIONLESS, support=support)
     balance = steady(vehicle, track, FREE, 20.0)

@@ -70,10 +70,13 @@ def test_parameters_of_a_coach_through_a_curve_with_all_outputs():
         coach("assemblies.bogie.elements.anti_roll_bar.stiffness=500e3"),
         coach("assemblies.bogie.elements.secondary_lateral_damper.damping=20e3"),
     ]
-    settings = Settings(outputs={
-        "elements": ["front.outer.primary.*", "*.secondary_lateral_damper.*"],
-        "contact_patches": True, "track": True,
-    })
+    settings = Settings(
+        outputs={
+            "elements": ["front.outer.primary.*", "*.secondary_lateral_damper.*"],
+            "contact_patches": True,
+            "track": True,
+        }
+    )
     heavy, *_ = assert_each_is_alone(
         vehicles, load_track("curve_r250"), settings=settings, **INTO_THE_CURVE
     )
@@ -175,10 +178,12 @@ def test_one_vehicle_is_an_ensemble_of_one():
 
 def test_a_vehicle_without_equilibrium_fails_by_itself():
     """The body hangs on nothing: no spring with preload carries it."""
-    loose = coach(*(
-        f"assemblies.bogie.elements.secondary_spring.{key}"
-        for key in ("preload=[0.0, 0.0, 0.0]", "stiffness=[160e3, 160e3, 0.0]")
-    ))
+    loose = coach(
+        *(
+            f"assemblies.bogie.elements.secondary_spring.{key}"
+            for key in ("preload=[0.0, 0.0, 0.0]", "stiffness=[160e3, 160e3, 0.0]")
+        )
+    )
     vehicles, track = [coach(), loose, with_mass(35e3)], load_track("straight")
     first, failure, last = outcomes(vehicles, track, speed=20.0, duration=0.2)
     assert isinstance(failure, ModelError)

@@ -62,8 +62,11 @@ def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
 
 
 def test_message_names_the_elements_that_alternate(monkeypatch):
-    monkeypatch.setattr(railsim.equilibrium._Balance, "_over_kinks",
-                        lambda self, state, rest, change: (state, rest, False))
+    monkeypatch.setattr(
+        railsim.equilibrium._Balance,
+        "_over_kinks",
+        lambda self, state, rest, change: (state, rest, False),
+    )
 
     def all_of_them():
         for payload, speed in itertools.product((0.0, 25e3, 50e3), (5.0, 20.0, 33.0)):

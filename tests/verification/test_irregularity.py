@@ -320,8 +320,10 @@ def test_missing_measured_file_is_a_fault_of_its_key(measured):
 # spectra by name, standard deviations in mm between 3 and 70 m computed independently of railsim;
 # the cross level as a height over 1.5 m; tolerance half a unit of the last digit printed
 PRINTED = [
-    *((f"fra_{i}", "vertical", v) for i, v in
-      ((1, 16.82), (2, 15.42), (3, 12.62), (5, 7.00), (6, 2.81))),
+    *(
+        (f"fra_{i}", "vertical", v)
+        for i, v in ((1, 16.82), (2, 15.42), (3, 12.62), (5, 7.00), (6, 2.81))
+    ),
     ("fra_6", "lateral", 2.81),
     ("fra_6", "cross_level", 2.51),
     ("fra_1983_6", "vertical", 3.37),
@@ -334,8 +336,10 @@ PRINTED = [
 @pytest.mark.parametrize(
     ("name", "channel", "mm", "digit"),
     [(*row, 0.01) for row in PRINTED]
-    + [("china_high_speed", c, v, 0.001) for c, v in
-       (("vertical", 0.462), ("cross_level", 0.379), ("gauge", 0.301))],
+    + [
+        ("china_high_speed", c, v, 0.001)
+        for c, v in (("vertical", 0.462), ("cross_level", 0.379), ("gauge", 0.301))
+    ],
 )
 def test_standard_deviation_of_a_spectrum_is_the_published_one(name, channel, mm, digit):
     height = 1.5 if channel == "cross_level" else 1.0
@@ -385,8 +389,9 @@ def test_a_step_between_few_rows_stays_a_step():
 def test_a_joint_sampled_coarsely_does_not_swing():
     s = np.arange(0.0, 60.0, 0.5)
     z = np.where(np.abs(s - 30.0) < 0.3, 5e-3, 0.0)
-    found = rails(track_of([[x, 0, v, 0, v] for x, v in zip(s, z, strict=True)]),
-                  np.linspace(0.0, 59.0, 6000))[0][Z_LEFT]
+    found = rails(
+        track_of([[x, 0, v, 0, v] for x, v in zip(s, z, strict=True)]), np.linspace(0.0, 59.0, 6000)
+    )[0][Z_LEFT]
     assert found.min() > -1.3e-3  # a quarter of the rows' range; the spline swings to -0.27 of it
     assert found.max() < 6.3e-3
 
@@ -407,7 +412,8 @@ def recorded(tmp_path, text, **more):
     (tmp_path / "rec.csv").write_text(text)
     (tmp_path / "t.toml").write_text(
         'format = "railsim-track/1"\nname = "t"\nplan = [{ type = "STR", length = 100.0 }]\n'
-        "[[irregularities]]\n" 'type = "measured"\nfile = "rec.csv"\nfade = 0.0\n'
+        "[[irregularities]]\n"
+        'type = "measured"\nfile = "rec.csv"\nfade = 0.0\n'
         + "".join(f"{key} = {value}\n" for key, value in more.items())
     )
     return load_track(tmp_path / "t.toml")
@@ -418,8 +424,11 @@ def test_columns_units_signs_decimal_comma_and_mileage_of_a_recording(tmp_path):
     for i in range(6):
         lines.append(f"{12.3 - 0.001 * i:.4f};x;{i:.1f};{2 * i}.5".replace(".", ","))
     found = recorded(
-        tmp_path, "\n".join(lines), columns='{ s = "Km", z_left = "LL", y_right = "AL" }',
-        units='{ s = "km", z_left = "mm", y_right = "mm" }', reverse='["z_left"]',
+        tmp_path,
+        "\n".join(lines),
+        columns='{ s = "Km", z_left = "LL", y_right = "AL" }',
+        units='{ s = "km", z_left = "mm", y_right = "mm" }',
+        reverse='["z_left"]',
         falling_mileage="true",
     ).irregularities[0]
     expected = [[i, 0.0, -1e-3 * i, 1e-3 * (2 * i + 0.5), 0.0] for i in range(6)]

@@ -30,8 +30,13 @@ def test_wavelength_of_a_conical_wheelset_is_klingels(amplitude):
     read to 1 mm.
     """
     wheelset = test_vehicle("single_wheelset")
-    result = simulate(wheelset, load_track("straight"), speed=1.0, until=60.0,
-                      settings=Settings(initial={"wheelset": {"y": amplitude}}))
+    result = simulate(
+        wheelset,
+        load_track("straight"),
+        speed=1.0,
+        until=60.0,
+        settings=Settings(initial={"wheelset": {"y": amplitude}}),
+    )
     y, s = result.wheelset_lateral[:, 0], result.distance
     rising = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
     crossings = s[rising] - y[rising] * (s[rising + 1] - s[rising]) / (y[rising + 1] - y[rising])

@@ -29,9 +29,9 @@ def on_springs(linearisation, lateral, yaw):
     return Linearisation(linearisation.names, matrix, linearisation.state, linearisation.parameter)
 
 
-@pytest.mark.parametrize("contact", [
-    Contact("harmonic", 0.3e-3), Contact("harmonic", 1e-3), Contact("harmonic", 3e-3),
-])
+@pytest.mark.parametrize(
+    "contact", [Contact("harmonic", 0.3e-3), Contact("harmonic", 1e-3), Contact("harmonic", 3e-3)]
+)
 def test_critical_speed_of_a_wheelset_on_springs(contact):
     """L2: cones 1:20 on 60E1, friction 1; 41.37 m/s and 2.524 Hz computed independently, 2 %."""
     wheelset = LinearVehicle(
@@ -49,8 +49,10 @@ def coned():
     """The benchmark coach on cones 1:20; rails with a head of constant radius, friction 10."""
     y, z = arc_chain_rail((28.0,), (300.0, 8.0))
     arc = Profile("arc", "rail", 1e-3 * y, 1e-3 * z, "one arc of 300 mm, corners of 8 mm")
-    vehicle = changed(load_vehicle("benchmark_vehicle1"), lambda kind, _, table:
-                      table.update(profile="cone_1in20") if kind == "wheelsets" else None)
+    vehicle = changed(
+        load_vehicle("benchmark_vehicle1"),
+        lambda kind, _, table: table.update(profile="cone_1in20") if kind == "wheelsets" else None,
+    )
     track = STRAIGHT.replace(rail="arc", friction=10.0)
 
     def prepared(contact):
@@ -74,8 +76,10 @@ def test_creep_coefficients_without_saturation_are_kalkers(coned):
     names = list(linear.names)
 
     def slope(force, velocity):
-        return linear.matrix[names.index(f"front.outer.wheelset.{force}'"),
-                             names.index(f"front.outer.wheelset.{velocity}'")]
+        return linear.matrix[
+            names.index(f"front.outer.wheelset.{force}'"),
+            names.index(f"front.outer.wheelset.{velocity}'"),
+        ]
 
     assert -slope("x", "x") * mass * speed / 2 == pytest.approx(9.694e6, rel=0.02)
     assert -slope("y", "y") * mass * speed / 2 == pytest.approx(8.826e6, rel=0.02)
@@ -87,8 +91,11 @@ def test_given_conicity_puts_the_vehicle_on_cones(coned):
     vehicle = load_vehicle("coach_manchester")
     found = []
     for conicity in (0.05, 0.1):
-        lowest = [mode for mode in modes(vehicle, STRAIGHT, speed=10.0, conicity=conicity)
-                  if mode.name.endswith("hunting")]
+        lowest = [
+            mode
+            for mode in modes(vehicle, STRAIGHT, speed=10.0, conicity=conicity)
+            if mode.name.endswith("hunting")
+        ]
         found.append(min(mode.frequency for mode in lowest))
     assert found[1] / found[0] == pytest.approx(np.sqrt(2.0), rel=0.1)
 
@@ -130,8 +137,21 @@ def run_from(prepared, mode, speed, scheme):
     work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
     time, seen = [], []
     for k in range(4 * 16):
-        status, *_ = time_loop(system, work, state, derivative, stages, empty_recorder(model, 1),
-                               SCHEMES[scheme], h, min(k, 1), steps, 1 << 40, int(k == 0), 0)
+        status, *_ = time_loop(
+            system,
+            work,
+            state,
+            derivative,
+            stages,
+            empty_recorder(model, 1),
+            SCHEMES[scheme],
+            h,
+            min(k, 1),
+            steps,
+            1 << 40,
+            int(k == 0),
+            0,
+        )
         assert status == 0
         time.append((k + 1) * steps * h)
         seen.append(mode.left[0] @ (state[places] - rest[places]))
@@ -148,11 +168,22 @@ def test_an_amplitude_beyond_the_contact_table_is_refused():
 
 def test_names_of_the_coachs_modes_over_speed():
     """Car body modes stay, hunting rises with speed; both bogies hunt."""
-    locus = root_locus(load_vehicle("coach_manchester"), STRAIGHT, speeds=[10.0, 20.0, 30.0, 40.0],
-                       linearisation="harmonic")
+    locus = root_locus(
+        load_vehicle("coach_manchester"),
+        STRAIGHT,
+        speeds=[10.0, 20.0, 30.0, 40.0],
+        linearisation="harmonic",
+    )
     names = locus.names
-    for name in ("lower sway", "upper sway", "car body bounce", "car body pitch", "car body yaw",
-                 "bogie bounce, in phase", "bogie pitch, out of phase"):
+    for name in (
+        "lower sway",
+        "upper sway",
+        "car body bounce",
+        "car body pitch",
+        "car body yaw",
+        "bogie bounce, in phase",
+        "bogie pitch, out of phase",
+    ):
         values = locus.eigenvalues[:, names.index(name)]
         assert np.isfinite(values).all()
         assert np.ptp(values.imag) < 0.03 * np.max(values.imag)

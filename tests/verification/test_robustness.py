@@ -25,16 +25,29 @@ def test_the_reference_scheme_moves_no_peak(case):
     assert max(differences) < 1.0
 
 
-@pytest.mark.parametrize(("radius", "friction", "dQ", "quotient"), [
-    pytest.param(150.0, 0.50, 0.395, 0.561, marks=pytest.mark.xfail(
-        reason="Y/Q 0.552 with the contact table of the elastic foundation", strict=False)),
-    (100.0, 0.60, 0.443, 0.691),
-])
+@pytest.mark.parametrize(
+    ("radius", "friction", "dQ", "quotient"),
+    [
+        pytest.param(
+            150.0,
+            0.50,
+            0.395,
+            0.561,
+            marks=pytest.mark.xfail(
+                reason="Y/Q 0.552 with the contact table of the elastic foundation", strict=False
+            ),
+        ),
+        (100.0, 0.60, 0.443, 0.691),
+    ],
+)
 @pytest.mark.parametrize("damping", [1e5, 4e5])
 def test_peaks_of_an_independent_computation(radius, friction, dQ, quotient, damping):
     """The same coach on the same support by another program: 1 % of Q0, 0.005 in Y/Q."""
-    result = run(("coach_manchester", radius, friction, 0.10), {"preset": "co-running"},
-                 contact_damping=damping)
+    result = run(
+        ("coach_manchester", radius, friction, 0.10),
+        {"preset": "co-running"},
+        contact_damping=damping,
+    )
     found = peaks(result)
     assert result.dQ_over_Q0.max() == pytest.approx(dQ, abs=0.01)
     assert found[3] == pytest.approx(quotient, abs=0.005)

@@ -63,8 +63,13 @@ def test_runs_from_1_to_100_m_s(straight, speed):
     """
     coach = load_vehicle("coach_flexicoil")
     initial = {"front.outer.wheelset": {"y": 1e-4}} if speed < 50.0 else {}
-    result = simulate(coach, straight, speed=speed, duration=min(4.0, 200.0 / speed),
-                      settings=Settings(initial=initial))
+    result = simulate(
+        coach,
+        straight,
+        speed=speed,
+        duration=min(4.0, 200.0 / speed),
+        settings=Settings(initial=initial),
+    )
     assert result.status == "complete"
     assert np.max(np.abs(result.wheelset_lateral)) < 1.5e-4
     assert np.max(np.abs(result.dQ_over_Q0)) < 0.1
@@ -126,8 +131,9 @@ def test_start_on_irregular_rails_makes_no_shock(straight, start):
     1.2 times the largest change of a run that passes there.  Put on leaning rails at rest instead,
     a wheelset's springs and elastic contacts (60 um) would unload its wheels.
     """
-    track = straight.replace(irregularities=[
-        {"type": "random", "spectrum": "erri_b176_low", "seed": 1}])
+    track = straight.replace(
+        irregularities=[{"type": "random", "spectrum": "erri_b176_low", "seed": 1}]
+    )
     coach = load_vehicle("coach_manchester")
     here = simulate(coach, track, speed=40.0, start=start, duration=0.5)
     way = simulate(coach, track, speed=40.0, until=120.0)
@@ -138,8 +144,9 @@ def test_start_on_irregular_rails_makes_no_shock(straight, start):
 
 def test_start_on_irregular_rails_is_the_state_on_the_way(straight):
     """What was met more than 4 s before the start is forgotten: 1 % of the largest force."""
-    track = straight.replace(irregularities=[
-        {"type": "random", "spectrum": "erri_b176_low", "seed": 1}])
+    track = straight.replace(
+        irregularities=[{"type": "random", "spectrum": "erri_b176_low", "seed": 1}]
+    )
     coach = load_vehicle("coach_manchester")
     here = simulate(coach, track, speed=20.0, start=150.0, duration=1.0)
     way = simulate(coach, track, speed=20.0, until=170.0)
@@ -149,8 +156,9 @@ def test_start_on_irregular_rails_is_the_state_on_the_way(straight):
 
 def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(straight, monkeypatch):
     """Then it is the state of the run from the beginning; the scheme's memory begins anew: 1 %."""
-    track = straight.replace(irregularities=[
-        {"type": "random", "spectrum": "erri_b176_low", "seed": 1, "begin": 10.0}])
+    track = straight.replace(
+        irregularities=[{"type": "random", "spectrum": "erri_b176_low", "seed": 1, "begin": 10.0}]
+    )
     coach = load_vehicle("coach_manchester")
     way = simulate(coach, track, speed=20.0, until=150.0)
     usual = run_in.settled
@@ -181,8 +189,14 @@ def test_start_in_a_curve_at_walking_speed_is_the_state_on_the_way(speed):
 
 def test_progress_of_a_run_counts_its_run_in():
     seen = []
-    simulate(load_vehicle("coach_manchester"), load_track("curve_r250"), speed=2.0, start=390.0,
-             duration=2.0, progress=seen.append)
+    simulate(
+        load_vehicle("coach_manchester"),
+        load_track("curve_r250"),
+        speed=2.0,
+        start=390.0,
+        duration=2.0,
+        progress=seen.append,
+    )
     assert seen == sorted(seen)
     assert seen[0] == 0.0
     assert seen[-1] == 1.0
@@ -221,8 +235,9 @@ def test_continued_run_gives_the_same_bytes(case, name, straight, tmp_path):
     """Through memory and through a file."""
     speed, settings = CASES[case]
     vehicle = test_vehicle(name)
-    track = straight.replace(irregularities=[
-        {"type": "random", "spectrum": "erri_b176_low", "seed": 3, "begin": 10.0}])
+    track = straight.replace(
+        irregularities=[{"type": "random", "spectrum": "erri_b176_low", "seed": 3, "begin": 10.0}]
+    )
     whole = simulate(vehicle, track, speed=speed, until=60.0, settings=settings)
     # the first part ends at an output of the whole run
     row = len(whole.time) // 2
@@ -240,15 +255,24 @@ def test_continued_run_gives_the_same_bytes(case, name, straight, tmp_path):
 
 
 @pytest.mark.parametrize("scheme", ["fast", "rk4"])
-@pytest.mark.parametrize("settings", [
-    Settings(output_spacing=0.25), in_table(output_spacing=0.25),
-    Settings(output_spacing=0.25, drive={"mode": "free", "resistance": (20e3, 0.0, 0.0)}),
-])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(output_spacing=0.25),
+        in_table(output_spacing=0.25),
+        Settings(output_spacing=0.25, drive={"mode": "free", "resistance": (20e3, 0.0, 0.0)}),
+    ],
+)
 def test_outputs_in_equal_steps_of_distance(bogie, straight, settings, scheme):
     """Also while the speed changes: within a micrometre of 0.25 m."""
     constant = settings.drive.mode != "table"
-    result = simulate(bogie, straight, speed=10.0 if constant else None, until=60.0,
-                      settings=settings.replace(scheme=scheme))
+    result = simulate(
+        bogie,
+        straight,
+        speed=10.0 if constant else None,
+        until=60.0,
+        settings=settings.replace(scheme=scheme),
+    )
     assert result.status == "complete"
     inner = np.diff(result.distance)[:-1]
     assert np.max(np.abs(inner - 0.25)) < 1e-6

@@ -5,15 +5,24 @@ from dynamics import Settings, load_track, load_vehicle
 
 from railsim.simulation import simulate
 
-WHEELSETS = ("front.outer.wheelset", "front.inner.wheelset",
-             "rear.inner.wheelset", "rear.outer.wheelset")
+WHEELSETS = (
+    "front.outer.wheelset",
+    "front.inner.wheelset",
+    "rear.inner.wheelset",
+    "rear.outer.wheelset",
+)
 
 
 def lateral_at_the_end(vehicle, speed, offset=0.003, until=900.0):
     """Largest lateral displacement in the last 100 m after all wheelsets started off centre [m]."""
     initial = {name: {"y": offset} for name in WHEELSETS}
-    result = simulate(vehicle, load_track("straight"), speed=speed, until=until,
-                      settings=Settings(initial=initial))
+    result = simulate(
+        vehicle,
+        load_track("straight"),
+        speed=speed,
+        until=until,
+        settings=Settings(initial=initial),
+    )
     assert result.status == "complete"
     return np.max(np.abs(result.wheelset_lateral[result.distance > until - 100.0]))
 

@@ -67,8 +67,7 @@ def test_cooperriders_bogie_loses_stability_at_its_published_speed():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "parameter", "already"),
-    [(30.0, 60.0, None, False), (75.0, 90.0, None, True)],
+    ("low", "high", "parameter", "already"), [(30.0, 60.0, None, False), (75.0, 90.0, None, True)]
 )
 def test_a_range_without_loss_of_stability_says_so(low, high, parameter, already):
     lost = loss_of_stability(bogie, low, high)
@@ -133,9 +132,7 @@ def test_modes_keep_their_places_where_frequencies_cross():
 
 def test_an_oscillation_that_becomes_overdamped_leaves_its_place_empty():
     def at(c):
-        return Linearisation(
-            ("x", "v"), np.array([[0.0, 1.0], [-1.0, -c]]), np.zeros(2), c
-        )
+        return Linearisation(("x", "v"), np.array([[0.0, 1.0], [-1.0, -c]]), np.zeros(2), c)
 
     values = np.array([modes.eigenvalues for modes in followed(at, [1.0, 1.5, 2.5, 1.8])])
     assert values.shape == (4, 2)

@@ -59,8 +59,21 @@ def test_newton_finds_the_end_of_a_long_run(name, radius):
     work = work_arrays(system)
     for _ in range(60):
         state[-2] = PLACE
-        status, *_ = time_loop(system, work, state, derivative, stages, empty_recorder(model, 1),
-                               FAST, 1e-3, 1, 500, 1 << 40, 0, 0)
+        status, *_ = time_loop(
+            system,
+            work,
+            state,
+            derivative,
+            stages,
+            empty_recorder(model, 1),
+            FAST,
+            1e-3,
+            1,
+            500,
+            1 << 40,
+            0,
+            0,
+        )
         assert status == 0
     for column in (W_Q, W_Y):
         wheel = solver.work.wheel[:, :, column]
@@ -71,9 +84,10 @@ def test_newton_finds_the_end_of_a_long_run(name, radius):
         assert at_end == pytest.approx(expected, abs=3e-3 * np.max(np.abs(expected)))
 
 
-@pytest.mark.parametrize(("radius", "cant", "speed"), [
-    (250.0, 0.15, 20.0), (400.0, 0.05, 12.0), (3000.0, 0.1, 60.0), (-300.0, -0.12, 22.0),
-])
+@pytest.mark.parametrize(
+    ("radius", "cant", "speed"),
+    [(250.0, 0.15, 20.0), (400.0, 0.05, 12.0), (3000.0, 0.1, 60.0), (-300.0, -0.12, 22.0)],
+)
 def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
     """Q2: total Q and Y of the vehicle from masses, places and the circle alone; 0.1 %.
 
@@ -89,8 +103,12 @@ def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
         offset = system.frame_offset[system.bodies.frame[b]] * kappa
         # towards the centre at the body's own place; its share along the middle's normal
         inwards = speed**2 * kappa * (1.0 - kappa * right) * np.cos(offset)
-        need += mass * np.array([inwards * np.cos(angle) - GRAVITY * np.sin(angle),
-                                 GRAVITY * np.cos(angle) + inwards * np.sin(angle)])
+        need += mass * np.array(
+            [
+                inwards * np.cos(angle) - GRAVITY * np.sin(angle),
+                GRAVITY * np.cos(angle) + inwards * np.sin(angle),
+            ]
+        )
     got = np.zeros(2)
     for w, b in enumerate(system.contact.body):
         turned = system.frame_offset[system.bodies.frame[b]] * kappa
@@ -99,8 +117,10 @@ def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
         level = Y * np.cos(angle) - Q * np.sin(angle)  # horizontal, along the wheelset's normal
         down = Q * np.cos(angle) + Y * np.sin(angle)
         level = level * np.cos(turned) - along * np.sin(-turned)
-        got += [level * np.cos(angle) + down * np.sin(angle),
-                down * np.cos(angle) - level * np.sin(angle)]
+        got += [
+            level * np.cos(angle) + down * np.sin(angle),
+            down * np.cos(angle) - level * np.sin(angle),
+        ]
     weight = GRAVITY * np.sum(system.bodies.mass)
     assert got[1] == pytest.approx(need[1], rel=1e-3)
     assert -got[0] == pytest.approx(need[0], abs=1e-3 * max(abs(need[0]), 0.1 * weight))
@@ -115,13 +135,15 @@ def test_no_steady_state_is_said_with_what_is_unbalanced():
 
 @pytest.fixture(scope="module")
 def coach():
-    return steady(load_vehicle("benchmark_vehicle1"), load_track("straight"), Settings(),
-                  WALKING_PACE)
+    return steady(
+        load_vehicle("benchmark_vehicle1"), load_track("straight"), Settings(), WALKING_PACE
+    )
 
 
-@pytest.mark.parametrize(("millimetres", "coefficient", "lateral"), [
-    (30.0, 0.1929, 15.6), (60.0, 0.1928, 31.1), (100.0, 0.1899, 48.2), (150.0, 0.1857, 64.2),
-])
+@pytest.mark.parametrize(
+    ("millimetres", "coefficient", "lateral"),
+    [(30.0, 0.1929, 15.6), (60.0, 0.1928, 31.1), (100.0, 0.1899, 48.2), (150.0, 0.1857, 64.2)],
+)
 def test_standing_on_cant(coach, millimetres, coefficient, lateral):
     """Q3: roll coefficient 0.5 %; the car's y 0.5 % with wheelsets held, 1 % rolling."""
     for held, tolerance in ((True, 5e-3), (False, 1e-2)):
@@ -136,9 +158,10 @@ BOGIE = 7e-3 * 2.56 * np.array([0.5, -0.5, 0.5, -0.5])
 BODY = 0.053 * np.array([0.5, 0.5, -0.5, -0.5])
 
 
-@pytest.mark.parametrize(("heights", "expected"), [
-    (BOGIE, 0.1781), (BODY, 0.1387), (BOGIE + BODY, 0.3169), (-BODY, 0.1387),
-])
+@pytest.mark.parametrize(
+    ("heights", "expected"),
+    [(BOGIE, 0.1781), (BODY, 0.1387), (BOGIE + BODY, 0.3169), (-BODY, 0.1387)],
+)
 def test_unloading_on_twist(coach, heights, expected):
     """Q4: dQ/Q0 of the worst wheel, wheelsets held across the track; 1 %."""
     standing = on_twist(coach, load_track("straight"), heights, held=True)
@@ -155,8 +178,10 @@ def rolling_on_twist():
         vehicle = load_vehicle("benchmark_vehicle1", [f"{key}=[31.391e6, {lateral}, 1.22e6]"])
         balance = steady(vehicle, load_track("straight"), Settings(), WALKING_PACE)
         found[lateral] = [
-            (on_twist(balance, load_track("straight"), heights),
-             on_twist(balance, load_track("straight"), heights, held=True))
+            (
+                on_twist(balance, load_track("straight"), heights),
+                on_twist(balance, load_track("straight"), heights, held=True),
+            )
             for heights in (BOGIE, BODY)
         ]
     return found

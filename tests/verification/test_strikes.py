@@ -21,8 +21,9 @@ def over_the_dip(rail="left", support="rigid", vehicle="coach_manchester", **set
     track = load_track("straight").replace(
         irregularities=[{**AT, "rail": rail}], support={"preset": support}
     )
-    return simulate(load_vehicle(vehicle), track, speed=SPEED, until=UNTIL,
-                    settings=Settings(**settings))
+    return simulate(
+        load_vehicle(vehicle), track, speed=SPEED, until=UNTIL, settings=Settings(**settings)
+    )
 
 
 def peak_values(result):
@@ -30,9 +31,9 @@ def peak_values(result):
 
 
 @pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
-@pytest.mark.parametrize(("rail", "support"), [
-    ("left", "rigid"), ("both", "rigid"), ("left", "co-running"),
-])
+@pytest.mark.parametrize(
+    ("rail", "support"), [("left", "rigid"), ("both", "rigid"), ("left", "co-running")]
+)
 def test_peaks_of_a_strike_are_those_of_the_reference(rail, support, vehicle):
     result = over_the_dip(rail, support, vehicle)
     reference = over_the_dip(rail, support, vehicle, scheme="rk4", step=0.125e-3, output_rate=1e3)
@@ -91,8 +92,18 @@ def test_vehicle_that_lifts_a_wheel_goes_on_as_alone():
 
 def test_peaks_are_at_least_those_of_the_outputs():
     result = over_the_dip()
-    for name in ("Q", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y", "T_gamma", "wheelset_lateral",
-                 "wheelset_roll", "wheelset_yaw", "dQ_over_Q0"):
+    for name in (
+        "Q",
+        "Y",
+        "Y_over_Q",
+        "sum_Y",
+        "sum_abs_Y",
+        "T_gamma",
+        "wheelset_lateral",
+        "wheelset_roll",
+        "wheelset_yaw",
+        "dQ_over_Q0",
+    ):
         largest, smallest = result.groups["peaks"][name]
         assert (largest >= np.nanmax(result[name], axis=0)).all()
         assert (smallest <= np.nanmin(result[name], axis=0)).all()

@@ -41,9 +41,15 @@ def test_static_deflection_is_the_load_over_the_stiffness_of_the_chain(preset):
 # one wheelset under a constant force: mass of a wheel, static wheel load of Manchester vehicle 1
 MU, P0 = 906.5, 54546.0
 RAIL = PRESETS["p2"]
-SOFT = {"kind": "bushing", "bodies": ["wheelset", "load"], "point": [0.0, 1.0, -0.46],
-        "sides": "both", "stiffness": [1e7, 1e6, 2e3], "preload": "auto",
-        "rotational_stiffness": [1e5, 1e5, 1e5]}
+SOFT = {
+    "kind": "bushing",
+    "bodies": ["wheelset", "load"],
+    "point": [0.0, 1.0, -0.46],
+    "sides": "both",
+    "stiffness": [1e7, 1e6, 2e3],
+    "preload": "auto",
+    "rotational_stiffness": [1e5, 1e5, 1e5],
+}
 
 
 def loaded_wheelset(contact_damping, **support):
@@ -51,14 +57,21 @@ def loaded_wheelset(contact_damping, **support):
     data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
     wheelset = data["assemblies"]["bogie"]["assemblies"]["axle"]["wheelsets"]["wheelset"]
     mass = 2.0 * (P0 / 9.81 - MU)
-    vehicle = Vehicle.model_validate({
-        "format": "railsim-vehicle/1", "name": "loaded wheelset",
-        "wheelsets": {"wheelset": wheelset},
-        "bodies": {"load": {"mass": mass, "inertia": [1e4] * 3, "position": [0.0, 0.0, -0.46]}},
-        "elements": {"spring": SOFT},
-    })
-    balance = steady(vehicle, load_track("straight").replace(support=support),
-                     Settings(contact_damping=contact_damping), 10.0)
+    vehicle = Vehicle.model_validate(
+        {
+            "format": "railsim-vehicle/1",
+            "name": "loaded wheelset",
+            "wheelsets": {"wheelset": wheelset},
+            "bodies": {"load": {"mass": mass, "inertia": [1e4] * 3, "position": [0.0, 0.0, -0.46]}},
+            "elements": {"spring": SOFT},
+        }
+    )
+    balance = steady(
+        vehicle,
+        load_track("straight").replace(support=support),
+        Settings(contact_damping=contact_damping),
+        10.0,
+    )
     return balance.model, balance.state
 
 
@@ -69,8 +82,11 @@ def with_rails(system, height, slope, start=-10.0, ds=0.05, length=20.0):
     coefficients[:, 0, 0], coefficients[:, 0, 1] = s, 1.0
     for row in (1, 3):
         rail[:, row, 0], rail[:, row, 1] = height(s), slope(s)
-    return system._replace(track=system.track._replace(
-        s_start=start, ds=ds, coefficients=coefficients, rail=rail, has_irregularity=1))
+    return system._replace(
+        track=system.track._replace(
+            s_start=start, ds=ds, coefficients=coefficients, rail=rail, has_irregularity=1
+        )
+    )
 
 
 def dipped_joint(s):
@@ -101,8 +117,9 @@ def over_the_joint(speed, h, scheme="rk4", damping=0.0, stiffness=None, after=0.
     work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
     steps = int((9.0 / speed + after) / h)
     recorder = empty_recorder(model, steps)
-    status, *_ = time_loop(system, work, state, derivative, stages, recorder, SCHEMES[scheme], h, 0,
-                           steps, 1, 1, 0)
+    status, *_ = time_loop(
+        system, work, state, derivative, stages, recorder, SCHEMES[scheme], h, 0, steps, 1, 1, 0
+    )
     assert status == 0
     end = recorder.state.shape[1] - N_SCALARS
     track = recorder.state[:, end - SUPPORT_SIZE : end]
@@ -145,8 +162,9 @@ def test_wheel_load_over_the_roughness_is_that_of_two_masses(frequency):
 
     base = rate_and_load(state, 0.0)
     e = 1e-9
-    columns = [(rate_and_load(state + e * unit, 0.0) - base) / e
-               for unit in np.eye(len(state))[:size]]
+    columns = [
+        (rate_and_load(state + e * unit, 0.0) - base) / e for unit in np.eye(len(state))[:size]
+    ]
     system_matrix = np.array(columns).T
     given = (rate_and_load(state, e) - base) / e
     A, C = system_matrix[:size], system_matrix[size]
@@ -174,9 +192,16 @@ def test_reference_scheme_and_fast_one_agree_without_masses():
 def test_support_that_varies_along_the_track():
     """Twice as stiff behind s = 50 m: the deflection there is half of that before."""
     track = load_track("straight").replace(
-        support={"preset": "ballasted", "variation": [[49.0, 1.0], [51.0, 2.0]]})
-    result = simulate(load_vehicle("coach_manchester"), track, speed=10.0, start=0.0, until=100.0,
-                      settings=Settings(outputs={"track": True}))
+        support={"preset": "ballasted", "variation": [[49.0, 1.0], [51.0, 2.0]]}
+    )
+    result = simulate(
+        load_vehicle("coach_manchester"),
+        track,
+        speed=10.0,
+        start=0.0,
+        until=100.0,
+        settings=Settings(outputs={"track": True}),
+    )
     place, deflection = result.wheelset_distance[:, 0], result["rail_deflection_vertical"][:, 0, 0]
     before = deflection[(place > 30.0) & (place < 40.0)].mean()
     behind = deflection[(place > 90.0) & (place < 100.0)].mean()

@@ -21,10 +21,16 @@ def track(plan=None, **more):
 def curve(radius=500.0, cant=0.1, length=250.0, **more):
     """Straight, clothoid, a long circle."""
     return track(
-        [{"type": "STR", "length": 20.0}, {"type": "CLO", "length": 80.0},
-         {"type": "CIR", "length": length, "radius": radius}],
-        cant=[{"type": "CST", "length": 20.0, "cant": 0.0}, {"type": "LIR", "length": 80.0},
-              {"type": "CST", "length": length, "cant": cant}],
+        [
+            {"type": "STR", "length": 20.0},
+            {"type": "CLO", "length": 80.0},
+            {"type": "CIR", "length": length, "radius": radius},
+        ],
+        cant=[
+            {"type": "CST", "length": 20.0, "cant": 0.0},
+            {"type": "LIR", "length": 80.0},
+            {"type": "CST", "length": length, "cant": cant},
+        ],
         **more,
     )
 
@@ -49,10 +55,13 @@ def masses(vehicle):
 def test_crest_takes_and_sag_gives_the_load_of_m_v2_over_r(coach, sign):
     """R 10 km at 40 m/s: 1.63 % of the weight, met to 1 % of itself where the bounce has died."""
     gradient = 0.02 * sign
-    profile = track(vertical=[
-        {"type": "CST", "length": 100.0, "gradient": gradient}, {"type": "LIR", "length": 400.0},
-        {"type": "CST", "length": 500.0, "gradient": -gradient},
-    ])
+    profile = track(
+        vertical=[
+            {"type": "CST", "length": 100.0, "gradient": gradient},
+            {"type": "LIR", "length": 400.0},
+            {"type": "CST", "length": 500.0, "gradient": -gradient},
+        ]
+    )
     result = simulate(coach, profile, speed=40.0, until=420.0)
     middle = (result.distance > 330.0) & (result.distance < 400.0)
     mass, _ = masses(coach)
@@ -107,8 +116,14 @@ def test_cant_about_the_inner_rail_is_cant_about_the_centre_when_steady(coach):
 
 def test_friction_counts_by_side_and_along_the_track(coach):
     """The right rail loses its friction at s = 50 m, the left one at 250 m."""
-    rows = ((0.0, 0.4, 0.4), (50.0, 0.4, 0.4), (50.5, 0.4, 0.0), (250.0, 0.4, 0.0),
-            (250.5, 0.0, 0.0), (1000.0, 0.0, 0.0))
+    rows = (
+        (0.0, 0.4, 0.4),
+        (50.0, 0.4, 0.4),
+        (50.5, 0.4, 0.0),
+        (250.0, 0.4, 0.0),
+        (250.5, 0.0, 0.0),
+        (1000.0, 0.0, 0.0),
+    )
     result = simulate(coach, curve(friction_table=rows), speed=20.0)
     place = result.wheelset_distance
     wear = result.T_gamma + result.T_gamma_spin
@@ -160,18 +175,27 @@ def test_widening_of_one_rail_moves_the_middle(coach):
 
 def test_reverse_curve_mirrors_the_first_one(coach):
     """Steady values of the second curve are those of the first with left and right exchanged."""
+
     def arc(radius):
-        return [{"type": "CLO", "length": 60.0}, {"type": "CIR", "length": 160.0, "radius": radius},
-                {"type": "CLO", "length": 60.0}]
+        return [
+            {"type": "CLO", "length": 60.0},
+            {"type": "CIR", "length": 160.0, "radius": radius},
+            {"type": "CLO", "length": 60.0},
+        ]
 
     def cant(height):
-        return [{"type": "LIR", "length": 60.0}, {"type": "CST", "length": 160.0, "cant": height},
-                {"type": "LIR", "length": 60.0}]
+        return [
+            {"type": "LIR", "length": 60.0},
+            {"type": "CST", "length": 160.0, "cant": height},
+            {"type": "LIR", "length": 60.0},
+        ]
 
     straight = [{"type": "STR", "length": 20.0}]
     level = [{"type": "CST", "length": 20.0, "cant": 0.0}]
-    reverse = track(straight + arc(400.0) + straight + arc(-400.0) + straight,
-                    cant=level + cant(0.1) + level + cant(-0.1) + level)
+    reverse = track(
+        straight + arc(400.0) + straight + arc(-400.0) + straight,
+        cant=level + cant(0.1) + level + cant(-0.1) + level,
+    )
     result = simulate(coach, reverse, speed=15.0)
     first = int(np.argmin(np.abs(result.distance - 225.0)))
     second = int(np.argmin(np.abs(result.distance - 525.0)))
@@ -186,8 +210,10 @@ def test_reverse_curve_mirrors_the_first_one(coach):
 def harmonic(wavelength, amplitude, length=200.0, rails=("left", "right")):
     s = np.arange(20.0, length, wavelength / 40.0)
     z = amplitude * np.sin(2.0 * np.pi * (s - 20.0) / wavelength)
-    rows = [(a, 0.0, b * ("left" in rails), 0.0, b * ("right" in rails))
-            for a, b in zip(s.tolist(), z.tolist(), strict=True)]
+    rows = [
+        (a, 0.0, b * ("left" in rails), 0.0, b * ("right" in rails))
+        for a, b in zip(s.tolist(), z.tolist(), strict=True)
+    ]
     return {"type": "measured", "rows": rows, "fade": 10.0}
 
 
@@ -239,18 +265,27 @@ def test_slow_run_over_a_twist_gives_the_static_change_of_load():
     data = wagon.model_dump(exclude_none=True)
     k = 4.0e6
     axle = data["assemblies"]["axle"]
-    axle["elements"] = {"spring": {
-        "kind": "bushing", "bodies": ["wagon", "wheelset"], "point": [0.0, 1.0, -0.46],
-        "sides": "both", "stiffness": [5e6, 5e6, k], "damping": [0.0, 0.0, 40e3],
-    }}
+    axle["elements"] = {
+        "spring": {
+            "kind": "bushing",
+            "bodies": ["wagon", "wheelset"],
+            "point": [0.0, 1.0, -0.46],
+            "sides": "both",
+            "stiffness": [5e6, 5e6, k],
+            "damping": [0.0, 0.0, 40e3],
+        }
+    }
     wagon = type(wagon).model_validate(data)
     ramp = 1e-3  # cross level per metre
     s = np.arange(0.0, 80.0, 0.5)
     level = ramp * (np.abs(s - 37.5) - 17.5) * (s > 20.0)
-    rows = [(a, 0.0, -0.5 * b, 0.0, 0.5 * b)
-            for a, b in zip(s.tolist(), level.tolist(), strict=True)]
-    twisted = track(irregularities=[{"type": "measured", "rows": rows, "fade": 0.0}],
-                    support={"preset": "rigid"})
+    rows = [
+        (a, 0.0, -0.5 * b, 0.0, 0.5 * b) for a, b in zip(s.tolist(), level.tolist(), strict=True)
+    ]
+    twisted = track(
+        irregularities=[{"type": "measured", "rows": rows, "fade": 0.0}],
+        support={"preset": "rigid"},
+    )
     result = simulate(wagon, twisted, speed=2.0, until=60.0)
     row = int(np.argmin(np.abs(result.distance - 55.0)))
     base = 1.506
@@ -262,13 +297,17 @@ def test_slow_run_over_a_twist_gives_the_static_change_of_load():
 
 def test_irregular_rails_mirrored_give_the_mirrored_result(coach):
     """Left and right of everything exchanged, through dips, kinks, twists and random rails."""
-    irregular = curve(length=100.0, friction=[0.4, 0.3],
-                      gauge_widening=((0.0, 0.0, 0.0), (100.0, 0.002, 0.001)), irregularities=[
-        {"type": "random", "spectrum": "erri_b176_low", "seed": 5, "begin": 15.0, "end": 150.0},
-        {"type": "dip", "s": 40.0, "length": 2.0, "depth": 0.003, "rail": "left"},
-        {"type": "kink", "s": 60.0, "length": 6.0, "offset": 0.003, "rail": "right"},
-        {"type": "twist", "s": 80.0, "length": 8.0, "height": 0.004},
-    ])
+    irregular = curve(
+        length=100.0,
+        friction=[0.4, 0.3],
+        gauge_widening=((0.0, 0.0, 0.0), (100.0, 0.002, 0.001)),
+        irregularities=[
+            {"type": "random", "spectrum": "erri_b176_low", "seed": 5, "begin": 15.0, "end": 150.0},
+            {"type": "dip", "s": 40.0, "length": 2.0, "depth": 0.003, "rail": "left"},
+            {"type": "kink", "s": 60.0, "length": 6.0, "offset": 0.003, "rail": "right"},
+            {"type": "twist", "s": 80.0, "length": 8.0, "height": 0.004},
+        ],
+    )
     here = simulate(coach, irregular, speed=15.0)
     there = simulate(mirrored_vehicle(coach), mirrored_track(irregular), speed=15.0)
     # round-off of 1e-16 grows where wheels leave and meet their flanges

@@ -88,8 +88,9 @@ def steady_curve(request, coach):
     balance = steady(coach, track, Settings(), speed)
     state = balance.state
     h = 0.5e-3
-    state = advance(balance.model.system, state, h, round(600.0 / speed / h), "fast",
-                    model=balance.model)
+    state = advance(
+        balance.model.system, state, h, round(600.0 / speed / h), "fast", model=balance.model
+    )
     return balance.model, state, speed
 
 

@@ -39,8 +39,26 @@ def elastic(coach):
 def test_frequencies_without_weight_and_damping(elastic):
     """L4: computed twice independently, 0.1 %."""
     modes, _ = elastic
-    expected = [0.5962, 0.8551, 1.0739, 1.2784, 1.2812, 2.8595, 7.4705, 7.4773, 9.6398, 9.6568,
-                11.624, 11.631, 12.805, 12.808, 35.354, 35.354, 36.232, 36.237]
+    expected = [
+        0.5962,
+        0.8551,
+        1.0739,
+        1.2784,
+        1.2812,
+        2.8595,
+        7.4705,
+        7.4773,
+        9.6398,
+        9.6568,
+        11.624,
+        11.631,
+        12.805,
+        12.808,
+        35.354,
+        35.354,
+        36.232,
+        36.237,
+    ]
     assert modes.natural_frequencies == pytest.approx(expected, rel=1e-3)
     assert np.max(np.abs(modes.damping_ratios)) < 1e-4
 
@@ -67,10 +85,18 @@ def test_frequencies_with_weight(coach):
 def test_frequencies_and_damping_with_weight_and_dampers(coach):
     """L6: f0 and zeta with all dampers and their series springs; 0.2 %."""
     modes, _ = held_modes(coach, loaded=True)
-    expected = np.array([
-        [0.5631, 0.2215], [0.8757, 0.5339], [1.0835, 0.1346], [1.2961, 0.1594], [1.2982, 0.4309],
-        [2.8614, 0.0428], [7.7457, 0.2464], [7.7553, 0.2412],
-    ])
+    expected = np.array(
+        [
+            [0.5631, 0.2215],
+            [0.8757, 0.5339],
+            [1.0835, 0.1346],
+            [1.2961, 0.1594],
+            [1.2982, 0.4309],
+            [2.8614, 0.0428],
+            [7.7457, 0.2464],
+            [7.7553, 0.2412],
+        ]
+    )
     oscillations = modes.taken(np.flatnonzero(modes.frequencies > 1e-3))
     assert oscillations.natural_frequencies[:8] == pytest.approx(expected[:, 0], rel=2e-3)
     assert oscillations.damping_ratios[:8] == pytest.approx(expected[:, 1], rel=2e-3)
@@ -90,8 +116,12 @@ def test_held_reference_would_pitch_otherwise(coach):
 
 def test_a_change_of_the_bodys_mass_moves_the_bounce_as_a_single_mass_would(coach):
     """Bounce of the body on four coils of 430 kN/m over eight primaries: f ~ sqrt(1/m)."""
-    heavier = changed(coach, lambda kind, name, table: table.update(mass=64e3)
-                      if (kind, name) == ("bodies", "carbody") else None)
+    heavier = changed(
+        coach,
+        lambda kind, name, table: (
+            table.update(mass=64e3) if (kind, name) == ("bodies", "carbody") else None
+        ),
+    )
     bounce = []
     for vehicle in (coach, heavier):
         modes, names = held_modes(undamped(vehicle), loaded=True)
@@ -107,12 +137,17 @@ def test_a_car_between_held_bogies_bounces_on_its_springs():
 
     The bogies alone under a held car are left with modes of their own, none of the car.
     """
-    car = modes(load_vehicle("benchmark_vehicle1"), speed=20.0, held=True,
-                hold=["front.frame", "rear.frame"])
+    car = modes(
+        load_vehicle("benchmark_vehicle1"),
+        speed=20.0,
+        held=True,
+        hold=["front.frame", "rear.frame"],
+    )
     bounce = car["car body bounce"]
     assert {name.partition(".")[0] for name in bounce.shape} == {"carbody"}
     assert bounce.natural_frequency == pytest.approx(
-        np.sqrt(4.0 * 430e3 / 32000.0) / (2.0 * np.pi), rel=5e-3)
+        np.sqrt(4.0 * 430e3 / 32000.0) / (2.0 * np.pi), rel=5e-3
+    )
     bogies = modes(load_vehicle("benchmark_vehicle1"), speed=20.0, hold=["carbody"])
     assert not any("carbody" in name for mode in bogies for name in mode.participation)
     assert any("hunting" in mode.name for mode in bogies)

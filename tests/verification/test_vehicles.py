@@ -9,8 +9,12 @@ from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.vehicle import Vehicle
 from railsim.simulation import simulate
 
-SPEEDS = {"two_axle_wagon": 15.0, "articulated_three_bogies": 20.0, "single_wheelset": 5.0,
-          "single_bogie": 10.0}
+SPEEDS = {
+    "two_axle_wagon": 15.0,
+    "articulated_three_bogies": 20.0,
+    "single_wheelset": 5.0,
+    "single_bogie": 10.0,
+}
 FRICTIONLESS = {"friction": (0.0, 0.0)}
 FREE = Settings(contact_damping=0.0, drive={"mode": "free"})
 
@@ -55,8 +59,13 @@ def test_wagon_comes_to_rest_after_a_disturbance_and_stays_there(scheme):
     """
     wagon = test_vehicle("two_axle_wagon")
     initial = {"wagon": {"vz": 0.15, "vroll": 0.05, "vpitch": 0.03}}
-    result = simulate(wagon, load_track("straight"), speed=15.0, duration=40.0,
-                      settings=Settings(initial=initial, scheme=scheme))
+    result = simulate(
+        wagon,
+        load_track("straight"),
+        speed=15.0,
+        duration=40.0,
+        settings=Settings(initial=initial, scheme=scheme),
+    )
     bodies = list(result.coordinates["body"])
     z = result.body_position[:, bodies.index("wagon"), [2, 3, 4]]
     assert np.ptp(z[result.time < 2.0], axis=0)[0] > 5e-3
@@ -108,18 +117,37 @@ def with_everything():
     data = vehicle.model_dump(exclude_none=True)
     table = [[0.0, 0.0], [0.02, 600.0], [0.3, 2000.0]]
     data["elements"] |= {
-        "series": {"kind": "spring_damper", "bodies": ["leading.frame", "leading_car"],
-                   "points": [[15.5, 1.2, -0.4], [15.5, 1.2, -1.0]], "sides": "both",
-                   "damper_table": table, "series_stiffness": 2e6},
-        "plain": {"kind": "spring_damper", "bodies": ["trailing.frame", "trailing_car"],
-                  "points": [[-15.5, 1.2, -0.4], [-15.5, 1.2, -1.0]], "sides": "both",
-                  "damper_table": table, "spring_table": [[0.0, 0.0], [0.01, 0.0], [0.02, 2e3]]},
-        "stop": {"kind": "bump_stop", "bodies": ["trailing.frame", "trailing_car"],
-                 "point": [-15.5, 0.0, -0.7], "axis": "y", "table": [[0.0, 0.0], [0.003, 0.0],
-                                                                     [0.02, 5e3]]},
-        "rubbing": {"kind": "friction", "bodies": ["shared.frame", "trailing_car"],
-                    "point": [0.0, 0.8, -0.8], "sides": "both",
-                    "friction_force": [500.0, 500.0, 0.0], "stick_stiffness": [1e6, 1e6, 0.0]},
+        "series": {
+            "kind": "spring_damper",
+            "bodies": ["leading.frame", "leading_car"],
+            "points": [[15.5, 1.2, -0.4], [15.5, 1.2, -1.0]],
+            "sides": "both",
+            "damper_table": table,
+            "series_stiffness": 2e6,
+        },
+        "plain": {
+            "kind": "spring_damper",
+            "bodies": ["trailing.frame", "trailing_car"],
+            "points": [[-15.5, 1.2, -0.4], [-15.5, 1.2, -1.0]],
+            "sides": "both",
+            "damper_table": table,
+            "spring_table": [[0.0, 0.0], [0.01, 0.0], [0.02, 2e3]],
+        },
+        "stop": {
+            "kind": "bump_stop",
+            "bodies": ["trailing.frame", "trailing_car"],
+            "point": [-15.5, 0.0, -0.7],
+            "axis": "y",
+            "table": [[0.0, 0.0], [0.003, 0.0], [0.02, 5e3]],
+        },
+        "rubbing": {
+            "kind": "friction",
+            "bodies": ["shared.frame", "trailing_car"],
+            "point": [0.0, 0.8, -0.8],
+            "sides": "both",
+            "friction_force": [500.0, 500.0, 0.0],
+            "stick_stiffness": [1e6, 1e6, 0.0],
+        },
     }
     return Vehicle.model_validate(data)
 
@@ -164,9 +192,13 @@ def with_loads(vehicle, body, **tables):
 def test_wind_is_carried_by_the_rails():
     """A side force of 20 kN and a torque about z: sums of Y, of Y x and of the lateral load."""
     force, torque = 20e3, 30e3
-    coach = with_loads(load_vehicle("coach_manchester"), "carbody",
-                       force_table=[[0.0, 0.0, 0.0, 0.0], [3.0, 0.0, force, 0.0]],
-                       torque_table=[[0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, torque]], axes="track")
+    coach = with_loads(
+        load_vehicle("coach_manchester"),
+        "carbody",
+        force_table=[[0.0, 0.0, 0.0, 0.0], [3.0, 0.0, force, 0.0]],
+        torque_table=[[0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, torque]],
+        axes="track",
+    )
     result = simulate(coach, load_track("straight"), speed=20.0, duration=20.0)
     sum_Y = result.sum_Y[-1]
     assert sum_Y.sum() == pytest.approx(force, rel=1e-3)
@@ -191,9 +223,13 @@ def _moved(result):
 
 def lopsided_everything():
     """All kinds of elements, a load to one side, wind and yaw torque."""
-    vehicle = with_loads(with_everything(), "trailing_car", point=[-8.0, 0.3, -2.0],
-                         force_table=[[0.0, 0.0, 0.0, 0.0], [1.0, 1e3, 5e3, 2e3]],
-                         torque_table=[[0.0, 0.0, 0.0, 0.0], [1.0, 1e3, 2e3, 5e3]])
+    vehicle = with_loads(
+        with_everything(),
+        "trailing_car",
+        point=[-8.0, 0.3, -2.0],
+        force_table=[[0.0, 0.0, 0.0, 0.0], [1.0, 1e3, 5e3, 2e3]],
+        torque_table=[[0.0, 0.0, 0.0, 0.0], [1.0, 1e3, 2e3, 5e3]],
+    )
     data = vehicle.model_dump(exclude_none=True)
     data["bodies"]["leading_car"]["position"] = [8.0, 0.04, -1.7]
     return Vehicle.model_validate(data)
@@ -202,15 +238,26 @@ def lopsided_everything():
 @pytest.mark.parametrize("kind", ["articulated", "wagon"])
 def test_mirrored_vehicle_on_the_mirrored_track_gives_the_mirrored_result(kind):
     """Every kind of element, irregular left and right rails, both by `definitions.mirror`."""
-    vehicle = lopsided_everything() if kind == "articulated" else with_loads(
-        test_vehicle("two_axle_wagon"), "wagon",
-        force_table=[[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 5e3, 0.0]])
+    vehicle = (
+        lopsided_everything()
+        if kind == "articulated"
+        else with_loads(
+            test_vehicle("two_axle_wagon"),
+            "wagon",
+            force_table=[[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 5e3, 0.0]],
+        )
+    )
     curve = load_track("curve_r500")
     plan = [e.model_dump(exclude_none=True) for e in curve.plan]
     cant = [e.model_dump(exclude_none=True) for e in curve.cant]
     plan[0]["length"] = cant[0]["length"] = 30.0
-    track = curve.replace(plan=plan, cant=cant, irregularities=[
-        {"type": "random", "spectrum": "erri_b176_low", "seed": 2, "begin": 25.0, "end": 160.0}])
+    track = curve.replace(
+        plan=plan,
+        cant=cant,
+        irregularities=[
+            {"type": "random", "spectrum": "erri_b176_low", "seed": 2, "begin": 25.0, "end": 160.0}
+        ],
+    )
     here = simulate(vehicle, track, speed=15.0, until=170.0)
     there = simulate(mirrored_vehicle(vehicle), mirrored_track(track), speed=15.0, until=170.0)
     scale = np.abs(here.Q).max()

@@ -57,13 +57,23 @@ def rail_line(system, point, s):
 @pytest.mark.parametrize("start", [40.0, 150.0])
 def test_creepage_is_the_velocity_of_the_material_against_the_rail_at_the_patch(coach, start):
     """R 150 m, on the transition and in the circle: kappa (x + c_x) and V (1 - kappa y) count."""
-    track = Track.model_validate({
-        "format": "railsim-track/1", "name": "R 150 m", "support": {"preset": "rigid"},
-        "plan": [{"type": "STR", "length": 10.0}, {"type": "CLO", "length": 60.0},
-                 {"type": "CIR", "length": 200.0, "radius": 150.0}],
-        "cant": [{"type": "CST", "length": 10.0, "cant": 0.0}, {"type": "LIR", "length": 60.0},
-                 {"type": "CST", "length": 200.0, "cant": 0.12}],
-    })
+    track = Track.model_validate(
+        {
+            "format": "railsim-track/1",
+            "name": "R 150 m",
+            "support": {"preset": "rigid"},
+            "plan": [
+                {"type": "STR", "length": 10.0},
+                {"type": "CLO", "length": 60.0},
+                {"type": "CIR", "length": 200.0, "radius": 150.0},
+            ],
+            "cant": [
+                {"type": "CST", "length": 10.0, "cant": 0.0},
+                {"type": "LIR", "length": 60.0},
+                {"type": "CST", "length": 200.0, "cant": 0.12},
+            ],
+        }
+    )
     balance = steady(coach, track, Settings(), SPEED)
     system, n = balance.model.system, balance.model.index.n_bodies
     state = start_state(balance.model, balance, track, start, 1e-3, 0)
@@ -135,7 +145,9 @@ def test_given_torque_on_a_wheelset_turns_it(coach):
     """A drive of 2 kN m on every axle is in balance with 2 kN m / r of creep force."""
     data = coach.model_dump(exclude_none=True)
     data["assemblies"]["bogie"]["assemblies"]["axle"]["elements"]["drive"] = {
-        "kind": "applied_force", "bodies": ["wheelset"], "torque_table": [[0.0, 0.0, -2e3, 0.0]],
+        "kind": "applied_force",
+        "bodies": ["wheelset"],
+        "torque_table": [[0.0, 0.0, -2e3, 0.0]],
     }
     driven = type(coach).model_validate(data)
     balance = steady(driven, load_track("straight"), Settings(), SPEED)

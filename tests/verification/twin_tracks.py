@@ -71,10 +71,16 @@ def _radii(curvature):
 
 
 def _track(wave, plan, **more):
-    return Track.model_validate({
-        "format": "railsim-track/1", "name": "twin", "plan": plan, "rounding": ROUNDING,
-        "support": {"preset": "rigid"}, **more,
-    })
+    return Track.model_validate(
+        {
+            "format": "railsim-track/1",
+            "name": "twin",
+            "plan": plan,
+            "rounding": ROUNDING,
+            "support": {"preset": "rigid"},
+            **more,
+        }
+    )
 
 
 def _measured(s, y_left, z_left, y_right, z_right):
@@ -99,8 +105,11 @@ def alignment(wave, curvature=0.0, cant=0.0):
     ends = [{"type": "CIR", "radius": radii[0]}, {"type": "CIR", "radius": radii[0]}]
     if curvature == 0.0:
         ends = [{"type": "STR"}, {"type": "STR"}]
-    plan = [ends[0] | {"length": BEGIN}, *_elements(wave, "CLO", "radius", radii),
-            ends[1] | {"length": AFTER}]
+    plan = [
+        ends[0] | {"length": BEGIN},
+        *_elements(wave, "CLO", "radius", radii),
+        ends[1] | {"length": AFTER},
+    ]
     waved = _track(wave, plan, **level)
     s, aside = _lateral(waved, smooth, wave)
     angle = np.arcsin(cant / CANT_BASE)
@@ -170,8 +179,9 @@ def widening(shift, length=5.0):
 
 def runs(vehicle, tracks, speed, until=None, settings=None):
     """One run over each track."""
-    return [simulate(vehicle, track, speed=speed, settings=settings, until=until)
-            for track in tracks]
+    return [
+        simulate(vehicle, track, speed=speed, settings=settings, until=until) for track in tracks
+    ]
 
 
 def differences(one, two, begin=BEGIN):
@@ -188,8 +198,11 @@ def differences(one, two, begin=BEGIN):
         for k, name in enumerate(("lateral", "vertical", "roll", "pitch", "yaw"), start=1)
     }
     moved = {name: pair for name, pair in moved.items() if np.ptp(pair[0]) > 1e-3}
-    turned = {name: moved.pop(name) for name in list(moved)
-              if not name.startswith(("lateral", "vertical"))}
+    turned = {
+        name: moved.pop(name)
+        for name in list(moved)
+        if not name.startswith(("lateral", "vertical"))
+    }
     return _ratios(forces) | _ratios(moved) | _ratios(turned)
 
 
