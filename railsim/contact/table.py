@@ -111,7 +111,8 @@ class TableGrid:
     n_w : int
         Number of nodes of w = yaw^2, from 0 to yaw_max^2.
     spacing : float
-        Distance of the candidates on the wheel's tread [m].
+        Distance of the candidates on the wheel's tread, at most `ds`: with nodes that lie closer
+        than the candidates the sums over the patch ripple from node to node [m].
     reference : float
         Load of the ellipse over which curvatures are averaged [N].
     floor_ratio : float
@@ -312,7 +313,9 @@ def build_contact_table(
     """
     grid = _chosen_grid(grid, normal)
     height = radius if centre_height is None else centre_height
-    wheel_points = wheel_curve(wheel, radius, tape_circle_place(back_to_back), grid.spacing)
+    wheel_points = wheel_curve(
+        wheel, radius, tape_circle_place(back_to_back), min(grid.spacing, grid.ds)
+    )
     rail_nodes = rail_curve(rail, gauge, inclination)
     if faults := misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
         raise InputError(faults)

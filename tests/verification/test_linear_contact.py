@@ -1,11 +1,15 @@
 """Linearised wheel-rail contact: critical speeds of cones, creep coefficients, runs from a mode."""
 
+import functools
+
 import numpy as np
 import pytest
 from dynamics import changed, load_track, load_vehicle
 from rig import test_vehicle
 
 from railsim.assembly import CONSTANT_SPEED, level_track_with_friction, work_arrays
+from railsim.contact import table
+from railsim.contact.table import TableGrid
 from railsim.errors import InputError
 from railsim.kernels.time_loop import time_loop
 from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillations
@@ -44,15 +48,20 @@ def test_critical_speed_of_a_wheelset_on_springs(contact):
     assert lost.modes[0].frequencies[0] == pytest.approx(2.524, rel=0.02)
 
 
+def on_cones(vehicle):
+    """The vehicle on wheels of 1:20."""
+    return changed(
+        vehicle,
+        lambda kind, _, part: part.update(profile="cone_1in20") if kind == "wheelsets" else None,
+    )
+
+
 @pytest.fixture(scope="module")
 def coned():
     """The benchmark coach on cones 1:20; rails with a head of constant radius, friction 10."""
     y, z = arc_chain_rail((28.0,), (300.0, 8.0))
     arc = Profile("arc", "rail", 1e-3 * y, 1e-3 * z, "one arc of 300 mm, corners of 8 mm")
-    vehicle = changed(
-        load_vehicle("benchmark_vehicle1"),
-        lambda kind, _, table: table.update(profile="cone_1in20") if kind == "wheelsets" else None,
-    )
+    vehicle = on_cones(load_vehicle("benchmark_vehicle1"))
     track = STRAIGHT.replace(rail="arc", friction=10.0)
 
     def prepared(contact):
@@ -67,6 +76,31 @@ def test_critical_speed_of_the_benchmark_coach_on_cones(coned, contact):
     lost = loss_of_stability(coned(contact).linearised, 60.0, 130.0, points=4)
     assert lost.parameter == pytest.approx(99.0, rel=0.05)
     assert lost.modes[0].frequencies[0] == pytest.approx(2.96, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "cones", "allowed"),
+    [("benchmark_vehicle1", True, 0.01), ("coach_manchester", False, 0.02)],
+)
+def test_half_the_spacing_of_the_contact_table_keeps_the_tangent_critical_speed(
+    name, cones, allowed, monkeypatch
+):
+    """On 60E1: the slope of the lateral force at the centre is no ripple; S1002 moves by 1.5 %."""
+    vehicle = on_cones(load_vehicle(name)) if cones else load_vehicle(name)
+    found = []
+    for share in (1.0, 0.5):
+        usual = TableGrid()
+        narrow = functools.partial(
+            TableGrid, s_min=-6e-3, s_max=6e-3, roll_max=3e-3, yaw_max=0.02, n_w=3,
+            ds=share * usual.ds, droll=share * usual.droll,
+        )  # fmt: skip
+        with monkeypatch.context() as patched:
+            patched.setattr(table, "TableGrid", narrow)
+            rolling = LinearVehicle(vehicle, STRAIGHT.replace(friction=0.4), contact=Contact())
+        found.append(loss_of_stability(rolling.linearised, 20.0, 130.0, points=5).parameter)
+    assert found[1] == pytest.approx(found[0], rel=allowed)
+    if cones:  # computed independently: 95 to 99 m/s
+        assert 95.0 < found[0] < 99.0
 
 
 def test_creep_coefficients_without_saturation_are_kalkers(coned):
