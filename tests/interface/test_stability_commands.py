@@ -119,6 +119,7 @@ def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path, dam
     assert {path: path.read_bytes() for path in (folder / "points").iterdir()} == whole
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_map_over_any_key_of_the_files(capsys, tmp_path):
     """Cones twice as steep cost speed, a heavier car a little; both keys stand in each record."""
     folder = tmp_path / "map"

@@ -1,22 +1,12 @@
 """Wide gauges and narrow wheelsets: the contact table covers the whole clearance."""
 
-import functools
-
 import pytest
 from dynamics import changed, load_track, load_vehicle
 
-import railsim.contact.table
 from railsim import simulate
-from railsim.contact.table import TableGrid
 
 
-@pytest.fixture(autouse=True)
-def coarse_tables(monkeypatch):
-    """Tables of a fifth of the usual size, which are built in seconds."""
-    grid = functools.partial(TableGrid, ds=2e-4, n_w=6)
-    monkeypatch.setattr(railsim.contact.table, "TableGrid", grid)
-
-
+@pytest.mark.usefixtures("small_contact_tables")
 @pytest.mark.parametrize(
     ("gauge", "back_to_back", "widening"),
     [(1.455, 1.360, 0.0), (1.435, 1.345, 0.0), (1.435, 1.360, 0.015)],

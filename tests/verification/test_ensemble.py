@@ -234,6 +234,7 @@ def test_nothing_large_is_copied():
     assert len(joint.bodies.kind) == 3 * len(members[0].system.bodies.kind)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_different_wheels_have_their_tables_side_by_side():
     track = load_track("curve_r250")
     worn = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile=cone_1in20"

@@ -87,6 +87,7 @@ def hollow(depth, width=0.05):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("depth", [2e-3, 4e-3])
+@pytest.mark.usefixtures("small_contact_tables")
 def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
     coach = railsim.load_vehicle("coach_manchester")
     found = rolling(coach, 20.0, {"S1002": hollow(depth)})
