@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, work_arrays
+from railsim.assembly import Model, components_of, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import AXLEBOX, FREE, N_SCALARS, WHEELSET, Drive, System
+from railsim.kernels.system import FREE, N_SCALARS, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.system import Linearisation, jacobian
 from railsim.notation import COMPONENTS
@@ -100,7 +100,7 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     for body, kind in enumerate(model.system.bodies.kind):
         if (kind == WHEELSET and held) or model.index.bodies[body] in hold:
             continue
-        for component in (4,) if kind == AXLEBOX else range(6):
+        for component in components_of(int(kind)):
             if not (kind == WHEELSET and component == 4):
                 positions.append((body, component))
             velocities.append((body, component))

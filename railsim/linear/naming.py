@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.assembly import Model
-from railsim.kernels.system import AXLEBOX, RIGID, WHEELSET
+from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
 from railsim.notation import COMPONENTS
 
@@ -92,7 +92,7 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
     rolling = {int(b) for b in np.flatnonzero((bodies.kind == WHEELSET) | (bodies.kind == AXLEBOX))}
     pairs = [*model.system.links.body.tolist(), *model.system.mounts.body.tolist()]
     carried = {a for pair in pairs for a, b in (pair, pair[::-1]) if b in rolling} - rolling
-    rigid = [int(b) for b in np.flatnonzero(bodies.kind == RIGID)]
+    rigid = [int(b) for b in np.flatnonzero((bodies.kind == RIGID) | (bodies.kind == FIXED))]
     cars = [b for b in rigid if b not in carried]
     if not cars and rigid:
         heaviest = max(float(bodies.mass[b]) for b in rigid)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_side
@@ -238,7 +238,7 @@ def _conditions(
     for body, kind in enumerate(bodies.kind):
         if kind == WHEELSET and held:
             continue
-        for component in (4,) if kind == AXLEBOX else range(6):
+        for component in components_of(int(kind)):
             if body in bodies.references and component == 0:
                 continue
             spin = kind == WHEELSET and component == 4

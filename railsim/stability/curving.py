@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import GRAVITY, Model, assemble, work_arrays
+from railsim.assembly import GRAVITY, Model, assemble, check_fixed, work_arrays
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -287,7 +287,9 @@ class _Search:
         profiles: Mapping[str, Profile] | None,
     ) -> None:
         self.track, self.cant = track, cant
-        balance = equilibrium(assemble(vehicle, circle(track), settings, profiles), WALKING_PACE)
+        assembled = assemble(vehicle, circle(track), settings, profiles)
+        check_fixed(assembled.flat, circle(track, curvature=1.0, cant=cant))
+        balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0 = balance.Q0
         self.parts = parts_of(self.model, coordinates(self.model))
