@@ -407,12 +407,33 @@ def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
             derivative[v + i] = 0.0
 
 
-@jit
 def right_hand_side(system, work, state, derivative):
     """Derivative of the whole state.
 
     See `mechanics`, which leaves out the internal states of elements.
     """
+    return right_hand_sides(system, work, state[None], derivative[None])
+
+
+@jit
+def right_hand_sides(system, work, states, derivatives):
+    """Derivatives of several states, one a row, as for difference quotients.
+
+    A call from Python takes a `System` apart, which lasts longer than an evaluation.  Status,
+    wheelset and number of patches are those of the last state, or of the first that is not
+    `RUNNING`.
+    """
+    status, where, n_patches = RUNNING, 0, 0
+    for k in range(states.shape[0]):
+        status, where, n_patches = rates_of_state(system, work, states[k], derivatives[k])
+        if status != RUNNING:
+            break
+    return status, where, n_patches
+
+
+@jit_merged
+def rates_of_state(system, work, state, derivative):
+    """As `right_hand_side`, within compiled code."""
     status, where, n_patches = mechanics(system, work, state, derivative)
     internal_rates(system, work, state, derivative)
     support_rates(system, work, state, derivative)
