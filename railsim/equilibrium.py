@@ -26,7 +26,7 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import AXLEBOX, FIXED, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
@@ -382,8 +382,6 @@ class _Balance:
         self.speed = speed
         self.work = work_arrays(system)
         self.residual = np.inf
-        self._derivative = np.zeros(model.n_state)
-        self._state = np.zeros(model.n_state)
         n = model.index.n_bodies
         self._unknowns: list[int] = []
         self._equations: list[int] = []
@@ -464,12 +462,10 @@ class _Balance:
         columns = []
         for k, span in zip(self._unknowns, spans, strict=True):
             span = max(float(span), 1e-9 * max(1.0, abs(state[k])))
-            ends = []
-            for sign in (1.0, -1.0):
-                self._state[:] = state
-                self._state[k] += sign * span
-                ends.append(self._accelerations(self._state))
-            columns.append((ends[0] - ends[1]) / (2.0 * span))
+            trials = np.array([state, state])
+            trials[:, k] += span, -span
+            ahead, behind = self._accelerations(trials)
+            columns.append((ahead - behind) / (2.0 * span))
         return np.array(columns).T
 
     def _start_rolling(self, state: Floats) -> None:
@@ -478,21 +474,21 @@ class _Balance:
         for body in np.flatnonzero(bodies.kind == WHEELSET):
             state[6 * n + 6 * body + 4] = -self.speed / bodies.radius[body]
 
-    def _accelerations(self, state: Floats) -> Floats:
-        status, where, _ = right_hand_side(self.system, self.work, state, self._derivative)
+    def _accelerations(self, states: Floats) -> Floats:
+        """Accelerations of one state, or of several, one a row."""
+        rows = np.atleast_2d(states)
+        derivatives = np.empty_like(rows)
+        status, where, _ = right_hand_sides(self.system, self.work, rows, derivatives)
         if status != RUNNING:
             sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
             raise ModelError(f"no static equilibrium: {sentence}")
-        return self._derivative[self._equations].copy()
+        return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
 
     def _jacobian(self, state: Floats, rest: Floats) -> Floats:
-        columns = []
-        for k in self._unknowns:
-            self._state[:] = state
-            step = 1e-9 * max(1.0, abs(state[k]))
-            self._state[k] += step
-            columns.append((self._accelerations(self._state) - rest) / step)
-        return np.array(columns).T
+        steps = 1e-9 * np.maximum(1.0, np.abs(state[self._unknowns]))
+        trials = np.repeat(state[None], len(steps), axis=0)
+        trials[np.arange(len(steps)), self._unknowns] += steps
+        return np.asarray(((self._accelerations(trials) - rest) / steps[:, None]).T)
 
     def _line_search(
         self, state: Floats, rest: Floats, change: Floats, trials: int

@@ -74,12 +74,16 @@ class Parts:
         total = float(energy.sum())
         return energy / total if total > 0.0 else energy
 
+    @cached_property
+    def _places(self) -> dict[tuple[int, int], int]:
+        """Place of each position component among the coordinates."""
+        c = self.coordinates
+        return {(int(c.bodies[k]), int(c.components[k])): k for k in range(c.n_positions)}
+
     def component(self, shape: Complex, body: int, component: int) -> complex:
         """Position component of a shape, 0 where the body is held or has none."""
-        c = self.coordinates
-        own = slice(0, c.n_positions)
-        found = np.flatnonzero((c.bodies[own] == body) & (c.components[own] == component))
-        return complex(shape[found[0]]) if len(found) else 0j
+        place = self._places.get((body, component))
+        return 0j if place is None else complex(shape[place])
 
     def bogie_of(self, body: int) -> str:
         """First part of a body's dotted name."""

@@ -20,6 +20,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.drawn import Drawn
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.status import RUNNING
@@ -47,7 +48,7 @@ STILL = 1e-4  # share of the wheel loads by which forces still change after a se
 
 
 @dataclass(frozen=True)
-class Curving:
+class Curving(Drawn):
     """Steady curving on a grid.
 
     Attributes
@@ -96,6 +97,7 @@ class Curving:
     wheelsets: tuple[str, ...]
     bogies: tuple[str, ...]
 
+    FIGURE: ClassVar = "railsim.plot.curving:curving_figure"
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
     VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
         "Q": ("wheelset", "side"),
