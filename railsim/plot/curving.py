@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
-from railsim.plot.style import DISTINCT, styled, wheelset_colours
+from railsim.plot.style import DISTINCT, say, styled, wheelset_colours
 from railsim.stability.curving import Curving
 
 Floats = NDArray[np.float64]
@@ -64,11 +64,13 @@ def curving_figure(found: Curving, title: str) -> Figure:
             axes[1, 0],
             found,
             order,
-            np.nansum(found.T_gamma, axis=(-2, -1)),
+            np.sum(found.T_gamma, axis=(-2, -1)),
             r"wear number $T_\gamma$ of all wheels (N)",
         )
         _steering(axes[1, 1], found, order)
         for one in axes.flat:
+            if not found.converged.any():
+                say(one, "no steady state at any point")
             one.set_xlabel("radius (m)")
             if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
                 one.set_xscale("log")
