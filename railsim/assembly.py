@@ -215,7 +215,7 @@ def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> Non
         faults += [
             Fault(
                 where,
-                body.name,
+                f"{body.name}.fixed",
                 "fixed to the ground beside curves, cant or gradients",
                 'fixed = "track", or straight level track',
             )

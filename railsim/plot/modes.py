@@ -17,9 +17,12 @@ Floats = NDArray[np.float64]
 SHOWN = 25.0  # Hz, oscillations up to which are drawn
 BARS = 14  # components of a shape that are drawn
 LEAST_BARS = 5  # rows of a shape, so that bars are of one height
+# by quarters of a period, to which a phase is nearest
 PHASES = {
     DISTINCT[0]: "in phase with the first component",
+    DISTINCT[2]: "a quarter ahead",
     DISTINCT[1]: "in opposite phase",
+    DISTINCT[5]: "a quarter behind",
     "0.6": "spin, which has no displacement",
 }
 DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
@@ -153,10 +156,10 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
 
 def _phase_colour(value: complex | None, reference: complex) -> str:
     """Colour of `PHASES`; the spin of a wheelset has a rate and no displacement."""
-    in_phase, opposite, unknown = PHASES
+    *quarters, unknown = PHASES
     if value is None:
         return unknown
-    return in_phase if (value * np.conj(reference)).real >= 0.0 else opposite
+    return quarters[round(float(np.angle(value * np.conj(reference))) / (0.5 * np.pi)) % 4]
 
 
 def _shape(axes: Axes, mode: Mode) -> None:
