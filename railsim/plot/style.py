@@ -156,6 +156,7 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
 def say(axes: Axes, words: str) -> None:
     """Write in the middle of axes why they are empty."""
     axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes)
+    axes.set(xticks=[], yticks=[])
 
 
 def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:

@@ -290,7 +290,7 @@ class _Search:
     ) -> None:
         self.track, self.cant = track, cant
         assembled = assemble(vehicle, circle(track), settings, profiles)
-        check_fixed(assembled.flat, circle(track, curvature=1.0, cant=cant))
+        check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0 = balance.Q0

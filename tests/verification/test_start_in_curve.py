@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from dynamics import load_vehicle
+from rig import test_vehicle
 
 import railsim
 from railsim import run_in
@@ -87,7 +88,7 @@ def test_friction_elements_need_their_run_in(monkeypatch):
     """What they hold depends on the way into the curve."""
     monkeypatch.setattr(run_in, "TIMES", (1.0, 1.0))
     remarks = []
-    started(load_vehicle("wagon_c62a"), curve("rigid", 600.0), remarks.append)
+    started(test_vehicle("two_axle_wagon"), curve("rigid", 600.0), remarks.append)
     assert remarks == [
         "The run begins with a run-in: what friction elements hold depends on the way there."
     ]
