@@ -75,6 +75,8 @@ class Curving(Drawn):
         Roll of the (first) car body against the track [rad].
     wheelsets, bogies : tuple of str
         Names.
+    wheelset_position : tuple of float
+        Places of the wheelsets along the vehicle, against its reference body [m].
     """
 
     radius: Floats
@@ -96,6 +98,7 @@ class Curving(Drawn):
     car_roll: Floats
     wheelsets: tuple[str, ...]
     bogies: tuple[str, ...]
+    wheelset_position: tuple[float, ...]
 
     FIGURE: ClassVar = "railsim.plot.curving:curving_figure"
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
@@ -121,6 +124,7 @@ class Curving(Drawn):
             "friction": self.friction.tolist(),
             "cant": self.cant,
             "wheelset": list(self.wheelsets),
+            "wheelset_position": list(self.wheelset_position),
             "side": ["left", "right"],
             "bogie": list(self.bogies),
             "speed": self.speed.tolist(),
@@ -451,5 +455,9 @@ def _gathered(
         converged,
         wheelsets=index.wheelsets,
         bogies=tuple(index.bodies[b] for b in search.parts.frames),
+        wheelset_position=tuple(
+            float(search.model.system.frame_offset[search.model.system.bodies.frame[b]])
+            for b in search.parts.wheelsets
+        ),
         **arrays,
     )
