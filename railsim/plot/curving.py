@@ -191,8 +191,8 @@ def _plan(axes: Axes, found: Curving) -> None:
         xticks=[],
         yticks=[],
         title=(
-            f"Wheelsets at R {found.radius[r]:g} m from above, running to the right, first deficiency "
-            f"and friction; angle of attack and displacement {EXAGGERATED:g} times"
+            f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
+            f"running to the right; angle of attack and displacement {EXAGGERATED:g} times"
         ),
     )
 
