@@ -23,6 +23,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST, time_loop
@@ -77,6 +78,8 @@ class Curving(Drawn):
         Names.
     wheelset_position : tuple of float
         Places of the wheelsets along the vehicle, against its reference body [m].
+    remarks : tuple of str
+        What a reader must know.
     """
 
     radius: Floats
@@ -99,6 +102,7 @@ class Curving(Drawn):
     wheelsets: tuple[str, ...]
     bogies: tuple[str, ...]
     wheelset_position: tuple[float, ...]
+    remarks: tuple[str, ...] = ()
 
     FIGURE: ClassVar = "railsim.plot.curving:curving_figure"
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
@@ -127,6 +131,7 @@ class Curving(Drawn):
             "wheelset_position": list(self.wheelset_position),
             "side": ["left", "right"],
             "bogie": list(self.bogies),
+            "remarks": list(self.remarks),
             "speed": self.speed.tolist(),
             "converged": self.converged.tolist(),
             "dims": {name: [*self.DIMS, *dims] for name, dims in self.VALUES.items()},
@@ -298,6 +303,7 @@ class _Search:
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0 = balance.Q0
+        self.remarks = (*balance.remarks, *_remarks(balance.model))
         self.parts = parts_of(self.model, coordinates(self.model))
         rest = balance.state.copy()
         rest[-2] = PLACE
@@ -414,6 +420,17 @@ class _Search:
         }
 
 
+def _remarks(model: Model) -> tuple[str, ...]:
+    """What steady states leave out."""
+    pads = int(np.count_nonzero(model.system.internal.kind == PAD))
+    if not pads:
+        return ()
+    return (
+        f"{pads} friction elements hold nothing: what the way into the curve leaves in them, up to "
+        "their limits, is left out",
+    )
+
+
 def _contact_places(solver: SteadyRolling, wheelsets: int) -> Floats:
     """Place of each wheel's most loaded patch from the wheelset's middle [m]."""
     work = solver.work
@@ -459,5 +476,6 @@ def _gathered(
             float(search.model.system.frame_offset[search.model.system.bodies.frame[b]])
             for b in search.parts.wheelsets
         ),
+        remarks=search.remarks,
         **arrays,
     )

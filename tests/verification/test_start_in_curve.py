@@ -92,3 +92,9 @@ def test_friction_elements_need_their_run_in(monkeypatch):
     assert remarks == [
         "The run begins with a run-in: what friction elements hold depends on the way there."
     ]
+
+
+def test_curving_without_the_forces_of_friction_elements_says_so():
+    """Newton's method knows no way into the curve."""
+    found = railsim.curving(test_vehicle("two_axle_wagon"), radius=[600.0])
+    assert any("friction elements hold nothing" in remark for remark in found.remarks)
