@@ -38,7 +38,7 @@ from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
-from railsim.settling import NEGLIGIBLE, Progress, advance, curve_to_settle_in
+from railsim.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
@@ -239,6 +239,7 @@ def _run(
     progress: Progress | None = None,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
+    DOING.info("on the way to the start")
     status = advance(model, system, state, step, steps, scheme, progress)
     if status != RUNNING:
         raise InputError(
