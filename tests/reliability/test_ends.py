@@ -1,7 +1,12 @@
 """A physical end keeps its result, however early it comes, and every command answers to it."""
 
+import gc
+import weakref
+
 import pytest
 
+import railsim
+import railsim.simulation
 from railsim.cli import main
 from railsim.result import check_result
 
@@ -48,3 +53,22 @@ def test_physical_end_keeps_its_result(changed, instants, reason, whole, tmp_pat
         assert main(command) == status, command
         errors = capsys.readouterr().err
         assert status != 2 or errors.count("\n") == 1, errors
+
+
+def test_run_that_has_ended_lets_go_of_its_tables(monkeypatch):
+    """Its hundred megabytes do not wait for the collector: hundreds of runs follow each other."""
+    prepare, prepared = railsim.simulation.prepare, []
+
+    def watched(*arguments, **how):
+        found = prepare(*arguments, **how)
+        prepared.append(weakref.ref(found))
+        return found
+
+    monkeypatch.setattr(railsim.simulation, "prepare", watched)
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    gc.disable()
+    try:
+        railsim.simulate(vehicle, track, speed=20.0, duration=0.1)
+        assert [found() for found in prepared] == [None]
+    finally:
+        gc.enable()
