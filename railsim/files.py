@@ -101,13 +101,25 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
         found, allowed = f"{folder} is a file", "give the name of a folder"
     elif not folder.exists() and folder.suffix.lower() in _OF_FILES:
         found, allowed = f"{folder.name} is the name of a file", "give the name of a folder"
-    elif folder.exists() and not os.access(folder, os.W_OK):
-        found, allowed = f"{folder} cannot be written to", "choose another folder"
+    elif problem := _unwritable(folder):
+        found, allowed = problem, "choose another folder"
     elif there and not overwrite:
         found, allowed = f"{folder} holds {', '.join(there)}", "give --overwrite or another folder"
     else:
         return
     raise InputError([Fault("--out", "", found, allowed)])
+
+
+def _unwritable(folder: Path) -> str:
+    """Say why nothing can be written into a folder, which may still have to be made."""
+    if folder.is_symlink() and not folder.exists():
+        return f"{folder} is a link that leads nowhere"
+    place = folder.absolute()
+    while not place.exists():
+        place = place.parent
+    if not place.is_dir():
+        return f"{place} is a file"
+    return "" if os.access(place, os.W_OK | os.X_OK) else f"{place} cannot be written to"
 
 
 def make_folder(folder: Path) -> None:
@@ -299,9 +311,15 @@ def whole_file(path: Path) -> Iterator[Path]:
     ...     print([path.name for path in Path(folder).iterdir()])
     ['a.txt']
     """
-    with PartialFile(path) as partial:
-        yield partial.path
-        partial.finish()
+    try:
+        with PartialFile(path) as partial:
+            yield partial.path
+            partial.finish()
+    except OSError as error:  # a full disk is told by the name that the user knows
+        hidden = error.filename is None or _PARTIAL.fullmatch(Path(str(error.filename)).name)
+        if error.errno is None or not hidden:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def remove_partial_files() -> None:

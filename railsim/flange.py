@@ -15,7 +15,7 @@ from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.settling import advance, curve_to_settle_in
+from railsim.settling import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
@@ -47,7 +47,7 @@ def tightest_curve(track: Track) -> tuple[float, float] | None:
 
 
 def in_flange_contact(
-    model: Model, track: Track, rolling: Floats, step: float
+    model: Model, track: Track, rolling: Floats, step: float, progress: Progress | None = None
 ) -> tuple[System, Floats] | None:
     """System on a curve as tight as the tightest one of the track, and the settled vehicle there.
 
@@ -57,6 +57,8 @@ def in_flange_contact(
         Steady rolling on straight track at the speed in question.
     step : float
         Step of the fast scheme, stable on straight track [s].
+    progress : callable, optional
+        Called now and then with the time that has been simulated, and that is to be [s].
 
     Returns
     -------
@@ -88,6 +90,7 @@ def in_flange_contact(
     state = rolling.copy()
     short = 0.5 * step
     steps = math.floor(auxiliary.length / speed / short)
-    status = advance(model, damped, state, short, steps, FAST)
+    DOING.info("settling in flange contact, for judging the time step")
+    status = advance(model, damped, state, short, steps, FAST, progress)
     state[-4] = 0.0  # of the last step's length: steps of any length are judged from here
     return (smooth, state) if status == RUNNING else None

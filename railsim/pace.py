@@ -12,6 +12,7 @@ from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError
 from railsim.flange import in_flange_contact
 from railsim.kernels.rhs import STANDSTILL_SPEED
+from railsim.settling import Progress
 from railsim.time_step import Stability
 
 Floats = NDArray[np.float64]
@@ -21,16 +22,29 @@ class Pace:
     """Step and output interval of a run, chosen once for each class of speeds.
 
     Creep forces stiffen as 1/V: the step of a class is that of its lowest speed.
+
+    Parameters
+    ----------
+    states : dict of float to float64[n_state]
+        Steady rolling on straight track at the speeds where it is known.
+    progress : callable, optional
+        Called while a step is judged, as in `railsim.flange.in_flange_contact`.
     """
 
     CLASS = 1.2  # ratio of a class's speeds
 
     def __init__(
-        self, model: Model, settings: Settings, track: Track, states: dict[float, Floats]
+        self,
+        model: Model,
+        settings: Settings,
+        track: Track,
+        states: dict[float, Floats],
+        progress: Progress | None = None,
     ) -> None:
         self._model = model
         self._track = track
         self._settings = settings
+        self._progress = progress
         self._known: dict[tuple[float, float], float] = {}
         self._states = states
         self.varies = settings.drive.mode != "constant"
@@ -90,7 +104,7 @@ class Pace:
             level,
             state,
             self._settings.scheme,
-            lambda step: in_flange_contact(self._model, self._track, state, step),
+            lambda step: in_flange_contact(self._model, self._track, state, step, self._progress),
         )
 
 

@@ -64,7 +64,7 @@ def beyond_experience(
     """
     found = []
     ratio = extremes["Q"][0] / Q0
-    w, side = (int(k) for k in np.unravel_index(np.nanargmax(ratio), ratio.shape))
+    w, side = _largest(ratio)
     if ratio[w, side] > MOST_Q:
         place = _place(extremes, "Q", (0, w, side), f"{wheelsets[w]}, {SIDES[side]}")
         found.append(
@@ -73,7 +73,7 @@ def beyond_experience(
         )
     limit = 10e3 + Q0.sum(axis=1) / 3.0
     ratio = np.abs(extremes["sum_Y"]) / limit
-    row, w = (int(k) for k in np.unravel_index(np.nanargmax(ratio), ratio.shape))
+    row, w = _largest(ratio)
     if ratio[row, w] > MOST_SUM_Y:
         place = _place(extremes, "sum_Y", (row, w), wheelsets[w])
         found.append(
@@ -107,6 +107,12 @@ def lifted_wheels(
         f"A wheel lifts off its rail: {who}, for {1e3 * unloaded[w, side]:.3g} ms altogether "
         f"({place}){others}.",
     )
+
+
+def _largest(ratio: Floats) -> tuple[int, ...]:
+    """Place of the largest value; of a run that ended before its first instant all are NaN."""
+    known = np.where(np.isnan(ratio), -np.inf, ratio)
+    return tuple(int(k) for k in np.unravel_index(np.argmax(known), ratio.shape))
 
 
 def _place(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str) -> str:

@@ -43,7 +43,7 @@ from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.steady import NotConverged, led
-from railsim.settling import NEGLIGIBLE, Progress, advance, curve_to_settle_in
+from railsim.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 
@@ -251,6 +251,7 @@ def _run(
     progress: Progress | None = None,
 ) -> None:
     """Advance a state; InputError if the vehicle leaves the track."""
+    DOING.info("on the way to the start")
     status = advance(model, system, state, step, steps, scheme, progress)
     if status != RUNNING:
         raise InputError(

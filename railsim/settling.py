@@ -1,5 +1,6 @@
 """A vehicle brought into a curve on an auxiliary track: straight, transition, curve."""
 
+import logging
 import math
 from collections.abc import Callable
 
@@ -14,7 +15,7 @@ from railsim.kernels.time_loop import time_loop
 from railsim.time_step import divide_strikes, empty_recorder
 
 Floats = NDArray[np.float64]
-# called with the time that has been simulated, and all of it [s]
+# called with the time that has been simulated, and all of it [s]; it may raise, as on Ctrl-C
 Progress = Callable[[float, float], None]
 
 STRAIGHT = 20.0  # m
@@ -22,7 +23,11 @@ STRAIGHT = 20.0  # m
 # counts from where the last wheelset is in the curve
 TRANSITION, SETTLING = 40.0, 30.0
 NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that are none
-STEPS = 10_000  # in a call: Ctrl-C is heard, and progress told, between calls
+# in a call, of all wheelsets: Ctrl-C is heard, and progress told, between calls; some tenths of a
+# second by the fast scheme, a second by the other one
+WHEELSET_STEPS = 40_000
+
+DOING = logging.getLogger("railsim.doing")  # what takes long, in words
 
 
 def curve_to_settle_in(
@@ -84,6 +89,7 @@ def advance(
     divide_strikes(work, scheme, step)
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     status, done = RUNNING, 0
+    most = max(1, WHEELSET_STEPS // len(system.contact.body))
     while status == RUNNING and done < steps:
         status, _, more, _ = time_loop(
             system,
@@ -95,7 +101,7 @@ def advance(
             scheme,
             step,
             1 + done,
-            min(STEPS, steps - done),
+            min(most, steps - done),
             steps + 2,
             int(done == 0),
             0,

@@ -31,7 +31,8 @@ from railsim.result import MemorySink, Result, Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.right_samples import filtering, low_pass_remark, output_words, sampled
 from railsim.run_in import start_state
-from railsim.settling import Progress as RunInProgress
+from railsim.settling import DOING
+from railsim.settling import Progress as SettlingProgress
 from railsim.time_step import SCHEMES
 
 Floats = NDArray[np.float64]
@@ -242,13 +243,14 @@ def outcomes(
     sinks = [MemorySink() for _ in vehicles] if sinks is None else sinks
     told = _Told(progress, len(vehicles), inputs)
     for number, (vehicle, sink) in enumerate(zip(vehicles, sinks, strict=True)):
-        told.next_run_in()
+        told.next_run()
         try:
-            run = _begun(vehicle, inputs, sink, profiles, before, shared, told.of_run_in)
+            run = _begun(vehicle, inputs, sink, profiles, before, shared, told)
         except Exception as error:
             found[number] = error
         else:
             runs[run] = number
+    DOING.info("")
     for run in advance(list(runs), settings, told.of_runs):
         number = runs[run]
         try:
@@ -259,7 +261,9 @@ def outcomes(
 
 
 class _Told:
-    """The finished fraction of runs, of which run-ins are a part, by simulated time.
+    """The finished fraction of runs and of what comes before them, by simulated time.
+
+    Before a run its step is judged in flange contact, and it may have a run-in.
 
     Parameters
     ----------
@@ -276,27 +280,40 @@ class _Told:
         end = inputs.track.length if inputs.until is None else inputs.until
         by_distance = (end - inputs.start) / inputs.speed
         self._length = min(inputs.duration or math.inf, by_distance)  # of one run [s]
-        self._before = 0.0  # simulated in the run-ins of other runs [s]
-        self._last = 0.0  # and in the last one
+        self._before = 0.0  # simulated while other runs were prepared [s]
+        self._judged = self._run_in = 0.0  # and this one
+        self._on_their_way = False
         self._fraction = 0.0
 
-    def next_run_in(self) -> None:
+    def next_run(self) -> None:
         """Take note that another run is prepared."""
-        self._before, self._last = self._before + self._last, 0.0
+        self._before += self._judged + self._run_in
+        self._judged = self._run_in = 0.0
         self._tell(self._fraction)
+
+    def of_judgement(self, done: float, whole: float) -> None:
+        """Take the time that has been simulated to judge a step, and all of it [s]."""
+        if self._on_their_way:  # at another speed: the runs wait for it
+            self._tell(self._fraction)
+            return
+        self._judged = done
+        self._tell((self._before + done) / (self._number * (whole + self._length)))
 
     def of_run_in(self, done: float, whole: float) -> None:
         """Take the time of a run-in that has been simulated, and all of it [s]."""
-        self._last = done
-        self._tell((self._before + done) / (self._number * (whole + self._length)))
+        self._run_in = done
+        each = self._judged + whole + self._length
+        self._tell((self._before + self._judged + done) / (self._number * each))
 
     def of_runs(self, fraction: float) -> None:
-        """Take the finished fraction of what follows the run-ins."""
-        run_ins, runs = self._before + self._last, self._number * self._length
-        self._tell(1.0 - (1.0 - fraction) * runs / (run_ins + runs))
+        """Take the finished fraction of what follows the preparation."""
+        self._on_their_way = True
+        before = self._before + self._judged + self._run_in
+        runs = self._number * self._length
+        self._tell(1.0 - (1.0 - fraction) * runs / (before + runs))
 
     def _tell(self, fraction: float) -> None:
-        # a run-in that has to be longer than expected takes nothing back
+        # a preparation that has to be longer than expected takes nothing back
         self._fraction = max(self._fraction, fraction)
         if self._progress is not None:
             self._progress(self._fraction)
@@ -309,7 +326,7 @@ def _begun(
     profiles: Mapping[str, Profile] | None,
     before: Floats | None,
     shared: SharedTables,
-    on_run_in: RunInProgress,
+    told: _Told,
 ) -> Run:
     """Prepare a run and tell its sink what will come."""
     began = time.perf_counter()
@@ -325,7 +342,8 @@ def _begun(
         profiles,
         shared,
         before,
-        on_run_in,
+        on_judgement=told.of_judgement,
+        on_run_in=told.of_run_in,
     )
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
     stored = StoredPeaks(sink)
@@ -339,8 +357,10 @@ def _begun(
         prepared.fresh,
         wall_time=time.perf_counter() - began,
     )
+    # which holds neither the sink nor the run: a circle would keep the tables in memory
+    largest, extremes, Q0 = stored.largest, run.extremes, prepared.balance.Q0
     stored.remark = lambda: lost_peak(
-        stored.largest, run_extremes(run.extremes, prepared.balance.Q0), output_words(settings),
+        largest, run_extremes(extremes, Q0), output_words(settings),
         filtered=settings.outputs.low_pass is not None,
     )  # fmt: skip
     run.remarks.extend(filter(None, [low_pass_remark(settings)]))
@@ -457,12 +477,14 @@ def prepare(
     profiles: Mapping[str, Profile] | None = None,
     shared: SharedTables | None = None,
     before: Floats | None = None,
-    on_run_in: RunInProgress | None = None,
+    *,
+    on_judgement: SettlingProgress | None = None,
+    on_run_in: SettlingProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
     model = balance.model
-    pace = Pace(model, sampled(settings), track, {speed: balance.state})
+    pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
     step, _ = pace.at(speed)
     remarks: list[str] = [*balance.remarks]
     if before is None:

@@ -108,6 +108,9 @@ def result_scene(
         allowed = f"run it with settings.outputs.quantities with {', '.join(NEEDED)}"
         raise InputError([Fault("result", name, "is not in it", allowed) for name in missing])
     distance = result["distance"]
+    if len(distance) < 2:
+        found = f"{len(distance)} instants: {result.status}"
+        raise InputError([Fault("result", "time", found, "a run of some length")])
     low, high = between or (float(distance[0]), float(distance[-1]))
     first, last = np.searchsorted(distance, [low, high])
     if last - first < 2:

@@ -42,14 +42,14 @@ class Record:
         self.time, self.distance = result["time"], result["distance"]
         steps = np.diff(self.time)
         if len(steps) < 10:
-            raise self._fault("time", f"{len(self.time)} instants", "a longer run")
+            raise self.fault("time", f"{len(self.time)} instants", "a longer run")
         # the last step of a run is shorter where its end falls between two outputs
         self.rows = len(self.time) - 1
         step = float(np.median(steps))
         self.rate = 1.0 / step
         if float(np.max(np.abs(steps[:-1] - step))) > 1e-3 * step:
             allowed = "a run with settings.output_rate, not output_spacing"
-            raise self._fault("time", "unequal time steps", allowed)
+            raise self.fault("time", "unequal time steps", allowed)
         self.low_pass = result.settings().outputs.low_pass
         self.coarse = self.low_pass is None and self.rate < FINE_ENOUGH * (1.0 - 1e-3)
         if self.coarse and not coarse:
@@ -57,9 +57,10 @@ class Record:
                 f"{FINE_ENOUGH:g} at least (settings.output_rate=1000), or values low-passed by "
                 "the run (settings.outputs.low_pass); --coarse assesses it all the same"
             )
-            raise self._fault("time", f"{self.rate:.4g} samples a second", allowed)
+            raise self.fault("time", f"{self.rate:.4g} samples a second", allowed)
 
-    def _fault(self, key: str, found: str, allowed: str) -> InputError:
+    def fault(self, key: str, found: str, allowed: str) -> InputError:
+        """Return the error that something about the result is not what it must be."""
         return InputError([Fault(self.name, key, found, allowed)])
 
     def need(self, names: Sequence[str], output: str) -> None:

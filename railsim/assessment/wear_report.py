@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.assessment.record import Record
+from railsim.assessment.record import START, Record
 from railsim.assessment.wear import (
     YIELD_IN_SHEAR,
     WholeLifeRailModel,
@@ -89,10 +89,11 @@ def wear_report(
     sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "damage", "usfd")}
     worst, length = np.full(shape, -np.inf), 0.0
     patches = all(name in record.result for name in PATCHES)
+    way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
         T_gamma = record.result.part("T_gamma", rows)
-        ways = np.gradient(record.distance[rows])[:, None, None]
+        ways = way[rows, None, None]
         # the force on the rail has the sign of the creepage
         against = np.ones(T_gamma.shape, dtype=bool)
         if not all_forces:
@@ -109,6 +110,9 @@ def wear_report(
             mass = np.where(area > 0.0, usfd(T_gamma / np.where(area > 0.0, area, 1.0)) * area, 0.0)
             sums["usfd"] += np.sum(mass * ways, axis=0)
             worst = np.maximum(worst, index)
+    if not length > 0.0:
+        found = f"{record.time[-1] - record.time[0]:.3g} s"
+        raise record.fault("time", found, f"more than the first {START:g} s, which do not count")
     return [
         WheelWear(
             place=f"wheelset {w + 1} {side}",

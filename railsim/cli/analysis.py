@@ -59,7 +59,7 @@ def load_inputs(
     found: dict[str, Any] = {}
     loads: dict[str, Callable[[], Any]] = {
         "vehicle": lambda: load_vehicle(vehicle, parts["vehicle"]),
-        "track": lambda: load_track(track or "straight", parts["track"]),
+        "track": lambda: load_track("straight" if track is None else track, parts["track"]),
         "settings": lambda: load_settings(settings, parts["settings"]),
     }
     for kind, read in loads.items():

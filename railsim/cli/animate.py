@@ -51,7 +51,9 @@ def command(
     """  # noqa: D301 - click reads the escape  # fmt: skip
     from railsim.animation import write_movie, write_page
 
-    path = Path(out) if out else Path(file).with_suffix(".html")
+    path = Path(out or file)
+    if not out and path.name:
+        path = path.with_suffix(".html")
     check_file(path, overwrite=overwrite, endings=ENDINGS)
     film = path.suffix.lower() in (".gif", ".mp4")
     scene = _scene(Path(file), film=film, **how)

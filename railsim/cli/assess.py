@@ -1,5 +1,6 @@
 """``railsim assess``: results against the limits of a standard."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,7 +99,7 @@ def _opened(files: "Sequence[str]") -> "dict[str, Result]":
     faults: list[Fault] = []
     paths: list[Path] = []
     for file in files:
-        inside = sorted(Path(file).glob("*.h5")) if Path(file).is_dir() else [Path(file)]
+        inside = sorted(Path(file).glob("*.h5")) if os.path.isdir(file) else [Path(file)]
         if not inside:
             faults.append(Fault(file, "", "no results in this folder", "a folder with .h5 files"))
         paths += inside

@@ -70,6 +70,7 @@ def remembered_interrupts() -> Iterator[None]:
         sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
+        _heard.clear()
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from railsim.cli.common import (
     set_option,
     table,
 )
-from railsim.files import TABLES, check_file, check_folder, make_folder, whole_file
+from railsim.files import TABLES, check_file, check_folder, is_file, make_folder, whole_file
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
@@ -311,7 +311,7 @@ def _base(
     base = find_file(extends, "vehicle")
     data = read_source(base, "vehicle").data
     removed = [key for key in suspension.vehicle.remove if _holds(data, key_path(key))]
-    if Path(extends).is_file():
+    if is_file(extends):
         folder = Path(out).parent if out else Path()
         extends = Path(os.path.relpath(base, folder)).as_posix()
     return extends, removed

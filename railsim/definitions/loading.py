@@ -39,6 +39,7 @@ from railsim.definitions.spring import (
 from railsim.definitions.track import TRACK_FORMAT, Track
 from railsim.definitions.vehicle import VEHICLE_FORMAT, Vehicle
 from railsim.errors import Fault, InputError
+from railsim.files import is_file
 
 D = TypeVar("D", bound=FileDefinition)
 
@@ -171,7 +172,7 @@ def _find_reference(source: Source) -> None:
     name = optimise.get("reference") if isinstance(optimise, dict) else None
     if isinstance(optimise, dict) and isinstance(name, str):
         beside = Path(source.file_of(("optimise", "reference"))).parent / name
-        if beside.is_file():
+        if is_file(beside):
             optimise["reference"] = str(beside.resolve())
 
 

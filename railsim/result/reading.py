@@ -56,7 +56,8 @@ def open_result(path: str | Path) -> Result:
     """
     path = Path(path)
     if not is_file(path):
-        found = "a folder" if os.path.isdir(path) else "there is no such file"
+        found = "not a regular file" if os.path.lexists(path) else "there is no such file"
+        found = "a folder" if os.path.isdir(path) else found
         raise InputError([Fault(str(path), "", found, "give a result file (.h5)")])
     try:
         if path.stat().st_size == 0:

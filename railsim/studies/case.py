@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from railsim.definitions.settings import Settings
@@ -80,6 +80,7 @@ class Case:
         return {name for _, name, _ in used}
 
 
+@lru_cache(1000)  # of some files, for 100 000 runs
 def short_name(path: str | Path) -> str:
     """Return what a file is called in the names of runs: its name without folder and ending."""
     return Path(path).name.removesuffix(".toml")

@@ -15,10 +15,9 @@ import json
 import os
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, overload
+from typing import Any, NamedTuple, Self, overload
 
 from railsim.errors import Fault, InputError
 
@@ -30,8 +29,7 @@ RECORD = {"name", "file", "labels", "status"}  # what every record has
 Record = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """What the journal knows of a run without reading its record.
 
     Attributes
@@ -104,7 +102,7 @@ class Journal:
 
     def _read(self) -> None:
         last = b"\n"
-        with open(self.path, "rb") as file:
+        with open(self.path, "rb", buffering=1 << 20) as file:
             for line in file:
                 self._take(line, self._end)
                 self._end += len(line)
@@ -115,16 +113,16 @@ class Journal:
     def _take(self, line: bytes, offset: int) -> None:
         if line == b"\n":
             return
-        head, _, body = line[9:-1].partition(b"\t")
         try:
-            if line[:9] != b"%08x\t" % zlib.crc32(line[9:-1]) or not line.endswith(b"\n"):
+            crc = zlib.crc32(memoryview(line)[9:-1])
+            if line[:9] != b"%08x\t" % crc or not line.endswith(b"\n"):
                 raise ValueError
-            facts = json.loads(head)
+            end = line.index(b"\t", 9)
+            facts = json.loads(line[9:end].decode())
             if "format" in facts:
-                self.inputs = json.loads(body) if facts["format"] == FORMAT else None
+                self.inputs = json.loads(line[end + 1 :]) if facts["format"] == FORMAT else None
                 return
-            place = offset + 9 + len(head) + 1
-            entry = Entry(**facts, offset=place, length=len(body))
+            entry = Entry(**facts, offset=offset + end + 1, length=len(line) - end - 2)
         except (ValueError, TypeError, KeyError):
             self.damaged += 1
             return

@@ -421,12 +421,12 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
     InputError : there is no study, or it cannot be read.
     """
     data: Any = None
-    if (folder / JOURNAL).is_file():
+    if is_file(folder / JOURNAL):
         with Journal(folder) as journal:
             data = journal.inputs
     if data is None:
         index = folder / "study.json"
-        if not index.is_file():
+        if not is_file(index):
             found = f"no study in {folder} to resume"
             fault = Fault("--resume", "", found, "give --vehicles, --tracks and --speeds")
             raise InputError([fault])
@@ -434,7 +434,7 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
     else:
         inputs = checked(Inputs, data, str(folder / JOURNAL))
     base = (folder / inputs.folder).resolve()
-    return inputs, base if base.is_dir() else Path.cwd()
+    return inputs, base if os.path.isdir(base) else Path.cwd()
 
 
 def _several(values: Any) -> list[Any]:

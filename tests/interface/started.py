@@ -5,9 +5,10 @@ import sys
 
 
 def started(arguments):
-    """Start railsim; Ctrl-C counts even where a shell started the tests without it."""
+    """Start railsim; Ctrl-C and hang-ups count even where a shell started the tests without."""
     call = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL);"
         "from railsim.cli import main; sys.exit(main())"
     )
     return subprocess.Popen(

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from example_result import example_result
 from made_record import Q0, curve, made, track
 
 import railsim
@@ -297,3 +298,16 @@ def test_simulated_coach_feels_the_uncompensated_acceleration():
     middle = list(record.sensors).index("floor_middle")
     there = np.abs(record.distance[: record.rows] - 390.0) < 5.0
     assert np.mean(acceleration[there, middle, 1]) == pytest.approx(0.814, rel=0.01)
+
+
+@pytest.mark.parametrize(("duration", "counted", "status"), [(3.0, 1, 2), (3.1, 2, 0)])
+def test_wear_of_a_run_that_ended_soon(duration, counted, status, tmp_path, capsys):
+    """The first 3 s do not count, and the last instant neither; one between them is enough."""
+    result = example_result(duration=duration, rate=10.0)
+    assert np.count_nonzero(result.time >= 3.0) == counted
+    path = result.to_hdf5(tmp_path / "run.h5")
+    assert main(["assess", str(path), "--standard", "wear", "--coarse", "--json"]) == status
+    said = capsys.readouterr()
+    assert "NaN" not in said.out
+    words = "run: time: 3 s; more than the first 3 s, which do not count\n"
+    assert said.err == (words if status == 2 else "")

@@ -7,11 +7,13 @@ import sys
 import pytest
 
 import railsim.cli.interrupts
+import railsim.flange
 import railsim.run_in
 import railsim.settling
 import railsim.simulation
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
+from railsim.cli.progress import progress_bar
 
 RUN = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10", "--quiet"]
 STUDY = ["study", "--vehicles", "coach_manchester", "--tracks", "curve_r250", "--speeds", "20"]
@@ -60,9 +62,9 @@ def comes(monkeypatch):
     def during_preparation(way, number):
         prepare = railsim.simulation.prepare
 
-        def interrupted(*arguments):
+        def interrupted(*arguments, **how):
             way(number)
-            return prepare(*arguments)
+            return prepare(*arguments, **how)
 
         monkeypatch.setattr(railsim.simulation, "prepare", interrupted)
 
@@ -81,8 +83,16 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
     assert list(tmp_path.iterdir()) == []
 
 
-def test_run_obeys_a_signal_that_python_loses_in_a_run_in(tmp_path, monkeypatch, capsys):
-    """At walking speed a run-in takes as long as a run: it is left after the call in hand."""
+@pytest.mark.parametrize(
+    ("module", "speed"), [(railsim.run_in, "20"), (railsim.flange, "2")], ids=["run-in", "step"]
+)
+def test_run_obeys_a_signal_that_python_loses_before_it(
+    tmp_path, monkeypatch, capsys, module, speed
+):
+    """At walking speed a run-in takes as long as a run, and so does the way to a flange contact.
+
+    Either is left after the call in hand.
+    """
     calls, time_loop = [], railsim.settling.time_loop
 
     def interrupted(*arguments):
@@ -90,17 +100,53 @@ def test_run_obeys_a_signal_that_python_loses_in_a_run_in(tmp_path, monkeypatch,
         lost(signal.SIGINT)
         return time_loop(*arguments)
 
-    def run_in(*arguments):  # and not where the step is judged
+    def advance(*arguments):
         monkeypatch.setattr(railsim.settling, "time_loop", interrupted)
-        return advance(*arguments)
+        return settle(*arguments)
 
-    advance = railsim.run_in.advance
-    monkeypatch.setattr(railsim.run_in, "advance", run_in)
-    run = ["run", "coach_manchester", "curve_r250", "--speed", "2", "--start", "390", "--quiet"]
+    settle = module.advance
+    monkeypatch.setattr(module, "advance", advance)
+    run = ["run", "coach_manchester", "curve_r250", "--speed", speed, "--start", "390", "--quiet"]
     assert main([*run, "--out", str(tmp_path / "run.h5")]) == 130
     assert capsys.readouterr().err == "railsim: interrupted\n"
     assert list(tmp_path.iterdir()) == []
     assert len(calls) == 1
+
+
+def test_bar_says_what_comes_before_a_run(monkeypatch):
+    """On a terminal; the finished fraction never falls."""
+    said, fractions = [], []
+
+    class Bar:
+        n = 0.0
+
+        def __init__(self, *, desc, **how):
+            said.append(desc)
+
+        def set_description_str(self, words, refresh):
+            said.append(words)
+
+        def update(self, more):
+            self.n += more
+            fractions.append(self.n)
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("tqdm.tqdm", Bar)
+    monkeypatch.setattr(railsim.settling, "WHEELSET_STEPS", 4000)
+    coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    with progress_bar("a run", quiet=False) as progress:
+        railsim.simulate(coach, track, speed=20.0, start=390.0, duration=0.1, progress=progress)
+    assert said == [
+        "a run",
+        "a run, settling in flange contact, for judging the time step",
+        "a run, on the way to the start",
+        "a run",
+    ]
+    assert fractions == sorted(fractions)
+    assert 0.0 < fractions[3] < 0.5
+    assert fractions[-1] == 1.0
 
 
 @pytest.mark.parametrize("way", [lost, turned_into_another])

@@ -1,9 +1,13 @@
 """Files and folders that commands write: refused before anything is, and never half full."""
 
+import os
+
 import pytest
 from example_result import example_result
 
 from railsim.cli import main
+from railsim.errors import InputError
+from railsim.files import check_folder
 
 FIRST = {"contact": "functions.csv", "compare": "compare.csv", "spring verify": "report.html"}
 
@@ -23,6 +27,25 @@ def test_file_in_place_of_the_folder_is_refused(tmp_path, inputs, capsys, comman
     assert main([*command.split(), *inputs[command], "--out", str(out)]) == 2
     assert "is a file; give the name of a folder" in capsys.readouterr().err
     assert out.read_text() == "mine"
+
+
+@pytest.mark.parametrize("where", ["file/out", "nowhere", "file/a/b"])
+def test_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path, capsys, where):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    with pytest.raises(InputError, match=r"file is a file|a link that leads nowhere"):
+        check_folder(tmp_path / where)
+    assert (
+        main(["modes", "coach_manchester", "--speed", "nan", "--out", str(tmp_path / where)]) == 2
+    )
+    assert "--out: " in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_in_one_that_cannot_be_written_to_is_refused(tmp_path):
+    (tmp_path / "mine").mkdir(mode=0o500)
+    with pytest.raises(InputError, match="mine cannot be written to"):
+        check_folder(tmp_path / "mine" / "out")
 
 
 @pytest.mark.parametrize("command", FIRST)

@@ -42,9 +42,9 @@ def test_run_in_may_be_interrupted_and_is_the_same_in_pieces(monkeypatch):
     """A start in a curve: the run-in before it is many calls of the time loop, or one."""
     track = railsim.load_track("curve_r250")
     vehicle = railsim.load_vehicle("coach_manchester")
-    how = {"speed": 20.0, "start": 150.0, "duration": 0.1}
+    how = {"speed": 20.0, "start": 390.0, "duration": 0.1}
     whole = railsim.simulate(vehicle, track, **how)
-    monkeypatch.setattr(railsim.settling, "STEPS", 137)
+    monkeypatch.setattr(railsim.settling, "WHEELSET_STEPS", 4 * 137)
     pieces = railsim.simulate(vehicle, track, **how)
     for name in whole:
         np.testing.assert_array_equal(pieces[name], whole[name])

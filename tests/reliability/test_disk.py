@@ -74,6 +74,7 @@ def test_full_disk_leaves_no_half_result(small_disk):
     [
         *product(["plot", "compare"], [0, 4 * KB, 60 * KB]),
         ("info", 4 * KB),  # a picture, as by plot
+        ("modes", 4 * KB),
     ],
 )
 def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
@@ -82,6 +83,7 @@ def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
     given = {
         "plot": ["plot", a, "--out", str(small_disk / "a.png")],
         "compare": ["compare", a, b, "--out", str(small_disk / "out")],
+        "modes": ["modes", "coach_manchester", "--quiet", "--out", str(small_disk / "modes")],
         "info": ["info", "coach_manchester", "--draw", str(small_disk / "coach.png")],
     }
     status = main(given[command])
@@ -89,7 +91,7 @@ def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
     assert status in (0, 1), error
     if status:
         assert error.count("\n") == 1
-        assert "No space left on device" in error
+        assert f"No space left on device: {small_disk}{os.sep}" in error
     left = [path.name for path in small_disk.rglob("*") if path.is_file()]
     assert not [name for name in left if name.endswith(".partial")]
 

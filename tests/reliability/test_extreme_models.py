@@ -70,5 +70,5 @@ def test_extreme_models(tmp_path, capsys, monkeypatch):
         assert main([*given, "--quiet", "--out", str(tmp_path / "run.h5")]) == 0
     statuses = tried(5, case)
     if len(statuses) >= 50:  # not all are refused before anything is computed
-        assert {0, 2, 3} == set(statuses)
+        assert {0, 2} <= set(statuses)
         assert statuses.count(2) < 0.8 * len(statuses)

@@ -30,6 +30,9 @@ DEFINITIONS = (
     "vehicles/springs/turasas_axlebox.toml",
     "tests/data/vehicles/two_axle_wagon.toml",
     "tests/data/vehicles/articulated_three_bogies.toml",
+    "vehicles/mechanisms/atr95_lift_5.toml",
+    "scenarios/en14363.toml",
+    "limits/en14363.toml",
 )
 SETTINGS = """format = "railsim-settings/1"
 scheme = "fast"
