@@ -88,7 +88,8 @@ def static_loads(
 
     Raises
     ------
-    ModelError : there is no equilibrium.
+    ModelError
+        There is no equilibrium.
 
     Examples
     --------

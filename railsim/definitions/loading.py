@@ -117,7 +117,8 @@ def load_vehicle(path: str | Path, overrides: Iterable[str] | str = ()) -> Vehic
 
     Raises
     ------
-    InputError : everything that is wrong in the file and those that it extends.
+    InputError
+        Everything that is wrong in the file and those that it extends.
 
     Examples
     --------
@@ -228,7 +229,8 @@ def changed_definition(definition: D, values: Mapping[str, Any]) -> D:
 
     Raises
     ------
-    InputError : everything that is wrong in the result.
+    InputError
+        Everything that is wrong in the result.
     """
     model = type(definition)
     format_name, known = _format_of(model)
@@ -245,7 +247,8 @@ def load_any(path: str | Path, overrides: Iterable[str] = ()) -> tuple[FileDefin
 
     Raises
     ------
-    InputError : everything that is wrong in it; an unknown format.
+    InputError
+        Everything that is wrong in it; an unknown format.
     """
     file = sources.find_any(path)
     head = sources.read_toml(file).get("format")

@@ -207,7 +207,7 @@ class Track(FileDefinition, Drawn):
     inclination: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.2)] = 0.025
     """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
     friction: NonNegativePair = (0.4, 0.4)
-    """Coefficient of friction, one number or [left, right] [1]"""
+    """Coefficient of friction, one number, or left and right [1]"""
     friction_table: FrictionRows | None = None
     """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
     friction_falling: FallingFriction | None = None

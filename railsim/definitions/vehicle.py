@@ -53,7 +53,7 @@ class Wheelset(Definition):
     position: Vector
     """Middle of the axle [m]; z = -radius"""
     radius: PositivePair
-    """Nominal rolling radius, one number or [left, right] [m]"""
+    """Nominal rolling radius, one number, or left and right [m]"""
     profile: TextPair
     """Wheel profile, a built-in name or a file, or [left, right]"""
     back_to_back: Positive = 1.360

@@ -321,7 +321,8 @@ class Result:
 
         Raises
         ------
-        InputError : a quantity or place that the result does not have; the file exists.
+        InputError
+            A quantity or place that the result does not have; the file exists.
         """
         # looked up: results lie below pictures and know none of them
         chosen = {"selections": quantities} if quantities else {}
@@ -339,7 +340,8 @@ class Result:
 
         Raises
         ------
-        InputError : the file exists and may not be overwritten, or cannot be written.
+        InputError
+            The file exists and may not be overwritten, or cannot be written.
         """
         from railsim.result.hdf5 import write
 
@@ -350,7 +352,8 @@ class Result:
 
         Raises
         ------
-        ImportError : xarray is not installed.
+        ImportError
+            Xarray is not installed.
         """
         try:
             import xarray
@@ -389,7 +392,8 @@ class Result:
 
         Raises
         ------
-        ImportError : pandas is not installed.
+        ImportError
+            Pandas is not installed.
         """
         try:
             import pandas
