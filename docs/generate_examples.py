@@ -8,7 +8,9 @@ scripts themselves.
 import ast
 import os
 import runpy
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -38,12 +40,12 @@ def gallery() -> str:
     items = []
     for script in SCRIPTS:
         name, (question, _) = script.stem, told(script)
-        items.append(
-            f"## [{question}]({name}.md)\n\n[![{question}](../img/examples/{name}.png)]({name}.md)\n"
-        )
+        picture = f"![{question}](../img/examples/{name}.png)"
+        items.append(f"## [{question}]({name}.md)\n\n[{picture}]({name}.md)\n")
     return (
-        "# Examples\n\nTen short scripts in reading order; each answers one question. They are in the folder "
-        "`examples/` and\nrun in a few seconds once railsim has compiled its kernels.\n\n" + "\n".join(items)
+        "# Examples\n\nTen short scripts in reading order; each answers one question. They are in "
+        "the folder\n`examples/` and run in a few seconds once railsim has compiled its kernels.\n\n"
+        + "\n".join(items)
     )
 
 
@@ -60,6 +62,9 @@ if __name__ == "__main__":
         path.write_text(text, "utf-8")
     if "--pages" not in sys.argv:
         IMAGES.mkdir(exist_ok=True)
-        os.chdir(IMAGES)
-        for script in SCRIPTS:
-            runpy.run_path(str(script))
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            for script in SCRIPTS:
+                runpy.run_path(str(script))
+                shutil.copy(f"{script.stem}.png", IMAGES)
+            os.chdir(ROOT)

@@ -1,8 +1,8 @@
 """Does the vehicle pass?
 
-EN 14363 takes percentiles of filtered quantities in many test sections of four zones. One curve gives one section of
-one zone: a first look, far from an assessment, and railsim says so: the verdict is `incomplete`. The bars are the
-estimates in per cent of their limits.
+EN 14363 takes percentiles of filtered quantities in many test sections of four zones. One curve
+gives a few sections of one zone: a first look, far from an assessment, and the verdict says so:
+`incomplete`. The bars are the estimates in per cent of their limits.
 """
 
 import railsim

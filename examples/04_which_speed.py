@@ -1,8 +1,8 @@
 """At which speed may the coach run through that curve?
 
-Steady curving over the cant deficiency, at R 250 m with 150 mm of cant: the speed follows from the balance of
-centrifugal force, weight and cant. Sum of guiding forces against 10 kN + P0/3 (Prud'homme, EN 14363), derailment
-quotient against 0.8, and the unloading of the inner wheels.
+Steady curving over the cant deficiency, at R 250 m with 150 mm of cant: the speed follows from
+the balance of centrifugal force, weight and cant. Sum of guiding forces against 10 kN + P0/3
+(Prud'homme, EN 14363), derailment quotient against 0.8, and the unloading of the inner wheels.
 """
 
 import matplotlib.pyplot as plt

@@ -1,7 +1,8 @@
 """Which modes has the vehicle?
 
-Eigenfrequencies and damping ratios at one speed, named after what moves: bounce, pitch, lower and upper sway, yaw of
-the car body, hunting of the bogies. The picture shows the share of each displacement in the least damped modes.
+Eigenfrequencies and damping ratios at one speed, named after what moves: bounce, pitch, lower and
+upper sway, yaw of the car body, hunting of the bogies. The picture shows the share of each
+displacement in the least damped modes.
 """
 
 import railsim

@@ -1,8 +1,8 @@
 """How does the bogie steer over the radius?
 
-Angle of attack of the leading wheelset and wear number of all wheels in steady curving, from tight to wide curves,
-for both primary suspensions. In tight curves the wheelset cannot become radial: the flange guides, and the wear
-number rises.
+Angle of attack of the leading wheelset and wear number of all wheels in steady curving, from
+tight to wide curves, for both primary suspensions. In tight curves the wheelset cannot become
+radial: the flange guides, and the wear number rises.
 """
 
 import matplotlib.pyplot as plt

@@ -1,7 +1,7 @@
 """Which coil springs does a trailing arm need?
 
-Two wanted deflections fix the stiffnesses of the outer and the inner spring; `verify` then finds equilibrium, heights
-and stresses under all loads of the file, with every check against its limit.
+Two wanted deflections fix the stiffnesses of the outer and the inner spring; `verify` then finds
+equilibrium, heights and stresses under all loads of the file, with every check against its limit.
 """
 
 import railsim

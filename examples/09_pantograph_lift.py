@@ -1,7 +1,8 @@
-"""Which lift gives a pantograph a constant contact force?
+"""Which force does the lift of a pantograph need over the height?
 
-The ATR95 pantograph with three of its lift mechanisms, all on the same air spring: ratio of the linkage and force
-over the height of the head, the first one as the reference.
+Three lifts of the ATR95 pantograph: ratio of the linkage and force of the lift over the height of
+the head. The first lift is the reference; the working range is shaded, the dashed line is the
+working height.
 """
 
 import railsim

@@ -1,7 +1,8 @@
 """How much do friction and speed matter?
 
-A study runs every combination and keeps one result file a run; what is finished is never computed again. Here three
-speeds and two coefficients of friction in a tight curve, with the largest derailment quotient of each run.
+A study runs every combination and keeps one result file a run; what is finished is never computed
+again. Here three speeds and two coefficients of friction in a tight curve, with the largest
+derailment quotient of each run.
 """
 
 import matplotlib.pyplot as plt

@@ -24,7 +24,8 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
 
 def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     """Bars of the worst place of each quantity, zone by zone, in per cent of the limit."""
-    zones = sorted({zone.zone for a in assessments for zone in a.zones})
+    reports = [zone for a in assessments for zone in a.zones]
+    zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
     rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
     height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
     figure = Picture(figsize=(2.4 + 2.6 * len(zones), height), layout="constrained")

@@ -99,7 +99,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
             color="0.25",
         )
     heights.set_ylabel("height under load / mm")
-    heights.legend(ncols=3, loc="center right")
+    heights.legend(ncols=3, loc="upper right")
     for axes in (deflection, rotation, heights):
         axes.set_xlabel("load $P$ / kN")
     return figure
