@@ -44,7 +44,7 @@ def gallery() -> str:
         items.append(f"## [{question}]({name}.md)\n\n[{picture}]({name}.md)\n")
     return (
         "# Examples\n\nTen short scripts in reading order; each answers one question. They are in "
-        "the folder\n`examples/` and run in a few seconds once railsim has compiled its kernels.\n\n"
+        "the folder\n`examples/` and run in seconds once railsim has compiled its kernels.\n\n"
         + "\n".join(items)
     )
 
