@@ -13,7 +13,7 @@ import railsim
 from railsim.plot.style import LIMIT, styled
 
 coach = railsim.load_vehicle("coach_manchester")
-speeds = np.linspace(20.0, 80.0, 7)
+speeds = np.linspace(40.0, 80.0, 5)
 
 with styled():
     figure, axes = plt.subplots(figsize=(7.0, 3.6), layout="constrained")

@@ -16,6 +16,7 @@ outcome = railsim.study(
     "curve_r250",
     speeds,
     grid={"track.friction": frictions},
+    start=240.0,
     until=430.0,
     out="study_friction_speed",
     workers=1,

@@ -59,7 +59,7 @@ class Wheelset(Definition):
     back_to_back: Positive = 1.360
     """Distance between the wheels' backs [m]"""
     tape_circle_distance: Positive = 1.5
-    """Distance between the tape circles, where the radius is measured [m]"""
+    """Distance between the nominal rolling circles [m]"""
 
 
 class Axlebox(Definition):
