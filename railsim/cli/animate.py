@@ -16,7 +16,7 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 
 @click.command()
 @click.argument("file", metavar="R.h5|modes.json")
-@click.option("--out", metavar="F", help="Page (.html), .gif or .mp4; default beside the input.")
+@click.option("--out", metavar="F", help="Page (.html), .gif or .mp4; default: next to the input.")
 @click.option("--vehicle", metavar="F", help="Vehicle of the modes: a file or a name.")
 @click.option("--mode", metavar="NAME", help="Mode by name or number; default the first.")
 @click.option(
