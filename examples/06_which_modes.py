@@ -6,8 +6,6 @@ displacement in the least damped modes.
 """
 
 import railsim
-from railsim.plot.modes import modes_figure
-from railsim.plot.style import save
 
 coach = railsim.load_vehicle("coach_manchester")
 modes = railsim.modes(coach, speed=30.0)
@@ -15,5 +13,4 @@ modes = railsim.modes(coach, speed=30.0)
 for mode in modes.oscillations[:12]:
     print(f"{mode.name:28} {mode.frequency:6.3f} Hz   damping {100.0 * mode.damping_ratio:5.1f} %")
 
-figure = modes_figure(modes, "Manchester coach at 30 m/s")
-save(figure, "06_which_modes.png", overwrite=True)
+figure = modes.plot("06_which_modes.png", title="Manchester coach at 30 m/s", overwrite=True)
