@@ -28,7 +28,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
     rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
     height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
-    figure = Picture(figsize=(2.4 + 2.6 * len(zones), height), layout="constrained")
+    figure = Picture(figsize=(max(6.8, 2.4 + 2.6 * len(zones)), height), layout="constrained")
     axes = figure.subplots(1, len(zones), sharey=True, squeeze=False)[0]
     width = 0.8 / len(assessments)
     most = 110.0
