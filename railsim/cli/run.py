@@ -178,7 +178,7 @@ def _checked(
 def result_record(result: "Result") -> dict[str, Any]:
     """Return what is printed of a result as plain numbers and strings, SI."""
     from railsim.result import mid_curves, peaks
-    from railsim.studies.summary import FACTS
+    from railsim.result.facts import FACTS
 
     return {
         **{name: result.attributes[name] for name in FACTS if name in result.attributes},

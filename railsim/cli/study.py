@@ -95,6 +95,7 @@ def _is_number(text: str) -> bool:
 @click.option("--resume", is_flag=True, help="Go on with the study in DIR; compute what changed.")
 @overwrite_option
 @click.option("--plots", is_flag=True, help="Draw every run, and vehicles against each other.")
+@click.option("--report", is_flag=True, help="Write report.html into DIR, see `railsim report`.")
 @json_option
 @quiet_option
 def command(
@@ -107,6 +108,7 @@ def command(
     load: str | None,
     assignments: tuple[str, ...],
     resume: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
     **how: Any,
@@ -134,7 +136,7 @@ def command(
             (tracks, speeds, grids),
             out,
             with_load(assignments, load, "vehicle."),
-            how,
+            {**how, "report": report},
             resume=resume,
             as_json=as_json,
             quiet=quiet,
@@ -163,7 +165,7 @@ def command(
                     ((),),
                     out,
                     tuple(stored.assignments),
-                    {**inputs, **how},
+                    {**inputs, **how, "report": report},
                     resume=True,
                     as_json=as_json,
                     quiet=quiet,
@@ -182,11 +184,22 @@ def command(
             **inputs,
             **how,
         )
+        page = _report(outcome) if report else None
     if as_json:
         print_json({"folder": str(outcome.folder), "runs": list(outcome.records)})
     else:
         _print_end(outcome)
+        if page is not None:
+            echo(str(page))
     return _status(outcome)
+
+
+def _report(outcome: "Outcome") -> Path:
+    from railsim.cli.report import write_report
+
+    path = outcome.folder / "report.html"
+    write_report([str(outcome.folder)], path)
+    return path
 
 
 def _campaign(
@@ -206,7 +219,8 @@ def _campaign(
     from railsim.errors import Fault, InputError
 
     taken = {"--tracks, --speeds, --grid": any(others)}
-    taken |= {f"--{n}": bool(how[n]) for n in ("start", "duration", "until", "settings", "plots")}
+    refused = ("start", "duration", "until", "settings", "plots", "report")
+    taken |= {f"--{n}": bool(how[n]) for n in refused}
     faults = [
         Fault(option, "", "given together with --scenario", "the scenario's file holds it")
         for option, given in taken.items()

@@ -27,6 +27,7 @@ from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
 from railsim.definitions.overrides import apply_overrides
+from railsim.definitions.published import PUBLISHED_FORMAT, Published
 from railsim.definitions.scenario import SCENARIO_FORMAT, Scenario
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
@@ -102,6 +103,7 @@ FORMATS: dict[str, Format] = {
     LIMITS_FORMAT: Format("limits", RunningLimits),
     SCENARIO_FORMAT: Format("scenario", Scenario),
     COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
+    PUBLISHED_FORMAT: Format("published", Published),
 }
 
 
@@ -188,6 +190,11 @@ def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -
 def load_comfort_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> ComfortLimits:
     """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
     return _loaded(ComfortLimits, _file_source(path, "limits"), overrides)
+
+
+def load_published(path: str | Path, overrides: Iterable[str] | str = ()) -> Published:
+    """Load published values, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(Published, _file_source(path, "published"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -15,7 +15,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from railsim.errors import Fault, InputError
 from railsim.files import is_file, read_text, whole_file
-from railsim.result import Result, mid_curves, peaks
+from railsim.result import Result
+from railsim.result.facts import FACTS, run_facts
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Record, Records
 from railsim.text import spreadsheet_cell
@@ -24,10 +25,6 @@ M = TypeVar("M", bound=BaseModel)
 INDEX_BYTES = 500_000_000
 MOST_FAULTS = 20
 FORMAT = "railsim-study-result/1"
-FACTS = (
-    "status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor",
-    "patches_out_of_range",
-)  # fmt: skip
 
 
 def waiting_record(case: Case) -> Record:
@@ -44,13 +41,7 @@ def waiting_record(case: Case) -> Record:
 
 def finished_record(case: Case, result: Result) -> Record:
     """Return the record of a run that has its result."""
-    return {
-        **waiting_record(case),
-        **{name: result.attributes[name] for name in FACTS if name in result.attributes},
-        "remarks": list(result.remarks),
-        "peaks": [peak.record() for peak in peaks(result)],
-        "mid_curves": [curve.record() for curve in mid_curves(result)],
-    }
+    return {**waiting_record(case), **run_facts(result)}
 
 
 def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
