@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    Speed,
     echo,
     json_option,
     load_option,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE")
 @click.argument("track", metavar="TRACK")
-@click.option("--speed", type=float, metavar="V", help="Speed in m/s.")
+@click.option("--speed", type=Speed(), metavar="V", help="Speed in m/s, or with a unit: 72km/h.")
 @click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
 @click.option("--start", type=float, metavar="S", help="Start in m along the track; default 0.")
 @click.option("--duration", type=float, metavar="T", help="Length of the run in s.")

@@ -63,15 +63,27 @@ def _is_number(text: str) -> bool:
 
 
 @click.command(cls=ManyValues)
+@click.argument("file", required=False, metavar="[STUDY]")
 @click.option("--vehicles", multiple=True, metavar="F...", help="Vehicles: files or names.")
 @click.option("--tracks", multiple=True, metavar="F...", help="Tracks: files or names.")
-@click.option("--speeds", multiple=True, type=float, metavar="V...", help="Speeds in m/s.")
+@click.option(
+    "--speeds",
+    multiple=True,
+    metavar="V...",
+    help="Speeds in m/s, or with a unit (72km/h); ranges first:last:number.",
+)
 @click.option(
     "--grid",
     "grids",
     multiple=True,
     metavar="KEY.PATH=A,B,C...",
-    help="Values of further keys; paths begin with vehicle., track. or settings.",
+    help="Values of further keys, or ranges first:last:number; paths begin with vehicle., track. "
+    "or settings.",
+)
+@click.option(
+    "--quantities",
+    metavar="FILE.py:FUNCTION",
+    help="Function that is given each result and returns further numbers by their names.",
 )
 @click.option("--scenario", metavar="F", help="Scenario in place of tracks and speeds.")
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
@@ -99,9 +111,10 @@ def _is_number(text: str) -> bool:
 @json_option
 @quiet_option
 def command(
+    file: str | None,
     vehicles: tuple[str, ...],
     tracks: tuple[str, ...],
-    speeds: tuple[float, ...],
+    speeds: tuple[str, ...],
     grids: tuple[str, ...],
     scenario: str | None,
     out: str,
@@ -115,6 +128,8 @@ def command(
 ) -> int:
     """Run every combination of vehicles, tracks, speeds and the values of a grid.
 
+    They are given as options or by a STUDY file, which can also link and sample values.
+
     One HDF5 file a run, summary.csv and study.json go to DIR.  A run that is there with the same
     inputs is not computed again, so the same command can be typed again after an interruption.
     With --resume alone the study that DIR holds goes on.
@@ -127,6 +142,7 @@ def command(
           --grid track.friction=0.3,0.4,0.5 --out friction
       railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \\
           --grid vehicle.bodies.carbody.mass=36e3,40e3,44e3,48e3 --together 8 --out mass
+      railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """  # noqa: D301 - click reads the escape
     if scenario is not None:
@@ -136,7 +152,7 @@ def command(
             (tracks, speeds, grids),
             out,
             with_load(assignments, load, "vehicle."),
-            {**how, "report": report},
+            {**how, "report": report, "file": file},
             resume=resume,
             as_json=as_json,
             quiet=quiet,
@@ -149,8 +165,12 @@ def command(
         "speeds": list(speeds),
         "grid": _grid(grids),
         "assignments": list(with_load(assignments, load, "vehicle.")),
-        **{name: how.pop(name) for name in ("settings", "start", "duration", "until")},
+        **{
+            name: how.pop(name) for name in ("settings", "start", "duration", "until", "quantities")
+        },
     }
+    if file is not None:
+        inputs = _of_file(file, inputs)
     base = Path.cwd()
     if resume and not any(inputs.values()):
         from railsim.studies.study import stored_inputs
@@ -165,13 +185,13 @@ def command(
                     ((),),
                     out,
                     tuple(stored.assignments),
-                    {**inputs, **how, "report": report},
+                    {**inputs, **how, "report": report, "file": None},
                     resume=True,
                     as_json=as_json,
                     quiet=quiet,
                 )
         inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
-    else:
+    elif file is None:
         _require(vehicles, tracks, speeds)
     # names of files in a study that goes on count from where it was started
     with chdir(base), progress_bar("study", quiet=quiet) as progress:
@@ -192,6 +212,37 @@ def command(
         if page is not None:
             echo(str(page))
     return _status(outcome)
+
+
+def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the inputs of a study file, with the assignments of the command line after its own."""
+    from railsim.definitions.loading import load_study
+    from railsim.definitions.study import value_texts
+    from railsim.errors import Fault, InputError
+
+    both = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
+    faults = [
+        Fault(f"--{name}", "", "given together with a study file", "the file holds it")
+        for name in both
+        if given[name]
+    ]
+    if faults:
+        raise InputError(faults)
+    plan = load_study(file)
+    return {
+        "vehicles": list(plan.vehicles),
+        "tracks": list(plan.tracks),
+        "speeds": None if plan.speeds is None else value_texts(plan.speeds),
+        "grid": {key: value_texts(values) for key, values in plan.grid.items()},
+        "linked": [{k: value_texts(v) for k, v in table.items()} for table in plan.linked],
+        "sample": plan.sample,
+        "settings": plan.settings,
+        "start": plan.start,
+        "duration": plan.duration,
+        "until": plan.until,
+        "assignments": [*plan.assignments, *given["assignments"]],
+        "quantities": given["quantities"],
+    }
 
 
 def _report(outcome: "Outcome") -> Path:
@@ -219,7 +270,7 @@ def _campaign(
     from railsim.errors import Fault, InputError
 
     taken = {"--tracks, --speeds, --grid": any(others)}
-    refused = ("start", "duration", "until", "settings", "plots", "report")
+    refused = ("start", "duration", "until", "settings", "plots", "report", "file", "quantities")
     taken |= {f"--{n}": bool(how[n]) for n in refused}
     faults = [
         Fault(option, "", "given together with --scenario", "the scenario's file holds it")
@@ -253,7 +304,7 @@ def _grid(texts: tuple[str, ...]) -> dict[str, list[str]]:
     return grid
 
 
-def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[float, ...]) -> None:
+def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[str, ...]) -> None:
     from railsim.errors import Fault, InputError
 
     given = {"--vehicles": vehicles, "--tracks": tracks, "--speeds": speeds}

@@ -26,6 +26,7 @@ FOLDERS = {
     "limits": "limits",
     "scenario": "scenarios",
     "published": "published",
+    "study": "studies",
 }
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}

@@ -52,11 +52,14 @@ class Job:
         Result file; an existing one is replaced.
     picture : Path or None
         Figure of the result.
+    own : str or None
+        Function of own quantities, see `railsim.studies.own`.
     """
 
     case: Case
     path: Path
     picture: Path | None = None
+    own: str | None = None
 
 
 Batch = tuple[Job, ...]
@@ -127,7 +130,7 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
             from railsim.plot.style import save
 
             save(histories(outcome), job.picture, overwrite=True)
-        return finished_record(job.case, outcome)
+        return finished_record(job.case, outcome, job.own)
     except RailsimError as error:
         return failed_record(job.case, str(error))
     except OSError as error:

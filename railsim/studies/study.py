@@ -13,6 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from railsim.definitions.base import FileDefinition
+from railsim.definitions.settings import Settings
+from railsim.definitions.study import Sample, value_texts
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, is_file, make_folder, sweep
 from railsim.result import Result, open_result
@@ -27,8 +32,11 @@ from railsim.studies.execute import (
     in_this_process,
     on_cluster,
 )
+from railsim.studies.given import as_files
 from railsim.studies.journal import JOURNAL, Journal, Record, Records
+from railsim.studies.own import Function, fingerprint, named
 from railsim.studies.points import Point
+from railsim.studies.rows import speed_of
 from railsim.studies.summary import (
     Inputs,
     checked,
@@ -37,6 +45,7 @@ from railsim.studies.summary import (
     waiting_record,
     write_index,
 )
+from railsim.units import ALLOWED
 from railsim.version import __version__
 
 _LOG = logging.getLogger(__name__)
@@ -83,13 +92,16 @@ class Outcome:
 
 
 def study(
-    vehicles: Sequence[str | Path] | str | Path,
-    tracks: Sequence[str | Path] | str | Path,
-    speeds: Sequence[float] | float,
+    vehicles: Sequence[str | Path | Vehicle] | str | Path | Vehicle,
+    tracks: Sequence[str | Path | Track] | str | Path | Track,
+    speeds: Sequence[float | None] | float | str | None,
     *,
     out: str | Path,
-    grid: Mapping[str, Iterable[object] | float] | None = None,
-    settings: str | Path | None = None,
+    grid: Mapping[str, Iterable[object] | float | str] | None = None,
+    linked: Sequence[Mapping[str, Iterable[object] | str]] = (),
+    sample: Sample | Mapping[str, Any] | None = None,
+    quantities: str | Function | None = None,
+    settings: str | Path | Settings | None = None,
     start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
@@ -108,16 +120,25 @@ def study(
 
     Parameters
     ----------
-    vehicles, tracks : sequence of str or Path, or a single one
-        Files, or names of shipped ones.
-    speeds : sequence of float, or a single one
-        Speeds [m/s].
+    vehicles, tracks : sequence of str, Path or definition, or a single one
+        Files, names of shipped ones, or `Vehicle` and `Track`, which are written into ``inputs/``
+        of the folder.
+    speeds : sequence of float, a single one, or a range such as ``"15:25:11"``; None
+        Speeds [m/s]; None where the settings have a speed table, or `linked` or `sample` vary
+        ``speed``.
     out : str or Path
         Folder of the study; made if need be.
     grid : mapping of str to values, optional
-        Values of further keys, ``{"track.friction": [0.3, 0.4]}``.
-    settings : str or Path, optional
-        Settings file for all runs.
+        Values of further keys, ``{"track.friction": [0.3, 0.4]}`` or ``"0.2:0.5:4"``.
+    linked : sequence of mappings, optional
+        Keys whose values go together, the first of one with the first of the others.
+    sample : Sample or mapping, optional
+        Random values of further keys, as the table ``sample`` of a study file.
+    quantities : callable or str, optional
+        Function of the result that returns further numbers by their names, or
+        ``FILE.py:FUNCTION``.
+    settings : str, Path or Settings, optional
+        Settings for all runs.
     start : float
         Distance at which all runs start [m].
     duration, until : float, optional
@@ -166,13 +187,22 @@ def study(
     """
     folder = Path(out)
     check_folder(folder)
-    vehicles, tracks, speeds = _several(vehicles), _several(tracks), _several(speeds)
-    written = {key: [str(v) for v in _several(values)] for key, values in (grid or {}).items()}
+    vehicles = as_files(_several(vehicles), folder)
+    tracks = as_files(_several(tracks), folder)
+    (settings,) = as_files([settings], folder)
+    speeds = _speeds(speeds)
+    written = _written("grid", grid or {})
+    tables = [_written("linked", table) for table in linked]
+    drawn = None if sample is None else _sample(sample)
+    own = named(quantities)
     plan = Plan(
         vehicles,
         tracks,
         speeds,
         written,
+        linked=tables,
+        sample=drawn,
+        told=fingerprint(own),
         settings=settings,
         start=start,
         duration=duration,
@@ -187,6 +217,9 @@ def study(
         "tracks": [str(track) for track in tracks],
         "speeds": list(speeds),
         "grid": written,
+        "linked": tables,
+        "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
+        "quantities": own,
         "settings": None if settings is None else str(settings),
         "start": start,
         "duration": duration,
@@ -194,7 +227,7 @@ def study(
         "assignments": list(assignments),
     }
     outcome = carry_out(
-        plan, inputs, folder, workers=workers, together=together, scheduler=scheduler,
+        plan, inputs, folder, own=own, workers=workers, together=together, scheduler=scheduler,
         resume=resume, overwrite=overwrite, plots=plots, progress=progress, on_record=on_record,
         on_remark=on_remark,
     )  # fmt: skip
@@ -232,6 +265,7 @@ def carry_out(
     overwrite: bool = False,
     plots: bool = False,
     longest_first: bool = False,
+    own: str | None = None,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
@@ -246,6 +280,8 @@ def carry_out(
         What was asked for, as the journal and the index keep it, see `Inputs`.
     longest_first : bool
         Begin with the longest runs, so that no core is left with one of them at the end.
+    own : str, optional
+        Function of own quantities, see `railsim.studies.own`.
 
     Others as in `study`.
     """
@@ -255,7 +291,7 @@ def carry_out(
             known = stack.enter_context(Journal(folder))
         if not (resume or overwrite):
             _refuse_another_study(folder, known, inputs)
-        state = _State(folder, plan, known, resume=resume, overwrite=overwrite)
+        state = _State(folder, plan, known, own, resume=resume, overwrite=overwrite)
         client = None if scheduler is None else cluster(scheduler)
         make_folder(folder)
         sweep(folder)
@@ -268,7 +304,7 @@ def carry_out(
         remark = on_remark or _LOG.warning
         for text in state.settle(journal):
             remark(text)
-        jobs = [_job(case, folder, plots) for case in state.cases]
+        jobs = [_job(case, folder, plots, own) for case in state.cases]
         if longest_first:
             jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
         keys = {point.name: point.key for point in plan.points}
@@ -312,9 +348,16 @@ class _State:
     """
 
     def __init__(
-        self, folder: Path, plan: Runs, known: Journal | None, *, resume: bool, overwrite: bool
+        self,
+        folder: Path,
+        plan: Runs,
+        known: Journal | None,
+        own: str | None,
+        *,
+        resume: bool,
+        overwrite: bool,
     ) -> None:
-        self._folder, self._plan = folder, plan
+        self._folder, self._plan, self._own = folder, plan, own
         self._entries = dict(known.entries) if known and not overwrite else {}
         self._there = {} if overwrite else _files(folder)
         self._damaged: dict[Path, str] = {}
@@ -347,7 +390,7 @@ class _State:
         try:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
-                self.found.append((point, finished_record(case, result)))
+                self.found.append((point, finished_record(case, result, self._own)))
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
@@ -439,12 +482,50 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
 
 def _several(values: Any) -> list[Any]:
     """Return values as a list, also where a single one is given."""
-    return [values] if isinstance(values, str | Path | float | int) else list(values)
+    single = isinstance(values, str | Path | float | int | FileDefinition)
+    return [values] if single else list(values)
 
 
-def _job(case: Case, folder: Path, plots: bool) -> Job:
+def _speeds(speeds: Any) -> list[float | None]:
+    """Return speeds as numbers; those of a range, and with units [m/s]."""
+    if speeds is None:
+        return [None]
+    found: list[float | None] = []
+    for speed in _several(speeds):
+        if isinstance(speed, str):
+            found += [speed_of(text) for text in _texts("speeds", speed)]
+        else:
+            found.append(speed)
+    return found
+
+
+def _written(what: str, values: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return values of keys as they are written in assignments."""
+    found = {}
+    for key, given in values.items():
+        found[key] = [text for value in _several(given) for text in _texts(f"{what} {key}", value)]
+    return found
+
+
+def _texts(what: str, value: Any) -> list[str]:
+    try:
+        return value_texts(value if isinstance(value, str) else (_plain(value),))
+    except ValueError as error:
+        raise InputError([Fault(what, "", str(error), f"allowed: {ALLOWED}")]) from None
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers of numpy as Python's own."""
+    return value.item() if hasattr(value, "item") and not isinstance(value, str) else value
+
+
+def _sample(given: Sample | Mapping[str, Any]) -> Sample:
+    return given if isinstance(given, Sample) else checked(Sample, dict(given), "sample")
+
+
+def _job(case: Case, folder: Path, plots: bool, own: str | None) -> Job:
     path = (folder / case.file_name).resolve()
-    return Job(case, path, path.with_suffix(".png") if plots else None)
+    return Job(case, path, path.with_suffix(".png") if plots else None, own)
 
 
 def _executed(

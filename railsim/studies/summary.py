@@ -19,6 +19,7 @@ from railsim.result import Result
 from railsim.result.facts import FACTS, run_facts
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Record, Records
+from railsim.studies.own import own_quantities
 from railsim.text import spreadsheet_cell
 
 M = TypeVar("M", bound=BaseModel)
@@ -39,9 +40,16 @@ def waiting_record(case: Case) -> Record:
     }
 
 
-def finished_record(case: Case, result: Result) -> Record:
-    """Return the record of a run that has its result."""
-    return {**waiting_record(case), **run_facts(result)}
+def finished_record(case: Case, result: Result, own: str | None = None) -> Record:
+    """Return the record of a run that has its result, with the quantities of its own function.
+
+    Raises
+    ------
+    RailsimError : that function goes wrong.
+    """
+    found = own_quantities(own, result)
+    facts = {**waiting_record(case), **run_facts(result)}
+    return {**facts, "quantities": found} if own else facts
 
 
 def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
@@ -82,6 +90,9 @@ class Inputs(BaseModel):
     tracks: list[str]
     speeds: list[float | None]
     grid: dict[str, list[str]] = {}
+    linked: list[dict[str, list[str]]] = []
+    sample: dict[str, Any] | None = None
+    quantities: str | None = None
     settings: str | None = None
     start: float = 0.0
     duration: float | None = None
@@ -216,4 +227,4 @@ def _row(record: Record) -> dict[str, Any]:
         ending = "mid" if number == 1 else f"mid{number}"
         for name, value in curve["largest"].items():
             row[f"{name}_{ending}"] = value
-    return row
+    return {**row, **record.get("quantities", {})}
