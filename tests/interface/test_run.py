@@ -150,7 +150,8 @@ def test_default_name_and_printed_tables(tmp_path, monkeypatch, capsys):
     assert main(SHORT) == 0
     assert os.listdir() == ["coach_manchester_curve_r250_20.h5"]
     printed = capsys.readouterr()
-    assert printed.err == ""
+    # the first run after an installation says that it compiles
+    assert [line for line in printed.err.splitlines() if not line.startswith("preparing:")] == []
     for words in (
         "S1002 on 60E1 inclined 1:40, gauge 1435 mm, friction 0.4",
         "FASTSIM 10 x 10",

@@ -7,11 +7,12 @@ of where a vehicle's energy goes.
 from pathlib import Path
 
 import numpy as np
-from dynamics import Settings, absolute_frame, evaluate, load_track, load_vehicle, rotation
+from dynamics import Settings, absolute_frame, load_track, load_vehicle, rotation
 
-from railsim.assembly import assemble, level_track
+from railsim.assembly import assemble, level_track, work_arrays
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
+from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, time_loop
 from railsim.time_step import empty_recorder
@@ -52,6 +53,7 @@ class Rig:
         self.state = np.zeros(model.n_state)
         self.state[-1] = 1.0
         self.probe = model.index.coordinate("probe", 0)
+        self.work, self.derivative = work_arrays(model.system), np.zeros(model.n_state)
         self.n = model.index.n_bodies
         self.body = self.probe // 6
 
@@ -59,7 +61,8 @@ class Rig:
         """Force on the frame along `axis`, positive as the probe moves away; sets the drives."""
         self.state[self.probe + axis] = deflection
         self.state[6 * self.n + self.probe + axis] = rate
-        self.work, self.derivative = evaluate(self.system, self.state)
+        status, *_ = right_hand_side(self.system, self.work, self.state, self.derivative)
+        assert status == 0
         return -self.work.pose[self.body, FORCE + axis]
 
     def history(self, axis, time, deflection, rate):
@@ -197,8 +200,6 @@ class WorkOfDissipation:
 
 def step_by_step(model, state, h, n_steps, scheme="rk4"):
     """States after each of `n_steps` steps."""
-    from railsim.assembly import work_arrays
-
     state = state.copy()
     work = work_arrays(model.system)
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))

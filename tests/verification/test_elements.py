@@ -123,7 +123,7 @@ def test_blow_off_damper_with_series_stiffness_follows_its_table_when_slow():
 
 
 @pytest.mark.parametrize("velocity", [0.05, 0.3, 2.0])
-@pytest.mark.parametrize("h", [1e-5, 1e-3])
+@pytest.mark.parametrize("h", [1e-4, 1e-3])
 def test_series_damper_relaxes_branch_by_branch(velocity, h):
     """After a step of velocity F' = k_s (v - u), F = F_d(u): closed form for every step h."""
     k_s, c_low, c_high = 5e6, 1e5, 5e3
@@ -175,14 +175,14 @@ def test_air_spring_has_its_static_and_its_fast_stiffness():
     held = Rig(**law).history(Z, np.arange(0.0, 5.0, 0.01), lambda t: 0.01, lambda t: 0.0)
     assert held[0] == pytest.approx(0.01 * (area + k1), rel=1e-9)
     assert held[-1] == pytest.approx(0.01 * (area + k1 * k2 / (k1 + k2)), rel=1e-9)
-    for frequency in (0.1, 1.0, 3.0, 10.0, 100.0):
+    for frequency in (0.1, 1.0, 3.0, 10.0, 40.0):
         steps = 400
         d, f = last_period(
             Rig(**law),
             Z,
             harmonic(0.01, frequency),
             frequency,
-            periods=2 + int(2 * frequency),
+            periods=2 + int(frequency),  # 1 s: the transient decays with 57 ms
             steps=steps,
         )
         s = 2j * np.pi * frequency
