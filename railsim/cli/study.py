@@ -106,6 +106,15 @@ def _is_number(text: str) -> bool:
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
 @click.option("--resume", is_flag=True, help="Go on with the study in DIR; compute what changed.")
 @overwrite_option
+@click.option(
+    "--keep",
+    default="all",
+    show_default=True,
+    metavar="WHAT",
+    help="all; summary: no result files; or quantities such as Q,Y,wheelset_*.",
+)
+@click.option("--compress", is_flag=True, help="Store arrays compressed, without loss.")
+@click.option("--single", is_flag=True, help="Store arrays with 4 bytes a number: 7 digits.")
 @click.option("--plots", is_flag=True, help="Draw every run, and vehicles against each other.")
 @click.option("--report", is_flag=True, help="Write report.html into DIR, see `railsim report`.")
 @json_option
@@ -191,6 +200,8 @@ def command(
                     quiet=quiet,
                 )
         inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
+        for name in ("keep", "compress", "single"):
+            how.pop(name)
     elif file is None:
         _require(vehicles, tracks, speeds)
     # names of files in a study that goes on count from where it was started
@@ -270,8 +281,10 @@ def _campaign(
     from railsim.errors import Fault, InputError
 
     taken = {"--tracks, --speeds, --grid": any(others)}
-    refused = ("start", "duration", "until", "settings", "plots", "report", "file", "quantities")
+    refused = ["start", "duration", "until", "settings", "plots", "report", "file", "quantities"]
+    refused += ["compress", "single"]
     taken |= {f"--{n}": bool(how[n]) for n in refused}
+    taken["--keep"] = how["keep"] != "all"
     faults = [
         Fault(option, "", "given together with --scenario", "the scenario's file holds it")
         for option, given in taken.items()

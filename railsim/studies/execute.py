@@ -30,6 +30,7 @@ from railsim.kernels.time_loop import time_loop
 from railsim.result import Result
 from railsim.studies.case import Case
 from railsim.studies.journal import Record
+from railsim.studies.keep import EVERYTHING, Keep
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import failed_record, finished_record
 from railsim.threads import one_thread_each
@@ -54,12 +55,15 @@ class Job:
         Figure of the result.
     own : str or None
         Function of own quantities, see `railsim.studies.own`.
+    keep : Keep
+        What is kept of the result.
     """
 
     case: Case
     path: Path
     picture: Path | None = None
     own: str | None = None
+    keep: Keep = EVERYTHING
 
 
 Batch = tuple[Job, ...]
@@ -130,7 +134,8 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
             from railsim.plot.style import save
 
             save(histories(outcome), job.picture, overwrite=True)
-        return finished_record(job.case, outcome, job.own)
+        record = finished_record(job.case, outcome, job.own)
+        return {**record, "file": job.keep.applied(job.path, outcome)}
     except RailsimError as error:
         return failed_record(job.case, str(error))
     except OSError as error:

@@ -6,12 +6,13 @@ on where it was when it is started again.  What is done stands in the journal.
 
 import errno
 import logging
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from railsim.definitions.base import FileDefinition
 from railsim.definitions.settings import Settings
@@ -34,6 +35,7 @@ from railsim.studies.execute import (
 )
 from railsim.studies.given import as_files
 from railsim.studies.journal import JOURNAL, Journal, Record, Records
+from railsim.studies.keep import ALL, EVERYTHING, Keep, parse_keep
 from railsim.studies.own import Function, fingerprint, named
 from railsim.studies.points import Point
 from railsim.studies.rows import speed_of
@@ -42,11 +44,17 @@ from railsim.studies.summary import (
     checked,
     finished_record,
     read_index,
+    summary_row,
+    unit_of,
     waiting_record,
     write_index,
 )
 from railsim.units import ALLOWED
 from railsim.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _LOG = logging.getLogger(__name__)
 MANY = 10_000  # runs from which on an index that is up to date is not made once more
@@ -87,8 +95,59 @@ class Outcome:
         return {
             record["name"]: open_result(self.folder / record["file"])
             for record in self.records
-            if record["status"] != "failed"
+            if record["status"] not in ("failed", "waiting") and record["file"]
         }
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """Return the summary, one row a run, as a `pandas.DataFrame` [SI].
+
+        Raises
+        ------
+        ImportError : pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError(
+                "to_dataframe needs pandas; install it with: pip install pandas"
+            ) from None
+        rows = [summary_row(record) for record in self.records]
+        frame = pandas.DataFrame(rows)
+        labels = [name for name in dict.fromkeys(n for r in self.records for n in r["labels"])]
+        for name in labels:  # values of a grid are texts, as in a file
+            with suppress(ValueError, TypeError):
+                frame[name] = pandas.to_numeric(frame[name])
+        return frame
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the numbers of the summary as an `xarray.Dataset` with the grid as dimensions.
+
+        Dimensions are what differs between the runs; where these are no full grid, as with a
+        sample, the dimension is ``run``.  Each variable has its ``units``.
+
+        Raises
+        ------
+        ImportError : pandas or xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(
+                "to_xarray needs xarray; install it with: pip install 'railsim[xarray]'"
+            ) from None
+        frame = self.to_dataframe()
+        labels = list(dict.fromkeys(name for record in self.records for name in record["labels"]))
+        varied = [name for name in labels if frame[name].nunique(dropna=False) > 1]
+        numbers = frame.select_dtypes("number").columns.difference(labels, sort=False)
+        full = math.prod(frame[name].nunique() for name in varied) == len(frame)
+        if varied and full and not frame.duplicated(varied).any():
+            data = xarray.Dataset.from_dataframe(frame.set_index(varied)[list(numbers)])
+        else:
+            indexed = frame.set_index("name").rename_axis("run")
+            data = xarray.Dataset.from_dataframe(indexed[[*varied, *numbers]]).set_coords(varied)
+        for name in data:
+            data[name].attrs["units"] = unit_of(str(name)) or "1"
+        return data
 
 
 def study(
@@ -112,6 +171,9 @@ def study(
     resume: bool = False,
     overwrite: bool = False,
     plots: bool = False,
+    keep: str = ALL,
+    compress: bool = False,
+    single: bool = False,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
@@ -158,6 +220,11 @@ def study(
         Compute everything again.
     plots : bool
         Draw every run, and the vehicles against each other.
+    keep : str
+        ``all``; ``summary``, no result files; or names of quantities with commas between, ``*``
+        standing for any letters.  Summaries are made before anything is left out.
+    compress, single : bool
+        Store arrays compressed, and with 4 bytes a number.
     progress : callable, optional
         Called with the finished fraction now and then.
     on_record : callable, optional
@@ -187,6 +254,7 @@ def study(
     """
     folder = Path(out)
     check_folder(folder)
+    kept = parse_keep(keep, compress=compress, single=single)
     vehicles = as_files(_several(vehicles), folder)
     tracks = as_files(_several(tracks), folder)
     (settings,) = as_files([settings], folder)
@@ -220,6 +288,9 @@ def study(
         "linked": tables,
         "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
         "quantities": own,
+        "keep": keep,
+        "compress": compress,
+        "single": single,
         "settings": None if settings is None else str(settings),
         "start": start,
         "duration": duration,
@@ -227,9 +298,9 @@ def study(
         "assignments": list(assignments),
     }
     outcome = carry_out(
-        plan, inputs, folder, own=own, workers=workers, together=together, scheduler=scheduler,
-        resume=resume, overwrite=overwrite, plots=plots, progress=progress, on_record=on_record,
-        on_remark=on_remark,
+        plan, inputs, folder, own=own, keep=kept, workers=workers, together=together,
+        scheduler=scheduler, resume=resume, overwrite=overwrite, plots=plots, progress=progress,
+        on_record=on_record, on_remark=on_remark,
     )  # fmt: skip
     if plots:
         from railsim.studies.pictures import draw
@@ -266,6 +337,7 @@ def carry_out(
     plots: bool = False,
     longest_first: bool = False,
     own: str | None = None,
+    keep: Keep = EVERYTHING,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
@@ -282,6 +354,8 @@ def carry_out(
         Begin with the longest runs, so that no core is left with one of them at the end.
     own : str, optional
         Function of own quantities, see `railsim.studies.own`.
+    keep : Keep
+        What is kept of each result.
 
     Others as in `study`.
     """
@@ -291,7 +365,7 @@ def carry_out(
             known = stack.enter_context(Journal(folder))
         if not (resume or overwrite):
             _refuse_another_study(folder, known, inputs)
-        state = _State(folder, plan, known, own, resume=resume, overwrite=overwrite)
+        state = _State(folder, plan, known, own, keep, resume=resume, overwrite=overwrite)
         client = None if scheduler is None else cluster(scheduler)
         make_folder(folder)
         sweep(folder)
@@ -304,7 +378,7 @@ def carry_out(
         remark = on_remark or _LOG.warning
         for text in state.settle(journal):
             remark(text)
-        jobs = [_job(case, folder, plots, own) for case in state.cases]
+        jobs = [_job(case, folder, plots, own, keep) for case in state.cases]
         if longest_first:
             jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
         keys = {point.name: point.key for point in plan.points}
@@ -314,7 +388,8 @@ def carry_out(
                 with suppress(FileNotFoundError):  # it would be out of date
                     (folder / "study.json").unlink()
             for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
-                file = folder / record["file"] if record["status"] != "failed" else None
+                there = record["status"] != "failed" and record["file"]
+                file = folder / record["file"] if there else None
                 journal.add(record, keys[record["name"]], None if file is None else file.stat())
                 if on_record is not None:
                     on_record(record)
@@ -353,11 +428,12 @@ class _State:
         plan: Runs,
         known: Journal | None,
         own: str | None,
+        keep: Keep,
         *,
         resume: bool,
         overwrite: bool,
     ) -> None:
-        self._folder, self._plan, self._own = folder, plan, own
+        self._folder, self._plan, self._own, self._keep = folder, plan, own, keep
         self._entries = dict(known.entries) if known and not overwrite else {}
         self._there = {} if overwrite else _files(folder)
         self._damaged: dict[Path, str] = {}
@@ -382,6 +458,8 @@ class _State:
         entry = self._entries.get(point.name)
         if entry is None or entry.status in ("failed", "waiting") or not point.key:
             return False
+        if not entry.size and not self._keep.summary:  # the summary was kept, the file is wanted
+            return False
         return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
 
     def _look_at(self, point: Point, case: Case) -> list[Fault]:
@@ -405,7 +483,11 @@ class _State:
         if self._lines:
             remarks.append(f"{self._lines} damaged lines of {JOURNAL} are left out")
         for point, record in self.found:
-            journal.add(record, point.key, self._there[record["file"]])
+            if self._keep.summary:
+                (self._folder / record["file"]).unlink()
+                journal.add({**record, "file": ""}, point.key, None)
+            else:
+                journal.add(record, point.key, self._there[record["file"]])
         for path, words in self._damaged.items():
             kept = path.with_name(f"{path.name}.damaged")
             os.replace(path, kept)
@@ -523,9 +605,9 @@ def _sample(given: Sample | Mapping[str, Any]) -> Sample:
     return given if isinstance(given, Sample) else checked(Sample, dict(given), "sample")
 
 
-def _job(case: Case, folder: Path, plots: bool, own: str | None) -> Job:
+def _job(case: Case, folder: Path, plots: bool, own: str | None, keep: Keep) -> Job:
     path = (folder / case.file_name).resolve()
-    return Job(case, path, path.with_suffix(".png") if plots else None, own)
+    return Job(case, path, path.with_suffix(".png") if plots else None, own, keep)
 
 
 def _executed(
