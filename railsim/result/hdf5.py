@@ -282,8 +282,20 @@ def write(
         sink.begin(result.coordinates, chosen.values())
         sink.append({name: result[name] for name in timed(chosen)})
         statics = {name: result[name] for name in chosen if "time" not in chosen[name].dims}
-        sink.close(result.attributes, statics, result.profiles, result.groups)
+        sink.close(result.attributes, statics, result.profiles, _groups_of(result, chosen))
     return sink.path
+
+
+def _groups_of(result: Result, chosen: Mapping[str, Quantity]) -> dict[str, Mapping[str, Any]]:
+    """Return the groups of a result, with the peaks of chosen quantities only."""
+    groups: dict[str, Mapping[str, Any]] = dict(result.groups)
+    if PEAKS in groups:
+        groups[PEAKS] = {
+            name: array
+            for name, array in groups[PEAKS].items()
+            if name.removesuffix("_time").removesuffix("_distance") in chosen
+        }
+    return {group: arrays for group, arrays in groups.items() if arrays}
 
 
 def _stored(file: h5py.File, name: str, array: Any) -> h5py.Dataset:

@@ -64,6 +64,25 @@ def test_chosen_quantities_compressed_and_single_are_kept_and_the_summary_is_who
     assert simulated == [10.0, 10.0]
 
 
+def test_peaks_over_all_steps_are_kept_of_the_chosen_quantities(tmp_path):
+    result = example_result(duration=1.0)
+    shape = {"Q": (2, 4, 2), "sum_Y": (2, 4)}
+    peaks = {
+        f"{name}{ending}": np.arange(np.prod(size), dtype=float).reshape(size)
+        for name, size in shape.items()
+        for ending in ("", "_time", "_distance")
+    }
+    whole = railsim.Result(
+        {n: result[n] for n in result}, result.quantities, result.coordinates, result.attributes,
+        groups={"peaks": peaks},
+    )  # fmt: skip
+    path = write(whole, tmp_path / "r.h5", names=["time", "distance", "Q", "Q0"])
+    again = open_run(path)
+    assert set(again.groups["peaks"]) == {"Q", "Q_time", "Q_distance"}
+    assert railsim.peaks(again)[0].value == 15.0
+    assert open_run(write(whole, tmp_path / "s.h5", names=["time", "distance"])).status
+
+
 def test_unknown_quantity_to_keep_is_refused(tmp_path, capsys):
     assert main(arguments(tmp_path / "s", 10, more=["--keep", "Q,Z"])) == 2
     assert "--keep: Z: no such quantity" in capsys.readouterr().err
