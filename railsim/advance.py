@@ -22,7 +22,7 @@ from railsim.definitions.settings import Settings
 from railsim.ensemble import Ensemble, contact_grid
 from railsim.equilibrium import Equilibrium
 from railsim.kernels.extremes import MAX, MIN
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import time_loop
 from railsim.kernels.vibration import VIBRATION
@@ -59,6 +59,8 @@ class Preparation:
         Step and output interval at any speed.
     fresh : bool
         Whether nothing was before the initial state.
+    remarks : tuple of str
+        What a reader must know.
     """
 
     model: Model
@@ -68,6 +70,7 @@ class Preparation:
     end_distance: float
     pace: Pace
     fresh: bool = True
+    remarks: tuple[str, ...] = ()
 
     def left(self, state: Floats) -> float:
         """Time from `state` to the end of the run at the present speed [s]."""
@@ -246,7 +249,7 @@ class _Convoy:
         if self._left() <= 1e-9:
             return []
         if self._spacing is not None:
-            right_hand_side(self._system, self._work, self._state, self._derivative)
+            right_hand_sides(self._system, self._work, self._state[None], self._derivative[None])
         speed, rate = self._state[-1], self._derivative[-1]
         paces = []
         for run in self._runs:

@@ -16,13 +16,14 @@ from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import creep_tables
 from railsim.contact.table import ContactTable, cached_contact_table
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
+from railsim.definitions.layout import is_straight_and_level
 from railsim.definitions.settings import Drive as DriveDefinition
 from railsim.definitions.settings import Settings
 from railsim.definitions.support import Support as SupportDefinition
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.element_arrays import ElementArrays
-from railsim.errors import ModelError
+from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.creep import LAW_NUMBERS
@@ -34,6 +35,7 @@ from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_ROW, SUPPORT_SIZE, 
 from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
+    FIXED,
     FREE,
     N_SCALARS,
     POSE_SIZE,
@@ -157,6 +159,7 @@ def assemble(
     """
     flat = flatten(vehicle)
     book = _ProfileBook(dict(profiles or {}))
+    check_fixed(flat, track, settings.drive.mode)
     shared = shared or SharedTables()
     if shared.track is None:
         shared.track = track_tables(track)
@@ -191,6 +194,41 @@ def assemble(
         unloaded = vehicle.model_copy(update={"load": None})
         design = assemble(unloaded, track, settings, profiles, shared)
     return Model(system, index, flat, tables, book.used, design)
+
+
+def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> None:
+    """Raise InputError where bodies are fixed that cannot be so on this track."""
+    fixed = [body for body in flat.bodies if body.fixed]
+    faults = []
+    where = f"vehicle '{flat.name}'"
+    if fixed and drive == "free":
+        names = ", ".join(body.name for body in fixed)
+        faults.append(
+            Fault(
+                "settings",
+                "drive.mode",
+                f"free running with {names} fixed",
+                "constant or table: a fixed body moves on as prescribed",
+            )
+        )
+    if not is_straight_and_level(track):
+        faults += [
+            Fault(
+                where,
+                f"{body.name}.fixed",
+                "fixed to the ground beside curves, cant or gradients",
+                'fixed = "track", or straight level track',
+            )
+            for body in fixed
+            if body.fixed == "ground"
+        ]
+    if faults:
+        raise InputError(faults)
+
+
+def components_of(kind: int) -> tuple[int, ...]:
+    """Components in which a body of this kind moves."""
+    return {AXLEBOX: (4,), FIXED: ()}.get(kind, (0, 1, 2, 3, 4, 5))
 
 
 def work_arrays(system: System) -> Work:
@@ -333,7 +371,9 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     origin = flat.body(flat.reference).position[0]
     places = [round(body.position[0] - origin, 9) for body in flat.bodies]
     offsets = sorted(set(places))
-    kinds = np.array([_KINDS[body.kind] for body in flat.bodies], dtype=np.int64)
+    kinds = np.array(
+        [FIXED if body.fixed else _KINDS[body.kind] for body in flat.bodies], dtype=np.int64
+    )
     bodies = Bodies(
         kind=kinds,
         frame=np.array([offsets.index(place) for place in places], dtype=np.int64),
@@ -344,6 +384,7 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
         row=aligned(np.array([_body_row(body) for body in flat.bodies])),
         whole=np.flatnonzero(kinds != AXLEBOX),
         axleboxes=np.flatnonzero(kinds == AXLEBOX),
+        fixed=np.flatnonzero(kinds == FIXED),
         references=np.array([names.index(flat.reference)], dtype=np.int64),
     )
     return bodies, np.array(offsets)

@@ -193,6 +193,7 @@ def _joined_bodies(systems: Sequence[System], first: Ints, offset: Floats) -> Bo
         references=first,
         whole=first,
         axleboxes=first,
+        fixed=first,
     )
     frames = [
         np.searchsorted(offset, system.frame_offset)[system.bodies.frame] for system in systems

@@ -8,6 +8,9 @@ Three steps, each on straight level track:
 2. without friction, Newton's method finds the position at rest; its wheel forces are Q0;
 3. with friction and speed, it finds the steady rolling: positions and the spin of the wheelsets.
 
+A fixed body is first let down on its springs like any other, and held where it then stands; where
+it cannot stand by itself it is held in its nominal position.
+
 What cannot be balanced is named: body, component, force or moment.
 """
 
@@ -16,17 +19,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, level_track, work_arrays
+from railsim.assembly import Model, components_of, level_track, work_arrays
 from railsim.element_arrays import vertical_support
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import AXLEBOX, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
+from railsim.kernels.system import AXLEBOX, FIXED, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
 from railsim.kernels.time_loop import FAST, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.kernels.wheel_rail import NORMAL, W_Q
@@ -55,12 +58,15 @@ class Equilibrium:
         Static wheel loads [N].
     residual : float
         Largest remaining acceleration [m/s2, rad/s2].
+    remarks : tuple of str
+        What a reader of results must know.
     """
 
     model: Model
     state: Floats
     Q0: Floats
     residual: float
+    remarks: tuple[str, ...] = ()
 
 
 def equilibrium(model: Model, speed: float) -> Equilibrium:
@@ -71,15 +77,58 @@ def equilibrium(model: Model, speed: float) -> Equilibrium:
     ModelError
         The preloads cannot carry a body, or no equilibrium is found; names what is unbalanced.
     """
-    model = with_preloads(model)
+    model, guess, remarks = _let_down(model)
     level = level_track(model.system)
     static = _Balance(model, level, speed=1.0, rolling=False)
-    state = static.solve(_first_guess(model, level))
+    state = static.solve(guess)
     Q0 = static.work.wheel[:, :, W_Q].copy()
     rough = level._replace(track=_with_friction(level, model.system))
     rolling = _Balance(model, rough, speed=speed, rolling=True)
     state = rolling.solve(state)
-    return Equilibrium(model, state, Q0, rolling.residual)
+    return Equilibrium(model, state, Q0, rolling.residual, remarks)
+
+
+def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:
+    """Return the model with preloads, a guess of its position with fixed bodies in place, remarks.
+
+    Raises
+    ------
+    ModelError
+        The preloads cannot carry a body.
+    """
+    fixed = model.system.bodies.fixed
+    if not len(fixed):
+        model = with_preloads(model)
+        return model, _first_guess(model, level_track(model.system)), ()
+    try:
+        released = with_preloads(_released(model))
+        level = level_track(released.system)
+        balance = _Balance(released, level, speed=1.0, rolling=False)
+        guess = balance.solve(_first_guess(released, level))
+        return (
+            replace(released, system=released.system._replace(bodies=model.system.bodies)),
+            guess,
+            (),
+        )
+    except ModelError:
+        model = with_preloads(model)
+        names = ", ".join(model.index.bodies[b] for b in fixed)
+        remark = (
+            f"Held in the nominal position, where it could not stand on its springs alone: {names}."
+        )
+        guess = _first_guess(model, level_track(model.system))
+        for body in fixed:
+            guess[6 * body : 6 * body + 6] = 0.0
+        return model, guess, (remark,)
+
+
+def _released(model: Model) -> Model:
+    """Return the model with all fixed bodies let loose."""
+    bodies = model.system.bodies
+    kind = np.where(bodies.kind == FIXED, RIGID, bodies.kind)
+    bodies = bodies._replace(kind=kind, fixed=bodies.fixed[:0])
+    design = None if model.design is None else _released(model.design)
+    return replace(model, system=model.system._replace(bodies=bodies), design=design)
 
 
 def with_preloads(model: Model) -> Model:
@@ -96,10 +145,18 @@ def with_preloads(model: Model) -> Model:
     if model.design is not None:
         return _levelled(_with_preloads_of(model, with_preloads(model.design)))
     conditions = _conditions(model.system)
-    filled, rest = _with_solved_preloads(model, _auto_preloads(model), conditions)
-    if not any(getattr(e.definition, "has_free_length", False) for e in model.flat.elements):
-        _check_balance(model, conditions, rest)
-    return filled
+    # springs carry the weight of a fixed body where they can
+    weights = [(int(body), 2) for body in model.system.bodies.fixed]
+    free_lengths = any(getattr(e.definition, "has_free_length", False) for e in model.flat.elements)
+    for wanted in [[*conditions, *weights], conditions] if weights else [conditions]:
+        filled, rest = _with_solved_preloads(model, _auto_preloads(model), wanted)
+        unbalanced = [] if free_lengths else _unbalanced(model, wanted, rest)
+        if not unbalanced:
+            return filled
+    raise ModelError(
+        "no static equilibrium: the springs with preload cannot carry the vehicle in its "
+        "nominal position; unbalanced: " + "; ".join(unbalanced)
+    )
 
 
 def _levelled(model: Model) -> Model:
@@ -252,18 +309,15 @@ def _add(totals: Floats, body: int, lever: Floats, force: Floats) -> None:
     totals[body] += fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
 
-def _check_balance(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> None:
+def _unbalanced(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> list[str]:
+    """What the preloads leave of forces and moments, in words."""
     weight = float(np.sum(model.system.bodies.mass)) * model.system.gravity
     lines = []
     for (body, component), value in zip(conditions, rest, strict=True):
         if abs(value) > UNBALANCED * weight:
             unit = "N" if component < 3 else "N m"
             lines.append(f"{model.index.bodies[body]}: {COMPONENTS[component]} {value:.6g} {unit}")
-    if lines:
-        raise ModelError(
-            "no static equilibrium: the springs with preload cannot carry the vehicle in its "
-            "nominal position; unbalanced: " + "; ".join(lines)
-        )
+    return lines
 
 
 def _with_friction(level: System, system: System):  # type: ignore[no-untyped-def]
@@ -328,13 +382,11 @@ class _Balance:
         self.speed = speed
         self.work = work_arrays(system)
         self.residual = np.inf
-        self._derivative = np.zeros(model.n_state)
-        self._state = np.zeros(model.n_state)
         n = model.index.n_bodies
         self._unknowns: list[int] = []
         self._equations: list[int] = []
         for body, kind in enumerate(system.bodies.kind):
-            for component in _components(int(kind)):
+            for component in components_of(int(kind)):
                 if body in system.bodies.references and component == 0:
                     continue
                 spin = kind == WHEELSET and component == 4
@@ -410,12 +462,10 @@ class _Balance:
         columns = []
         for k, span in zip(self._unknowns, spans, strict=True):
             span = max(float(span), 1e-9 * max(1.0, abs(state[k])))
-            ends = []
-            for sign in (1.0, -1.0):
-                self._state[:] = state
-                self._state[k] += sign * span
-                ends.append(self._accelerations(self._state))
-            columns.append((ends[0] - ends[1]) / (2.0 * span))
+            trials = np.array([state, state])
+            trials[:, k] += span, -span
+            ahead, behind = self._accelerations(trials)
+            columns.append((ahead - behind) / (2.0 * span))
         return np.array(columns).T
 
     def _start_rolling(self, state: Floats) -> None:
@@ -424,21 +474,21 @@ class _Balance:
         for body in np.flatnonzero(bodies.kind == WHEELSET):
             state[6 * n + 6 * body + 4] = -self.speed / bodies.radius[body]
 
-    def _accelerations(self, state: Floats) -> Floats:
-        status, where, _ = right_hand_side(self.system, self.work, state, self._derivative)
+    def _accelerations(self, states: Floats) -> Floats:
+        """Accelerations of one state, or of several, one a row."""
+        rows = np.atleast_2d(states)
+        derivatives = np.empty_like(rows)
+        status, where, _ = right_hand_sides(self.system, self.work, rows, derivatives)
         if status != RUNNING:
             sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
             raise ModelError(f"no static equilibrium: {sentence}")
-        return self._derivative[self._equations].copy()
+        return derivatives[:, self._equations].reshape(*states.shape[:-1], -1)
 
     def _jacobian(self, state: Floats, rest: Floats) -> Floats:
-        columns = []
-        for k in self._unknowns:
-            self._state[:] = state
-            step = 1e-9 * max(1.0, abs(state[k]))
-            self._state[k] += step
-            columns.append((self._accelerations(self._state) - rest) / step)
-        return np.array(columns).T
+        steps = 1e-9 * np.maximum(1.0, np.abs(state[self._unknowns]))
+        trials = np.repeat(state[None], len(steps), axis=0)
+        trials[np.arange(len(steps)), self._unknowns] += steps
+        return np.asarray(((self._accelerations(trials) - rest) / steps[:, None]).T)
 
     def _line_search(
         self, state: Floats, rest: Floats, change: Floats, trials: int
@@ -516,10 +566,6 @@ class _Balance:
         return f"no static equilibrium; {alternate}largest remaining accelerations: " + ", ".join(
             parts
         )
-
-
-def _components(kind: int) -> tuple[int, ...]:
-    return (4,) if kind == AXLEBOX else (0, 1, 2, 3, 4, 5)
 
 
 def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) -> Floats:

@@ -33,6 +33,7 @@ def run_remarks(run: Run) -> tuple[str, ...]:
     extremes = run_extremes(run.extremes, Q0)
     found = [
         *run.remarks,
+        *run.prepared.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
         *lifted_wheels(extremes, run.unloaded, wheelsets),
         *vibration(

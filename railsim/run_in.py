@@ -5,7 +5,8 @@ the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
 
 - into a curve over an auxiliary track, which begins straight, takes up curvature and cant of the
   place over a transition, and keeps them until the vehicle has settled; the state at its end,
-  relative to the track frames, is the state at the place;
+  relative to the track frames, is the state at the place; or, where it is asked for, it is put
+  there in the steady state that Newton's method finds;
 - into a transition, a ramp or a vertical curve over the real track, from the last place before it
   where nothing changes under the vehicle: there it stands on a twist that it came over;
 - onto irregular rails over the last seconds of the real track before the start;
@@ -14,6 +15,7 @@ the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,7 @@ from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
 from railsim.definitions.track import Track
 from railsim.equilibrium import Equilibrium, initial_state
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
@@ -38,6 +41,8 @@ from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
+from railsim.linear.circle import PLACE, circle
+from railsim.linear.steady import NotConverged, led
 from railsim.settling import NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
@@ -59,6 +64,7 @@ def start_state(
     step: float,
     scheme: int,
     progress: Progress | None = None,
+    remark: Callable[[str], None] | None = None,
 ) -> Floats:
     """State of the undisturbed vehicle at `start`.
 
@@ -70,6 +76,9 @@ def start_state(
         Time step [s] and scheme of the run.
     progress : callable, optional
         Called now and then with the time that has been simulated, and that is to be [s].
+    remark : callable, optional
+        Where it is given, the vehicle is in its steady state in a curve; called with a sentence
+        where it is not.
 
     Returns
     -------
@@ -87,11 +96,11 @@ def start_state(
     steps = _approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
-        return _arrived(model, balance, track, start, step, scheme, steps, progress)
+        return _arrived(model, balance, track, start, step, scheme, steps, progress, remark)
     except InputError:
         if whole <= steps:
             raise
-    return _arrived(model, balance, track, start, step, scheme, whole, progress)
+    return _arrived(model, balance, track, start, step, scheme, whole, progress, remark)
 
 
 def _arrived(
@@ -103,6 +112,7 @@ def _arrived(
     scheme: int,
     steps: int,
     progress: Progress | None,
+    remark: Callable[[str], None] | None,
 ) -> Floats:
     """State at `start` after so many steps over the real track."""
     speed = float(balance.state[-1])
@@ -119,7 +129,9 @@ def _arrived(
         if progress is not None:
             progress(before + done, before + whole)
 
-    state = settled(model, balance, track, place, step, settling)
+    state = None if remark is None else _steady(model, balance, track, place, remark)
+    if state is None:
+        state = settled(model, balance, track, place, step, settling)
     if state is None:
         work = _located(model, place)
         state = initial_state(model, balance, place, work.frames)
@@ -254,6 +266,49 @@ def _run(
         )
 
 
+def _curve(track: Track, place: float) -> tuple[float, float]:
+    """Curvature [1/m] and cant [m] at a place, 0 where negligible."""
+    alignment = Alignment(track)
+    curvature, cant = float(alignment.curvature(place)), float(alignment.cant(place))
+    return (
+        curvature if abs(curvature) >= NEGLIGIBLE else 0.0,
+        cant if abs(cant) >= NEGLIGIBLE else 0.0,
+    )
+
+
+def _steady(
+    model: Model, balance: Equilibrium, track: Track, start: float, remark: Callable[[str], None]
+) -> Floats | None:
+    """State as of `settled` by Newton's method; None, and a remark in a curve, where there is none.
+
+    Friction elements hold what the way into the curve left in them: no steady state tells that.
+    """
+    curvature, cant = _curve(track, start)
+    if not (curvature or cant):
+        return None
+    if (model.system.internal.kind == PAD).any():
+        remark(
+            "The run begins with a run-in: what friction elements hold depends on the way there."
+        )
+        return None
+    level, speed, friction = model.system, float(balance.state[-1]), _friction(track, start)
+    level = level._replace(support=level.support._replace(variation=level.support.variation[:0]))
+
+    def along(share: float) -> tuple[System, float]:
+        part = circle(track, curvature=share * curvature, cant=share * cant, friction=friction)
+        return level._replace(track=track_tables(part)), speed
+
+    rolling = balance.state.copy()
+    rolling[-2] = PLACE
+    try:
+        state = led(model, along, rolling)[0].state
+    except NotConverged as error:
+        remark(f"The run begins with a run-in, as Newton's method found {error}.")
+        return None
+    state[-3:] = balance.state[-3:]
+    return state
+
+
 def settled(
     model: Model,
     balance: Equilibrium,
@@ -283,10 +338,8 @@ def settled(
     InputError
         The vehicle does not stay on the track there.
     """
-    alignment = Alignment(track)
-    curvature = float(alignment.curvature(start))
-    cant = float(alignment.cant(start))
-    if abs(curvature) < NEGLIGIBLE and abs(cant) < NEGLIGIBLE:
+    curvature, cant = _curve(track, start)
+    if not (curvature or cant):
         return None
     speed = float(balance.state[-1])
     auxiliary = curve_to_settle_in(
@@ -299,7 +352,7 @@ def settled(
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)
-    where = f"R {1.0 / curvature:.0f} m" if abs(curvature) >= NEGLIGIBLE else "on cant"
+    where = f"R {1.0 / curvature:.0f} m" if curvature else "on cant"
     _run(model, system, state, step, steps - 1, FAST, start, where, progress)
     state[-3:] = balance.state[-3:]
     return state

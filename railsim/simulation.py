@@ -39,8 +39,8 @@ Progress = Callable[[float], None]
 
 _LOG = logging.getLogger(__name__)
 SPEED_RANGE = (0.5, 150.0)  # m/s
-# settings that a continued run may have of its own; it has no initial disturbance
-OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial")
+# settings that a continued run may have of its own; it has no start and no initial disturbance
+OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial", "start_state")
 
 
 def simulate(
@@ -464,8 +464,18 @@ def prepare(
     model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state})
     step, _ = pace.at(speed)
+    remarks: list[str] = [*balance.remarks]
     if before is None:
-        state = start_state(model, balance, track, start, step, SCHEMES[settings.scheme], on_run_in)
+        state = start_state(
+            model,
+            balance,
+            track,
+            start,
+            step,
+            SCHEMES[settings.scheme],
+            on_run_in,
+            remarks.append if settings.start_state == "steady" else None,
+        )
         _disturb(model, settings, state)
     else:
         state = _taken_up(model, before)
@@ -477,6 +487,7 @@ def prepare(
         end_distance=track.length if until is None else until,
         pace=pace,
         fresh=before is None,
+        remarks=tuple(remarks),
     )
 
 

@@ -16,7 +16,7 @@ from railsim.assembly import Model, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import N_SCALARS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
@@ -158,7 +158,7 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
     derivative = np.zeros_like(state)
 
     def rate(trial: Floats) -> Floats:
-        status, _, _ = right_hand_side(system, work, trial, derivative)
+        status, _, _ = right_hand_sides(system, work, trial[None], derivative[None])
         if status != RUNNING:
             raise ModelError("the state of steady rolling lies outside the contact table")
         return derivative.copy()

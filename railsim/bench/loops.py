@@ -9,7 +9,7 @@ from railsim.kernels import jit
 from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up, stretched_roll
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
-from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, right_hand_side
+from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
 from railsim.kernels.wheel_rail import (
     BEYOND,
     C11,
@@ -36,7 +36,7 @@ from railsim.kernels.wheel_rail import (
 def many_right_hand_sides(system, work, state, derivative, n):
     """Everything, as RK4 calls it."""
     for _ in range(n):
-        right_hand_side(system, work, state, derivative)
+        rates_of_state(system, work, state, derivative)
 
 
 @jit

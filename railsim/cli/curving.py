@@ -147,4 +147,5 @@ def _lines(found: "Curving") -> list[str]:
     words = (
         f"Leading wheelset, its outer wheel, T_gamma of all wheels; cant {1e3 * found.cant:g} mm"
     )
-    return [words, *table(header, rows, numbers=0)]
+    remarks = [f"remark: {remark}" for remark in found.remarks]
+    return [words, *table(header, rows, numbers=0), *remarks]

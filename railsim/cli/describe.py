@@ -40,6 +40,7 @@ def vehicle_data(vehicle: "Vehicle") -> dict[str, Any]:
         {
             "name": body.name,
             "kind": body.kind,
+            "fixed": body.fixed,
             "mass": body.mass,
             "inertia": body.inertia,
             "position": body.position,
@@ -92,7 +93,8 @@ def vehicle_lines(vehicle: "Vehicle") -> list[str]:
         inertia = body["inertia"] if body["kind"] != "axlebox" else (0, body["pitch_inertia"], 0)
         wheels = _either(body["profile"]) if body["profile"] else body["wheelset"] or ""
         cells = [f"{value:.0f}" for value in (body["mass"], *inertia)]
-        rows.append([body["name"], body["kind"], wheels, *cells, _point(body["position"])])
+        kind = f"{body['kind']}, fixed" if body["fixed"] else body["kind"]
+        rows.append([body["name"], kind, wheels, *cells, _point(body["position"])])
     header = ["body", "kind", "wheels", "m kg", "Ixx", "Iyy", "Izz kg m2", "x, y, z m"]
     lines += ["", *table(header, rows, numbers=3), ""]
     lines += table(["element", "kind", "number", "between", "values"], _element_rows(vehicle), 9)

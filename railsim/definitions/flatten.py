@@ -43,6 +43,8 @@ class FlatBody:
         Wheelset that carries the axlebox.
     pitch_inertia : float
         Moment of inertia of an axlebox about the axle [kg m2].
+    fixed : str or None
+        Where a body is held: ``track`` or ``ground``.
     """
 
     name: str
@@ -53,6 +55,7 @@ class FlatBody:
     wheelset: Wheelset | None = None
     parent: str | None = None
     pitch_inertia: float = 0.0
+    fixed: str | None = None
 
 
 @dataclass(frozen=True)
@@ -186,14 +189,15 @@ def _flat(vehicle: Vehicle) -> FlatVehicle:
     flat = (*bodies, *wheelsets, *boxes)
     positions = {body.name: body.position for body in flat}
     elements = [e for group, place in places for e in _elements(group, place, positions)]
-    reference = vehicle.reference or flat[0].name
+    fixed = [body.name for body in flat if body.fixed]
+    reference = vehicle.reference or [*fixed, flat[0].name][0]
     return FlatVehicle(vehicle.name, flat, tuple(elements), reference)
 
 
 def _bodies(group: Vehicle | Assembly, place: _Place) -> Iterator[FlatBody]:
     for name, body in group.bodies.items():
         at = place.point(body.position)
-        yield FlatBody(place.full(name), "body", body.mass, body.inertia, at)
+        yield FlatBody(place.full(name), "body", body.mass, body.inertia, at, fixed=body.fixed)
 
 
 def _wheelsets(group: Vehicle | Assembly, place: _Place) -> Iterator[FlatBody]:

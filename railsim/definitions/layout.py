@@ -96,6 +96,12 @@ def gradient_sections(track: Track) -> list[Section]:
     return _sections("vertical", [_vertical_draft(element) for element in track.vertical])[0]
 
 
+def is_straight_and_level(track: Track) -> bool:
+    """Whether a track has neither curves nor cant nor gradients."""
+    sections = (*curvature_sections(track), *cant_sections(track), *gradient_sections(track))
+    return not any(section.start_value or section.end_value for section in sections)
+
+
 def track_faults(track: Track) -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
     _, faults = _sections("plan", [_plan_draft(element) for element in track.plan])

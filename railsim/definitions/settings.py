@@ -147,6 +147,9 @@ class Settings(FileDefinition):
     """Poisson's number of wheels and rails [1]"""
     drive: Drive = Drive()
     """How the speed goes along the track"""
+    start_state: Literal["run-in", "steady"] = "run-in"
+    """Of a run that begins in a curve: the end of some 10 s over an auxiliary track, or the steady
+    state by Newton's method"""
     outputs: Outputs = Outputs()
     """Further quantities in the result"""
     initial: dict[str, InitialState] = Field(default_factory=dict)

@@ -37,6 +37,9 @@ class Body(Definition):
     """Moments of inertia Ixx, Iyy, Izz about the centre of gravity [kg m2]"""
     position: Vector
     """Centre of gravity [m]"""
+    fixed: Literal["track", "ground"] | None = None
+    """Held where the vehicle at rest has it: in its moving track frame (`track`), which is the
+    same as on the `ground` of a test rig where the track is straight and level"""
 
 
 class Wheelset(Definition):

@@ -11,7 +11,7 @@ last.  With u the absolute angular velocity in body axes
 where Om is the angular velocity of the axes that I is expressed in: u itself for a rigid body,
 C^T w_F + (roll', yaw' sin roll, yaw' cos roll) for a wheelset, so that its spin stays out of C and
 the gyroscopic moment is exact.  The reference body's x is held: V' is given, or (free running) it
-is what keeps x'' = 0.
+is what keeps x'' = 0.  Of a fixed body r' = 0 and u = C^T w_F, whatever the forces on it.
 
 Hot path: loops are inside the functions, arrays are indexed directly.  A row view (`R[b]`) costs a
 reference count and a call with a whole `System` hundreds of words on the stack; together they made
@@ -34,7 +34,7 @@ from railsim.kernels.lanes import (
     starts,
     store_rows,
 )
-from railsim.kernels.rotation import product, sine_cosine_lanes, turned, turned_back
+from railsim.kernels.rotation import product, sine_cosine, sine_cosine_lanes, turned, turned_back
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.support import locate_support, support_rates
 from railsim.kernels.system import (
@@ -54,7 +54,7 @@ from railsim.kernels.system import (
     Y_0,
     Z_0,
 )
-from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, cell_of, track_frames
+from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, OMEGA_S, cell_of, track_frames
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
@@ -364,12 +364,76 @@ def hold_reference(bodies, relative, acceleration, derivative):
         derivative[held] = 0.0
 
 
-@jit
+@jit_inline
+def turn_fixed(bodies, frames, speed, state):
+    """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
+    n = bodies.kind.shape[0]
+    for k in range(bodies.fixed.shape[0]):
+        b = bodies.fixed[k]
+        f = bodies.frame[b]
+        sr, cr = sine_cosine(state[6 * b + 3])
+        sp, cp = sine_cosine(state[6 * b + 4])
+        sy, cy = sine_cosine(state[6 * b + 5])
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        # C^T = Ry(-pitch) Rx(-roll) Rz(-yaw)
+        w1, w2 = cy * w1 + sy * w2, cy * w2 - sy * w1
+        w2, w3 = cr * w2 + sr * w3, cr * w3 - sr * w2
+        w1, w3 = cp * w1 - sp * w3, cp * w3 + sp * w1
+        v = 6 * n + 6 * b
+        state[v], state[v + 1], state[v + 2] = 0.0, 0.0, 0.0
+        state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
+
+
+@jit_inline
+def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
+    """Keep fixed bodies where they are; what holds them is part of their accelerations.
+
+    u' = C^T (V^2 omega_s + V' omega), `rate` being V'.
+    """
+    n = bodies.kind.shape[0]
+    for k in range(bodies.fixed.shape[0]):
+        b = bodies.fixed[k]
+        f, v = bodies.frame[b], 6 * n + 6 * b
+        for i in range(3):
+            turn = 0.0
+            for j in range(3):
+                acceleration[b, i] -= derivative[v + j] * C[b, 3 * j + i]
+                turn += C[b, 3 * j + i] * (
+                    speed * speed * frames[f, OMEGA_S + j] + rate * frames[f, OMEGA + j]
+                )
+            acceleration[b, 3 + i] = turn
+        for i in range(6):
+            derivative[6 * b + i] = 0.0
+            derivative[v + i] = 0.0
+
+
 def right_hand_side(system, work, state, derivative):
     """Derivative of the whole state.
 
     See `mechanics`, which leaves out the internal states of elements.
     """
+    return right_hand_sides(system, work, state[None], derivative[None])
+
+
+@jit
+def right_hand_sides(system, work, states, derivatives):
+    """Derivatives of several states, one a row, as for difference quotients.
+
+    A call from Python takes a `System` apart, which lasts longer than an evaluation.  Status,
+    wheelset and number of patches are those of the last state, or of the first that is not
+    `RUNNING`.
+    """
+    status, where, n_patches = RUNNING, 0, 0
+    for k in range(states.shape[0]):
+        status, where, n_patches = rates_of_state(system, work, states[k], derivatives[k])
+        if status != RUNNING:
+            break
+    return status, where, n_patches
+
+
+@jit_merged
+def rates_of_state(system, work, state, derivative):
+    """As `right_hand_side`, within compiled code."""
     status, where, n_patches = mechanics(system, work, state, derivative)
     internal_rates(system, work, state, derivative)
     support_rates(system, work, state, derivative)
@@ -394,7 +458,7 @@ def mechanics(system, work, state, derivative):
     ----------
     system : System;  work : Work
     state, derivative : float64[n_state]
-        See `railsim.kernels.system`.
+        See `railsim.kernels.system`; the velocities of fixed bodies in `state` are set.
 
     Returns
     -------
@@ -418,6 +482,8 @@ def mechanics(system, work, state, derivative):
         return status, 0, 0
     if system.support.elastic:
         locate_support(system, work, s)
+    if bodies.fixed.shape[0] > 0:
+        turn_fixed(bodies, work.frames, speed, state)
     kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
@@ -449,6 +515,8 @@ def mechanics(system, work, state, derivative):
     if rate != 0.0:
         apply_speed_change(bodies, work.frames, state, rate, derivative)
     hold_reference(bodies, work.relative, work.acceleration, derivative)
+    if bodies.fixed.shape[0] > 0:
+        hold_fixed(bodies, work.frames, speed, rate, work.relative, work.acceleration, derivative)
     derivative[-3] = 1.0
     derivative[-2] = speed
     derivative[-1] = rate

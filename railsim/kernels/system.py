@@ -13,7 +13,8 @@ State vector (float64[n_state]), for n bodies and m internal element states:
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
-(here the pitch rate relative to the wheelset's axes) are used.
+(here the pitch rate relative to the wheelset's axes) are used.  A fixed body keeps its coordinates;
+its u_1, u_2, u_3 are those of its track frame.
 """
 
 from typing import NamedTuple
@@ -24,7 +25,7 @@ from railsim.kernels.internal import Internal
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
-RIGID, WHEELSET, AXLEBOX = range(3)
+RIGID, WHEELSET, AXLEBOX, FIXED = range(4)
 
 # ways of driving
 CONSTANT, TABLE, FREE = range(3)
@@ -71,13 +72,14 @@ class Bodies(NamedTuple):
 
     Attributes
     ----------
-    kind : int64[n]          RIGID, WHEELSET or AXLEBOX
+    kind : int64[n]          RIGID, WHEELSET, AXLEBOX or FIXED
     frame : int64[n]         index of the body's track frame
     parent : int64[n]        the wheelset that carries an axlebox, else -1
     row : float64[n, BODY_SIZE]   mass [kg], principal moments of inertia [kg m2] (an axlebox uses
                              the second only), y and z of the centre of gravity in the track frame
                              [m], nominal rolling radius [m] and 1 for a wheelset, else 1 and 0
     whole, axleboxes : int64[...]   bodies with six coordinates, and with one
+    fixed : int64[...]       bodies, part of `whole`, that are at rest in their track frames
     references : int64[v]    one body of each vehicle, whose frame is `s`; its x is held
     """
 
@@ -87,6 +89,7 @@ class Bodies(NamedTuple):
     row: np.ndarray
     whole: np.ndarray
     axleboxes: np.ndarray
+    fixed: np.ndarray
     references: np.ndarray
 
     @property

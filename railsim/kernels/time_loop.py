@@ -257,7 +257,7 @@ def step_fast(system, work, state, derivative, decay, h):
         d1 = (h + shift) * rate[q + 3] - (0.5 * h + shift) * before[q + 3]
         d2 = (h + shift) * rate[q + 4] - (0.5 * h + shift) * before[q + 4]
         d3 = (h + shift) * rate[q + 5] - (0.5 * h + shift) * before[q + 5]
-        if kind != AXLEBOX:
+        if kind < AXLEBOX:  # rigid bodies and wheelsets; fixed ones do not turn in their frames
             # the angles are those against the frame, whose own turn changes over the step
             f = bodies.frame[b]
             e1, e2, e3 = frames[f, OMEGA_S], frames[f, OMEGA_S + 1], frames[f, OMEGA_S + 2]

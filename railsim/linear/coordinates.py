@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, work_arrays
+from railsim.assembly import Model, components_of, work_arrays
 from railsim.errors import ModelError
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import AXLEBOX, FREE, N_SCALARS, WHEELSET, Drive, System
+from railsim.kernels.system import FREE, N_SCALARS, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
-from railsim.linear.system import Linearisation, jacobian
+from railsim.linear.system import Linearisation, jacobian_of_rows
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]
@@ -100,7 +100,7 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     for body, kind in enumerate(model.system.bodies.kind):
         if (kind == WHEELSET and held) or model.index.bodies[body] in hold:
             continue
-        for component in (4,) if kind == AXLEBOX else range(6):
+        for component in components_of(int(kind)):
             if not (kind == WHEELSET and component == 4):
                 positions.append((body, component))
             velocities.append((body, component))
@@ -196,8 +196,6 @@ class FreeVehicle:
         self.coordinates = coordinates(model, held=held, hold=hold)
         self.state = state.copy()
         self.work = work_arrays(system)
-        self._derivative = np.zeros_like(state)
-        self._trial = state.copy()
         self._n = model.index.n_bodies
         bodies = system.bodies
         self._whole = np.asarray(bodies.whole)
@@ -208,7 +206,7 @@ class FreeVehicle:
         self.system = system._replace(drive=Drive(FREE, np.zeros((1, 2)), np.zeros(3)))
         change = self.evaluate(state)[-1]
         self._is_straight = not self.work.frames[:, OMEGA : OMEGA + 3].any()
-        along = self._directions(state)[np.flatnonzero(self._whole == reference)[0], 0]
+        along = self._directions(state[None])[0][np.flatnonzero(self._whole == reference)[0], 0]
         # the traction without which the vehicle would slow down in the curve
         force = -change * float(along * bodies.mass[reference])
         self.system = system._replace(drive=Drive(FREE, np.array([[0.0, force]]), np.zeros(3)))
@@ -226,7 +224,7 @@ class FreeVehicle:
         ModelError
             It is not finite.
         """
-        matrix = jacobian(self.rate, self.x, self.coordinates.steps)
+        matrix = jacobian_of_rows(self.rates, self.x, self.coordinates.steps)
         if not np.isfinite(matrix).all():
             raise ModelError("the vehicle cannot be linearised: a derivative is not finite")
         return matrix
@@ -258,30 +256,39 @@ class FreeVehicle:
         ModelError
             The state lies outside the range of the model.
         """
-        status, where, _ = right_hand_side(self.system, self.work, state, self._derivative)
+        return np.asarray(self._evaluated(state[None])[0])
+
+    def _evaluated(self, states: Floats) -> Floats:
+        derivatives = np.empty_like(states)
+        status, where, _ = right_hand_sides(self.system, self.work, states, derivatives)
         if status != RUNNING:
             sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
             raise ModelError(f"outside the range of the model: {sentence}")
-        return self._derivative
+        return derivatives
 
     def rate(self, x: Floats) -> Floats:
         """Derivative of the coordinates, float64[n]."""
-        trial = self._trial
-        trial[:] = self.state
-        trial[self.coordinates.places] = x
-        derivative = self.evaluate(trial)
-        derivative[self._reference[0]] = trial[self._reference[1]]
-        velocities = derivative[6 * self._n : 12 * self._n].reshape(-1, 6)
-        if self._is_straight:
-            velocities[self._whole, 0] += derivative[-1]
-        else:
-            velocities[self._whole, :3] += derivative[-1] * self._directions(trial)
-        return np.asarray(derivative[self.coordinates.places])
+        return np.asarray(self.rates(x[None])[0])
 
-    def _directions(self, state: Floats) -> Floats:
+    def rates(self, x: Floats) -> Floats:
+        """Derivatives of the coordinates, float64[k, n] of as many."""
+        trials = np.repeat(self.state[None], len(x), axis=0)
+        trials[:, self.coordinates.places] = x
+        derivatives = self._evaluated(trials)
+        derivatives[:, self._reference[0]] = trials[:, self._reference[1]]
+        velocities = derivatives[:, 6 * self._n : 12 * self._n].reshape(len(x), -1, 6)
+        change = derivatives[:, -1, None]
+        if self._is_straight:
+            velocities[:, self._whole, 0] += change
+        else:
+            velocities[:, self._whole, :3] += change[:, None] * self._directions(trials)
+        derivatives[:, 6 * self._n : 12 * self._n] = velocities.reshape(len(x), -1)
+        return np.asarray(derivatives[:, self.coordinates.places])
+
+    def _directions(self, states: Floats) -> Floats:
         """e_x + omega x r of whole bodies: how they move as their frames go along the track."""
-        r = state[: 6 * self._n].reshape(-1, 6)[self._whole, :3] + self._nominal
+        r = states[:, : 6 * self._n].reshape(len(states), -1, 6)[:, self._whole, :3] + self._nominal
         omega = self.work.frames[self._frames, OMEGA : OMEGA + 3]
         moved = np.cross(omega, r)
-        moved[:, 0] += 1.0
+        moved[..., 0] += 1.0
         return moved

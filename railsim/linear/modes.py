@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.drawn import Drawn
 from railsim.errors import Fault, InputError
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of
@@ -88,7 +89,7 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class Modes:
+class Modes(Drawn):
     """Modes of a vehicle at one speed.
 
     Attributes
@@ -110,6 +111,8 @@ class Modes:
     modes: tuple[Mode, ...]
     remarks: tuple[str, ...] = ()
     parameter: tuple[str, float] | None = None
+
+    FIGURE: ClassVar = "railsim.plot.modes:modes_figure"
 
     def __iter__(self) -> Any:
         return iter(self.modes)
@@ -155,7 +158,7 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class RootLocus:
+class RootLocus(Drawn):
     """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
 
     Attributes
@@ -171,6 +174,8 @@ class RootLocus:
     key: str
     values: tuple[float, ...]
     sets: tuple[Modes, ...]
+
+    FIGURE: ClassVar = "railsim.plot.modes:locus_figure"
 
     @property
     def eigenvalues(self) -> Complex:

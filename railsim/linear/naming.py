@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.assembly import Model
-from railsim.kernels.system import AXLEBOX, RIGID, WHEELSET
+from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
 from railsim.notation import COMPONENTS
 
@@ -74,12 +74,16 @@ class Parts:
         total = float(energy.sum())
         return energy / total if total > 0.0 else energy
 
+    @cached_property
+    def _places(self) -> dict[tuple[int, int], int]:
+        """Place of each position component among the coordinates."""
+        c = self.coordinates
+        return {(int(c.bodies[k]), int(c.components[k])): k for k in range(c.n_positions)}
+
     def component(self, shape: Complex, body: int, component: int) -> complex:
         """Position component of a shape, 0 where the body is held or has none."""
-        c = self.coordinates
-        own = slice(0, c.n_positions)
-        found = np.flatnonzero((c.bodies[own] == body) & (c.components[own] == component))
-        return complex(shape[found[0]]) if len(found) else 0j
+        place = self._places.get((body, component))
+        return 0j if place is None else complex(shape[place])
 
     def bogie_of(self, body: int) -> str:
         """First part of a body's dotted name."""
@@ -92,7 +96,7 @@ def parts_of(model: Model, coordinates: Coordinates) -> Parts:
     rolling = {int(b) for b in np.flatnonzero((bodies.kind == WHEELSET) | (bodies.kind == AXLEBOX))}
     pairs = [*model.system.links.body.tolist(), *model.system.mounts.body.tolist()]
     carried = {a for pair in pairs for a, b in (pair, pair[::-1]) if b in rolling} - rolling
-    rigid = [int(b) for b in np.flatnonzero(bodies.kind == RIGID)]
+    rigid = [int(b) for b in np.flatnonzero((bodies.kind == RIGID) | (bodies.kind == FIXED))]
     cars = [b for b in rigid if b not in carried]
     if not cars and rigid:
         heaviest = max(float(bodies.mass[b]) for b in rigid)

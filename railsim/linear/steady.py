@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.internal import AIR
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import RATE, REFERENCE_MASS
 from railsim.kernels.system import AXLEBOX, WHEELSET, System
@@ -80,8 +80,6 @@ class SteadyRolling:
         )
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
-        self._derivative = np.zeros(model.n_state)
-        self._trial = np.zeros(model.n_state)
         self._unknowns, self._equations, self._inertias = _conditions(model, system, held)
         bodies = system.bodies
         self._rigid = np.flatnonzero(bodies.kind != AXLEBOX)
@@ -126,13 +124,16 @@ class SteadyRolling:
         NotConverged
             The state lies outside the range of the model.
         """
-        status, where, self.patches = right_hand_side(
-            self.system, self.work, state, self._derivative
-        )
+        return np.asarray(self._evaluated(state[None])[0])
+
+    def _evaluated(self, states: Floats) -> Floats:
+        """Derivatives of several states, one a row."""
+        derivatives = np.empty_like(states)
+        status, where, self.patches = right_hand_sides(self.system, self.work, states, derivatives)
         if status != RUNNING:
             sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
             raise NotConverged(f"no steady state: {sentence}")
-        return self._derivative
+        return derivatives
 
     def prepared(self, guess: Floats, speed: float) -> Floats:
         """Return a guess with the velocities of steady rolling at a speed [m/s]."""
@@ -145,31 +146,33 @@ class SteadyRolling:
         rolling = -speed / self.system.bodies.radius[self._wheelsets]
         state[spins] = guess[spins] * speed / before if np.all(guess[spins]) else rolling
         self.evaluate(state)  # the frames
-        self._turn_with_frames(state)
+        self._turn_with_frames(state[None])
         return state
 
-    def _turn_with_frames(self, state: Floats) -> None:
-        """Set u = C^T w_F of all bodies, of wheelsets but for the spin."""
+    def _turn_with_frames(self, states: Floats) -> None:
+        """Set u = C^T w_F of all bodies in several states, of wheelsets but for the spin."""
         n = self.model.index.n_bodies
-        omega = state[-1] * self.work.frames[self._frames, OMEGA : OMEGA + 3]
+        omega = states[0, -1] * self.work.frames[self._frames, OMEGA : OMEGA + 3]
         if not omega.any():
             return
-        angles = state[: 6 * n].reshape(n, 6)[self._rigid, 3:]
-        roll, pitch, yaw = angles.T
+        angles = states[:, : 6 * n].reshape(-1, n, 6)[:, self._rigid, 3:]
+        roll, pitch, yaw = np.moveaxis(angles, 2, 0)
         pitch = np.where(self._no_pitch, 0.0, pitch)
         x, y, z = omega.T
         x, y = np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
         y, z = np.cos(roll) * y + np.sin(roll) * z, np.cos(roll) * z - np.sin(roll) * y
         x, z = np.cos(pitch) * x - np.sin(pitch) * z, np.cos(pitch) * z + np.sin(pitch) * x
-        rates = state[6 * n : 12 * n].reshape(n, 6)
-        rates[self._rigid, 3] = x
-        rates[self._rigid, 4] = np.where(self._no_pitch, rates[self._rigid, 4], y)
-        rates[self._rigid, 5] = z
+        first = 6 * n + 6 * self._rigid
+        states[:, first + 3] = x
+        states[:, first + 4] = np.where(self._no_pitch, states[:, first + 4], y)
+        states[:, first + 5] = z
 
-    def _forces(self, state: Floats) -> Floats:
-        self._turn_with_frames(state)
-        found = self.evaluate(state)[self._equations] * self._inertias
-        return np.asarray(found)
+    def _forces(self, states: Floats) -> Floats:
+        """What is not balanced, of one state or of several, one a row."""
+        rows = np.atleast_2d(states)
+        self._turn_with_frames(rows)
+        found = self._evaluated(rows)[:, self._equations] * self._inertias
+        return np.asarray(found.reshape(*states.shape[:-1], -1))
 
     def _largest(self, forces: Floats) -> float:
         return float(np.max(np.abs(forces / self._inertias)))
@@ -188,14 +191,10 @@ class SteadyRolling:
         return better
 
     def _jacobian(self, state: Floats, forces: Floats) -> Floats:
-        trial = self._trial
-        columns = np.empty((len(forces), len(self._unknowns)))
-        for column, k in enumerate(self._unknowns):
-            step = STEP * max(1.0, abs(state[k]))
-            trial[:] = state
-            trial[k] += step
-            columns[:, column] = (self._forces(trial) - forces) / step
-        return columns
+        steps = STEP * np.maximum(1.0, np.abs(state[self._unknowns]))
+        trials = np.repeat(state[None], len(steps), axis=0)
+        trials[np.arange(len(steps)), self._unknowns] += steps
+        return np.asarray(((self._forces(trials) - forces) / steps[:, None]).T)
 
     def _line_search(
         self, state: Floats, forces: Floats, change: Floats
@@ -238,7 +237,7 @@ def _conditions(
     for body, kind in enumerate(bodies.kind):
         if kind == WHEELSET and held:
             continue
-        for component in (4,) if kind == AXLEBOX else range(6):
+        for component in components_of(int(kind)):
             if body in bodies.references and component == 0:
                 continue
             spin = kind == WHEELSET and component == 4

@@ -103,11 +103,18 @@ def jacobian(function: Callable[[Floats], Floats], state: Floats, steps: Floats)
     >>> jacobian(lambda x: np.array([x[0] * x[1]]), np.array([2.0, 3.0]), np.full(2, 1e-3))
     array([[3., 2.]])
     """
-    columns = []
-    for k, step in enumerate(steps):
-        trial = state.copy()
-        trial[k] = state[k] + step
-        ahead = function(trial)
-        trial[k] = state[k] - step
-        columns.append((ahead - function(trial)) / (2.0 * step))
-    return np.array(columns).T
+    return jacobian_of_rows(
+        lambda rows: np.array([function(row) for row in rows]), state, np.asarray(steps)
+    )
+
+
+def jacobian_of_rows(function: Callable[[Floats], Floats], state: Floats, steps: Floats) -> Floats:
+    """As `jacobian`, of a function that takes many states at once.
+
+    Parameters
+    ----------
+    function : callable
+        float64[k, n] to float64[k, m].
+    """
+    ahead, behind = (function(state + sign * np.diag(steps)) for sign in (1.0, -1.0))
+    return np.asarray(((ahead - behind) / (2.0 * steps[:, None])).T)

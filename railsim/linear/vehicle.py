@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, SharedTables, assemble
+from railsim.assembly import Model, SharedTables, assemble, check_fixed
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.internal import PAD
-from railsim.kernels.system import RIGID, System
+from railsim.kernels.system import FIXED, RIGID, System
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
@@ -137,6 +137,7 @@ class LinearVehicle:
         balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
+        self._remarks = balance.remarks
         _check_hold(self.model, hold)
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
@@ -144,12 +145,13 @@ class LinearVehicle:
         self._rest = balance.state.copy()
         self._rest[-2] = PLACE
         there = circle(track, curvature=self.curvature, cant=cant)
+        check_fixed(assembled.flat, there)
         self.system = self.model.system._replace(track=track_tables(there))
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a reader of the results must know."""
-        found = []
+        found = list(self._remarks)
         pads = np.flatnonzero(self.model.system.internal.kind == PAD)
         if len(pads):
             found.append(
@@ -210,7 +212,7 @@ def _check_hold(model: Model, hold: Sequence[str]) -> None:
     rigid = [
         name
         for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)
-        if kind == RIGID
+        if kind in (RIGID, FIXED)
     ]
     wrong = [name for name in hold if name not in rigid]
     if wrong:

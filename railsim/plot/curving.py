@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
-from railsim.plot.style import DISTINCT, styled, wheelset_colours
+from railsim.plot.style import DISTINCT, say, styled, wheelset_colours
 from railsim.stability.curving import Curving
 
 Floats = NDArray[np.float64]
@@ -16,6 +16,8 @@ Places = NDArray[np.intp]
 LEFT, RIGHT = 0, 1
 MAPS = 3  # maps of wear side by side at most
 NUMBERS = 80  # fields of a map in which numbers can be read
+EXAGGERATED = 30.0  # angles of attack and displacements of the drawn wheelsets
+HALF, WHEEL = 0.75, 0.46  # m, half the distance of the tape circles, radius of a wheel, as drawn
 WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 
 
@@ -30,14 +32,14 @@ def curving_figure(found: Curving, title: str) -> Figure:
     """
     with styled():
         mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
-        figure = Figure(figsize=(10.2, 10.6 if mapped else 7.4), layout="constrained")
+        heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
+        figure = Figure(figsize=(10.2, sum(heights)), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
-        upper: Figure | SubFigure = figure
+        rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+        _plan(figure.add_subfigure(rows[1]).subplots(), found)
         if mapped:
-            grid = figure.add_gridspec(2, 1, height_ratios=[7.4, 3.2])
-            upper = figure.add_subfigure(grid[0])
-            _wear_maps(figure.add_subfigure(grid[1]), found, np.argsort(found.radius))
-        axes = upper.subplots(2, 2)
+            _wear_maps(figure.add_subfigure(rows[2]), found, np.argsort(found.radius))
+        axes = figure.add_subfigure(rows[0]).subplots(2, 2)
         order = np.argsort(found.radius)
         radius = found.radius[order]
         outer = np.where(radius > 0.0, LEFT, RIGHT)
@@ -64,11 +66,13 @@ def curving_figure(found: Curving, title: str) -> Figure:
             axes[1, 0],
             found,
             order,
-            np.nansum(found.T_gamma, axis=(-2, -1)),
+            np.sum(found.T_gamma, axis=(-2, -1)),
             r"wear number $T_\gamma$ of all wheels (N)",
         )
         _steering(axes[1, 1], found, order)
         for one in axes.flat:
+            if not found.converged.any():
+                say(one, "no steady state at any point")
             one.set_xlabel("radius (m)")
             if np.min(radius) > 0.0 and np.max(radius) > WIDE * np.min(radius):
                 one.set_xscale("log")
@@ -155,8 +159,42 @@ def _lines(axes: Axes, found: Curving, order: Places, values: Floats, words: str
                 ms=6,
                 mfc="none",
                 color=DISTINCT[m % len(DISTINCT)],
+                label="by time integration" if timed.any() else None,
             )
     axes.set_title(words)
+
+
+def _plan(axes: Axes, found: Curving) -> None:
+    """Wheelsets on the unrolled track in the tightest curve, seen from above."""
+    there = found.converged[:, 0, 0] > 0
+    if not there.any():
+        say(axes, "no steady state at any radius for the first deficiency and friction")
+        return
+    r = int(np.argmin(np.where(there, np.abs(found.radius), np.inf)))
+    place = np.array(found.wheelset_position)
+    for y in (-HALF, HALF):
+        axes.axhline(y, color="0.75", lw=2.5, zorder=1)
+    colours = wheelset_colours(found.wheelsets)
+    for w, name in enumerate(found.wheelsets):
+        yaw = EXAGGERATED * found.attack[r, 0, 0, w]
+        middle = np.array([place[w], EXAGGERATED * found.lateral[r, 0, 0, w]])
+        along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+        ends = [middle - HALF * across, middle + HALF * across]
+        axes.plot(*np.transpose(ends), color=colours[name], lw=1.6, zorder=2)
+        for end in ends:
+            wheel = [end - WHEEL * along, end + WHEEL * along]
+            axes.plot(*np.transpose(wheel), color=colours[name], lw=4.0, zorder=3)
+    axes.set(
+        xlim=(np.min(place) - 2.0, np.max(place) + 2.0),
+        ylim=(1.9, -1.9),  # to the right is downwards
+        aspect="equal",
+        xticks=[],
+        yticks=[],
+        title=(
+            f"Wheelsets at R {found.radius[r]:g} m (first deficiency and friction) from above, "
+            f"running to the right; angle of attack and displacement {EXAGGERATED:g} times"
+        ),
+    )
 
 
 def _steering(axes: Axes, found: Curving, order: Places) -> None:

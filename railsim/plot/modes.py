@@ -10,16 +10,19 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from railsim.linear.modes import Mode, Modes, RootLocus
-from railsim.plot.style import DISTINCT, LIMIT, styled
+from railsim.plot.style import DISTINCT, LIMIT, say, styled
 
 Floats = NDArray[np.float64]
 
 SHOWN = 25.0  # Hz, oscillations up to which are drawn
 BARS = 14  # components of a shape that are drawn
 LEAST_BARS = 5  # rows of a shape, so that bars are of one height
+# by quarters of a period, to which a phase is nearest
 PHASES = {
     DISTINCT[0]: "in phase with the first component",
+    DISTINCT[2]: "a quarter ahead",
     DISTINCT[1]: "in opposite phase",
+    DISTINCT[5]: "a quarter behind",
     "0.6": "spin, which has no displacement",
 }
 DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
@@ -43,12 +46,17 @@ def locus_figure(locus: RootLocus, title: str) -> Figure:
         values = np.array(locus.values)
         eigenvalues = locus.eigenvalues
         chosen = _drawn(eigenvalues)
+        if not chosen:
+            say(plane, f"no oscillation below {SHOWN:g} Hz")
+            return figure
         colours = _colours(locus.names, chosen)
         for k in chosen:
             size = np.abs(eigenvalues[:, k])
             colour, width = colours[k]
             dashes = (0, (4, 2)) if width < 1.0 or locus.names[k][-1].isdigit() else "-"
             style: dict[str, Any] = {"color": colour, "lw": width, "ls": dashes}
+            if len(values) == 1:
+                style["marker"] = "o"
             label = locus.names[k] if width > 1.0 else None
             zeta = -eigenvalues[:, k].real / size
             damping.plot(values, 100.0 * zeta, label=label, **style)
@@ -87,11 +95,11 @@ def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> Non
 
 
 def _drawn(eigenvalues: NDArray[np.complex128]) -> list[int]:
-    """Modes that exist at two values at least and stay below `SHOWN`."""
+    """Modes that exist at two values at least (of several) and stay below `SHOWN`."""
     with np.errstate(invalid="ignore"):
         low = np.abs(eigenvalues) < 2.0 * np.pi * SHOWN
     there = np.isfinite(eigenvalues.real) & low
-    return [k for k in range(eigenvalues.shape[1]) if np.sum(there[:, k]) >= 2]
+    return [k for k in range(eigenvalues.shape[1]) if np.sum(there[:, k]) >= min(2, len(there))]
 
 
 def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str, float]]:
@@ -129,6 +137,9 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
         figure = Figure(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         grid = figure.add_gridspec(rows, 2)
+        if not drawn:
+            say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")
+            return figure
         for k, mode in enumerate(drawn):
             axes = figure.add_subplot(grid[k // 2, k % 2])
             _shape(axes, mode)
@@ -145,10 +156,10 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
 
 def _phase_colour(value: complex | None, reference: complex) -> str:
     """Colour of `PHASES`; the spin of a wheelset has a rate and no displacement."""
-    in_phase, opposite, unknown = PHASES
+    *quarters, unknown = PHASES
     if value is None:
         return unknown
-    return in_phase if (value * np.conj(reference)).real >= 0.0 else opposite
+    return quarters[round(float(np.angle(value * np.conj(reference))) / (0.5 * np.pi)) % 4]
 
 
 def _shape(axes: Axes, mode: Mode) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from railsim.plot.style import DISTINCT, LIMIT, styled
+from railsim.plot.style import DISTINCT, LIMIT, say, styled
 from railsim.stability.critical_speed import CriticalSpeed
 from railsim.stability.ramp import THRESHOLD, Diagram
 
@@ -72,13 +72,7 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
         figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
         axes = figure.subplots()
         if found.conicity_over_amplitude is None:
-            axes.text(
-                0.5,
-                0.5,
-                "the wheelset does not fit between the rails",
-                ha="center",
-                transform=axes.transAxes,
-            )
+            say(axes, "the wheelset does not fit between the rails")
         else:
             _conicity(axes, found.conicity_over_amplitude)
             axes.set(ylabel="amplitude of the wheelset (mm)", ylim=(0.0, SMALL_AMPLITUDES))
@@ -169,6 +163,9 @@ def map_figure(
                     label=words,
                 )
         axes.set(xlabel=names[0], ylabel="critical speed (m/s)")
+        if not any(np.isfinite(values).any() for values in speeds.values()):
+            say(axes, "no critical speed in the range at any point")
+            return figure
         axes.set_ylim(0.0, None)
         axes.legend()
     return figure

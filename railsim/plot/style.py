@@ -153,6 +153,12 @@ def shade(axes: Axes, shown: Sequence[Span], *, named: bool = False) -> None:
     axes.set_title(axes.get_title(loc="left"), pad=14.0)
 
 
+def say(axes: Axes, words: str) -> None:
+    """Write in the middle of axes why they are empty."""
+    axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes)
+    axes.set(xticks=[], yticks=[])
+
+
 def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a figure; the ending of the name says the format (.png, .svg, .pdf).
 

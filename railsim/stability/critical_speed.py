@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.drawn import Drawn
 from railsim.errors import Fault, InputError, ModelError
 from railsim.linear.eigenmodes import LossOfStability, loss_of_stability
 from railsim.linear.modes import SPEED_RANGE
@@ -37,7 +38,7 @@ ABOVE = 5.0  # m/s above the linear critical speed at which a ramp begins
 
 
 @dataclass
-class CriticalSpeed:
+class CriticalSpeed(Drawn):
     """Critical speeds of a vehicle.
 
     Attributes
@@ -70,6 +71,8 @@ class CriticalSpeed:
     instability_limit: dict[str, float] | None = None
     conicity_over_amplitude: dict[str, Any] | None = None
     remarks: list[str] = field(default_factory=list)
+
+    FIGURE: ClassVar = "railsim.plot.stability:bifurcation_figure"
 
     def record(self) -> dict[str, Any]:
         """Return everything as plain data."""

@@ -15,13 +15,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import GRAVITY, Model, assemble, work_arrays
+from railsim.assembly import GRAVITY, Model, assemble, check_fixed, work_arrays
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.drawn import Drawn
 from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST, time_loop
@@ -47,7 +49,7 @@ STILL = 1e-4  # share of the wheel loads by which forces still change after a se
 
 
 @dataclass(frozen=True)
-class Curving:
+class Curving(Drawn):
     """Steady curving on a grid.
 
     Attributes
@@ -74,6 +76,10 @@ class Curving:
         Roll of the (first) car body against the track [rad].
     wheelsets, bogies : tuple of str
         Names.
+    wheelset_position : tuple of float
+        Places of the wheelsets along the vehicle, against its reference body [m].
+    remarks : tuple of str
+        What a reader must know.
     """
 
     radius: Floats
@@ -95,7 +101,10 @@ class Curving:
     car_roll: Floats
     wheelsets: tuple[str, ...]
     bogies: tuple[str, ...]
+    wheelset_position: tuple[float, ...]
+    remarks: tuple[str, ...] = ()
 
+    FIGURE: ClassVar = "railsim.plot.curving:curving_figure"
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
     VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
         "Q": ("wheelset", "side"),
@@ -119,8 +128,10 @@ class Curving:
             "friction": self.friction.tolist(),
             "cant": self.cant,
             "wheelset": list(self.wheelsets),
+            "wheelset_position": list(self.wheelset_position),
             "side": ["left", "right"],
             "bogie": list(self.bogies),
+            "remarks": list(self.remarks),
             "speed": self.speed.tolist(),
             "converged": self.converged.tolist(),
             "dims": {name: [*self.DIMS, *dims] for name, dims in self.VALUES.items()},
@@ -287,9 +298,12 @@ class _Search:
         profiles: Mapping[str, Profile] | None,
     ) -> None:
         self.track, self.cant = track, cant
-        balance = equilibrium(assemble(vehicle, circle(track), settings, profiles), WALKING_PACE)
+        assembled = assemble(vehicle, circle(track), settings, profiles)
+        check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
+        balance = equilibrium(assembled, WALKING_PACE)
         self.model: Model = balance.model
         self.Q0 = balance.Q0
+        self.remarks = (*balance.remarks, *_remarks(balance.model))
         self.parts = parts_of(self.model, coordinates(self.model))
         rest = balance.state.copy()
         rest[-2] = PLACE
@@ -406,6 +420,17 @@ class _Search:
         }
 
 
+def _remarks(model: Model) -> tuple[str, ...]:
+    """What steady states leave out."""
+    pads = int(np.count_nonzero(model.system.internal.kind == PAD))
+    if not pads:
+        return ()
+    return (
+        f"{pads} friction elements hold nothing: what the way into the curve leaves in them, up to "
+        "their limits, is left out",
+    )
+
+
 def _contact_places(solver: SteadyRolling, wheelsets: int) -> Floats:
     """Place of each wheel's most loaded patch from the wheelset's middle [m]."""
     work = solver.work
@@ -447,5 +472,10 @@ def _gathered(
         converged,
         wheelsets=index.wheelsets,
         bogies=tuple(index.bodies[b] for b in search.parts.frames),
+        wheelset_position=tuple(
+            float(search.model.system.frame_offset[search.model.system.bodies.frame[b]])
+            for b in search.parts.wheelsets
+        ),
+        remarks=search.remarks,
         **arrays,
     )

@@ -126,3 +126,21 @@ def test_a_root_locus_as_named_arrays():
     there = locus.sets[1].modes[locus.names.index("front hunting")]
     assert float(mode["damping_ratio"]) == pytest.approx(there.damping_ratio)
     assert float(mode["frequency"]) == pytest.approx(there.frequency)
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        lambda coach: railsim.modes(coach),
+        lambda coach: railsim.root_locus(coach, speeds=[20.0, 25.0]),
+        lambda coach: railsim.curving(coach, radius=[600.0]),
+        lambda coach: railsim.critical_speed(coach, methods=("linear",), low=20.0, high=30.0),
+    ],
+)
+def test_results_draw_themselves(found, tmp_path):
+    result = found(railsim.load_vehicle("coach_manchester"))
+    figure = result.plot(tmp_path / "picture.png", title="What was analysed")
+    assert "What was analysed" in (figure._suptitle or figure.axes[0].title).get_text()
+    assert (tmp_path / "picture.png").stat().st_size > 1000
+    with pytest.raises(railsim.InputError, match="exists"):
+        result.plot(tmp_path / "picture.png")

@@ -1,0 +1,52 @@
+"""Results that draw themselves.
+
+Analyses lie below pictures and know none of them: the function that draws a result is named, and
+looked up when a picture is asked for.
+"""
+
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Drawn:
+    """A result with a picture of its own.
+
+    Attributes
+    ----------
+    FIGURE : str
+        Function of result and title that draws it, as ``module:name``.
+    """
+
+    FIGURE: ClassVar[str]
+
+    def plot(
+        self, path: str | Path | None = None, *, title: str = "", overwrite: bool = False
+    ) -> "Figure":
+        """Draw the result.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            Where the picture is written too; the suffix tells its kind.
+        title : str
+            What was analysed.
+        overwrite : bool
+            Whether a file may be replaced.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError
+            The file exists or cannot be written.
+        """
+        figure: Figure = resolve_name(self.FIGURE)(self, title)
+        if path is not None:
+            resolve_name("railsim.plot.style:save")(figure, Path(path), overwrite=overwrite)
+        return figure

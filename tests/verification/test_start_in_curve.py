@@ -1,0 +1,100 @@
+"""A run that begins in a curve in its steady state: what a long run-in comes to."""
+
+import numpy as np
+import pytest
+from dynamics import load_vehicle
+from rig import test_vehicle
+
+import railsim
+from railsim import run_in
+from railsim.assembly import assemble, work_arrays
+from railsim.definitions.settings import Settings
+from railsim.equilibrium import equilibrium
+from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.wheel_rail import W_Q, W_Y
+from railsim.linear.steady import NotConverged
+
+STEADY = Settings(start_state="steady")
+SPEED = 20.0
+LONG = 40.0  # s in the curve: the slowest mode, the car's sway, decays with 0.25 1/s at least
+
+
+def curve(support, radius=250.0):
+    """A long curve with cant."""
+    track = railsim.load_track("curve_r250").replace(
+        plan=[{"type": "CIR", "length": 400.0, "radius": radius}],
+        cant=[{"type": "CST", "length": 400.0, "cant": np.copysign(0.15, radius)}],
+    )
+    return track.replace(support={"preset": "rigid"}) if support == "rigid" else track
+
+
+def started(vehicle, track, remark=None):
+    """Wheel forces and internal states where a run begins, each over its own scale."""
+    balance = equilibrium(assemble(vehicle, track, Settings()), SPEED)
+    model = balance.model
+    state = run_in.start_state(model, balance, track, 200.0, 1e-3, 0, None, remark)
+    work, derivative = work_arrays(model.system), np.zeros_like(state)
+    right_hand_side(model.system, work, state, derivative)
+    inner = slice(12 * model.index.n_bodies, 12 * model.index.n_bodies + len(work.drive))
+    return work.wheel[:, :, [W_Q, W_Y]] / balance.Q0.mean(), state[inner] / balance.Q0.mean()
+
+
+@pytest.mark.parametrize(
+    ("name", "support", "radius"),
+    [("coach_manchester", "rigid", -400.0), ("coach_flexicoil", "elastic", 300.0)],
+)
+def test_steady_start_is_the_end_of_a_long_run_in(name, support, radius, monkeypatch):
+    """Forces of wheels and dampers within 1e-4 of the wheel load; exp(-0.25 * 40) is 5e-5."""
+    monkeypatch.setattr(run_in, "TIMES", (4.0, LONG))
+    vehicle, track, remarks = load_vehicle(name), curve(support, radius), []
+    newton, run = started(vehicle, track, remarks.append), started(vehicle, track)
+    assert not remarks
+    for one, other in zip(newton, run, strict=True):
+        assert one == pytest.approx(other, abs=1e-4)
+
+
+def test_nothing_moves_in_a_run_from_the_steady_state():
+    """1 s on elastic rails; 1e-5 of the static wheel load is what Newton's method leaves."""
+    result = railsim.simulate(
+        load_vehicle("coach_manchester"),
+        curve("elastic", 500.0),
+        speed=SPEED,
+        start=100.0,
+        duration=1.0,
+        settings=STEADY,
+    )
+    assert result.remarks == ()
+    for values in (result.Q, result.Y):
+        assert np.max(np.ptp(values, axis=0)) < 1e-5 * np.max(result.Q0)
+
+
+def test_where_newton_fails_the_run_in_is_used_which_is_said(monkeypatch):
+    """The same state as without asking for the steady one, and a remark."""
+
+    def failed(*_):
+        raise NotConverged("no steady state; it was not looked for")
+
+    monkeypatch.setattr(run_in, "led", failed)
+    monkeypatch.setattr(run_in, "TIMES", (1.0, 1.0))
+    vehicle, track, remarks = load_vehicle("coach_manchester"), curve("rigid", 600.0), []
+    assert np.array_equal(started(vehicle, track, remarks.append)[0], started(vehicle, track)[0])
+    assert remarks == [
+        "The run begins with a run-in, as Newton's method found no steady state; "
+        "it was not looked for."
+    ]
+
+
+def test_friction_elements_need_their_run_in(monkeypatch):
+    """What they hold depends on the way into the curve."""
+    monkeypatch.setattr(run_in, "TIMES", (1.0, 1.0))
+    remarks = []
+    started(test_vehicle("two_axle_wagon"), curve("rigid", 600.0), remarks.append)
+    assert remarks == [
+        "The run begins with a run-in: what friction elements hold depends on the way there."
+    ]
+
+
+def test_curving_without_the_forces_of_friction_elements_says_so():
+    """Newton's method knows no way into the curve."""
+    found = railsim.curving(test_vehicle("two_axle_wagon"), radius=[600.0])
+    assert any("friction elements hold nothing" in remark for remark in found.remarks)
