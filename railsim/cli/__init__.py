@@ -33,6 +33,7 @@ COMMANDS = {
     "plot": ("plot", "Time histories of a result; a track in plan."),
     "animate": ("animate", "A vehicle and its contacts moving along the track."),
     "report": ("report", "One page of inputs, tables against limits and plots."),
+    "export": ("export", "A result as CSV, for MATLAB, or as Parquet."),
     "assess": ("assess", "Running safety and ride comfort of results."),
     "modes": ("modes", "Eigenfrequencies, damping and mode shapes of a vehicle."),
     "critical-speed": ("critical_speed", "Linear and non-linear critical speed."),

@@ -11,6 +11,23 @@ from railsim.text import printable
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+class Speed(click.ParamType):  # type: ignore[type-arg]
+    """A speed in m/s, or with a unit: ``72km/h``."""
+
+    name = "speed"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the speed in m/s."""
+        from railsim.units import number_with_unit
+
+        found = number_with_unit(str(value))
+        if found is not None:
+            return found
+        return float(click.FLOAT.convert(value, param, ctx))
+
+
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print a line, on stderr with `err`; what would steer the terminal is shown as its code."""
     click.echo(printable(str(text)), err=err)

@@ -92,12 +92,17 @@ def _description(
     from railsim.cli import describe
     from railsim.definitions.mechanism import Mechanism
     from railsim.definitions.spring import TrailingArmSuspension
+    from railsim.definitions.study import Study
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
     if isinstance(definition, Track):
         data = describe.track_data(definition, speeds)
         return data, describe.track_lines(definition, speeds)
+    if isinstance(definition, Study):
+        data = {"kind": kind, "runs": definition.runs, **definition.model_dump(exclude_none=True)}
+        lines = [f"{definition.name}: {definition.runs} runs", ""]
+        return data, lines + definition.to_toml().splitlines()
     if not isinstance(definition, Vehicle):
         data = {"kind": kind, **definition.model_dump()}
         if isinstance(definition, TrailingArmSuspension):

@@ -80,7 +80,8 @@ def command(
 def _result_figure(
     file: str, selections: tuple[str, ...], over: str, by: str, between: tuple[float, float] | None
 ) -> "Figure":
-    from railsim.plot.histories import STUDY, histories
+    from railsim.plot.histories import histories
+    from railsim.plot.selection import STUDY
     from railsim.result import open_run
 
     return histories(open_run(file), selections or STUDY, over=over, by=by, between=between)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    Speed,
     echo,
     json_option,
     load_option,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE")
 @click.argument("track", metavar="TRACK")
-@click.option("--speed", type=float, metavar="V", help="Speed in m/s.")
+@click.option("--speed", type=Speed(), metavar="V", help="Speed in m/s, or with a unit: 72km/h.")
 @click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
 @click.option("--start", type=float, metavar="S", help="Start in m along the track; default 0.")
 @click.option("--duration", type=float, metavar="T", help="Length of the run in s.")
@@ -182,7 +183,7 @@ def _checked(
 def result_record(result: "Result") -> dict[str, Any]:
     """Return what is printed of a result as plain numbers and strings, SI."""
     from railsim.result import mid_curves, peaks
-    from railsim.studies.summary import FACTS
+    from railsim.result.facts import FACTS
 
     return {
         **{name: result.attributes[name] for name in FACTS if name in result.attributes},

@@ -63,15 +63,27 @@ def _is_number(text: str) -> bool:
 
 
 @click.command(cls=ManyValues)
+@click.argument("file", required=False, metavar="[STUDY]")
 @click.option("--vehicles", multiple=True, metavar="F...", help="Vehicles: files or names.")
 @click.option("--tracks", multiple=True, metavar="F...", help="Tracks: files or names.")
-@click.option("--speeds", multiple=True, type=float, metavar="V...", help="Speeds in m/s.")
+@click.option(
+    "--speeds",
+    multiple=True,
+    metavar="V...",
+    help="Speeds in m/s, or with a unit (72km/h); ranges first:last:number.",
+)
 @click.option(
     "--grid",
     "grids",
     multiple=True,
     metavar="KEY.PATH=A,B,C...",
-    help="Values of further keys; paths begin with vehicle., track. or settings.",
+    help="Values of further keys, or ranges first:last:number; paths begin with vehicle., track. "
+    "or settings.",
+)
+@click.option(
+    "--quantities",
+    metavar="FILE.py:FUNCTION",
+    help="Function that is given each result and returns further numbers by their names.",
 )
 @click.option("--scenario", metavar="F", help="Scenario in place of tracks and speeds.")
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
@@ -102,24 +114,38 @@ def _is_number(text: str) -> bool:
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
 @click.option("--resume", is_flag=True, help="Continue the study in DIR; compute what has changed.")
 @overwrite_option
+@click.option(
+    "--keep",
+    default="all",
+    show_default=True,
+    metavar="WHAT",
+    help="all; summary: no result files; or quantities such as Q,Y,wheelset_*.",
+)
+@click.option("--compress", is_flag=True, help="Store arrays compressed, without loss.")
+@click.option("--single", is_flag=True, help="Store arrays with 4 bytes a number: 7 digits.")
 @click.option("--plots", is_flag=True, help="Plot every run, and the vehicles against each other.")
+@click.option("--report", is_flag=True, help="Write report.html into DIR, see `railsim report`.")
 @json_option
 @quiet_option
 def command(
+    file: str | None,
     vehicles: tuple[str, ...],
     tracks: tuple[str, ...],
-    speeds: tuple[float, ...],
+    speeds: tuple[str, ...],
     grids: tuple[str, ...],
     scenario: str | None,
     out: str,
     load: str | None,
     assignments: tuple[str, ...],
     resume: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
     **how: Any,
 ) -> int:
     """Run every combination of vehicles, tracks, speeds and the values of a grid.
+
+    They are given as options or by a STUDY file, which can also link and sample values.
 
     DIR receives one HDF5 file per run, summary.csv and study.json.  A finished run with the
     same inputs is not computed again, so the same command can be repeated after an interruption.
@@ -133,6 +159,7 @@ def command(
           --grid track.friction=0.3,0.4,0.5 --out friction
       railsim study --vehicles coach_manchester --tracks curve_r250 --speeds 20 \\
           --grid vehicle.bodies.carbody.mass=36e3,40e3,44e3,48e3 --together 8 --out mass
+      railsim study curving_reference --out reference --report
       railsim study --scenario en14363 --vehicles coach_manchester --out campaign
     """  # noqa: D301 - click reads the escape
     if scenario is not None:
@@ -142,7 +169,7 @@ def command(
             (tracks, speeds, grids),
             out,
             with_load(assignments, load, "vehicle."),
-            how,
+            {**how, "report": report, "file": file},
             resume=resume,
             as_json=as_json,
             quiet=quiet,
@@ -155,8 +182,12 @@ def command(
         "speeds": list(speeds),
         "grid": _grid(grids),
         "assignments": list(with_load(assignments, load, "vehicle.")),
-        **{name: how.pop(name) for name in ("settings", "start", "duration", "until")},
+        **{
+            name: how.pop(name) for name in ("settings", "start", "duration", "until", "quantities")
+        },
     }
+    if file is not None:
+        inputs = _of_file(file, inputs)
     base = Path.cwd()
     if resume and not any(inputs.values()):
         from railsim.studies.study import stored_inputs
@@ -171,13 +202,15 @@ def command(
                     ((),),
                     out,
                     tuple(stored.assignments),
-                    {**inputs, **how},
+                    {**inputs, **how, "report": report, "file": None},
                     resume=True,
                     as_json=as_json,
                     quiet=quiet,
                 )
         inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
-    else:
+        for name in ("keep", "compress", "single"):
+            how.pop(name)
+    elif file is None:
         _require(vehicles, tracks, speeds)
     # names of files in a study that goes on count from where it was started
     with chdir(base), progress_bar("study", quiet=quiet) as progress:
@@ -190,11 +223,53 @@ def command(
             **inputs,
             **how,
         )
+        page = _report(outcome) if report else None
     if as_json:
         print_json({"folder": str(outcome.folder), "runs": list(outcome.records)})
     else:
         _print_end(outcome)
+        if page is not None:
+            echo(str(page))
     return _status(outcome)
+
+
+def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the inputs of a study file, with the assignments of the command line after its own."""
+    from railsim.definitions.loading import load_study
+    from railsim.definitions.study import value_texts
+    from railsim.errors import Fault, InputError
+
+    both = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
+    faults = [
+        Fault(f"--{name}", "", "given together with a study file", "the file holds it")
+        for name in both
+        if given[name]
+    ]
+    if faults:
+        raise InputError(faults)
+    plan = load_study(file)
+    return {
+        "vehicles": list(plan.vehicles),
+        "tracks": list(plan.tracks),
+        "speeds": None if plan.speeds is None else value_texts(plan.speeds),
+        "grid": {key: value_texts(values) for key, values in plan.grid.items()},
+        "linked": [{k: value_texts(v) for k, v in table.items()} for table in plan.linked],
+        "sample": plan.sample,
+        "settings": plan.settings,
+        "start": plan.start,
+        "duration": plan.duration,
+        "until": plan.until,
+        "assignments": [*plan.assignments, *given["assignments"]],
+        "quantities": given["quantities"],
+    }
+
+
+def _report(outcome: "Outcome") -> Path:
+    from railsim.cli.report import write_report
+
+    path = outcome.folder / "report.html"
+    write_report([str(outcome.folder)], path)
+    return path
 
 
 def _campaign(
@@ -214,7 +289,10 @@ def _campaign(
     from railsim.errors import Fault, InputError
 
     taken = {"--tracks, --speeds, --grid": any(others)}
-    taken |= {f"--{n}": bool(how[n]) for n in ("start", "duration", "until", "settings", "plots")}
+    refused = ["start", "duration", "until", "settings", "plots", "report", "file", "quantities"]
+    refused += ["compress", "single"]
+    taken |= {f"--{n}": bool(how[n]) for n in refused}
+    taken["--keep"] = how["keep"] != "all"
     faults = [
         Fault(option, "", "given together with --scenario", "the scenario's file holds it")
         for option, given in taken.items()
@@ -247,7 +325,7 @@ def _grid(texts: tuple[str, ...]) -> dict[str, list[str]]:
     return grid
 
 
-def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[float, ...]) -> None:
+def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[str, ...]) -> None:
     from railsim.errors import Fault, InputError
 
     given = {"--vehicles": vehicles, "--tracks": tracks, "--speeds": speeds}

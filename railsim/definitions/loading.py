@@ -27,6 +27,7 @@ from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
 from railsim.definitions.overrides import apply_overrides, with_values
+from railsim.definitions.published import PUBLISHED_FORMAT, Published
 from railsim.definitions.scenario import SCENARIO_FORMAT, Scenario
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
@@ -36,6 +37,7 @@ from railsim.definitions.spring import (
     spring_faults,
     spring_remarks,
 )
+from railsim.definitions.study import STUDY_FORMAT, Study
 from railsim.definitions.track import TRACK_FORMAT, Track
 from railsim.definitions.vehicle import VEHICLE_FORMAT, Vehicle
 from railsim.errors import Fault, InputError
@@ -103,6 +105,8 @@ FORMATS: dict[str, Format] = {
     LIMITS_FORMAT: Format("limits", RunningLimits),
     SCENARIO_FORMAT: Format("scenario", Scenario),
     COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
+    PUBLISHED_FORMAT: Format("published", Published),
+    STUDY_FORMAT: Format("study", Study, free=("grid",)),
 }
 
 
@@ -195,6 +199,33 @@ def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -
 def load_comfort_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> ComfortLimits:
     """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
     return _loaded(ComfortLimits, _file_source(path, "limits"), overrides)
+
+
+def load_study(path: str | Path, overrides: Iterable[str] | str = ()) -> Study:
+    """Load a study file, or a shipped one by its name; as `load_vehicle`.
+
+    Names of files that lie beside it count from its folder.
+    """
+    source = _file_source(path, "study")
+    folder = Path(source.file).parent
+    data = source.data
+    for key in ("vehicles", "tracks"):
+        if isinstance(data.get(key), list):
+            data[key] = [_beside(folder, name) for name in data[key]]
+    if "settings" in data:
+        data["settings"] = _beside(folder, data["settings"])
+    return _loaded(Study, source, overrides)
+
+
+def _beside(folder: Path, name: Any) -> Any:
+    if isinstance(name, str) and name and (folder / name).is_file():
+        return str((folder / name).resolve())
+    return name
+
+
+def load_published(path: str | Path, overrides: Iterable[str] | str = ()) -> Published:
+    """Load published values, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(Published, _file_source(path, "published"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -1,6 +1,7 @@
 """Overrides: ``key.path=value`` as ``--set`` gives them, or keys and values of Python.
 
-Values of `--set` are TOML; what is no TOML is taken as text, so that ``rail=60E1`` needs no quotes.
+Values of `--set` are TOML; what is no TOML is a number with a unit (``5mm``) or text, so that
+``rail=60E1`` needs no quotes.  A path may be short where it is unique: ``primary.stiffness.x``.
 """
 
 import tomllib
@@ -11,9 +12,10 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from railsim.definitions.paths import descend, key_path
+from railsim.definitions.paths import descend, full_path, key_path
 from railsim.definitions.sources import Source, replace_origin
 from railsim.errors import Fault, InputError
+from railsim.units import number_with_unit
 
 OVERRIDE = "--set"
 
@@ -121,6 +123,8 @@ def _assign(
     path = key_path(key)
     if path[0] in free and len(path) > 2:
         path = [path[0], ".".join(path[1:-1]), path[-1]]
+    else:
+        path = full_path(source.data, path, dict(defaults))
     parent, last = descend(source.data, path, path[0] in free, dict(defaults))
     present = parent[last] if not isinstance(parent, dict) or last in parent else None
     parent[last] = read(present)
@@ -135,7 +139,7 @@ def _value(written: str, text_expected: bool) -> Any:
     except tomllib.TOMLDecodeError:
         if not written or written[0] in "[{\"'":
             raise KeyError(f"the value '{written[:60]}' is no TOML") from None
-        return written
+        return written if text_expected or (found := number_with_unit(written)) is None else found
     except (ValueError, RecursionError):  # an integer of 5000 digits, a thousand brackets
         raise KeyError(f"the value '{written[:60]}...' is out of range") from None
     return written if text_expected and not isinstance(value, str | list | dict) else value

@@ -1,15 +1,18 @@
 """Dotted paths into nested tables: ``bodies.carbody.mass``, ``placements.front.position.0``.
 
-Members of lists are named by their key `name`, else by their index from 0.  What a path does not
+Members of lists are named by their key `name`, else by their index from 0; those of three numbers
+also by the axes ``x``, ``y``, ``z``.  What a path does not
 find is a `KeyError` with a sentence for the user.
 """
 
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
 from typing import Any
 
 from railsim.errors import nearest
+
+AXES = ("x", "y", "z")
 
 
 def key_path(key: str) -> list[str]:
@@ -86,7 +89,76 @@ def _member(node: Any, part: str) -> str | int | None:
                 return index
         if part.isdecimal() and int(part) < len(node):
             return int(part)
+        if part in AXES and len(node) == len(AXES) and all(_is_number(value) for value in node):
+            return AXES.index(part)
     return None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]:
+    """Return the whole path of a short one: its parts in their order, others between them.
+
+    Parameters
+    ----------
+    data : dict
+        Tables as read.
+    path : sequence of str
+        Keys, the last of them the one that is meant.
+    defaults : dict, optional
+        As for `descend`.
+
+    Returns
+    -------
+    list of str
+        The path itself where it leads somewhere, or where nothing has these parts.
+
+    Raises
+    ------
+    KeyError : several keys have these parts.
+
+    Examples
+    --------
+    >>> axle = {"elements": {"primary": {"stiffness": [1.0, 2.0, 3.0]}}}
+    >>> full_path({"assemblies": {"axle": axle}}, ["primary", "stiffness", "x"])
+    ['assemblies', 'axle', 'elements', 'primary', 'stiffness', 'x']
+    """
+    whole = list(path)
+    if len(whole) < 2 or whole[0] in data or whole[0] in (defaults or {}):
+        return whole
+    found = [place for place in _places(data) if _holds(place, whole)]
+    if len(found) > 1:
+        shown = ", ".join(".".join(place) for place in found[:4])
+        raise KeyError(f"'{'.'.join(whole)}' is {len(found)} keys: {shown}")
+    return found[0] if found else whole
+
+
+def _places(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
+    """Yield the paths of all tables, lists and values."""
+    if isinstance(node, dict):
+        members = [(str(key), value) for key, value in node.items()]
+    elif isinstance(node, list):
+        vector = len(node) == len(AXES) and all(_is_number(value) for value in node)
+        names = AXES if vector else [
+            str(m["name"]) if isinstance(m, dict) and "name" in m else str(i)
+            for i, m in enumerate(node)
+        ]  # fmt: skip
+        members = list(zip(names, node, strict=True))
+    else:
+        return
+    for key, value in members:
+        yield [*before, key]
+        yield from _places(value, (*before, key))
+
+
+def _holds(place: Sequence[str], path: Sequence[str]) -> bool:
+    """Whether a place ends as a short path does and holds its other parts, in their order."""
+    if place[-1] != path[-1]:
+        return False
+    rest = iter(place)
+    return all(part in rest for part in path)
 
 
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:

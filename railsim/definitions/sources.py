@@ -25,6 +25,8 @@ FOLDERS = {
     "mechanism": "vehicles/mechanisms",
     "limits": "limits",
     "scenario": "scenarios",
+    "published": "published",
+    "study": "studies",
 }
 # Keys that hold the name of another file, relative to the file in which they stand.
 FILE_KEYS = {"profile", "rail", "file"}

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from railsim.definitions.layout import curvature_sections
 from railsim.errors import Fault, InputError
 from railsim.notation import QUANTITIES, Quantity
-from railsim.plot.selection import Line, Panel, panels
+from railsim.plot.selection import LIMITS, STUDY, Line, Panel, panels
 from railsim.plot.style import (
     DISTINCT,
     LIMIT,
@@ -28,12 +28,6 @@ from railsim.plot.style import (
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.text import unformatted
-
-STUDY = ("dQ_over_Q0", "sum_abs_Y", "Y_over_Q", "wheelset_roll", "wheelset_lateral", "wheelset_yaw")
-"""What is drawn unless told otherwise."""
-
-LIMITS = {"Y_over_Q": (0.8, "EN 14363: 0.8"), "dQ_over_Q0": (-0.6, "EN 14363: −60 %")}
-"""EN 14363 (2016): derailment quotient, on-track tests; wheel unloading, twisted track [SI]."""
 
 
 def histories(

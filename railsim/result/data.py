@@ -98,6 +98,18 @@ class Result:
         self._vehicle: Vehicle | None = None
         self._track: Track | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what `pickle` makes the result anew from: all arrays, read if need be."""
+        parts = (
+            {name: np.asarray(array) for name, array in self._arrays.items()},
+            dict(self._quantities),
+            dict(self._coordinates),
+            dict(self._attributes),
+            dict(self._profiles),
+            {group: dict(arrays) for group, arrays in self._groups.items()},
+        )
+        return _remade, (*parts, self._source)
+
     # -- the arrays ---------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Array:
@@ -417,6 +429,11 @@ class Result:
         frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))
         frame.attrs["units"] = units
         return frame
+
+
+def _remade(*parts: Any) -> Result:
+    """Return a result from its parts, see `Result.__reduce__`."""
+    return Result(*parts[:-1], source=parts[-1])
 
 
 class FrozenArrays(Mapping[str, Array]):

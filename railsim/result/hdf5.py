@@ -6,8 +6,9 @@ and components are dimension scales themselves; facts about the run are root att
 group ``profiles`` holds the points of every profile that was used, further groups hold arrays
 without dimensions of their own, such as the state at the end.
 
-Names are stored as fixed-length UTF-8 with the attribute ``_Encoding``: h5py, MATLAB's h5read and
-HDFView read them as they are, and xarray decodes them.  Attributes are variable-length UTF-8
+Names are stored as fixed-length ASCII, those that are not ASCII as UTF-8, with the attribute
+``_Encoding``: h5py, MATLAB's h5read, GNU Octave (ASCII only) and HDFView read them as they are, and
+xarray decodes them.  Attributes are variable-length UTF-8
 strings, which h5py returns as `str` and which may be longer than 64 kB, as an input text can be.
 
 A file is written under a hidden name beside its target and gets its own name only when it is whole
@@ -22,6 +23,7 @@ import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -51,6 +53,30 @@ _LOG = logging.getLogger(__name__)
 PEAKS = "peaks"  # group of largest and smallest values over all steps
 CHUNK_BYTES = 2**18
 ROWS_AT_ONCE = 2048  # of the coach 4 MB
+DOUBLE = ("time", "distance")
+
+
+@dataclass(frozen=True)
+class Storage:
+    """How arrays over time are stored.
+
+    Attributes
+    ----------
+    compress : bool
+        Compress without loss (deflate, bytes of numbers side by side).
+    single : bool
+        Numbers of 4 bytes, 7 digits, but for time and distance.
+    """
+
+    compress: bool = False
+    single: bool = False
+
+    def kind(self, name: str) -> type[np.floating[Any]]:
+        """Return the type of the numbers of a quantity."""
+        return np.float32 if self.single and name not in DOUBLE else np.float64
+
+
+PLAIN = Storage()
 
 
 class Hdf5Sink(SinkContext):
@@ -69,6 +95,8 @@ class Hdf5Sink(SinkContext):
         Root attributes to add to those of the run.
     option : str
         What the user knows the path by, for messages.
+    storage : Storage
+        Compression and precision.
 
     Raises
     ------
@@ -83,8 +111,10 @@ class Hdf5Sink(SinkContext):
         overwrite: bool = False,
         attributes: Attributes = NOTHING,
         option: str = "--out",
+        storage: Storage = PLAIN,
     ) -> None:
         self.path = Path(path)
+        self._storage = storage
         check_file(self.path, overwrite=overwrite, option=option)
         self._attributes = dict(attributes)
         self._overwrite = overwrite
@@ -131,7 +161,9 @@ class Hdf5Sink(SinkContext):
         """Create what is a function of time; with chunks that fit, where the length is known."""
         for name in sorted(self._blocks, key=lambda name: name != "time"):
             inner = self._blocks[name].shape[1:]
-            self._datasets[name] = _create(self._file, self._quantities[name], inner, length)
+            self._datasets[name] = _create(
+                self._file, self._quantities[name], inner, length, self._storage
+            )
 
     def append(self, chunk: Mapping[str, Array]) -> None:
         """See `Sink.append`; rows wait until they are worth writing."""
@@ -155,6 +187,7 @@ class Hdf5Sink(SinkContext):
         length = self._length + self._waiting
         for name, dataset in self._datasets.items():
             rows = self._blocks[name][: self._waiting]
+            rows = np.ascontiguousarray(rows, dtype=dataset.dtype)
             dataset.resize(length, axis=0)
             dataset[self._length : length] = rows
             self._crc[name] = zlib.crc32(rows.data, self._crc[name])
@@ -234,16 +267,35 @@ def _of_file(error: OSError | RuntimeError, path: Path) -> OSError | None:
     return OSError(number, os.strerror(number), str(path)) if number else None
 
 
-def write(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a result to a file; see `Result.to_hdf5`."""
-    with Hdf5Sink(path, overwrite=overwrite, option=str(path)) as sink:
-        sink.begin(result.coordinates, result.quantities.values())
-        sink.append({name: result[name] for name in timed(result.quantities)})
-        statics = {
-            name: result[name] for name in result if "time" not in result.quantities[name].dims
-        }
-        sink.close(result.attributes, statics, result.profiles, result.groups)
+def write(
+    result: Result,
+    path: str | Path,
+    *,
+    overwrite: bool = False,
+    names: Iterable[str] | None = None,
+    storage: Storage = PLAIN,
+) -> Path:
+    """Write a result to a file, or some of its quantities; see `Result.to_hdf5`."""
+    wanted = set(result if names is None else names)
+    chosen = {name: q for name, q in result.quantities.items() if name in wanted}
+    with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:
+        sink.begin(result.coordinates, chosen.values())
+        sink.append({name: result[name] for name in timed(chosen)})
+        statics = {name: result[name] for name in chosen if "time" not in chosen[name].dims}
+        sink.close(result.attributes, statics, result.profiles, _groups_of(result, chosen))
     return sink.path
+
+
+def _groups_of(result: Result, chosen: Mapping[str, Quantity]) -> dict[str, Mapping[str, Any]]:
+    """Return the groups of a result, with the peaks of chosen quantities only."""
+    groups: dict[str, Mapping[str, Any]] = dict(result.groups)
+    if PEAKS in groups:
+        groups[PEAKS] = {
+            name: array
+            for name, array in groups[PEAKS].items()
+            if name.removesuffix("_time").removesuffix("_distance") in chosen
+        }
+    return {group: arrays for group, arrays in groups.items() if arrays}
 
 
 def _stored(file: h5py.File, name: str, array: Any) -> h5py.Dataset:
@@ -255,7 +307,9 @@ def _stored(file: h5py.File, name: str, array: Any) -> h5py.Dataset:
 
 def _write_names(file: h5py.Group, dim: str, labels: Sequence[str]) -> None:
     encoded = [label.encode() for label in labels]
-    kind = h5py.string_dtype("utf-8", max((len(label) for label in encoded), default=1))
+    # GNU Octave reads no fixed-length UTF-8, and what is ASCII is the same in both
+    encoding = "ascii" if all(label.isascii() for label in labels) else "utf-8"
+    kind = h5py.string_dtype(encoding, max((len(label) for label in encoded), default=1))
     dataset = _stored(file, dim, np.array(encoded, dtype=kind))
     dataset.attrs["_Encoding"] = "utf-8"
     dataset.attrs["long_name"] = f"name of the {dim}"
@@ -263,7 +317,11 @@ def _write_names(file: h5py.Group, dim: str, labels: Sequence[str]) -> None:
 
 
 def _create(
-    file: h5py.File, quantity: Quantity, inner: tuple[int, ...], length: int | None
+    file: h5py.File,
+    quantity: Quantity,
+    inner: tuple[int, ...],
+    length: int | None,
+    storage: Storage,
 ) -> h5py.Dataset:
     """Create an empty dataset for a quantity that is a function of time.
 
@@ -283,8 +341,13 @@ def _create(
         shape=(0, *inner),
         maxshape=(None, *inner),
         chunks=(rows, *(max(1, size) for size in inner)),
-        dtype=np.float64,
+        dtype=storage.kind(quantity.name),
         fletcher32=True,
+        **(
+            {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+            if storage.compress
+            else {}
+        ),
     )
     if quantity.name == "time":
         dataset.make_scale("time")

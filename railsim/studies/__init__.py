@@ -3,10 +3,13 @@
 ==============  ===========================================================================
 `case.py`       `Case`: all that one run depends on, with its name and its key
 `points.py`     what each run is asked for, with a key, before anything is loaded
+`given.py`      definitions given in Python become files of the folder
+`rows.py`       values of grids, linked keys and samples
 `combine.py`    from lists and grids to cases; every fault of all of them at once
 `run.py`        a case becomes a file
 `execute.py`    cases over processes or a dask cluster
 `journal.py`    what is done, one line a run, appended
+`own.py`        own quantities by a Python function
 `summary.py`    ``summary.csv`` and ``study.json``
 `study.py`      `study`: the whole job
 ==============  ===========================================================================

@@ -14,12 +14,15 @@ from typing import Any, TypeVar
 from railsim.definitions.base import FileDefinition
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.overrides import OVERRIDE, split_overrides
+from railsim.definitions.study import Sample, value_texts
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.profiles.used import profile_faults
 from railsim.simulation import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
 from railsim.studies.points import Fingerprints, Grid, Overrides, Point, check_number, point_key
+from railsim.studies.rows import made_rows
+from railsim.units import ALLOWED
 
 T = TypeVar("T", bound=FileDefinition)
 LONGEST_NAME = 250  # bytes of a file's name, ending included; file systems allow 255
@@ -99,6 +102,12 @@ class Plan:
         Values, written as in a file, of further keys.
     settings, start, duration, until, assignments
         As in `load_case`, for all runs.
+    linked : sequence of mappings
+        Keys whose values go together, as `grid`; ``speed`` is that of the run.
+    sample : Sample, optional
+        Random values of further keys.
+    told : str
+        What else the record of a run depends on.
     workers : int
         Processes that will do the runs, for the time that a refused study would take.
 
@@ -124,6 +133,9 @@ class Plan:
         duration: float | None = None,
         until: float | None = None,
         assignments: Sequence[str] = (),
+        linked: Sequence[Grid] = (),
+        sample: Sample | None = None,
+        told: str = "",
         workers: int = 1,
     ) -> None:
         grid = grid or {}
@@ -131,26 +143,36 @@ class Plan:
             raise InputError(
                 [Fault("study", "", "no combination", "give a vehicle, a track, a speed")]
             )
-        self._grid, self._settings = grid, settings
+        self._grid, self._settings = (
+            {**grid, **{k: v for t in linked for k, v in t.items()}},
+            settings,
+        )
         self._start, self._duration, self._until = start, duration, until
         self._faults: dict[Fault, None] = {}
         self._loaded = cache(self._load)
         check_number(
-            [vehicles, tracks, speeds, *grid.values()],
+            [
+                vehicles,
+                tracks,
+                speeds,
+                *grid.values(),
+                *(next(iter(table.values())) for table in linked),
+                range(sample.number if sample else 1),
+            ],
             workers,
             lambda: self._simulated_time(tracks[0], speeds[0]),
         )
         common = self._split(assignments)
-        rows = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+        rows = made_rows(grid, linked, sample)
         # one and the same for all vehicles, tracks and speeds
-        own = [self._own(common, row) for row in rows]
-        suffixes = [_suffix(row) for row in rows]
+        own = [self._own(common, row.values) for row in rows]
         fingerprint = Fingerprints()
         self.points = []
         for vehicle, track, speed in product(vehicles, tracks, speeds):
             short = {"vehicle": short_name(vehicle), "track": short_name(track)}
-            for row, overrides, suffix in zip(rows, own, suffixes, strict=True):
-                first = self._first_speed(overrides["settings"], speed)
+            for row, overrides in zip(rows, own, strict=True):
+                asked = speed if row.speed is None else row.speed
+                first = self._first_speed(overrides["settings"], asked)
                 key = point_key(
                     fingerprint("vehicle", vehicle, overrides["vehicle"]),
                     fingerprint("track", track, overrides["track"]),
@@ -159,10 +181,11 @@ class Plan:
                     start,
                     duration,
                     until,
+                    *([f"told {told}"] if told else []),
                 )
-                name = run_name(vehicle, track, 0.0 if first is None else first) + suffix
-                told = math.nan if first is None else first
-                labels: dict[str, str | float] = {**short, "speed": told, **row}
+                name = run_name(vehicle, track, 0.0 if first is None else first) + row.suffix
+                known = math.nan if first is None else first
+                labels: dict[str, str | float] = {**short, "speed": known, **row.values}
                 self.points.append(Point(name, vehicle, track, first, overrides, labels, key))
 
     def cases(self, points: Sequence[Point]) -> list[Case]:
@@ -268,31 +291,6 @@ def _range_faults(
     return []
 
 
-def _suffix(point: Mapping[str, str]) -> str:
-    """Return what a point of the grid adds to the name of its run.
-
-    Examples
-    --------
-    >>> _suffix({"track.friction": "0.3", "settings.drive.speed_table.0.1": "12"})
-    '_friction=0.3_speed_table.0.1=12'
-    """
-    last = {key: re.sub(r"^.*\.(?=[^.]*[^.\d])", "", key) for key in point}
-    unique = len(set(last.values())) == len(last)
-    parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
-    return "".join("_" + in_a_name(part) for part in parts)
-
-
-def in_a_name(text: str) -> str:
-    """Return what a text is called within the name of a file, which leads to no other folder.
-
-    Examples
-    --------
-    >>> in_a_name("[10, 20]"), in_a_name("../other")
-    ('10-20', '..-other')
-    """
-    return re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", text))
-
-
 def name_faults(points: Sequence[Point]) -> list[Fault]:
     """Return what is wrong with the names of runs: two of a name, or too long for a file."""
     counts = Counter(point.name for point in points)
@@ -309,20 +307,28 @@ def name_faults(points: Sequence[Point]) -> list[Fault]:
 
 
 def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
-    """Return the key and the values of ``key.path=a,b,c``; commas within brackets do not part.
+    """Return the key and the values of ``key.path=a,b,c`` or ``key.path=first:last:number``.
+
+    Commas within brackets do not part values.
 
     Examples
     --------
     >>> parse_grid("settings.fastsim_grid=[10,10],[20,20]")
     ('settings.fastsim_grid', ('[10,10]', '[20,20]'))
+    >>> parse_grid("track.friction=0.1,0.2:0.4:3")
+    ('track.friction', ('0.1', '0.2', '0.3', '0.4'))
 
     Raises
     ------
     InputError : it is nothing of the kind.
     """
     key, equals, written = text.partition("=")
-    values = tuple(value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written))
+    values = [value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written)]
     if not (equals and key.strip() and all(values)):
         fault = Fault("--grid", text, "not understood", "allowed: key.path=a,b,c")
         raise InputError([fault])
-    return key.strip(), values
+    try:
+        found = tuple(one for value in values for one in value_texts(value))
+    except ValueError as error:
+        raise InputError([Fault("--grid", text, str(error), f"allowed: {ALLOWED}")]) from None
+    return key.strip(), found

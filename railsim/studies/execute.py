@@ -9,7 +9,9 @@ Processes whose study is no more end by themselves.
 import math
 import multiprocessing
 import os
+import secrets
 import signal
+import tempfile
 import threading
 import time
 import traceback
@@ -18,18 +20,19 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError, RailsimError, words_of
-from railsim.files import remove_partial_files, sweep
+from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.result import Result
 from railsim.studies.case import Case
 from railsim.studies.journal import Record
+from railsim.studies.keep import EVERYTHING, Keep
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import failed_record, finished_record
 from railsim.threads import one_thread_each
@@ -52,11 +55,17 @@ class Job:
         Result file; an existing one is replaced.
     picture : Path or None
         Figure of the result.
+    own : str or None
+        Function of own quantities, see `railsim.studies.own`.
+    keep : Keep
+        What is kept of the result.
     """
 
     case: Case
     path: Path
     picture: Path | None = None
+    own: str | None = None
+    keep: Keep = EVERYTHING
 
 
 Batch = tuple[Job, ...]
@@ -127,7 +136,8 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
             from railsim.plot.style import save
 
             save(histories(outcome), job.picture, overwrite=True)
-        return finished_record(job.case, outcome)
+        record = finished_record(job.case, outcome, job.own)
+        return {**record, "file": job.keep.applied(job.path, outcome)}
     except RailsimError as error:
         return failed_record(job.case, str(error))
     except OSError as error:
@@ -296,19 +306,80 @@ def cluster(address: str) -> Any:
 
 
 def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:
-    """Do batches on the workers of a dask cluster, which must see the folder under its path."""
+    """Do batches on the workers of a dask cluster.
+
+    A worker that sees the study's folder writes into it; from others the files come back with the
+    records.  What a worker that died was doing begins again on another one; a batch whose workers
+    have died several times (dask's ``allowed-failures``) is given up.
+    """
     from distributed import as_completed
 
-    with client:
-        futures = client.map(perform, list(batches), pure=False)
-        keys = [future.key for future in futures]
-        batch_of = dict(zip(keys, batches, strict=True))
-        share_of = dict(zip(keys, _shares(batches), strict=True))
+    folders = {job.path.parent for batch in batches for job in batch}
+    with client, _marks(folders) as mark:
+        futures = client.map(perform_there, list(batches), mark=mark, pure=False)
+        batch_of = {future.key: batch for future, batch in zip(futures, batches, strict=True)}
+        share_of = dict(zip(batch_of, _shares(batches), strict=True))
+        waiting = as_completed(futures)
+        del futures
         fraction = 0.0
-        for future in as_completed(futures):
-            yield from _outcome(future, batch_of[future.key])
+        for future in waiting:
+            yield from _taken(future, batch_of[future.key])
+            future.release()  # its files are no longer needed
             fraction += share_of[future.key]
             progress(min(1.0, fraction))
+
+
+@contextmanager
+def _marks(folders: set[Path]) -> Iterator[str]:
+    """Give the name of a file that stands in each folder within the block, for who sees it."""
+    mark = f".railsim-{secrets.token_hex(8)}"
+    try:
+        for folder in folders:
+            (folder / mark).touch()
+        yield mark
+    finally:
+        for folder in folders:
+            (folder / mark).unlink(missing_ok=True)
+
+
+def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, bytes]]:
+    """Do the jobs of a batch on a machine that may not see the study's folder.
+
+    Returns
+    -------
+    records : list of Record
+    files : dict of str to bytes
+        What the jobs have written, where the folder is not seen here.
+    """
+    if all((job.path.parent / mark).is_file() for job in batch):
+        return perform(batch), {}
+    with tempfile.TemporaryDirectory(prefix="railsim-") as folder:
+        here = tuple(
+            replace(
+                job,
+                path=Path(folder) / job.path.name,
+                picture=job.picture and Path(folder) / job.picture.name,
+            )
+            for job in batch
+        )
+        records = perform(here)
+        return records, {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+def _taken(future: Any, batch: Batch) -> list[Record]:
+    """Return the records of a batch of the cluster, its files written."""
+    folder = batch[0].path.parent
+    try:
+        records, files = future.result()
+        for name, data in files.items():
+            with whole_file(folder / name) as partial:
+                partial.write_bytes(data)
+    except OSError as error:
+        return [failed_record(job.case, words_of(error), errno=error.errno or 0) for job in batch]
+    except Exception as error:
+        return [failed_record(job.case, f"{type(error).__name__}: {error}") for job in batch]
+    found: list[Record] = records
+    return found
 
 
 def _outcome(future: Any, batch: Batch) -> list[Record]:

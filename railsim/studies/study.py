@@ -6,13 +6,19 @@ on where it was when it is started again.  What is done stands in the journal.
 
 import errno
 import logging
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
+from railsim.definitions.base import FileDefinition
+from railsim.definitions.settings import Settings
+from railsim.definitions.study import Sample, value_texts
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, is_file, make_folder, sweep
 from railsim.result import Result, open_result
@@ -27,17 +33,28 @@ from railsim.studies.execute import (
     in_this_process,
     on_cluster,
 )
+from railsim.studies.given import as_files
 from railsim.studies.journal import JOURNAL, Journal, Record, Records
+from railsim.studies.keep import ALL, EVERYTHING, Keep, parse_keep
+from railsim.studies.own import Function, fingerprint, named
 from railsim.studies.points import Point
+from railsim.studies.rows import speed_of
 from railsim.studies.summary import (
     Inputs,
     checked,
     finished_record,
     read_index,
+    summary_row,
+    unit_of,
     waiting_record,
     write_index,
 )
+from railsim.units import ALLOWED
 from railsim.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _LOG = logging.getLogger(__name__)
 MANY = 10_000  # runs from which on an index that is up to date is not made once more
@@ -78,18 +95,72 @@ class Outcome:
         return {
             record["name"]: open_result(self.folder / record["file"])
             for record in self.records
-            if record["status"] != "failed"
+            if record["status"] not in ("failed", "waiting") and record["file"]
         }
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """Return the summary, one row a run, as a `pandas.DataFrame` [SI].
+
+        Raises
+        ------
+        ImportError : pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError(
+                "to_dataframe needs pandas; install it with: pip install pandas"
+            ) from None
+        rows = [summary_row(record) for record in self.records]
+        frame = pandas.DataFrame(rows)
+        labels = [name for name in dict.fromkeys(n for r in self.records for n in r["labels"])]
+        for name in labels:  # values of a grid are texts, as in a file
+            with suppress(ValueError, TypeError):
+                frame[name] = pandas.to_numeric(frame[name])
+        return frame
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the numbers of the summary as an `xarray.Dataset` with the grid as dimensions.
+
+        Dimensions are what differs between the runs; where these are no full grid, as with a
+        sample, the dimension is ``run``.  Each variable has its ``units``.
+
+        Raises
+        ------
+        ImportError : pandas or xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(
+                "to_xarray needs xarray; install it with: pip install 'railsim[xarray]'"
+            ) from None
+        frame = self.to_dataframe()
+        labels = list(dict.fromkeys(name for record in self.records for name in record["labels"]))
+        varied = [name for name in labels if frame[name].nunique(dropna=False) > 1]
+        numbers = frame.select_dtypes("number").columns.difference(labels, sort=False)
+        full = math.prod(frame[name].nunique() for name in varied) == len(frame)
+        if varied and full and not frame.duplicated(varied).any():
+            data = xarray.Dataset.from_dataframe(frame.set_index(varied)[list(numbers)])
+        else:
+            indexed = frame.set_index("name").rename_axis("run")
+            data = xarray.Dataset.from_dataframe(indexed[[*varied, *numbers]]).set_coords(varied)
+        for name in data:
+            data[name].attrs["units"] = unit_of(str(name)) or "1"
+        return data
 
 
 def study(
-    vehicles: Sequence[str | Path] | str | Path,
-    tracks: Sequence[str | Path] | str | Path,
-    speeds: Sequence[float] | float,
+    vehicles: Sequence[str | Path | Vehicle] | str | Path | Vehicle,
+    tracks: Sequence[str | Path | Track] | str | Path | Track,
+    speeds: Sequence[float | None] | float | str | None,
     *,
     out: str | Path,
-    grid: Mapping[str, Iterable[object] | float] | None = None,
-    settings: str | Path | None = None,
+    grid: Mapping[str, Iterable[object] | float | str] | None = None,
+    linked: Sequence[Mapping[str, Iterable[object] | str]] = (),
+    sample: Sample | Mapping[str, Any] | None = None,
+    quantities: str | Function | None = None,
+    settings: str | Path | Settings | None = None,
     start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
@@ -100,6 +171,9 @@ def study(
     resume: bool = False,
     overwrite: bool = False,
     plots: bool = False,
+    keep: str = ALL,
+    compress: bool = False,
+    single: bool = False,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
@@ -108,16 +182,25 @@ def study(
 
     Parameters
     ----------
-    vehicles, tracks : sequence of str or Path, or a single one
-        Files, or names of shipped ones.
-    speeds : sequence of float, or a single one
-        Speeds [m/s].
+    vehicles, tracks : sequence of str, Path or definition, or a single one
+        Files, names of shipped ones, or `Vehicle` and `Track`, which are written into ``inputs/``
+        of the folder.
+    speeds : sequence of float, a single one, or a range such as ``"15:25:11"``; None
+        Speeds [m/s]; None where the settings have a speed table, or `linked` or `sample` vary
+        ``speed``.
     out : str or Path
         Folder of the study; made if need be.
     grid : mapping of str to values, optional
-        Values of further keys, ``{"track.friction": [0.3, 0.4]}``.
-    settings : str or Path, optional
-        Settings file for all runs.
+        Values of further keys, ``{"track.friction": [0.3, 0.4]}`` or ``"0.2:0.5:4"``.
+    linked : sequence of mappings, optional
+        Keys whose values go together, the first of one with the first of the others.
+    sample : Sample or mapping, optional
+        Random values of further keys, as the table ``sample`` of a study file.
+    quantities : callable or str, optional
+        Function of the result that returns further numbers by their names, or
+        ``FILE.py:FUNCTION``.
+    settings : str, Path or Settings, optional
+        Settings for all runs.
     start : float
         Distance at which all runs start [m].
     duration, until : float, optional
@@ -137,6 +220,11 @@ def study(
         Compute everything again.
     plots : bool
         Draw every run, and the vehicles against each other.
+    keep : str
+        ``all``; ``summary``, no result files; or names of quantities with commas between, ``*``
+        standing for any letters.  Summaries are made before anything is left out.
+    compress, single : bool
+        Store arrays compressed, and with 4 bytes a number.
     progress : callable, optional
         Called with the finished fraction now and then.
     on_record : callable, optional
@@ -167,13 +255,23 @@ def study(
     """
     folder = Path(out)
     check_folder(folder)
-    vehicles, tracks, speeds = _several(vehicles), _several(tracks), _several(speeds)
-    written = {key: [str(v) for v in _several(values)] for key, values in (grid or {}).items()}
+    kept = parse_keep(keep, compress=compress, single=single)
+    vehicles = as_files(_several(vehicles), folder)
+    tracks = as_files(_several(tracks), folder)
+    (settings,) = as_files([settings], folder)
+    speeds = _speeds(speeds)
+    written = _written("grid", grid or {})
+    tables = [_written("linked", table) for table in linked]
+    drawn = None if sample is None else _sample(sample)
+    own = named(quantities)
     plan = Plan(
         vehicles,
         tracks,
         speeds,
         written,
+        linked=tables,
+        sample=drawn,
+        told=fingerprint(own),
         settings=settings,
         start=start,
         duration=duration,
@@ -188,6 +286,12 @@ def study(
         "tracks": [str(track) for track in tracks],
         "speeds": list(speeds),
         "grid": written,
+        "linked": tables,
+        "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
+        "quantities": own,
+        "keep": keep,
+        "compress": compress,
+        "single": single,
         "settings": None if settings is None else str(settings),
         "start": start,
         "duration": duration,
@@ -195,9 +299,9 @@ def study(
         "assignments": list(assignments),
     }
     outcome = carry_out(
-        plan, inputs, folder, workers=workers, together=together, scheduler=scheduler,
-        resume=resume, overwrite=overwrite, plots=plots, progress=progress, on_record=on_record,
-        on_remark=on_remark,
+        plan, inputs, folder, own=own, keep=kept, workers=workers, together=together,
+        scheduler=scheduler, resume=resume, overwrite=overwrite, plots=plots, progress=progress,
+        on_record=on_record, on_remark=on_remark,
     )  # fmt: skip
     if plots:
         from railsim.studies.pictures import draw
@@ -233,6 +337,8 @@ def carry_out(
     overwrite: bool = False,
     plots: bool = False,
     longest_first: bool = False,
+    own: str | None = None,
+    keep: Keep = EVERYTHING,
     progress: Callable[[float], None] | None = None,
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
@@ -247,6 +353,10 @@ def carry_out(
         What was asked for, as the journal and the index keep it, see `Inputs`.
     longest_first : bool
         Begin with the longest runs, so that no core is left with one of them at the end.
+    own : str, optional
+        Function of own quantities, see `railsim.studies.own`.
+    keep : Keep
+        What is kept of each result.
 
     Others as in `study`.
     """
@@ -256,7 +366,7 @@ def carry_out(
             known = stack.enter_context(Journal(folder))
         if not (resume or overwrite):
             _refuse_another_study(folder, known, inputs)
-        state = _State(folder, plan, known, resume=resume, overwrite=overwrite)
+        state = _State(folder, plan, known, own, keep, resume=resume, overwrite=overwrite)
         client = None if scheduler is None else cluster(scheduler)
         make_folder(folder)
         sweep(folder)
@@ -269,7 +379,7 @@ def carry_out(
         remark = on_remark or _LOG.warning
         for text in state.settle(journal):
             remark(text)
-        jobs = [_job(case, folder, plots) for case in state.cases]
+        jobs = [_job(case, folder, plots, own, keep) for case in state.cases]
         if longest_first:
             jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
         keys = {point.name: point.key for point in plan.points}
@@ -279,7 +389,8 @@ def carry_out(
                 with suppress(FileNotFoundError):  # it would be out of date
                     (folder / "study.json").unlink()
             for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
-                file = folder / record["file"] if record["status"] != "failed" else None
+                there = record["status"] != "failed" and record["file"]
+                file = folder / record["file"] if there else None
                 journal.add(record, keys[record["name"]], None if file is None else file.stat())
                 if on_record is not None:
                     on_record(record)
@@ -314,9 +425,17 @@ class _State:
     """
 
     def __init__(
-        self, folder: Path, plan: Runs, known: Journal | None, *, resume: bool, overwrite: bool
+        self,
+        folder: Path,
+        plan: Runs,
+        known: Journal | None,
+        own: str | None,
+        keep: Keep,
+        *,
+        resume: bool,
+        overwrite: bool,
     ) -> None:
-        self._folder, self._plan = folder, plan
+        self._folder, self._plan, self._own, self._keep = folder, plan, own, keep
         self._entries = dict(known.entries) if known and not overwrite else {}
         self._there = {} if overwrite else _files(folder)
         self._damaged: dict[Path, str] = {}
@@ -341,6 +460,8 @@ class _State:
         entry = self._entries.get(point.name)
         if entry is None or entry.status in ("failed", "waiting") or not point.key:
             return False
+        if not entry.size and not self._keep.summary:  # the summary was kept, the file is wanted
+            return False
         return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
 
     def _look_at(self, point: Point, case: Case) -> list[Fault]:
@@ -349,7 +470,7 @@ class _State:
         try:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
-                self.found.append((point, finished_record(case, result)))
+                self.found.append((point, finished_record(case, result, self._own)))
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
@@ -364,7 +485,11 @@ class _State:
         if self._lines:
             remarks.append(f"{self._lines} damaged lines of {JOURNAL} are left out")
         for point, record in self.found:
-            journal.add(record, point.key, self._there[record["file"]])
+            if self._keep.summary:
+                (self._folder / record["file"]).unlink()
+                journal.add({**record, "file": ""}, point.key, None)
+            else:
+                journal.add(record, point.key, self._there[record["file"]])
         for path, words in self._damaged.items():
             kept = path.with_name(f"{path.name}.damaged")
             os.replace(path, kept)
@@ -442,12 +567,50 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
 
 def _several(values: Any) -> list[Any]:
     """Return values as a list, also where a single one is given."""
-    return [values] if isinstance(values, str | Path | float | int) else list(values)
+    single = isinstance(values, str | Path | float | int | FileDefinition)
+    return [values] if single else list(values)
 
 
-def _job(case: Case, folder: Path, plots: bool) -> Job:
+def _speeds(speeds: Any) -> list[float | None]:
+    """Return speeds as numbers; those of a range, and with units [m/s]."""
+    if speeds is None:
+        return [None]
+    found: list[float | None] = []
+    for speed in _several(speeds):
+        if isinstance(speed, str):
+            found += [speed_of(text) for text in _texts("speeds", speed)]
+        else:
+            found.append(speed)
+    return found
+
+
+def _written(what: str, values: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return values of keys as they are written in assignments."""
+    found = {}
+    for key, given in values.items():
+        found[key] = [text for value in _several(given) for text in _texts(f"{what} {key}", value)]
+    return found
+
+
+def _texts(what: str, value: Any) -> list[str]:
+    try:
+        return value_texts(value if isinstance(value, str) else (_plain(value),))
+    except ValueError as error:
+        raise InputError([Fault(what, "", str(error), f"allowed: {ALLOWED}")]) from None
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers of numpy as Python's own."""
+    return value.item() if hasattr(value, "item") and not isinstance(value, str) else value
+
+
+def _sample(given: Sample | Mapping[str, Any]) -> Sample:
+    return given if isinstance(given, Sample) else checked(Sample, dict(given), "sample")
+
+
+def _job(case: Case, folder: Path, plots: bool, own: str | None, keep: Keep) -> Job:
     path = (folder / case.file_name).resolve()
-    return Job(case, path, path.with_suffix(".png") if plots else None)
+    return Job(case, path, path.with_suffix(".png") if plots else None, own, keep)
 
 
 def _executed(

@@ -7,6 +7,7 @@ from the journal (`railsim.studies.journal`) when the study ends or is interrupt
 
 import csv
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
@@ -15,19 +16,20 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from railsim.errors import Fault, InputError
 from railsim.files import is_file, read_text, whole_file
-from railsim.result import Result, mid_curves, peaks
+from railsim.notation import QUANTITIES
+from railsim.result import Result
+from railsim.result.facts import FACTS, run_facts
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Record, Records
+from railsim.studies.own import own_quantities
 from railsim.text import spreadsheet_cell
 
 M = TypeVar("M", bound=BaseModel)
 INDEX_BYTES = 500_000_000
 MOST_FAULTS = 20
+UNITS = {"speed": "m/s", "step": "s", "wall_time": "s", "cpu_time": "s"}
+_COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*)(?:_(time|distance))?")
 FORMAT = "railsim-study-result/1"
-FACTS = (
-    "status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor",
-    "patches_out_of_range",
-)  # fmt: skip
 
 
 def waiting_record(case: Case) -> Record:
@@ -42,15 +44,16 @@ def waiting_record(case: Case) -> Record:
     }
 
 
-def finished_record(case: Case, result: Result) -> Record:
-    """Return the record of a run that has its result."""
-    return {
-        **waiting_record(case),
-        **{name: result.attributes[name] for name in FACTS if name in result.attributes},
-        "remarks": list(result.remarks),
-        "peaks": [peak.record() for peak in peaks(result)],
-        "mid_curves": [curve.record() for curve in mid_curves(result)],
-    }
+def finished_record(case: Case, result: Result, own: str | None = None) -> Record:
+    """Return the record of a run that has its result, with the quantities of its own function.
+
+    Raises
+    ------
+    RailsimError : that function goes wrong.
+    """
+    found = own_quantities(own, result)
+    facts = {**waiting_record(case), **run_facts(result)}
+    return {**facts, "quantities": found} if own else facts
 
 
 def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
@@ -91,6 +94,12 @@ class Inputs(BaseModel):
     tracks: list[str]
     speeds: list[float | None]
     grid: dict[str, list[str]] = {}
+    linked: list[dict[str, list[str]]] = []
+    sample: dict[str, Any] | None = None
+    quantities: str | None = None
+    keep: str = "all"
+    compress: bool = False
+    single: bool = False
     settings: str | None = None
     start: float = 0.0
     duration: float | None = None
@@ -173,7 +182,7 @@ def check_index(path: Path) -> Index:
     allowed = "the same study with --resume computes it again"
     faults = []
     for run in index.runs:
-        if run.status in ("waiting", "failed"):
+        if run.status in ("waiting", "failed") or not run.file:
             continue
         if Path(run.file).name != run.file:
             faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
@@ -187,15 +196,16 @@ def check_index(path: Path) -> Index:
 def write_summary(records: Sequence[Record], stream: TextIO) -> None:
     """Write one line a run: what tells it apart, how it ended, its peaks and mid-curve values.
 
-    The columns of a quantity are ``Q_peak`` (or ``dQ_over_Q0_max`` and ``_min``), the same with
-    ``_wheelset``, ``_side``, ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at
-    the middle of the first curve (``Q_mid2`` of the second).  The column ``remarks`` holds all
-    remarks on the run.
+    The header names the unit where there is one: ``Q_peak (N)``.  The columns of a quantity are
+    ``Q_peak`` (or ``dQ_over_Q0_max`` and ``_min``), the same with ``_wheelset``, ``_side``,
+    ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at the middle of the first
+    curve (``Q_mid2`` of the second).  The column ``remarks`` holds all remarks on the run.
     """
     # the records twice, rather than all of them in memory
     columns = list(dict.fromkeys(name for record in records for name in _checked_row(record)))
     writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
-    writer.writeheader()
+    units = {name: unit_of(name) for name in columns}
+    writer.writerow({name: f"{name} ({unit})" if unit else name for name, unit in units.items()})
     for record in records:
         cells = _checked_row(record)
         writer.writerow({name: spreadsheet_cell(cell) for name, cell in cells.items()})
@@ -203,14 +213,32 @@ def write_summary(records: Sequence[Record], stream: TextIO) -> None:
 
 def _checked_row(record: Record) -> dict[str, Any]:
     try:
-        return _row(record)
+        return summary_row(record)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         found = f"the record of '{record['name']}' cannot be used ({error!r})"
         allowed = "remove the journal: results that are there are kept"
         raise InputError([Fault(JOURNAL, "", found, allowed)]) from None
 
 
-def _row(record: Record) -> dict[str, Any]:
+def unit_of(column: str) -> str:
+    """Return the unit of a column of the summary, empty where it has none.
+
+    Examples
+    --------
+    >>> [unit_of(name) for name in ("Q_peak", "Q_peak_time", "wheelset_yaw_mid2", "Q_peak_side")]
+    ['N', 's', 'rad', '']
+    """
+    if column in UNITS:
+        return UNITS[column]
+    found = _COLUMN.fullmatch(column)
+    if not found or found[1] not in QUANTITIES:
+        return ""
+    unit = {"time": "s", "distance": "m"}.get(found[2] or "", QUANTITIES[found[1]].unit)
+    return "" if unit == "1" else unit
+
+
+def summary_row(record: Record) -> dict[str, Any]:
+    """Return the cells of a run's line by the names of their columns, without units."""
     row = {"name": record["name"], **record["labels"], "file": record["file"]}
     row |= {name: record.get(name, "") for name in FACTS}
     row["remarks"] = " ".join(record.get("remarks", ()))
@@ -225,4 +253,4 @@ def _row(record: Record) -> dict[str, Any]:
         ending = "mid" if number == 1 else f"mid{number}"
         for name, value in curve["largest"].items():
             row[f"{name}_{ending}"] = value
-    return row
+    return {**row, **record.get("quantities", {})}

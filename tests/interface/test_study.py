@@ -60,7 +60,7 @@ def arguments(out, *speeds, tracks=(CURVE,), more=()):
 
 def rows(folder):
     with open(folder / "summary.csv", encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+        return [{key.partition(" (")[0]: v for key, v in r.items()} for r in csv.DictReader(file)]
 
 
 def index(folder):

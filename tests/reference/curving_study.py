@@ -1,14 +1,13 @@
 """The published curving study: its numbers, and the same read from a result of railsim.
 
-Source: Grossi (2025), section 6.1.1, see tests/data/SOURCES.md: SIMPACK Rail, R 250 m, 20 m/s.
+Source: Grossi (2025), section 6.1.1, see published/curving_study_r250.toml.
 """
-
-import csv
-from pathlib import Path
 
 import numpy as np
 
-NUMBERS = Path(__file__).parents[1] / "data" / "curving_study_r250.csv"
+from railsim.definitions.loading import load_published
+
+STUDY = "curving_study_r250"
 RIGID = {"preset": "rigid"}  # the study's rails, as far as known
 COACHES = ("manchester", "flexicoil")
 MID_CURVE = 19.8  # s from the start of the track, where the study reads its values
@@ -23,18 +22,12 @@ TOLERANCE = {
     "wheelset_yaw": 0.03,
     "wheelset_lateral": 0.01,
 }
-SIGN = {"wheelset_yaw": -1.0, "wheelset_lateral": -1.0}  # right-hand curve: outwards is left
-UNIT = {"kN": 1e3, "mrad": 1e-3, "mm": 1e-3, "1": 1.0}
 
 
 def published(coach):
     """Published values by quantity, with the signs of railsim [SI]."""
-    with NUMBERS.open() as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    return {
-        row["quantity"]: SIGN.get(row["quantity"], 1.0) * float(row[coach]) * UNIT[row["unit"]]
-        for row in rows
-    }
+    found = load_published(STUDY).values
+    return {value.quantity: value.values[f"coach_{coach}"] for value in found}
 
 
 def measured(result, quantity):

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from curving_study import COACHES, NUMBERS, RIGID, TOLERANCE, measured, published
+from curving_study import COACHES, RIGID, STUDY, TOLERANCE, measured, published
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.simulation import simulate
@@ -65,8 +65,13 @@ def test_r500_runs_with_the_same_parameters_and_is_gentler(results):
 
 
 def test_own_copy_of_the_numbers_is_that_of_the_reference(reference_dir):
-    def rows(path):
-        lines = (line for line in path.read_text().splitlines() if not line.startswith("#"))
-        return {r["quantity"]: (r["flexicoil"], r["manchester"]) for r in csv.DictReader(lines)}
-
-    assert rows(NUMBERS) == rows(reference_dir / NUMBERS.name)
+    unit = {"kN": 1e3, "mrad": 1e-3, "mm": 1e-3, "1": 1.0}
+    lines = (reference_dir / f"{STUDY}.csv").read_text().splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    printed = {row["quantity"]: row for row in rows}
+    for coach in COACHES:
+        own = published(coach)
+        assert set(own) == set(printed)
+        for quantity, row in printed.items():  # the source prints magnitudes
+            value = float(row[coach]) * unit[row["unit"]]
+            assert abs(own[quantity]) == pytest.approx(value, rel=1e-12)

@@ -1,0 +1,112 @@
+"""Runs from result files and from folders of studies, for commands that take either."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from railsim.result import Result
+
+Record = dict[str, Any]
+
+
+@dataclass
+class Gathered:
+    """Runs by their names.
+
+    Attributes
+    ----------
+    records : list of Record
+        One for each run, as in the journal of a study.
+    paths : dict of str to Path
+        Result files by the names of the runs that have one.
+    remarks : list of str
+        What was not found as the records say.
+    """
+
+    records: list[Record] = field(default_factory=list)
+    paths: dict[str, Path] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    def results(self, names: Sequence[str]) -> "dict[str, Result]":
+        """Open the results of some runs; runs without a file are left out."""
+        from railsim.result import open_run
+
+        return {name: open_run(self.paths[name]) for name in names if name in self.paths}
+
+
+def gather(files: Sequence[str]) -> Gathered:
+    """Return the runs of result files and of folders.
+
+    A folder is that of a study, or all results in it.
+
+    Raises
+    ------
+    InputError : everything that cannot be read.
+    """
+    from railsim.errors import Fault, InputError
+
+    found = Gathered()
+    faults: list[Fault] = []
+    for file in files:
+        path = Path(file)
+        try:
+            records = _of_folder(path) if path.is_dir() else [_of_file(path)]
+        except InputError as error:
+            faults.extend(error.faults)
+            continue
+        if not records:
+            allowed = "the folder of a study, or one with .h5 files"
+            faults.append(Fault(file, "", "no results in this folder", allowed))
+        _add(found, records, path if path.is_dir() else path.parent, prefix=len(files) > 1)
+    names = [record["name"] for record in found.records]
+    twice = {name for name in names if names.count(name) > 1} if len(files) > 1 else set()
+    faults += [Fault(name, "", "given twice", "give each result once") for name in sorted(twice)]
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _add(found: Gathered, records: Sequence[Record], folder: Path, *, prefix: bool) -> None:
+    """Add records; of several folders each run is called after its folder where it has to be."""
+    known = {record["name"] for record in found.records}
+    missing = 0
+    for record in records:
+        name = record["name"]
+        if prefix and name in known:
+            name = f"{folder.name}/{name}"
+        found.records.append({**record, "name": name})
+        if record["status"] in ("failed", "waiting"):
+            continue
+        if record.get("file") and (folder / record["file"]).is_file():
+            found.paths[name] = folder / record["file"]
+        else:
+            missing += 1
+    if missing:
+        found.remarks.append(
+            f"{missing} of {len(records)} runs in {folder} have no result file any more, only "
+            "their summary: their curves cannot be shown."
+        )
+
+
+def _of_folder(folder: Path) -> list[Record]:
+    from railsim.studies.journal import JOURNAL, Journal, Records
+    from railsim.studies.summary import read_index
+
+    if (folder / "study.json").is_file():
+        runs = [run.model_dump() for run in read_index(folder / "study.json").runs]
+        return [{"labels": {}, **run} for run in runs]
+    if (folder / JOURNAL).is_file():
+        with Journal(folder) as journal:
+            return list(Records(journal.path, list(journal.entries.values())))
+    return [_of_file(path) for path in sorted(folder.glob("*.h5"))]
+
+
+def _of_file(path: Path) -> Record:
+    from railsim.result import open_run
+    from railsim.result.facts import run_facts
+
+    result = open_run(path)
+    labels = {"vehicle": result.vehicle().name, "track": result.track().name, "speed": result.speed}
+    return {"name": path.stem, "file": path.name, "labels": labels, **run_facts(result)}

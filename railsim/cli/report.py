@@ -1,0 +1,73 @@
+"""``railsim report``: one self-contained page about results or studies."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.files import check_file, whole_file
+
+ENDINGS = (".html", ".htm")
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="DIR_OR_FILES...")
+@click.option("--out", default="report.html", metavar="F.html", show_default=True, help="Page.")
+@click.option("--title", metavar="TEXT", help="Title; by default the names of what is reported.")
+@click.option(
+    "--curves",
+    type=click.IntRange(min=1, max=16),
+    default=8,
+    show_default=True,
+    metavar="N",
+    help="Runs whose curves are shown; of more, those with the largest values.",
+)
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    files: tuple[str, ...],
+    out: str,
+    title: str | None,
+    curves: int,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Write one self-contained page about results or studies.
+
+    What was run, peaks, values against limits, curves to zoom and read off, the spread over what a
+    study varied, published values where there are any, failures and remarks.  The page needs no
+    network; it can be sent and printed.
+
+    \b
+    Example:
+      railsim report curves --out report.html
+      railsim report manchester.h5 flexicoil.h5 --out coaches.html --overwrite
+    """  # noqa: D301 - click reads the escape
+    path = Path(out)
+    check_file(path, overwrite=overwrite, endings=ENDINGS)
+    write_report(files, path, title=title, curves=curves)
+    if as_json:
+        print_json({"file": str(path)})
+    elif not quiet:
+        echo(str(path))
+
+
+def write_report(
+    files: Sequence[str], path: Path, *, title: str | None = None, curves: int = 8
+) -> None:
+    """Write the page about result files and folders of studies."""
+    from railsim.cli.gathered import gather
+    from railsim.report.runs import page
+    from railsim.report.spread import worst_runs
+
+    found = gather(files)
+    with_files = [record for record in found.records if record["name"] in found.paths]
+    results = found.results(worst_runs(with_files, curves))
+    names = ", ".join(dict.fromkeys(Path(file).resolve().stem for file in files[:4]))
+    more = f" and {len(files) - 4} more" if len(files) > 4 else ""
+    text = page(title or names + more, found.records, results, found.remarks)
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")

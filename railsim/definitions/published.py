@@ -1,0 +1,59 @@
+"""Published values, `railsim-published/1`: what others found for a vehicle that railsim ships.
+
+A report puts them beside a run of the same vehicle on the same track at the same speed.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from railsim.definitions.base import (
+    Count,
+    Definition,
+    FileDefinition,
+    Finite,
+    NonNegative,
+    Positive,
+    Text,
+)
+from railsim.notation import QUANTITIES
+
+PUBLISHED_FORMAT = "railsim-published/1"
+Vehicles = Annotated[dict[Text, Finite], Field(min_length=1)]
+
+
+class PublishedValue(Definition):
+    """One quantity at one place, for each vehicle."""
+
+    quantity: Literal[tuple(QUANTITIES)]  # type: ignore[valid-type]
+    """Quantity of a result"""
+    wheelset: Count = 1
+    """Wheelset, from the leading end"""
+    side: Literal["left", "right"] | None = None
+    """Wheel, for quantities that have one"""
+    read: Literal["largest", "smallest"] | NonNegative
+    """Largest or smallest value over the run, or the time of the value from the start of the track
+    [s]"""
+    values: Vehicles
+    """Value by the name of the vehicle, with railsim's signs [SI]"""
+
+
+class Published(FileDefinition):
+    """A published study: everything that its file says."""
+
+    format: Literal["railsim-published/1"]
+    """Kind and version of the file"""
+    name: Text
+    """What the study is called"""
+    source: Text
+    """Where the values are printed"""
+    program: Text
+    """What they were computed or measured with"""
+    track: Text
+    """Track: the name of a shipped one"""
+    speed: Positive
+    """Speed [m/s]"""
+    notes: tuple[Text, ...] = ()
+    """What a reader must know, one sentence each"""
+    values: Annotated[tuple[PublishedValue, ...], Field(min_length=1)]
+    """What is printed"""

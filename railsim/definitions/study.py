@@ -1,0 +1,173 @@
+"""Study files, `railsim-study/1`: what is combined, linked and sampled, under version control."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import (
+    Count,
+    Definition,
+    FileDefinition,
+    Finite,
+    NonNegative,
+    Positive,
+    Text,
+)
+from railsim.units import range_values
+
+STUDY_FORMAT = "railsim-study/1"
+
+Value = (
+    Annotated[bool, Field(strict=True)]
+    | Annotated[int, Field(strict=True)]
+    | Finite
+    | Text
+    | tuple[Finite | Text, ...]
+)
+Values = Text | Annotated[tuple[Value, ...], Field(min_length=1)]
+
+
+def value_texts(values: Values) -> list[str]:
+    """Return values as `key=value` takes them: those of a range, or one for each of a list.
+
+    Examples
+    --------
+    >>> value_texts("0.2:0.4:3"), value_texts((True, 0.5, "72 km/h", (10, 20)))
+    (['0.2', '0.3', '0.4'], ['true', '0.5', '72 km/h', '[10, 20]'])
+
+    Raises
+    ------
+    ValueError : a range that is none.
+    """
+    if isinstance(values, str):
+        found = range_values(values)
+        return [values] if found is None else [f"{value:.12g}" for value in found]
+    return [_text(value) for value in values]
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(_text(member) for member in value)}]"
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+class Spread(Definition):
+    """How a sampled parameter is spread: between two ends, by a tolerance, or normally."""
+
+    low: Finite | None = None
+    """Smallest value [SI]"""
+    high: Finite | None = None
+    """Largest value [SI]"""
+    scale: Literal["linear", "log"] = "linear"
+    """Equal probability of equal differences, or of equal ratios, between `low` and `high`"""
+    nominal: Finite | None = None
+    """Value that has the `tolerance` [SI]"""
+    tolerance: Positive | None = None
+    """Half the range over the nominal value: all values within it are equally probable [1]"""
+    mean: Finite | None = None
+    """Mean of a normal distribution [SI]"""
+    deviation: Positive | None = None
+    """Its standard deviation [SI]"""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        pairs = ((self.low, self.high), (self.nominal, self.tolerance), (self.mean, self.deviation))
+        whole = [None not in pair for pair in pairs]
+        begun = [pair != (None, None) for pair in pairs]
+        if sum(whole) != 1 or begun != whole:
+            raise ValueError(
+                "one of 'low' and 'high', 'nominal' and 'tolerance', 'mean' and 'deviation' is "
+                "needed"
+            )
+        if self.low is not None and self.high is not None:
+            if not self.low < self.high:
+                raise ValueError("'low' must be below 'high'")
+            if self.scale == "log" and not self.low * self.high > 0.0:
+                raise ValueError('scale = "log" needs two ends of the same sign, neither zero')
+        return self
+
+
+class Sample(Definition):
+    """Random values of several parameters at once."""
+
+    method: Literal["latin_hypercube", "sobol"] = "latin_hypercube"
+    """Latin hypercube, or the scrambled sequence of Sobol"""
+    number: Count
+    """How many values of each parameter; a power of two for `sobol`"""
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    """Where the random numbers begin: the same seed gives the same sample"""
+    parameters: Annotated[dict[Text, Spread], Field(min_length=1)]
+    """Parameters by their paths, or `speed`"""
+
+    @model_validator(mode="after")
+    def _balanced(self) -> Self:
+        if self.method == "sobol" and self.number & (self.number - 1):
+            raise ValueError("'number' must be a power of two for method = \"sobol\"")
+        return self
+
+
+class Study(FileDefinition):
+    """A study: everything that its file says."""
+
+    format: Literal["railsim-study/1"]
+    """Kind and version of the file"""
+    name: Text
+    """What the study is called"""
+    purpose: Text | None = None
+    """What it is for"""
+    vehicles: Annotated[tuple[Text, ...], Field(min_length=1)]
+    """Vehicles: files or names of shipped ones"""
+    tracks: Annotated[tuple[Text, ...], Field(min_length=1)]
+    """Tracks: files or names of shipped ones"""
+    speeds: Values | None = None
+    """Speeds: a list or a range [m/s, or with a unit]; not where `speed` is linked or sampled"""
+    settings: Text | None = None
+    """Settings file for all runs"""
+    start: Finite = 0.0
+    """Start of all runs along the track [m]"""
+    duration: Positive | None = None
+    """End of all runs: time [s]"""
+    until: NonNegative | None = None
+    """End of all runs: distance [m]"""
+    assignments: tuple[Text, ...] = ()
+    """`key.path=value` for all runs, the paths beginning with `vehicle.`, `track.`, `settings.`"""
+    grid: dict[Text, Values] = Field(default_factory=dict)
+    """Values of further keys: all combinations"""
+    linked: tuple[dict[Text, Values], ...] = ()
+    """Keys whose values go together: the first of one with the first of the others"""
+    sample: Sample | None = None
+    """Random values of further keys"""
+
+    @property
+    def runs(self) -> int:
+        """Number of its runs."""
+        lists = [len(value_texts(values)) for values in self.grid.values()]
+        lists += [len(value_texts(next(iter(table.values())))) for table in self.linked if table]
+        lists += [len(value_texts(self.speeds))] if self.speeds is not None else []
+        lists += [self.sample.number] if self.sample else []
+        return math.prod([len(self.vehicles), len(self.tracks), *lists])
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for name, values in [*self.grid.items(), *(p for t in self.linked for p in t.items())]:
+            try:
+                value_texts(values)
+            except ValueError as error:
+                raise ValueError(f"'{name}': {error}") from None
+        for table in self.linked:
+            if not table:
+                raise ValueError("a table of linked keys is empty")
+            lengths = {name: len(value_texts(values)) for name, values in table.items()}
+            if len(set(lengths.values())) != 1:
+                told = ", ".join(f"'{name}' {length}" for name, length in lengths.items())
+                raise ValueError(f"linked keys need equally many values: {told}")
+        names = [*self.grid, *(name for table in self.linked for name in table)]
+        names += list(self.sample.parameters) if self.sample else []
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"'{twice[0]}' is varied twice")
+        if (self.speeds is None) != ("speed" in names):
+            raise ValueError("'speeds' is needed, or 'speed' linked or sampled; not both")
+        return self

@@ -1,0 +1,202 @@
+"""Time histories of several runs, thinned for a page: what the plots of a report are fed with.
+
+Runs over the same plan of track share their horizontal axis, the distance, cut into equal cells.
+Of each cell the smallest and the largest value are kept, in the order in which they occur: no peak
+is lost.  Values are stored as 16-bit integers between a quantity's smallest and largest value.
+"""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.layout import Section, curvature_sections
+from railsim.plot.selection import LIMITS, STUDY
+from railsim.result import Result
+from railsim.text import printable
+
+Floats = NDArray[np.float64]
+
+CELLS = 800  # of the horizontal axis
+MOST_VALUES = 4_000_000  # of all curves of a page, 2 bytes each
+MISSING = 65535  # stands for no value
+STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs over the same plan of track.
+
+    Attributes
+    ----------
+    track : str
+        Name of the track.
+    results : dict
+        Results by the names of their runs.
+    """
+
+    track: str
+    results: dict[str, Result]
+
+
+def groups(results: Mapping[str, Result]) -> list[Group]:
+    """Put results over the same plan of track together; runs without instants are left out."""
+    found: dict[tuple[Any, ...], Group] = {}
+    for name, result in results.items():
+        if len(result["time"]) < 2:
+            continue
+        track = result.track()
+        key = (track.name, *((s.type, s.begin, s.end, s.start_value) for s in _plan(result)))
+        found.setdefault(key, Group(track.name, {})).results[name] = result
+    return list(found.values())
+
+
+def _plan(result: Result) -> list[Section]:
+    return curvature_sections(result.track())
+
+
+def curve_data(group: Group, cells: int = CELLS) -> dict[str, Any]:
+    """Return the curves of a group as plain data for the page.
+
+    Parameters
+    ----------
+    group : Group
+    cells : int
+        Number of cells of the horizontal axis.
+    """
+    results = group.results
+    over = "distance" if all(map(_moves, results.values())) else "time"
+    low = min(float(result[over][0]) for result in results.values())
+    high = max(float(result[over][-1]) for result in results.values())
+    shortest = min(len(result[over]) for result in results.values())
+    cells = max(1, min(cells, shortest // 2))
+    edges = np.linspace(low, high, cells + 1)
+    wheelsets = max((result.wheelsets for result in results.values()), key=len)
+    quantities = [_quantity(results, name, over, edges, len(wheelsets)) for name in STUDY]
+    first = next(iter(results.values()))
+    return {
+        "track": printable(group.track),
+        "axis": "Distance along the track s (m)" if over == "distance" else "Time t (s)",
+        "runs": [printable(name) for name in results],
+        "wheelsets": [printable(name) for name in wheelsets],
+        "low": low,
+        "high": high,
+        "cells": cells,
+        "sections": _sections(first) if over == "distance" else [],
+        "quantities": [quantity for quantity in quantities if quantity],
+    }
+
+
+def _moves(result: Result) -> bool:
+    return bool(result["distance"][-1] - result["distance"][0] > STANDS_STILL)
+
+
+def _sections(result: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            "begin": section.begin,
+            "end": section.end,
+            "curve": section.type == "CIR",
+            "words": f"R {1.0 / section.start_value:.6g}" if section.type == "CIR" else "",
+        }
+        for section in _plan(result)
+        if section.type != "STR"
+    ]
+
+
+def _quantity(
+    results: Mapping[str, Result], name: str, over: str, edges: Floats, wheelsets: int
+) -> dict[str, Any] | None:
+    """Return one quantity of all runs, shown units; None where no run has it."""
+    having = [result for result in results.values() if name in result]
+    if not having:
+        return None
+    quantity = having[0].quantities[name]
+    sides = 2 if "side" in quantity.dims else 1
+    shape = (len(results), wheelsets, sides, 2 * (len(edges) - 1))
+    values = np.full(shape, np.nan)
+    for row, result in enumerate(results.values()):
+        if name in result:
+            array = result[name].reshape(len(result["time"]), -1, sides)
+            thin = thinned(result[over], array.reshape(len(array), -1), edges)
+            count = array.shape[1]
+            values[row, :count] = thin.T.reshape(count, sides, -1)
+    values *= quantity.scale
+    low, high, codes = coded(values)
+    limit = LIMITS.get(name)
+    return {
+        "name": name,
+        "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
+        "unit": quantity.shown_unit.replace("-", ""),
+        "sign": quantity.sign,
+        "sides": sides,
+        "low": low,
+        "high": high,
+        "limit": limit[0] * quantity.scale if limit else None,
+        "limit_words": limit[1] if limit else "",
+        "codes": codes,
+    }
+
+
+def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
+    """Return the smallest and the largest value of every cell, in the order of their occurrence.
+
+    Parameters
+    ----------
+    axis : float64[n]
+        Where the values are, not decreasing.
+    values : float64[n, m]
+        nan where there is none.
+    edges : float64[cells + 1]
+        Ends of the cells.
+
+    Returns
+    -------
+    float64[2 cells, m]
+        In a cell that holds no instant between two others the values there, interpolated; nan
+        outside of the run.
+    """
+    cells = len(edges) - 1
+    starts = np.searchsorted(axis, edges)
+    starts[-1] = len(axis) if edges[-1] >= axis[-1] else starts[-1]
+    found = np.full((2 * cells, values.shape[1]), np.nan)
+    columns = np.arange(values.shape[1])
+    missing = np.isnan(values)
+    lows, highs = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
+    for cell in range(cells):
+        begin, end = starts[cell], starts[cell + 1]
+        if begin < end:
+            low, high = lows[begin:end].argmin(axis=0), highs[begin:end].argmax(axis=0)
+            found[2 * cell] = values[begin + np.minimum(low, high), columns]
+            found[2 * cell + 1] = values[begin + np.maximum(low, high), columns]
+            continue
+        for row, share in ((2 * cell, 0.25), (2 * cell + 1, 0.75)):
+            at = edges[cell] + share * (edges[cell + 1] - edges[cell])
+            if axis[0] <= at <= axis[-1]:
+                after = max(1, int(np.searchsorted(axis, at)))
+                part = (at - axis[after - 1]) / (axis[after] - axis[after - 1])
+                found[row] = (1.0 - part) * values[after - 1] + part * values[after]
+    return found
+
+
+def coded(values: Floats) -> tuple[float, float, str]:
+    """Return smallest and largest value, and all values as base64 of 16-bit integers between."""
+    there = np.isfinite(values)
+    low = float(values[there].min()) if there.any() else 0.0
+    high = float(values[there].max()) if there.any() else 0.0
+    step = (high - low) / (MISSING - 1) or 1.0
+    codes = np.full(values.shape, MISSING, dtype="<u2")
+    codes[there] = np.rint((values[there] - low) / step).astype("<u2")
+    return low, high, b64encode(codes.tobytes()).decode()
+
+
+def cells_of(found: Sequence[Group]) -> int:
+    """Return how fine the curves of all groups may be so that the page stays small."""
+    lines = sum(
+        len(group.results) * max(len(r.wheelsets) for r in group.results.values()) * 9
+        for group in found
+    )
+    return max(50, min(CELLS, MOST_VALUES // max(1, 2 * lines)))

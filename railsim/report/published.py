@@ -1,0 +1,92 @@
+"""Published values beside those of a run: same vehicle, same track, same speed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isclose
+
+import numpy as np
+
+from railsim.definitions.loading import load_published, load_track, load_vehicle
+from railsim.definitions.published import Published, PublishedValue
+from railsim.definitions.sources import shipped_names
+from railsim.notation import SIDES
+from railsim.result import Result
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A published value and that of a run.
+
+    Attributes
+    ----------
+    study : Published
+        Where it was published.
+    value : PublishedValue
+        What was published.
+    run : str
+        Name of the run.
+    rails : str
+        Rails of the run: ``elastic`` or ``rigid``.
+    published, found : float
+        The two values [SI].
+    """
+
+    study: Published
+    value: PublishedValue
+    run: str
+    rails: str
+    published: float
+    found: float
+
+    @property
+    def difference(self) -> float:
+        """Relative difference of the magnitudes."""
+        return (abs(self.found) - abs(self.published)) / abs(self.published)
+
+
+def beside_published(results: Mapping[str, Result]) -> list[Beside]:
+    """Return every published value that the runs can be held against.
+
+    A run is taken where vehicle and speed are those of the publication and the track differs in
+    the support of its rails at most: what the rails of a publication are like is rarely known.
+    """
+    studies = [load_published(name) for name in shipped_names("published")]
+    return [row for study in studies for row in _of_study(study, results)]
+
+
+def _of_study(study: Published, results: Mapping[str, Result]) -> Sequence[Beside]:
+    track = load_track(study.track)
+    names = dict.fromkeys(name for value in study.values for name in value.values)
+    vehicles = {name: load_vehicle(name) for name in names}
+    rows = []
+    for run, result in results.items():
+        if not isclose(result.speed, study.speed, rel_tol=1e-9):
+            continue
+        there = result.track()
+        if there.replace(support=track.support) != track:
+            continue
+        vehicle = result.vehicle()
+        name = next((name for name, known in vehicles.items() if known == vehicle), None)
+        rails = "rigid" if there.support.preset == "rigid" else "elastic"
+        for value in study.values:
+            if name in value.values and (found := reading(result, value)) is not None:
+                rows.append(Beside(study, value, run, rails, value.values[name], found))
+    return rows
+
+
+def reading(result: Result, value: PublishedValue) -> float | None:
+    """Return a published quantity as a result has it [SI]; None where it has not got there."""
+    if value.quantity not in result or value.wheelset > len(result.wheelsets):
+        return None
+    array = result[value.quantity][:, value.wheelset - 1]
+    if value.side is not None:
+        array = array[:, SIDES.index(value.side)]
+    if value.read == "largest":
+        return float(np.nanmax(array))
+    if value.read == "smallest":
+        return float(np.nanmin(array))
+    # from the start of the track: the run may have begun further on
+    time = result["time"] + result["distance"][0] / result.speed
+    if not time[0] <= value.read <= time[-1]:
+        return None
+    return float(array[int(np.argmin(np.abs(time - value.read)))])

@@ -1,0 +1,425 @@
+"""One self-contained page about runs: what was run, values against limits, curves, spread.
+
+`page` puts it together from the records of the runs and the results of those whose curves are
+shown.  Nothing on the page comes from elsewhere; its plots are drawn by uPlot (`vendor/`).
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.notation import QUANTITIES
+from railsim.report.curves import cells_of, curve_data, groups
+from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
+from railsim.report.limits import limit_tables
+from railsim.report.published import beside_published
+from railsim.report.spread import LEAST, WORDS, columns, parameters, spread_rows
+from railsim.report.tables import Cell, Table
+from railsim.result import Result
+from railsim.text import printable
+from railsim.version import __version__
+
+Record = Mapping[str, Any]
+MOST_ROWS = 300  # of a table on the page
+MOST_DIFFERENCES = 40  # keys in which vehicles differ
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing of the page; `kinds` are named in its colours."""
+
+    title: str
+    words: str
+    svg: str
+    kinds: Sequence[str] = ()
+
+
+@dataclass
+class Section:
+    """A section of the page.
+
+    Attributes
+    ----------
+    id, title : str
+    texts : list of str
+    drawings : list of Drawing
+    tables : list of Table
+    plots : list of str
+        Plots that its script draws: the number of a group of curves, or ``spread``.
+    details : list of Table
+        Tables that unfold.
+    """
+
+    id: str
+    title: str
+    texts: list[str] = field(default_factory=list)
+    drawings: list[Drawing] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    plots: list[str] = field(default_factory=list)
+    details: list[Table] = field(default_factory=list)
+
+
+def page(
+    title: str,
+    records: Sequence[Record],
+    results: Mapping[str, Result],
+    remarks: Sequence[str] = (),
+) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    title : str
+        What the runs are about.
+    records : sequence of mapping
+        One for each run, as `railsim.result.facts.run_facts` with ``name`` and ``labels``; also of
+        runs that failed or wait.
+    results : mapping of str to Result
+        Those runs, by name, whose curves and values against limits are shown.
+    remarks : sequence of str
+        What else a reader must know.
+    """
+    found = groups(results)
+    cells = cells_of(found)
+    data: dict[str, Any] = {"curves": [curve_data(group, cells) for group in found]}
+    limits, limit_remarks, exceeded = limit_tables(results)
+    sections = [_peaks(records, results)]
+    if found:
+        sections.append(_curves(found, records, results))
+    if limits or limit_remarks:
+        told = Table(["remark"], [[remark] for remark in limit_remarks], "Remarks on these values")
+        details = [told] if limit_remarks else []
+        sections.append(Section("limits", "Against limits", tables=limits, details=details))
+    if spread := _spread(records, data):
+        sections.append(spread)
+    if published := _published(results):
+        sections.append(published)
+    sections.append(_what_was_run(records, results))
+    sections.append(_remarks(records, remarks))
+    shown = {
+        "title": printable(title),
+        "lead": _lead(records, results),
+        "verdict": _verdict(records, exceeded),
+        "sections": [section for section in sections if section],
+        "foot": f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
+        "Numbers in the units of the field; files and the Python interface are SI.",
+    }
+    folder = files("railsim.report")
+
+    def text(name: str) -> str:
+        return folder.joinpath(name).read_text("utf-8")
+
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    raw = {
+        # "</" would end the script
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        "style": text("templates/runs.css"),
+        "script": text("templates/runs.js"),
+        "plot_style": text("vendor/uPlot.min.css"),
+        "plot_script": text("vendor/uPlot.iife.min.js"),
+    }
+    safe = {name: Markup(value) for name, value in raw.items()}
+    return environment.from_string(text("templates/runs.html")).render(
+        page=shown, wrap=Markup("_<wbr>"), **safe
+    )
+
+
+def _done(records: Sequence[Record]) -> list[Record]:
+    return [record for record in records if record.get("peaks")]
+
+
+def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
+    number = f"{len(records)} run{'s' * (len(records) != 1)}"
+    names = {kind: list(dict.fromkeys(str(record["labels"].get(kind, "")) for record in records))
+             for kind in ("vehicle", "track")}  # fmt: skip
+    parts = [number]
+    for kind, found in names.items():
+        if len(found) <= 4 and all(found):
+            parts.append(f"{kind}{'s' * (len(found) > 1)} {', '.join(map(printable, found))}")
+        else:
+            parts.append(f"{len(found)} {kind}s")
+    versions = sorted({str(r.attributes.get("railsim_version", "")) for r in results.values()})
+    created = sorted(str(r.attributes.get("created", "")) for r in results.values())
+    if versions and any(versions):
+        parts.append(f"computed by railsim {', '.join(filter(None, versions))}")
+    if created and created[-1]:
+        parts.append(f"last run {created[-1]}")
+    return "; ".join(parts) + "."
+
+
+def _verdict(records: Sequence[Record], exceeded: Sequence[str]) -> list[dict[str, Any]]:
+    counts = Counter(str(record["status"]) for record in records)
+    whole = counts == {"complete": len(records)}
+    words = ", ".join(f"{number} {status}" for status, number in counts.items())
+    text = f"All {len(records)} runs are complete." if whole else f"Of {len(records)} runs {words}."
+    if len(records) == 1:
+        text = f"The run is {words[2:]}."
+    lines = [{"ok": whole, "text": text}]
+    if exceeded:
+        more = f" and {len(exceeded) - 3} more" if len(exceeded) > 3 else ""
+        text = f"Limits exceeded: {'; '.join(exceeded[:3])}{more}."
+        lines.append({"ok": False, "text": printable(text)})
+    return lines
+
+
+def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
+    """Peaks of the shown runs side by side, where and when."""
+    shown = [record for record in _done(records) if record["name"] in results]
+    rows: dict[tuple[str, str], list[Cell]] = {}
+    for number, record in enumerate(shown):
+        wheelsets = results[record["name"]].wheelsets
+        for peak in record["peaks"]:
+            quantity = QUANTITIES[peak["quantity"]]
+            words = f"{quantity.words}, {WORDS[peak['kind']]}"
+            row = rows.setdefault((quantity.name, peak["kind"]), [words])
+            row += [""] * (1 + number - len(row))
+            place = peak.get("wheelset", "")
+            where = f"wheelset {wheelsets.index(place) + 1} " if place in wheelsets else ""
+            where += f"{peak.get('side', '')} at {peak['distance']:.1f} m"
+            row.append((quantity.text(peak["value"]), where))
+    table = Table(
+        ["", *(printable(str(record["name"])) for record in shown)],
+        [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
+    )
+    texts = ["Largest magnitudes over all steps of the runs, with their signs; wheelsets count "
+             "from the leading end."]  # fmt: skip
+    if len(shown) < len(_done(records)):
+        texts.append(f"{len(shown)} of {len(_done(records))} runs, those with the largest values; "
+                     "all others are in the spread and in the study's summary.csv.")  # fmt: skip
+    return Section("peaks", "Peaks", texts, tables=[table] if shown else [])
+
+
+def _curves(
+    found: Sequence[Any], records: Sequence[Record], results: Mapping[str, Result]
+) -> Section:
+    texts = []
+    if len(results) < len(_done(records)):
+        texts = [f"{len(results)} of {len(_done(records))} runs, those with the largest values."]
+    names = [str(number) for number in range(len(found))]
+    return Section("curves", "Along the track", texts, plots=names)
+
+
+def _spread(records: Sequence[Record], data: dict[str, Any]) -> Section | None:
+    done = _done(records)
+    varied = parameters(done)
+    if len(done) < LEAST or not varied:
+        return None
+    data["spread"] = {"parameters": varied, "columns": columns(done)}
+    rows = spread_rows(done)
+    table = Table(
+        ["value", "smallest", "in run", "median", "largest", "in run"],
+        rows,
+        f"Spread over {len(done)} runs",
+        words=frozenset({0, 2, 5}),
+        note="Peaks and values at mid-curve by magnitude, over all wheels.",
+    )
+    texts = [f"Varied: {', '.join(map(printable, varied))}."]
+    return Section("spread", "Over the study", texts, plots=["spread"], details=[table])
+
+
+def _published(results: Mapping[str, Result]) -> Section | None:
+    rows = beside_published(results)
+    if not rows:
+        return None
+    tables = []
+    for study in dict.fromkeys(row.study.name for row in rows):
+        own = [row for row in rows if row.study.name == study]
+        cells = []
+        for row in own:
+            quantity = QUANTITIES[row.value.quantity]
+            side = f" {row.value.side}" if row.value.side else ""
+            at = row.value.read if isinstance(row.value.read, str) else f"t = {row.value.read:g} s"
+            cells.append(
+                [
+                    printable(row.run),
+                    quantity.words,
+                    f"wheelset {row.value.wheelset}{side}, {at}",
+                    quantity.text(row.published),
+                    quantity.text(row.found),
+                    f"{100.0 * row.difference:+.1f} %",
+                    row.rails,
+                ]
+            )
+        first = own[0].study
+        note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
+        header = ["run", "", "read", "published", "here", "difference", "rails here"]
+        words = frozenset({0, 1, 2, 6})
+        tables.append(Table(header, cells, first.name, words=words, note=note))
+    return Section("published", "Beside published values", tables=tables)
+
+
+def _what_was_run(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
+    section = Section("inputs", "What was run")
+    label = {record["name"]: record["labels"] for record in records}
+    vehicles: dict[str, Any] = {}
+    tracks: dict[str, list[Track]] = {}
+    for name, result in results.items():
+        own = label.get(name, {})
+        vehicle, track = result.vehicle(), result.track()
+        vehicles.setdefault(str(own.get("vehicle", vehicle.name)), vehicle)
+        tracks.setdefault(str(own.get("track", track.name)), []).append(track)
+    for name, vehicle in vehicles.items():
+        words = f"{vehicle.name}. {vehicle.source or ''}"
+        section.drawings.append(
+            Drawing(
+                printable(name),
+                printable(words),
+                _svg(vehicle_svg(vehicle)),
+                [kind.replace("_", " ") for kind in element_kinds(vehicle)],
+            )
+        )
+    for name, variants in tracks.items():
+        rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
+        values = sorted({mu for track in variants for mu in track.friction})
+        friction = ", ".join(f"{mu:g}" for mu in values)
+        words = f"{variants[0].name}. Friction {friction}; rails {rails}."
+        drawing = _svg(track_svg(variants[0]))
+        section.drawings.append(Drawing(printable(name), printable(words), drawing))
+    if len(vehicles) > 1:
+        section.tables.append(_differences(vehicles))
+    section.tables.append(_settings(results))
+    section.details.append(_runs(records))
+    return section
+
+
+def _rails(track: Track) -> str:
+    preset = track.support.preset
+    return "rigid" if preset == "rigid" else f"elastic ({preset})"
+
+
+def _svg(text: str) -> Any:
+    return Markup(text)
+
+
+def _differences(vehicles: Mapping[str, Any]) -> Table:
+    """Return the keys in which vehicles differ."""
+    flat = {name: dict(_flat(vehicle.model_dump())) for name, vehicle in vehicles.items()}
+    keys = dict.fromkeys(key for values in flat.values() for key in values)
+    told = ("name", "source")
+    rows = [
+        [key, *(str(values.get(key, "—")) for values in flat.values())]
+        for key in keys
+        if key not in told and len({str(values.get(key)) for values in flat.values()}) > 1
+    ]
+    more = len(rows) - MOST_DIFFERENCES
+    return Table(
+        ["key", *map(printable, vehicles)],
+        [[printable(cell) for cell in row] for row in rows[:MOST_DIFFERENCES]],
+        "In what the vehicles differ (SI)",
+        words=frozenset(range(len(vehicles) + 1)),
+        note=f"{more} more keys differ." if more > 0 else "",
+    )
+
+
+def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
+    if isinstance(node, dict):
+        return [row for name, value in node.items()
+                for row in _flat(value, f"{key}.{name}" if key else str(name))]  # fmt: skip
+    if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
+        return [(key, f"{len(node)} rows: {node}"[:60])]
+    return [(key, node)]
+
+
+def _settings(results: Mapping[str, Result]) -> Table:
+    """Return how the runs were computed; beside it what differs from the default."""
+    usual = dict(_flat(Settings().model_dump()))
+    found: dict[str, dict[str, None]] = {}
+    for result in results.values():
+        own = dict(_flat(result.settings().model_dump()))
+        own["step"] = f"{1e3 * float(result.attributes.get('step', 0.0)):.4g} ms"
+        for key, value in own.items():
+            found.setdefault(key, {})[str(value)] = None
+    always = ("scheme", "step", "output_rate", "creep_law", "fastsim_grid", "normal_contact")
+    rows = []
+    for key, values in found.items():
+        changed = key != "step" and set(values) != {str(usual.get(key))}
+        if key in always or changed:
+            rows.append([key, ", ".join(values), "changed" if changed else ""])
+    words = frozenset({0, 1, 2})
+    return Table(["setting", "value", ""], rows, "How it was computed", words=words)
+
+
+def _runs(records: Sequence[Record]) -> Table:
+    labels = list(dict.fromkeys(name for record in records for name in record["labels"]))
+    rows: list[list[Cell]] = []
+    for record in records[:MOST_ROWS]:
+        time = record.get("wall_time")
+        rows.append(
+            [
+                printable(str(record["name"])),
+                *(printable(_number(record["labels"].get(name, ""))) for name in labels),
+                str(record["status"]),
+                "" if time is None else f"{time:.2f}",
+            ]
+        )
+    more = len(records) - MOST_ROWS
+    return Table(
+        ["run", *("speed (m/s)" if name == "speed" else name for name in labels), "status",
+         "wall time (s)"],
+        rows,
+        f"All {len(records)} runs",
+        words=frozenset({0, 1, 2}),
+        failed=frozenset(
+            i for i, record in enumerate(records[:MOST_ROWS]) if record["status"] != "complete"
+        ),
+        note=f"{more} more are in summary.csv." if more > 0 else "",
+    )  # fmt: skip
+
+
+def _number(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
+    """Runs that did not end well, and remarks, equal ones once."""
+    section = Section("remarks", "Failures and remarks", list(map(printable, more)))
+    rows = [
+        [printable(str(record["name"])), str(record["status"]),
+         printable(str(record.get("status_reason", "")))]
+        for record in records
+        if record["status"] != "complete"
+    ]  # fmt: skip
+    if rows:
+        left = len(rows) - MOST_ROWS
+        section.tables.append(
+            Table(
+                ["run", "status", "reason"],
+                rows[:MOST_ROWS],
+                f"{len(rows)} of {len(records)} runs without an end as asked for",
+                words=frozenset({0, 1, 2}),
+                note=f"{left} more are in summary.csv." if left > 0 else "",
+            )
+        )
+    else:
+        section.texts.append("Every run came to its end.")
+    said: dict[str, list[str]] = {}
+    for record in records:
+        for remark in record.get("remarks", ()):
+            said.setdefault(str(remark), []).append(str(record["name"]))
+    cells = []
+    for remark, names in list(said.items())[:MOST_ROWS]:
+        more_names = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        cells.append([printable(remark), printable(", ".join(names[:3]) + more_names)])
+    if cells:
+        section.tables.append(
+            Table(
+                ["remark", "runs"],
+                cells,
+                "What a reader must know",
+                words=frozenset({0, 1}),
+                note=f"{len(said) - MOST_ROWS} more are in summary.csv."
+                if len(said) > MOST_ROWS
+                else "",
+            )
+        )
+    else:
+        section.texts.append("There are no remarks on the runs.")
+    return section

@@ -1,0 +1,122 @@
+"""How the values of a study spread over what was varied: columns for the page and its table."""
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Any
+
+from railsim.notation import QUANTITIES, Quantity
+from railsim.text import printable
+
+Record = Mapping[str, Any]
+WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
+LEAST = 3  # runs, for a spread
+
+
+def parameters(records: Sequence[Record]) -> dict[str, list[Any]]:
+    """Return what differs between runs, numbers as numbers, by its name.
+
+    Examples
+    --------
+    >>> runs = [{"labels": {"vehicle": "a", "speed": 20.0, "track.friction": f}} for f in "12"]
+    >>> parameters(runs)
+    {'track.friction': [1.0, 2.0]}
+    """
+    names = list(dict.fromkeys(name for record in records for name in record["labels"]))
+    found = {}
+    for name in names:
+        values = [record["labels"].get(name, "") for record in records]
+        if len(set(map(str, values))) > 1:
+            found[name] = _numbers(values)
+    return found
+
+
+def _numbers(values: Sequence[Any]) -> list[Any]:
+    try:
+        return [float(value) for value in values]
+    except (TypeError, ValueError):
+        return [printable(str(value)) for value in values]
+
+
+def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
+    """Return the values of all runs, in the units of printed tables, by what they are.
+
+    Each has ``words``, ``unit`` and ``values``, None where a run has none.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for number, record in enumerate(records):
+        for key, words, quantity, value in _values(record):
+            column = found.setdefault(
+                key,
+                {
+                    "words": words,
+                    "unit": quantity.shown_unit.replace("-", ""),
+                    "values": [None] * len(records),
+                },
+            )
+            if value == value:
+                column["values"][number] = float(f"{value * quantity.scale:.6g}")
+    return found
+
+
+def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
+    rows = []
+    for peak in record.get("peaks", ()):
+        if peak["quantity"] in QUANTITIES and peak["value"] is not None:
+            quantity = QUANTITIES[peak["quantity"]]
+            # a peak is told by its magnitude: mirrored curves count alike
+            value = abs(peak["value"]) if peak["kind"] == "abs" else peak["value"]
+            words = f"{quantity.long_name}, {WORDS[peak['kind']]}"
+            rows.append((f"{quantity.name}_{peak['kind']}", words, quantity, value))
+    for number, curve in enumerate(record.get("mid_curves", ()), start=1):
+        for name, value in curve["largest"].items():
+            if name in QUANTITIES and value is not None:
+                quantity = QUANTITIES[name]
+                words = f"{quantity.long_name}, middle of curve {number}"
+                rows.append((f"{name}_mid{number}", words, quantity, abs(value)))
+    return rows
+
+
+def spread_rows(records: Sequence[Record]) -> list[list[str]]:
+    """Return smallest, median and largest value of each quantity, with the runs they belong to."""
+    rows = []
+    for column in columns(records).values():
+        pairs = [(v, i) for i, v in enumerate(column["values"]) if v is not None]
+        if len(pairs) < LEAST:
+            continue
+        low, high = min(pairs), max(pairs)
+        unit = f" ({column['unit']})" if column["unit"] else ""
+        rows.append(
+            [
+                column["words"] + unit,
+                f"{low[0]:.4g}",
+                str(records[low[1]]["name"]),
+                f"{median(value for value, _ in pairs):.4g}",
+                f"{high[0]:.4g}",
+                str(records[high[1]]["name"]),
+            ]
+        )
+    return rows
+
+
+def worst_runs(records: Sequence[Record], most: int) -> list[str]:
+    """Return the names of at most `most` runs whose curves tell most, those of large values.
+
+    All runs where there are no more; else the largest of one quantity after the other, then the
+    second largest, in the order of the runs.
+    """
+    names = [str(record["name"]) for record in records]
+    if len(names) <= most:
+        return names
+    ranked = []
+    for name in ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_abs_Y_abs", "T_gamma_abs"):
+        values = columns(records).get(name, {"values": []})["values"]
+        pairs = [(-value, number) for number, value in enumerate(values) if value is not None]
+        ranked.append([number for _, number in sorted(pairs)])
+    chosen: dict[int, None] = {}
+    for place in range(len(names)):
+        for ranks in ranked:
+            if place < len(ranks) and len(chosen) < most:
+                chosen[ranks[place]] = None
+    if not chosen:
+        chosen = dict.fromkeys(range(most))
+    return [names[number] for number in sorted(chosen)]

@@ -1,0 +1,21 @@
+"""What summaries and reports say of a result, without its arrays."""
+
+from typing import Any
+
+from railsim.result.data import Result
+from railsim.result.extremes import mid_curves, peaks
+
+FACTS = (
+    "status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor",
+    "patches_out_of_range",
+)  # fmt: skip
+
+
+def run_facts(result: Result) -> dict[str, Any]:
+    """Return how a run ended, its remarks, peaks and mid-curve values as plain data [SI]."""
+    return {
+        **{name: result.attributes[name] for name in FACTS if name in result.attributes},
+        "remarks": list(result.remarks),
+        "peaks": [peak.record() for peak in peaks(result)],
+        "mid_curves": [curve.record() for curve in mid_curves(result)],
+    }

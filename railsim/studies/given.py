@@ -1,0 +1,50 @@
+"""What a study is given in Python: files, names of shipped ones, or definitions.
+
+A definition is written into ``inputs/`` of the study's folder, so that the study can be resumed,
+sent to other machines and read without the script that made it.
+"""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from railsim.definitions.base import FileDefinition
+from railsim.files import make_folder, whole_file
+
+INPUTS = "inputs"
+
+
+def as_files(given: Sequence[Any], folder: Path) -> list[str | Path]:
+    """Return files in place of definitions, written where they are not there yet."""
+    found: list[str | Path] = []
+    taken: dict[str, str] = {}
+    for one in given:
+        if not isinstance(one, FileDefinition):
+            found.append(one)
+            continue
+        text = one.to_toml()
+        name = base = _slug(str(getattr(one, "name", "settings")))
+        number = 1
+        while taken.get(name, text) != text:
+            number += 1
+            name = f"{base}-{number}"
+        taken[name] = text
+        path = (folder / INPUTS / f"{name}.toml").absolute()
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            make_folder(path.parent)
+            with whole_file(path) as partial:
+                partial.write_text(text, encoding="utf-8")
+        found.append(str(path))
+    return found
+
+
+def _slug(name: str) -> str:
+    """Return a name as that of a file.
+
+    Examples
+    --------
+    >>> _slug("Passenger coach, soft primary")
+    'passenger_coach_soft_primary'
+    """
+    return re.sub(r"\W+", "_", name.lower()).strip("_")[:60] or "definition"

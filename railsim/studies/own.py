@@ -1,0 +1,105 @@
+"""Own quantities of a study: a Python function that is given each result.
+
+The function is named by its file, ``FILE.py:FUNCTION``; it is loaded in each process of the study.
+It returns numbers by their names.
+"""
+
+import hashlib
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+from railsim.errors import Fault, InputError, RailsimError
+from railsim.files import TABLE_BYTES, read_bytes
+from railsim.result import Result
+
+OPTION = "--quantities"
+ALLOWED = "FILE.py:FUNCTION, such as quantities.py:summary"
+
+Function = Callable[[Result], Mapping[str, float]]
+
+
+def named(function: "str | Function | None") -> str | None:
+    """Return the name ``FILE.py:FUNCTION`` of a function with the file's whole path.
+
+    Raises
+    ------
+    InputError : there is no such file or function, or the function has no file of its own.
+    """
+    if function is None:
+        return None
+    if callable(function):
+        name = getattr(function, "__qualname__", "")
+        try:
+            file = inspect.getfile(function)
+        except TypeError:
+            file = ""
+        if not name.isidentifier() or not Path(file).is_file():
+            found = f"{function!r} is no function of a module's own"
+            raise InputError([Fault(OPTION, "", found, "a function defined in a file")])
+        return f"{Path(file).resolve()}:{name}"
+    file, _, name = function.rpartition(":")
+    if not (file.endswith(".py") and name.isidentifier()):
+        raise InputError([Fault(OPTION, function, "not understood", f"allowed: {ALLOWED}")])
+    whole = f"{Path(file).resolve()}:{name}"
+    _loaded(whole)
+    return whole
+
+
+def fingerprint(name: str | None) -> str:
+    """Return a hash of the file of a function, empty where there is none."""
+    if name is None:
+        return ""
+    return hashlib.sha256(read_bytes(name.rpartition(":")[0], TABLE_BYTES)).hexdigest() + name
+
+
+def own_quantities(name: str | None, result: Result) -> dict[str, float]:
+    """Return what the function says of a result; nothing where there is no function.
+
+    Raises
+    ------
+    RailsimError : it goes wrong, or returns something else than numbers by their names.
+    """
+    if name is None:
+        return {}
+    try:
+        found: Any = _loaded(name)(result)
+        return {_checked_name(key): _number(key, value) for key, value in dict(found).items()}
+    except Exception as error:
+        raise RailsimError(f"{OPTION} {name}: {type(error).__name__}: {error}") from error
+
+
+def _checked_name(key: object) -> str:
+    if not isinstance(key, str) or not key.isprintable() or not key:
+        raise TypeError(f"the name {key!r} is no text")
+    return key
+
+
+def _number(key: str, value: Any) -> float:
+    number = float(value)
+    if math.isinf(number):
+        raise ValueError(f"'{key}' is infinite")
+    return number
+
+
+@cache
+def _loaded(name: str) -> Function:
+    file, _, function = name.rpartition(":")
+    spec = spec_from_file_location(f"railsim_quantities_{Path(file).stem}", file)
+    try:
+        assert spec is not None  # of a .py file
+        assert spec.loader is not None
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    except Exception as error:
+        found = f"cannot be loaded ({type(error).__name__}: {error})"
+        raise InputError([Fault(OPTION, file, found, ALLOWED)]) from None
+    found_one = getattr(module, function, None)
+    if not callable(found_one):
+        raise InputError([Fault(OPTION, file, f"no function '{function}'", ALLOWED)])
+    made: Function = found_one
+    return made

@@ -1,0 +1,149 @@
+"""Rows of values that a study gives the keys of its files: grids, linked keys, samples."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from railsim.definitions.study import Sample, Spread
+from railsim.errors import Fault, InputError
+from railsim.studies.points import Grid
+from railsim.units import number_with_unit
+
+SPEED = "speed"  # a key that is none of a file: the speed of the run
+
+
+@dataclass(frozen=True)
+class Row:
+    """Values of the varied keys of one run.
+
+    Attributes
+    ----------
+    values : mapping of str to str
+        As `key=value` takes them, by the paths of the keys.
+    suffix : str
+        What they add to the name of the run.
+    speed : float or None
+        Speed of the run where it is varied here [m/s].
+    """
+
+    values: Mapping[str, str]
+    suffix: str
+    speed: float | None = None
+
+
+def made_rows(grid: Grid, linked: Sequence[Grid] = (), sample: Sample | None = None) -> list[Row]:
+    """Return all combinations: the grid outermost, then linked keys, then the sample."""
+    combined = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+    for table in linked:
+        together = [
+            dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)
+        ]
+        combined = [{**row, **more} for row in combined for more in together]
+    if sample is None:
+        return [_row(values, suffix(_without_speed(values))) for values in combined]
+    drawn = sampled(sample)
+    width = len(str(len(drawn)))
+    return [
+        _row({**row, **values}, f"{suffix(_without_speed(row))}_sample={number:0{width}d}")
+        for row in combined
+        for number, values in enumerate(drawn, start=1)
+    ]
+
+
+def _without_speed(values: Mapping[str, str]) -> dict[str, str]:
+    return {key: value for key, value in values.items() if key != SPEED}
+
+
+def _row(values: Mapping[str, str], name: str) -> Row:
+    speed = speed_of(values[SPEED]) if SPEED in values else None
+    return Row(_without_speed(values), name, speed)
+
+
+def speed_of(text: str, option: str = "speeds") -> float:
+    """Return a speed that may have a unit [m/s].
+
+    Raises
+    ------
+    InputError : it is no number.
+    """
+    found = number_with_unit(text)
+    if found is not None:
+        return found
+    try:
+        return float(text)
+    except ValueError:
+        fault = Fault(option, "", f"'{text}' is no speed", "such as 20 or 72km/h")
+        raise InputError([fault]) from None
+
+
+def sampled(sample: Sample) -> list[dict[str, str]]:
+    """Return the values of a sample, one mapping for each of its members.
+
+    Latin hypercube and Sobol's sequence by scipy: every tenth of each parameter's probability holds
+    a tenth of its values, however many parameters there are (McKay, Beckman and Conover 1979; Sobol
+    1967, scrambled after Owen).
+    """
+    from scipy.stats import qmc
+
+    count = len(sample.parameters)
+    engine = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
+    shares = engine(d=count, seed=sample.seed).random(sample.number)
+    return [
+        {
+            name: f"{quantile(spread, float(share)):.10g}"
+            for (name, spread), share in zip(sample.parameters.items(), row, strict=True)
+        }
+        for row in shares
+    ]
+
+
+def quantile(spread: Spread, share: float) -> float:
+    """Return the value of a parameter below which `share` of its values lie.
+
+    Examples
+    --------
+    >>> quantile(Spread(low=1.0, high=100.0, scale="log"), 0.5)
+    10.0
+    >>> quantile(Spread(nominal=200.0, tolerance=0.1), 0.75)
+    210.0
+    """
+    if spread.low is not None and spread.high is not None:
+        if spread.scale == "log":
+            return float(f"{spread.low * (spread.high / spread.low) ** share:.12g}")
+        return spread.low + (spread.high - spread.low) * share
+    if spread.nominal is not None and spread.tolerance is not None:
+        return spread.nominal * (1.0 + spread.tolerance * (2.0 * share - 1.0))
+    assert spread.mean is not None  # one of the three is given
+    assert spread.deviation is not None
+    from scipy.special import ndtri
+
+    # a sample may hold the very end, whose value is infinite
+    inside = min(max(share, math.ulp(0.5)), 1.0 - math.ulp(0.5))
+    return spread.mean + spread.deviation * float(ndtri(inside))
+
+
+def suffix(point: Mapping[str, str]) -> str:
+    """Return what a point of the grid adds to the name of its run.
+
+    Examples
+    --------
+    >>> suffix({"track.friction": "0.3", "settings.drive.speed_table.0.1": "12"})
+    '_friction=0.3_speed_table.0.1=12'
+    """
+    last = {key: re.sub(r"^.*\.(?=[^.]*[^.\d])", "", key) for key in point}
+    unique = len(set(last.values())) == len(last)
+    parts = [f"{last[key] if unique else key}={value}" for key, value in point.items()]
+    return "".join("_" + in_a_name(part) for part in parts)
+
+
+def in_a_name(text: str) -> str:
+    """Return what a text is called within the name of a file, which leads to no other folder.
+
+    Examples
+    --------
+    >>> in_a_name("[10, 20]"), in_a_name("../other")
+    ('10-20', '..-other')
+    """
+    return re.sub(r"[^\w.+=-]+", "-", re.sub(r"[\[\]{}\"' ]", "", text))

@@ -1,0 +1,60 @@
+"""Numbers and ranges as people write them: ``72 km/h``, ``5 mm``, ``10:60:26``, ``log:1:100:3``."""
+
+import math
+import re
+
+UNITS = {
+    "km/h": 1.0 / 3.6, "m/s": 1.0, "mm": 1e-3, "m": 1.0, "kN": 1e3, "N": 1.0,
+    "mrad": 1e-3, "deg": math.pi / 180.0,
+}  # fmt: skip
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_WITH_UNIT = re.compile(rf"({NUMBER})\s*({'|'.join(map(re.escape, UNITS))})")
+_RANGE = re.compile(
+    rf"(log:)?({NUMBER}):({NUMBER}):(\d+)(?:\s*({'|'.join(map(re.escape, UNITS))}))?"
+)
+MOST_VALUES = 100_000  # of a range
+ALLOWED = "first:last:number, with log: before it for equal ratios, such as 10:60:26 or 15:30:4 m/s"
+
+
+def number_with_unit(text: str) -> float | None:
+    """Return a number with a unit in SI; None where it is nothing of the kind.
+
+    Examples
+    --------
+    >>> number_with_unit("72km/h"), number_with_unit("-2.5 mm"), number_with_unit("60E1")
+    (20.0, -0.0025, None)
+    """
+    found = _WITH_UNIT.fullmatch(text.strip())
+    return rounded(float(found[1]) * UNITS[found[2]]) if found else None
+
+
+def range_values(text: str) -> list[float] | None:
+    """Return the values of a range in SI; None where it is nothing of the kind.
+
+    Examples
+    --------
+    >>> range_values("10:20:3"), range_values("log:1e4:1e6:3"), range_values("36:72:2 km/h")
+    ([10.0, 15.0, 20.0], [10000.0, 100000.0, 1000000.0], [10.0, 20.0])
+
+    Raises
+    ------
+    ValueError : fewer than one value or too many of them, or no ratio leads from end to end.
+    """
+    found = _RANGE.fullmatch(text.strip())
+    if not found:
+        return None
+    first, last, number = float(found[2]), float(found[3]), int(found[4])
+    if not 1 <= number <= MOST_VALUES:
+        raise ValueError(f"{number} values; 1 to {MOST_VALUES} are allowed")
+    scale = UNITS[found[5]] if found[5] else 1.0
+    shares = [k / (number - 1) if number > 1 else 0.0 for k in range(number)]
+    if found[1]:
+        if not first * last > 0.0:
+            raise ValueError("equal ratios need two ends of the same sign, neither zero")
+        return [rounded(scale * first * (last / first) ** share) for share in shares]
+    return [rounded(scale * (first + (last - first) * share)) for share in shares]
+
+
+def rounded(value: float) -> float:
+    """Return a number without the round-off of its making, to 12 digits."""
+    return float(f"{value:.12g}")

@@ -1,0 +1,297 @@
+"""``railsim report``: the page's content, and the page in a real browser."""
+
+import base64
+import json
+import os
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from example_result import example_result, feed
+from test_study import arguments
+from test_study import simulated as simulated
+
+from railsim.cli import main
+from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
+from railsim.report.published import beside_published, reading
+from railsim.report.runs import page
+from railsim.report.spread import columns, parameters, worst_runs
+from railsim.result import Hdf5Sink, peaks
+from railsim.result.facts import run_facts
+
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+
+SECTIONS = ["peaks", "curves", "limits", "spread", "published", "inputs", "remarks"]
+
+# What a reader does, in both widths: look, move over a plot, zoom into one, choose a wheel.
+PROBE = """
+function probe(frame) {
+  const w = frame.contentWindow, d = w.document, found = {};
+  const plots = d.querySelector('[data-plots="0"]').railsimPlots;
+  found.errors = w.railsimErrors;
+  found.resources = w.performance.getEntriesByType("resource").length;
+  found.overflow = d.documentElement.scrollWidth - d.documentElement.clientWidth;
+  const edge = d.documentElement.clientWidth + 1, scrolled = ".scroll, svg *";
+  found.wide = Array.from(d.querySelectorAll("body *")).filter(e =>
+    !e.matches(scrolled) && !e.closest(".scroll") && e.getBoundingClientRect().right > edge
+  ).map(e => e.outerHTML.slice(0, 80));
+  found.plots = d.querySelectorAll(".u-wrap canvas").length;
+  found.sections = Array.from(d.querySelectorAll("section")).map(s => s.id);
+  const over = plots[0].over, box = over.getBoundingClientRect(), y = box.top + 0.5 * box.height;
+  const at = share => ({clientX: box.left + share * box.width, clientY: y, bubbles: true,
+    button: 0, movementX: 9});
+  over.dispatchEvent(new w.MouseEvent("mousemove", at(0.3)));
+  over.dispatchEvent(new w.MouseEvent("mousemove", at(0.35)));
+  found.readings = Array.from(d.querySelectorAll(".readings tbody td")).map(c => c.textContent);
+  found.place = d.querySelector(".readings th").textContent;
+  found.linked = plots.map(u => u.cursor.idx);
+  over.dispatchEvent(new w.MouseEvent("mousedown", at(0.3)));
+  d.dispatchEvent(new w.MouseEvent("mousemove", at(0.5)));
+  over.dispatchEvent(new w.MouseEvent("mousemove", at(0.5)));
+  d.dispatchEvent(new w.MouseEvent("mouseup", at(0.5)));
+  return new Promise(done => w.setTimeout(() => {
+    found.zoomed = plots.map(u => [u.scales.x.min, u.scales.x.max]);
+    const side = d.querySelectorAll(".controls select")[1], first = plots[0].data[1].slice();
+    side.value = 1 - side.value;
+    side.dispatchEvent(new w.Event("change"));
+    found.changed = plots[0].data[1].some((v, i) => v !== first[i]);
+    const g = plots[0].ctx, c = g.canvas, pixels = g.getImageData(0, 0, c.width, c.height).data;
+    found.ink = pixels.filter((v, i) => i % 4 === 3 && v > 0).length / (c.width * c.height);
+    found.width = d.documentElement.clientWidth;
+    done(found);
+  }, 60));
+}
+"""
+
+
+def probed(folder, html):
+    """Open a page at desktop and phone width in one browser; return what was found in each."""
+    catch = (
+        "<script>window.railsimErrors = [];"
+        "addEventListener('error', e => railsimErrors.push(String(e.message)));</script>"
+    )
+    (folder / "page.html").write_text(html.replace("<head>", f"<head>{catch}", 1), encoding="utf-8")
+    frames = "".join(
+        f'<iframe src="page.html" style="width:{w}px;height:900px"></iframe>' for w in (1200, 390)
+    )
+    (folder / "probe.html").write_text(
+        f"<body>{frames}<pre id=found></pre><script>{PROBE}"
+        "addEventListener('load', async () => { const found = [];"
+        "for (const f of document.querySelectorAll('iframe')) { found.push(await probe(f)); }"
+        "document.getElementById('found').textContent = JSON.stringify(found); });</script>"
+    )
+    done = subprocess.run(
+        [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files",
+         f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=8000", "--dump-dom",
+         (folder / "probe.html").as_uri()],
+        capture_output=True, text=True, check=False, env={**os.environ, "HOME": str(folder)},
+    )  # fmt: skip
+    text = re.search(r"<pre id=\"found\">(.*?)</pre>", done.stdout, re.DOTALL)
+    assert text, done.stderr[-2000:]
+    assert text[1], done.stderr[-2000:]
+    return json.loads(text[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder with three made-up results."""
+    path = tmp_path_factory.mktemp("results")
+    for name, how in {"a": {}, "b": {"gain": 1.15}, "c": {"gain": 0.7, "speed": 15.0}}.items():
+        with Hdf5Sink(path / f"{name}.h5") as sink:
+            feed(sink, **how)
+    return path
+
+
+@pytest.fixture(scope="module")
+def html(folder):
+    out = folder / "report.html"
+    assert main(["report", str(folder), "--out", str(out), "--quiet"]) == 0
+    return out.read_text(encoding="utf-8")
+
+
+class Outside(HTMLParser):
+    """Everything that a page would fetch."""
+
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        if tag == "link" or "src" in given or not given.get("href", "#").startswith("#"):
+            self.found.append((tag, given))
+
+
+def test_page_holds_everything_and_fetches_nothing(html):
+    outside = Outside()
+    outside.feed(html)
+    assert outside.found == []
+    assert "@import" not in html
+    assert not re.search(r"url\((?!#)", html)
+    assert len(html) < 1_000_000
+    for words in ("All 3 runs are complete", "Nadal", "Prud", "Manchester primary suspension"):
+        assert words in html
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="no chromium")
+def test_page_works_in_a_browser_at_desktop_and_phone_width(html, tmp_path):
+    for found in probed(tmp_path, html):
+        assert found["errors"] == []
+        assert found["resources"] == 0
+        assert found["wide"] == [], found["width"]
+        assert found["overflow"] <= 0
+        assert found["plots"] == 7  # six quantities, one spread
+        assert found["sections"] == SECTIONS
+        # read-off: names of the runs, and a value of each quantity
+        assert found["readings"][0] == "a"
+        assert all(found["readings"][:7])
+        assert found["place"].startswith("s = ")
+        assert len(set(found["linked"])) == 1
+        assert found["linked"][0] > 0
+        low, high = found["zoomed"][0]
+        assert found["zoomed"] == [[low, high]] * 6
+        assert 0.0 < high - low < 0.3 * 980.0  # a fifth of the length was drawn over
+        assert found["changed"]
+        assert 0.01 < found["ink"] < 0.9
+
+
+def test_thinned_curves_keep_every_peak_and_their_order():
+    axis = np.linspace(0.0, 100.0, 5001)
+    values = np.stack([np.sin(axis) + 0.3 * np.sin(37.0 * axis), axis], axis=1)
+    thin = thinned(axis, values, np.linspace(0.0, 100.0, 41))
+    for cell in range(40):
+        inside = (axis >= 2.5 * cell) & ((axis < 2.5 * (cell + 1)) | (cell == 39))
+        pair = thin[2 * cell : 2 * cell + 2]
+        assert pair.min(axis=0) == pytest.approx(values[inside].min(axis=0), abs=0.0)
+        assert pair.max(axis=0) == pytest.approx(values[inside].max(axis=0), abs=0.0)
+    assert np.all(np.diff(thin[:, 1]) > 0.0)
+
+
+def test_cells_without_an_instant_are_interpolated_and_none_is_made_up_beyond_the_run():
+    axis = np.array([10.0, 20.0, 30.0])
+    thin = thinned(axis, axis[:, None], np.linspace(0.0, 40.0, 17))
+    there = np.isfinite(thin[:, 0])
+    places = np.ravel([[2.5 * c + 0.625, 2.5 * c + 1.875] for c in range(16)])
+    assert np.all(there[(places > 12.5) & (places < 30.0)])
+    assert not there[(places < 10.0) | (places > 32.5)].any()
+    assert np.all(np.diff(thin[there, 0]) >= 0.0)
+
+
+def test_coded_values_are_right_to_half_a_step():
+    values = np.array([[-3.0, 0.1, np.nan, 8.0]])
+    low, high, text = coded(values)
+    codes = np.frombuffer(base64.b64decode(text), "<u2")
+    assert codes[2] == MISSING
+    back = low + codes[[0, 1, 3]] * (high - low) / (MISSING - 1)
+    assert back == pytest.approx(values[0, [0, 1, 3]], abs=0.5 * 11.0 / (MISSING - 1))
+
+
+def test_runs_over_other_tracks_are_drawn_apart():
+    one = example_result()
+    found = groups({"a": one, "b": example_result(gain=2.0)})
+    assert [list(group.results) for group in found] == [["a", "b"]]
+    data = curve_data(found[0])
+    (q,) = [q for q in data["quantities"] if q["name"] == "dQ_over_Q0"]
+    assert q["high"] == pytest.approx(200.0 * one.dQ_over_Q0.max())
+    assert (q["unit"], q["limit"]) == ("%", -60.0)
+
+
+def records(number):
+    runs = []
+    for i in range(number):
+        facts = run_facts(example_result(gain=1.0 + i / number, rate=5.0))
+        labels = {
+            "vehicle": "coach",
+            "track": "curve",
+            "speed": 20.0,
+            "track.friction": f"0.{i + 1}",
+        }
+        runs.append({"name": f"run{i}", "file": "", "labels": labels, **facts})
+    return runs
+
+
+def test_spread_has_the_values_of_every_run():
+    runs = records(4)
+    assert parameters(runs) == {"track.friction": pytest.approx([0.1, 0.2, 0.3, 0.4])}
+    column = columns(runs)["Y_abs"]
+    assert column["unit"] == "kN"
+    assert column["values"] == pytest.approx([32.0, 40.0, 48.0, 56.0], rel=1e-5)
+    assert worst_runs(runs, 2) == ["run2", "run3"]
+    assert worst_runs(runs, 9) == ["run0", "run1", "run2", "run3"]
+
+
+def test_failures_and_remarks_are_told_and_names_are_shown_literally():
+    runs = records(3)
+    runs[0]["remarks"] = runs[1]["remarks"] = ["A wheel lifts <b>off</b>."]
+    reason = "there is no equilibrium </script>"
+    runs[2] = {**runs[2], "status": "failed", "status_reason": reason, "peaks": []}
+    text = page("<i>t</i>\x1b", runs, {"run0": example_result()}, ["1 of 3 runs has no file."])
+    assert "Of 3 runs 2 complete, 1 failed." in text
+    assert "A wheel lifts &lt;b&gt;off&lt;/b&gt;." in text
+    assert text.count("A wheel lifts") == 1
+    assert "run0, run1" in text
+    assert "no equilibrium &lt;/script&gt;" in text
+    assert "<i>t</i>" not in text
+    assert "\x1b" not in text
+    assert "1 of 3 runs has no file." in text
+
+
+def test_published_values_stand_beside_the_run_they_belong_to():
+    result = example_result()
+    rows = {row.value.quantity: row for row in beside_published({"a": result})}
+    assert set(rows) == {"dQ_over_Q0", "sum_abs_Y", "Y_over_Q", "wheelset_roll", "wheelset_yaw",
+                         "wheelset_lateral"}  # fmt: skip
+    largest = result.dQ_over_Q0[:, 0, 0].max()
+    assert rows["dQ_over_Q0"].found == largest
+    assert rows["dQ_over_Q0"].difference == pytest.approx(largest / 0.3792 - 1.0)
+    instant = int(np.argmin(np.abs(result.time - 19.8)))
+    assert rows["wheelset_yaw"].found == result.wheelset_yaw[instant, 0]
+    assert beside_published({"a": example_result(speed=19.0)}) == []
+    value = rows["wheelset_yaw"].value
+    assert reading(example_result(duration=10.0), value) is None
+
+
+def test_study_is_reported_with_its_failures(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path / "s", 10, 12, 13, 99)) == 1
+    assert main(["report", str(tmp_path / "s"), "--out", str(tmp_path / "r.html"), "--json"]) == 0
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "Of 4 runs 2 complete, 1 failed, 1 derailed." in text
+    assert "there is no equilibrium at 13 m/s" in text
+    os.remove(tmp_path / "s" / "coach_manchester_curve_r250_10.h5")
+    assert main(["report", str(tmp_path / "s"), "--out", str(tmp_path / "q.html")]) == 0
+    told = "1 of 4 runs in"
+    assert told in (tmp_path / "q.html").read_text(encoding="utf-8")
+
+
+def test_study_writes_its_report_where_asked(tmp_path, simulated, capsys):
+    assert main(arguments(tmp_path, 10, more=["--report"])) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "report.html")
+    assert "The run is complete." in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["nowhere.h5"], "nowhere.h5"),
+        (["."], "no results in this folder"),
+        (["nowhere.h5", "--out", "r.pdf"], "must end in .html"),
+    ],
+)
+def test_what_cannot_be_reported_is_told_in_a_line(tmp_path, monkeypatch, capsys, given, words):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", *given]) == 2
+    assert words in capsys.readouterr().err
+    assert os.listdir(tmp_path) == []
+
+
+def test_peaks_of_the_page_are_those_of_the_result(html, folder):
+    from railsim.result import open_result
+
+    for peak in peaks(open_result(folder / "b.h5")):
+        assert peak.quantity.text(peak.value) in html

@@ -1,0 +1,205 @@
+"""Study files, ranges, linked and sampled values, short paths, units, own quantities, objects."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from test_study import CURVE, arguments, index, rows
+from test_study import simulated as simulated
+
+import railsim
+from railsim.cli import main
+from railsim.definitions.loading import load_study, load_track, load_vehicle
+from railsim.definitions.study import Sample, Spread
+from railsim.errors import InputError
+from railsim.studies.combine import combinations
+from railsim.studies.rows import made_rows, quantile, sampled
+
+COACH = "coach_manchester"
+HEAD = f'format = "railsim-study/1"\nname = "n"\nvehicles = ["{COACH}"]\ntracks = ["{CURVE}"]\n'
+
+
+def written(folder, text):
+    path = folder / "mine.toml"
+    path.write_text(HEAD + text, encoding="utf-8")
+    return str(path)
+
+
+def test_study_file_makes_grid_links_and_sample(tmp_path, simulated):
+    file = written(tmp_path, """
+[grid]
+"track.friction" = "0.3:0.4:2"
+[[linked]]
+speed = ["36km/h", 12.0]
+"vehicle.bodies.carbody.mass" = [40e3, 44e3]
+[sample]
+number = 2
+seed = 7
+[sample.parameters]
+"vehicle.primary.stiffness.x" = { nominal = 30e6, tolerance = 0.1 }
+""")  # fmt: skip
+    assert main(["study", file, "--out", str(tmp_path / "s"), "--workers", "1", "--quiet"]) == 0
+    assert simulated == [10.0, 10.0, 12.0, 12.0] * 2
+    found = rows(tmp_path / "s")
+    assert len({row["name"] for row in found}) == 8
+    assert found[0]["name"].endswith("_friction=0.3_mass=40000_sample=1")
+    masses = {row["speed"]: row["vehicle.bodies.carbody.mass"] for row in found}
+    assert masses == {"10.0": "40000", "12.0": "44000"}
+    stiffness = {float(row["vehicle.primary.stiffness.x"]) for row in found}
+    assert len(stiffness) == 2  # one for each member of the sample
+    assert all(27e6 <= k <= 33e6 for k in stiffness)
+    inputs = index(tmp_path / "s")["inputs"]
+    assert inputs["sample"]["seed"] == 7
+
+
+def test_study_goes_on_alone_from_what_its_journal_says(tmp_path, simulated):
+    file = written(tmp_path, 'speeds = "10:12:2"\n[sample]\nnumber = 2\n[sample.parameters]\n'
+                   '"track.friction" = { low = 0.2, high = 0.4 }\n')  # fmt: skip
+    out = str(tmp_path / "s")
+    assert main(["study", file, "--out", out, "--workers", "1"]) == 0
+    before = (tmp_path / "s" / "summary.csv").read_bytes()
+    assert main(["study", "--resume", "--out", out, "--workers", "1"]) == 0
+    assert len(simulated) == 4
+    assert (tmp_path / "s" / "summary.csv").read_bytes() == before
+
+
+def test_short_path_changes_what_the_long_one_does(tmp_path):
+    long = "assemblies.bogie.assemblies.axle.elements.primary.stiffness"
+    short = load_vehicle(COACH, ["primary.stiffness.y=5kN"])
+    assert short == load_vehicle(COACH, [f"{long}.1=5000.0"])
+    assert load_vehicle(COACH, ["carbody.mass=40e3"]).bodies["carbody"].mass == 40e3
+    with pytest.raises(InputError, match=r"'bogie\.damping' is \d+ keys: assemblies\.bogie"):
+        load_vehicle(COACH, ["bogie.damping=[1.0, 1.0, 1.0]"])
+    with pytest.raises(InputError, match="no 'primry'"):
+        load_vehicle(COACH, ["primry.stiffness.x=1.0"])
+
+
+def test_value_with_a_unit_is_in_si_and_text_stays_text():
+    assert load_track(CURVE, ["gauge=1440mm"]).gauge == pytest.approx(1.44, rel=1e-12)
+    assert load_track(CURVE, ["name=12mm"]).name == "12mm"
+
+
+def test_speeds_and_grid_take_units_and_ranges(tmp_path, simulated):
+    more = ["--grid", "track.friction=0.3,0.4:0.5:2"]
+    assert main(arguments(tmp_path, "36km/h", "12:16:3", more=more)) == 1  # 15 m/s: see `simulated`
+    assert simulated[:3] == [10.0] * 3
+
+
+def test_latin_hypercube_has_one_value_in_each_part_of_each_parameter():
+    spreads = {"a": Spread(low=0.0, high=8.0), "b": Spread(low=1.0, high=256.0, scale="log")}
+    sample = Sample(number=8, seed=3, parameters=spreads)
+    drawn = sampled(sample)
+    assert sorted(int(float(row["a"])) for row in drawn) == list(range(8))
+    assert sorted(int(np.log2(float(row["b"]))) for row in drawn) == list(range(8))
+    assert sampled(sample) == drawn
+    assert sampled(Sample(number=8, seed=4, parameters=spreads)) != drawn
+
+
+def test_sobol_sample_is_balanced_and_normal_spread_is_normal():
+    sample = Sample(method="sobol", number=64, parameters={"a": Spread(mean=5.0, deviation=2.0)})
+    values = np.array([float(row["a"]) for row in sampled(sample)])
+    # half of a balanced sequence lies on each side, 68 % within a standard deviation
+    assert (values < 5.0).sum() == 32
+    assert abs((np.abs(values - 5.0) < 2.0).mean() - 0.6827) < 1.0 / 32.0
+    assert quantile(Spread(mean=5.0, deviation=2.0), 0.975) == pytest.approx(8.92, abs=5e-3)
+
+
+def test_grid_is_outermost_then_links_then_the_sample():
+    sample = Sample(number=2, parameters={"c": Spread(low=0.0, high=1.0)})
+    made = made_rows({"a": ["1", "2"]}, [{"b": ["3", "4"], "speed": ["5", "6"]}], sample)
+    assert [(row.values["a"], row.values["b"], row.speed) for row in made] == [
+        (a, b, v) for a in "12" for b, v in (("3", 5.0), ("4", 6.0)) for _ in range(2)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "'speeds' is needed"),
+        ('speeds = [10.0]\n[grid]\n"track.friction" = "0.1:0.2:0"\n', "0 values"),
+        ('speeds = [10.0]\n[[linked]]\na = [1, 2]\nb = [1]\n', "equally many"),
+        ('speeds = [10.0]\n[grid]\na = [1]\n[[linked]]\na = [1]\n', "'a' is varied twice"),
+        ('speeds = [10.0]\n[sample]\nmethod = "sobol"\nnumber = 6\nparameters.a = {low = 0.0, '
+         "high = 1.0}\n", "power of two"),
+        ("speeds = [10.0]\n[sample]\nnumber = 6\nparameters.a = {low = 1.0}\n", "is needed"),
+        ("speeds = [10.0]\nspeed = [1.0]\n", "speed"),
+    ],
+)  # fmt: skip
+def test_fault_of_a_study_file_is_told_by_validate_and_study(tmp_path, capsys, text, words):
+    file = written(tmp_path, text)
+    assert main(["validate", file]) == 2
+    assert words in capsys.readouterr().err
+    assert main(["study", file, "--out", str(tmp_path / "s")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "s").exists()
+
+
+def test_info_says_how_many_runs_a_study_file_has(capsys):
+    assert main(["info", "primary_tolerance"]) == 0
+    assert "32 runs" in capsys.readouterr().out
+    assert main(["info", "primary_tolerance", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["runs"] == 32
+
+
+def test_options_beside_a_study_file_are_refused(tmp_path, capsys):
+    out = str(tmp_path / "s")
+    assert main(["study", "curving_reference", "--speeds", "10", "--out", out]) == 2
+    assert "given together with a study file" in capsys.readouterr().err
+
+
+def test_shipped_studies_have_cases_without_a_fault():
+    for name in ("curving_reference", "primary_tolerance"):
+        plan = load_study(name)
+        speeds = [20.0] * len(plan.speeds)
+        assert combinations(plan.vehicles, plan.tracks, speeds[:1])
+
+
+def function(result):
+    return {"own largest Q": float(result.Q.max()), "own end": float(result.time[-1])}
+
+
+def test_own_quantities_stand_in_record_and_summary_and_follow_their_file(tmp_path, simulated):
+    file = tmp_path / "own.py"
+    file.write_text("def mine(result):\n    return {'twice': 2.0 * result.Q.max()}\n")
+    out = tmp_path / "s"
+    more = ["--quantities", f"{file}:mine"]
+    assert main(arguments(out, 10, more=more)) == 0
+    result = railsim.open_result(out / f"{COACH}_{CURVE}_10.h5")
+    assert float(rows(out)[0]["twice"]) == 2.0 * result.Q.max()
+    file.write_text("def mine(result):\n    return {'thrice': 3.0 * result.Q.max()}\n")
+    from railsim.studies.own import _loaded
+
+    _loaded.cache_clear()  # another process would load it anew
+    assert main(arguments(out, 10, more=more)) == 0
+    assert float(rows(out)[0]["thrice"]) == 3.0 * result.Q.max()
+    assert simulated == [10.0]  # the run itself is kept
+
+
+def test_own_quantities_that_go_wrong_fail_their_run_only(tmp_path, simulated, capsys):
+    file = tmp_path / "own.py"
+    file.write_text("def mine(result):\n    return {'x': 1.0 / (result.speed - 10.0)}\n")
+    assert main(arguments(tmp_path / "s", 10, 12, more=["--quantities", f"{file}:mine"])) == 1
+    by_speed = {row["speed"]: row for row in rows(tmp_path / "s")}
+    assert "ZeroDivisionError" in by_speed["10.0"]["status_reason"]
+    assert by_speed["12.0"]["x"] == "0.5"
+    assert main(arguments(tmp_path / "t", 10, more=["--quantities", f"{file}:other"])) == 2
+    assert "no function 'other'" in capsys.readouterr().err
+
+
+def test_definitions_in_python_are_written_and_run(tmp_path, simulated):
+    vehicle = load_vehicle(COACH)
+    soft = vehicle.replace(name="Soft coach")
+    track = load_track(CURVE)
+    settings = railsim.load_settings(None, ["output_rate=100.0"])
+    how = {"out": tmp_path, "settings": settings, "workers": 1, "quantities": function}
+    outcome = railsim.study([soft, vehicle], track, 10.0, **how)
+    names = [record["labels"]["vehicle"] for record in outcome.records]
+    assert names[0] == "soft_coach"
+    assert len(set(names)) == 2
+    assert load_vehicle(tmp_path / "inputs" / "soft_coach.toml") == soft
+    assert outcome.records[0]["quantities"]["own largest Q"] > 0.0
+    again = railsim.study([soft, vehicle], track, 10.0, **how)
+    assert again.computed == 0
+    with (tmp_path / "summary.csv").open() as file:
+        assert "own end" in next(csv.reader(file))

@@ -1,0 +1,65 @@
+"""A study on a dask cluster of several processes, with and without a folder in common."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.result import open_run
+from railsim.studies.combine import load_case
+from railsim.studies.execute import Job, perform_there
+
+distributed = pytest.importorskip("distributed")
+
+STUDY = {"vehicles": "coach_manchester", "tracks": "straight", "until": 10.0, "grid": {
+    "track.friction": "0.2:0.5:6"}}  # fmt: skip
+
+
+def arrays(folder):
+    found = {}
+    for path in sorted(folder.glob("*.h5")):
+        result = open_run(path)
+        found[path.name] = {name: result[name] for name in result}
+    return found
+
+
+def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
+    case = load_case("coach_manchester", "straight", 20.0, until=10.0)
+    job = Job(case, tmp_path / "elsewhere" / case.file_name)
+    (record,), files = perform_there((job,), "nobody made this mark")
+    assert record["status"] == "complete"
+    assert set(files) == {case.file_name}
+    assert not job.path.parent.exists()
+    (tmp_path / "here.h5").write_bytes(files[case.file_name])
+    assert open_run(tmp_path / "here.h5").status == "complete"
+
+
+@pytest.mark.slow
+def test_study_survives_the_death_of_a_worker_and_is_that_of_one_process(tmp_path):
+    alone = railsim.study(speeds=20.0, out=tmp_path / "alone", workers=1, **STUDY)
+    assert not alone.failed
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        pids = [worker.pid for worker in cluster.workers.values()]
+        killed = []
+
+        def kill(record):
+            if not killed:
+                killed.append(pids[0])
+                os.kill(pids[0], signal.SIGKILL)
+
+        outcome = railsim.study(
+            speeds=20.0, out=tmp_path / "many", scheduler=cluster.scheduler_address,
+            on_record=kill, **STUDY
+        )  # fmt: skip
+    assert killed
+    assert not outcome.failed
+    assert [r["name"] for r in outcome.records] == [r["name"] for r in alone.records]
+    one, many = arrays(tmp_path / "alone"), arrays(tmp_path / "many")
+    assert one.keys() == many.keys()
+    for name, expected in one.items():
+        assert all(np.array_equal(expected[q], many[name][q], equal_nan=True) for q in expected)
+    assert not [p for p in (tmp_path / "many").iterdir() if p.name.startswith(".")]
