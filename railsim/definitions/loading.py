@@ -20,8 +20,10 @@ from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.limits import (
     COMFORT_LIMITS_FORMAT,
     LIMITS_FORMAT,
+    STATIONARY_LIMITS_FORMAT,
     ComfortLimits,
     RunningLimits,
+    StationaryLimits,
 )
 from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
@@ -103,6 +105,7 @@ FORMATS: dict[str, Format] = {
     LIMITS_FORMAT: Format("limits", RunningLimits),
     SCENARIO_FORMAT: Format("scenario", Scenario),
     COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
+    STATIONARY_LIMITS_FORMAT: Format("limits", StationaryLimits),
 }
 
 
@@ -189,6 +192,13 @@ def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -
 def load_comfort_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> ComfortLimits:
     """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
     return _loaded(ComfortLimits, _file_source(path, "limits"), overrides)
+
+
+def load_stationary_limits(
+    path: str | Path, overrides: Iterable[str] | str = ()
+) -> StationaryLimits:
+    """Load the limits of stationary tests, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(StationaryLimits, _file_source(path, "limits"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

@@ -9,6 +9,7 @@
 `journal.py`    what is done, one line a run, appended
 `summary.py`    ``summary.csv`` and ``study.json``
 `study.py`      `study`: the whole job
+`stationary.py` a vehicle at a stand on twisted track and on cant, against limits
 ==============  ===========================================================================
 
 Begin reading in `study.py`.
