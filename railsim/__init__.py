@@ -2,10 +2,12 @@
 
 The public names, loaded when they are first used:
 
-    vehicle = railsim.load_vehicle("coach_manchester")
-    track = railsim.load_track("curve_r250")
-    result = railsim.simulate(vehicle, track, speed=20.0)
-    result.to_hdf5("run.h5")
+>>> import railsim
+>>> vehicle = railsim.load_vehicle("coach_manchester")
+>>> track = railsim.load_track("curve_r250")
+>>> result = railsim.simulate(vehicle, track, speed=20.0, until=10.0)
+>>> figure = result.plot("Q", "sum_Y")
+>>> path = result.to_hdf5("run.h5")  # doctest: +SKIP
 """
 
 from importlib import import_module
@@ -14,25 +16,54 @@ from typing import TYPE_CHECKING, Any
 from railsim.version import __version__
 
 if TYPE_CHECKING:
-    from railsim.assessment import assess
-    from railsim.definitions.loading import load_mechanism, load_settings, load_track, load_vehicle
+    from railsim.assessment import Assessment, assess
+    from railsim.definitions.loading import (
+        load_comfort_limits,
+        load_mechanism,
+        load_running_limits,
+        load_scenario,
+        load_settings,
+        load_spring,
+        load_track,
+        load_vehicle,
+    )
+    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.settings import Settings
+    from railsim.definitions.spring import TrailingArmSuspension
+    from railsim.definitions.track import Track
+    from railsim.definitions.vehicle import Vehicle
     from railsim.errors import InputError, ModelError
     from railsim.linear.modes import modes, root_locus
+    from railsim.profiles import Profile, load_profile
     from railsim.result import Result, mid_curves, open_result, peaks
     from railsim.simulation import simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
+    from railsim.statics import StaticLoads, static_loads
     from railsim.studies import study
 
 _HOMES = {
-    "assess": "railsim.assessment",
+    "Assessment": "railsim.assessment",
     "InputError": "railsim.errors",
+    "Mechanism": "railsim.definitions.mechanism",
     "ModelError": "railsim.errors",
+    "Profile": "railsim.profiles",
     "Result": "railsim.result",
+    "Settings": "railsim.definitions.settings",
+    "StaticLoads": "railsim.statics",
+    "Track": "railsim.definitions.track",
+    "TrailingArmSuspension": "railsim.definitions.spring",
+    "Vehicle": "railsim.definitions.vehicle",
+    "assess": "railsim.assessment",
     "critical_speed": "railsim.stability.critical_speed",
     "curving": "railsim.stability.curving",
+    "load_comfort_limits": "railsim.definitions.loading",
     "load_mechanism": "railsim.definitions.loading",
+    "load_profile": "railsim.profiles",
+    "load_running_limits": "railsim.definitions.loading",
+    "load_scenario": "railsim.definitions.loading",
     "load_settings": "railsim.definitions.loading",
+    "load_spring": "railsim.definitions.loading",
     "load_track": "railsim.definitions.loading",
     "load_vehicle": "railsim.definitions.loading",
     "mid_curves": "railsim.result",
@@ -42,19 +73,33 @@ _HOMES = {
     "root_locus": "railsim.linear.modes",
     "simulate": "railsim.simulation",
     "simulate_together": "railsim.simulation",
+    "static_loads": "railsim.statics",
     "study": "railsim.studies",
 }
 
 __all__ = [
+    "Assessment",
     "InputError",
+    "Mechanism",
     "ModelError",
+    "Profile",
     "Result",
+    "Settings",
+    "StaticLoads",
+    "Track",
+    "TrailingArmSuspension",
+    "Vehicle",
     "__version__",
     "assess",
     "critical_speed",
     "curving",
+    "load_comfort_limits",
     "load_mechanism",
+    "load_profile",
+    "load_running_limits",
+    "load_scenario",
     "load_settings",
+    "load_spring",
     "load_track",
     "load_vehicle",
     "mid_curves",
@@ -64,6 +109,7 @@ __all__ = [
     "root_locus",
     "simulate",
     "simulate_together",
+    "static_loads",
     "study",
 ]
 

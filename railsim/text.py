@@ -4,6 +4,9 @@ A vehicle may be called ``$x^$``, ``=1+1`` or hold escape sequences; wherever it
 these characters and does nothing.  Pages escape theirs by themselves (jinja2).
 """
 
+from collections.abc import Iterable, Sequence
+from html import escape
+
 
 def printable(text: str) -> str:
     r"""Return text without characters that steer a terminal; ends of lines stay.
@@ -48,3 +51,22 @@ def spreadsheet_cell(value: object) -> object:
     except ValueError:
         return f"'{value}"
     return value
+
+
+def html_table(caption: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table as HTML, for notebooks; every text in it is shown literally.
+
+    Examples
+    --------
+    >>> html_table("", [], [["<b>"]])
+    '<table><tbody><tr><td>&lt;b&gt;</td></tr></tbody></table>'
+    """
+
+    def line(cells: Iterable[object], kind: str) -> str:
+        texts = (escape(printable(str(cell))) for cell in cells)
+        return "<tr>" + "".join(f"<{kind}>{text}</{kind}>" for text in texts) + "</tr>"
+
+    head = f"<thead>{line(header, 'th')}</thead>" if header else ""
+    body = "".join(line(row, "td") for row in rows)
+    title = f"<caption>{escape(printable(caption))}</caption>" if caption else ""
+    return f"<table>{title}{head}<tbody>{body}</tbody></table>"

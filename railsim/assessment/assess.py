@@ -164,7 +164,8 @@ def assess(
 
     Raises
     ------
-    InputError : results that lack what is needed, are too coarse or too short.
+    InputError
+        Results that lack what is needed, are too coarse or too short.
 
     Examples
     --------

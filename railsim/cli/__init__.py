@@ -27,7 +27,7 @@ DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 
 # name of a command: its module in this package, and what it does
 COMMANDS = {
-    "run": ("run", "One vehicle on one track: one HDF5 file and the table of peaks."),
+    "run": ("run", "One vehicle on one track: one HDF5 file and a table of peak values."),
     "study": ("study", "Every combination of vehicles, tracks and speeds."),
     "compare": ("compare", "Results side by side: tables and overlaid plots."),
     "plot": ("plot", "Time histories of a result; a track in plan."),
@@ -41,9 +41,9 @@ COMMANDS = {
     "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
     "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
     "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),
-    "list": ("library", "What vehicles, tracks, profiles and design files there are."),
+    "list": ("library", "Available vehicles, tracks, profiles and design files."),
     "validate": ("validate", "Check files and list every fault."),
-    "info": ("info", "What a vehicle, track or result file holds, in a screenful."),
+    "info": ("info", "Contents of a vehicle, track or result file on one screen."),
     "bench": ("bench", "The runtime benchmark on this machine."),
 }
 

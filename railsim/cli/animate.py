@@ -16,17 +16,23 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
 
 @click.command()
 @click.argument("file", metavar="R.h5|modes.json")
-@click.option("--out", metavar="F", help="Page (.html), .gif or .mp4; default beside the input.")
+@click.option("--out", metavar="F", help="Page (.html), .gif or .mp4; default: next to the input.")
 @click.option("--vehicle", metavar="F", help="Vehicle of the modes: a file or a name.")
 @click.option("--mode", metavar="NAME", help="Mode by name or number; default the first.")
 @click.option(
-    "--between", nargs=2, type=float, metavar="S1 S2", help="Part of the run, distance in m."
+    "--between",
+    nargs=2,
+    type=float,
+    metavar="S1 S2",
+    help="Section of the run to show, distance in m.",
 )
-@click.option("--frames", type=click.IntRange(2, 20_000), metavar="N", help="Frames at most.")
+@click.option(
+    "--frames", type=click.IntRange(2, 20_000), metavar="N", help="Maximum number of frames."
+)
 @click.option("--fps", type=click.IntRange(1, 100), default=20, show_default=True,
-              help="Frames a second of a film.")  # fmt: skip
+              help="Frames per second of a film.")  # fmt: skip
 @click.option("--gain", type=click.FloatRange(0.0, 1000.0), default=1.0, show_default=True,
-              help="Factor on the motion of the bodies in a film.")  # fmt: skip
+              help="Magnification of the motion of the bodies in a film.")  # fmt: skip
 @overwrite_option
 @json_option
 @quiet_option
@@ -40,10 +46,10 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Write a run, or a mode, as one page that plays, or as a film.
+    """Animate a run or a mode as one HTML page or as a film.
 
-    The page needs nothing else: it plays, scrubs, zooms and turns in any browser, also without a
-    network.  Films show the same from one side; MP4 needs ffmpeg.
+    The page is self-contained: it plays, zooms and rotates in any browser, also without a network.
+    Films show the motion from one side; MP4 needs ffmpeg.
 
     \b
     Example:

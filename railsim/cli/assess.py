@@ -33,15 +33,19 @@ FILES = ("assessment.json", "assessment.csv", "assessment.png")
     "--method", type=click.Choice(["normal", "simplified"]), default="normal", show_default=True,
     help="With wheel forces, or with accelerations only.",
 )  # fmt: skip
-@click.option("--admissible-speed", type=float, metavar="V", help="In place of the vehicle's, m/s.")
-@click.option("--cant-deficiency", type=float, metavar="I", help="Admissible one, m.")
+@click.option(
+    "--admissible-speed", type=float, metavar="V", help="Instead of the vehicle's, in m/s."
+)
+@click.option("--cant-deficiency", type=float, metavar="I", help="Admissible cant deficiency in m.")
 @click.option(
     "--category", type=click.Choice(["passenger", "freight", "locomotive", "multiple_unit"]),
-    help="In place of the vehicle's.",
+    help="Instead of the vehicle's.",
 )  # fmt: skip
-@click.option("--causal", is_flag=True, help="Filters as amplifiers have them, with phase.")
-@click.option("--coarse", is_flag=True, help="Take fewer than 1000 samples a second too.")
-@click.option("--all-sections", is_flag=True, help="Count sections outside a zone's conditions.")
+@click.option(
+    "--causal", is_flag=True, help="Causal filters, with phase, as in measuring amplifiers."
+)
+@click.option("--coarse", is_flag=True, help="Also accept results below 1000 samples per second.")
+@click.option("--all-sections", is_flag=True, help="Also use sections outside a zone's conditions.")
 @click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
 @click.option("--out", metavar="DIR", help="Folder for assessment.json, .csv and .png.")
 @overwrite_option
@@ -63,7 +67,7 @@ def command(
     """Assess results: running behaviour, comfort, wear or derailment.
 
     Runs of one vehicle are assessed together, those of several vehicles one after the other; a
-    folder stands for all results in it.  The verdict is "pass" only where all zones have enough
+    folder means all results in it.  The verdict is "pass" only where all zones have enough
     sections within the standard's conditions.
 
     \b

@@ -13,12 +13,12 @@ from railsim.cli.progress import progress_bar
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress bar.")
 def command(quick: bool, as_json: bool, quiet: bool) -> None:
-    """Measure how fast railsim is on this machine, and how right at that speed.
+    """Measure the speed of railsim on this machine, and the error at that speed.
 
     The study's runs in multiples of real time with their errors against RK4 at 0.125 ms; the parts
     of the right-hand side; FASTSIM over its grid; many runs per call; one core and two; start-up,
-    whole commands and memory.  Takes a few minutes.  Other programs that run meanwhile spoil wall
-    times.
+    whole commands and memory.  Takes a few minutes.  Other programs that run at the same time
+    falsify the wall times.
 
     \b
     Example:

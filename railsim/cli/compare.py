@@ -35,7 +35,7 @@ def command(
 ) -> None:
     """Print peaks and mid-curve values of results side by side.
 
-    The first result is what the others are compared with; differences are those of magnitudes.
+    The others are compared with the first result; differences are those of magnitudes.
     With --out the table and a picture of the leading wheelset's quantities are written.
 
     \b

@@ -61,7 +61,10 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
 @click.option("--gauge", default=1.435, show_default=True, help="Track gauge (m).")
 @click.option("--inclination", default=0.025, show_default=True, help="Rail inclination (1).")
 @click.option(
-    "--back-to-back", default=1.360, show_default=True, help="Distance of the wheel backs (m)."
+    "--back-to-back",
+    default=1.360,
+    show_default=True,
+    help="Distance between the flange backs (m).",
 )
 @click.option(
     "--radius",
@@ -77,7 +80,7 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
     "--max-shift", default=0.010, show_default=True, help="Largest lateral displacement (m)."
 )
 @click.option(
-    "--exact", is_flag=True, help="Check the patches by boundary elements (some ten seconds)."
+    "--exact", is_flag=True, help="Check the patches by boundary elements (about ten seconds)."
 )
 @click.option(
     "--normal",
@@ -97,7 +100,7 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
 @click.option(
     "--build-creep-table",
     is_flag=True,
-    help="Only compute the table of the creep law `table` anew (half an hour; may be interrupted).",
+    help="Only recompute the table of the creep law `table` (half an hour; can be interrupted).",
 )
 @click.option(
     "--workers",
@@ -106,7 +109,9 @@ PATCH_SHARES = (-0.6, -0.3, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7)
     show_default=True,
     help="Processes, for --build-creep-table.",
 )
-@click.option("--out", metavar="DIR", help="Folder for pictures and tables; made if need be.")
+@click.option(
+    "--out", metavar="DIR", help="Folder for pictures and tables; created if it does not exist."
+)
 @overwrite_option
 @json_option
 @quiet_option
@@ -132,8 +137,9 @@ def command(
 ) -> None:
     """Contact geometry of a wheelset on its rails.
 
-    Prints rolling radius difference, contact angles and places over the lateral displacement, the
-    equivalent conicity of EN 15302, and the contact patches of the right wheel under a load.
+    Prints rolling radius difference, contact angles and contact positions over the lateral
+    displacement, the equivalent conicity of EN 15302, and the contact patches of the right wheel
+    under a load.
 
     \b
     Example:

@@ -130,7 +130,7 @@ def _shown(value: float) -> str:
 
 
 def build_table(out: str | None, workers: int, as_json: bool, quiet: bool) -> None:
-    """Compute the table of the full theory anew into a folder and compare it with the shipped one.
+    """Recompute the table of the full theory into a folder and compare it with the shipped one.
 
     Parameters
     ----------

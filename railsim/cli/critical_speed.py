@@ -96,7 +96,7 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @click.option(
     "--out",
     metavar="DIR",
-    help="Folder for critical_speed.json and .png; a map goes on where it stopped.",
+    help="Folder for critical_speed.json and .png; an interrupted map is continued.",
 )
 @click.option("--settings", metavar="F", help="Settings file: scheme, creep law, contact.")
 @load_option
@@ -124,12 +124,12 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Find from which speed a vehicle hunts on ideal straight track.
+    """Find the critical speed of a vehicle on ideal straight track.
 
-    V_lin: lowest speed at which a mode is not damped.  V_n: lowest speed at which hunting
-    sustains itself, by a ramp of falling speed with runs at constant speed, by a bifurcation
-    diagram, or by continuation of the periodic motions.  Of TRACK (default: straight) rails,
-    gauge, friction and support count.
+    V_lin: lowest speed at which a mode is undamped.  V_n: lowest speed at which hunting sustains
+    itself, by a ramp of falling speed with runs at constant speed, by a bifurcation diagram, or by
+    continuation of the periodic motions.  Rails, gauge, friction and support are those of TRACK
+    (default: straight).
 
     \b
     Example:

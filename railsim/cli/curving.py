@@ -61,10 +61,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Find how a vehicle runs steadily in curves, at every combination of the values given.
+    """Compute steady curving of a vehicle for every combination of the given values.
 
-    The speed follows from radius, cant and cant deficiency.  A point that Newton's method does not
-    find is sought by time integration and marked.
+    The speed follows from radius, cant and cant deficiency.  Where Newton's method fails, time
+    integration is used; such points are marked.
 
     \b
     Example:

@@ -20,8 +20,6 @@ GRAVITY = 9.81
 CANT_BASE = 1.5
 # Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
 USUAL_CANT_DEFICIENCY = 0.150
-# Speed at which the static state is found: steady rolling needs one [m/s].
-SLOW = 10.0
 
 
 def _point(point: Sequence[float]) -> str:
@@ -169,18 +167,9 @@ def _finds_its_preload(element: "Element") -> bool:
 
 def static_data(vehicle: "Vehicle") -> dict[str, Any]:
     """Return static wheel loads and preloads on straight level track [N]."""
-    from railsim.assembly import assemble
-    from railsim.definitions.loading import load_track
-    from railsim.definitions.settings import Settings
-    from railsim.equilibrium import equilibrium
+    from railsim.statics import static_loads
 
-    balance = equilibrium(assemble(vehicle, load_track("straight"), Settings()), SLOW)
-    model = balance.model
-    loads = dict(zip(model.index.wheelsets, balance.Q0.tolist(), strict=True))
-    tensions = model.system.links.spring[:, 2:].tolist()
-    preloads = dict(zip(model.index.links, tensions, strict=True))
-    preloads |= dict(zip(model.index.mounts, model.system.mounts.preload.tolist(), strict=True))
-    return {"Q0": loads, "preload": {k: v for k, v in preloads.items() if any(v)}}
+    return static_loads(vehicle).record()
 
 
 def static_lines(static: dict[str, Any]) -> list[str]:

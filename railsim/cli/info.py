@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     type=click.FloatRange(min=0.0, min_open=True),
     multiple=True,
     metavar="V",
-    help="Speed for the cant deficiency of a track's curves, m/s; may be given several times.",
+    help="Speed for the cant deficiency in the curves of a track, m/s; may be given several times.",
 )
 @click.option(
-    "--static", is_flag=True, help="Also find static wheel loads and preloads of a vehicle."
+    "--static", is_flag=True, help="Also compute static wheel loads and preloads of a vehicle."
 )
 @click.option("--draw", metavar="F.png", help="Draw a vehicle in three views, or a track.")
 @overwrite_option

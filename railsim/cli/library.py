@@ -35,10 +35,10 @@ def _kinds() -> dict[str, str]:
 @overwrite_option
 @json_option
 def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: bool) -> None:
-    """List what can be called by its bare name: vehicles, tracks, profiles, springs ...
+    """List everything that can be given by its bare name: vehicles, tracks, profiles, springs ...
 
-    Beside railsim's own files those of the folders in the environment variable RAILSIM_PATH and of
-    installed packages with an entry point `railsim.library`.
+    Besides railsim's own files, the list contains those of the folders in the environment variable
+    RAILSIM_PATH and of installed packages with an entry point `railsim.library`.
 
     \b
     Example:

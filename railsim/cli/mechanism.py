@@ -30,16 +30,25 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@click.option("--optimise", "searched", is_flag=True, help="Search as the table [optimise] says.")
-@click.option("--starts", type=click.IntRange(min=1), metavar="N", help="Starts of the search.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Seed of its starts.")
-@click.option("--case", metavar="NAME", help="A case of the file instead of its base.")
+@click.option(
+    "--optimise", "searched", is_flag=True, help="Search as specified in the table [optimise]."
+)
+@click.option(
+    "--starts",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Number of starting points of the search.",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), metavar="S", help="Seed of the starting points."
+)
+@click.option("--case", metavar="NAME", help="Case of the file instead of its base.")
 @click.option(
     "--at",
     "places",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Also all results where one of them has a value (SI), such as height=0.8955.",
+    help="Also print all results at a given value of one of them (SI), such as height=0.8955.",
 )
 @click.option(
     "--out", metavar="DIR", help=f"Folder for {REPORT}, pictures, animation, positions.csv."
@@ -277,7 +286,7 @@ def _optimised_text(
 
 
 def _write(folder: Path, content: dict[str, bytes], overwrite: bool) -> list[Path]:
-    """Write files into a folder, which is made if need be; nothing on a fault."""
+    """Write files into a folder, which is created if it does not exist; nothing on a fault."""
     check_folder(folder, content, overwrite=overwrite)
     make_folder(folder)
     for name, data in content.items():

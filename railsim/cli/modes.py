@@ -73,7 +73,7 @@ ANIMATION = "mode.html"
 @click.option("--cant", type=float, default=0.0, metavar="H", help="Cant of the track in m.")
 @click.option("--out", metavar="DIR", help="Folder for modes.json and modes.png.")
 @click.option(
-    "--animate", metavar="NAME", help="Write this mode into --out as a page that plays, mode.html."
+    "--animate", metavar="NAME", help="Write this mode to --out as an animated page, mode.html."
 )
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
 @load_option
@@ -97,11 +97,11 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Find the modes of a vehicle that rolls steadily.
+    """Compute the modes of a vehicle in steady rolling.
 
-    Linearised are the very equations that runs use, about steady rolling on straight or circular
-    track; of TRACK (default: straight) rails, gauge, friction and support count.  Paths of --set
-    and --over begin with vehicle., track. or settings.
+    The equations of the time-domain simulation are linearised about steady rolling on straight or
+    circular track; rails, gauge, friction and support are those of TRACK (default: straight).
+    Paths of --set and --over begin with vehicle., track. or settings.
 
     \b
     Example:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     help="All wheels in one pair of axes, or one pair of axes for each wheelset.",
 )
 @click.option(
-    "--between", type=float, nargs=2, metavar="A B", help="Part of the horizontal axis to show."
+    "--between", type=float, nargs=2, metavar="A B", help="Range of the horizontal axis to show."
 )
 @overwrite_option
 @json_option
@@ -50,8 +50,9 @@ def command(
     """Draw quantities of a result, or a track with its curvature and cant.
 
     Without a QUANTITY: wheel load change, lateral force, derailment quotient, roll, lateral
-    displacement and yaw.  A QUANTITY may name places: Y:1:left is the left wheel of the leading
-    wheelset, body_acceleration:carbody:y the lateral acceleration of the carbody.
+    displacement and yaw.  A QUANTITY may select wheels, bodies and components: Y:1:left is the left
+    wheel of the leading wheelset, body_acceleration:carbody:y the lateral acceleration of the
+    carbody.
 
     \b
     Example:

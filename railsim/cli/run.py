@@ -44,7 +44,11 @@ if TYPE_CHECKING:
 @click.option("--settings", metavar="F", help="Settings file.")
 @set_option
 @overwrite_option
-@click.option("--plots", is_flag=True, help="Draw the result beside its file (.png).")
+@click.option(
+    "--plots",
+    is_flag=True,
+    help="Also plot the result; the picture is written next to the file (.png).",
+)
 @click.option("--check-step", is_flag=True, help="Run again at half the step and compare peaks.")
 @json_option
 @quiet_option
@@ -66,9 +70,9 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Run one vehicle over one track and print its largest values.
+    """Simulate one vehicle on one track and print the peak values.
 
-    VEHICLE and TRACK are files or names of shipped ones.  The run ends with the track unless
+    VEHICLE and TRACK are files or names of shipped files.  The run ends with the track unless
     --duration or --until says otherwise.  Paths of --set begin with vehicle., track. or settings.
     The speed is not needed with --continue, or where the settings have a speed table.
 

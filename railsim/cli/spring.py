@@ -69,10 +69,10 @@ def design(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Find the springs' stiffnesses, and coils, from two wanted deflections.
+    """Find stiffnesses and numbers of coils of the springs for two required deflections.
 
     With --search, also find the nests of standard wires that fit the space and the stresses,
-    ranked by mass or by fatigue margin (search.objective), with the limits that are active.
+    ranked by mass or by fatigue margin (search.objective), with the active limits.
 
     \b
     Example:
@@ -283,7 +283,7 @@ def _write_pages(
     overwrite: bool,
     search: "SearchResult | None" = None,
 ) -> list[Path]:
-    """Write pictures and page into a folder, which is made if need be; nothing on a fault."""
+    """Write pictures and page into a folder, created if it does not exist; nothing on a fault."""
     from railsim.report.springs import as_png, collected, figures, page
 
     results = collected(suspension, search)

@@ -75,13 +75,20 @@ def _is_number(text: str) -> bool:
 )
 @click.option("--scenario", metavar="F", help="Scenario in place of tracks and speeds.")
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
-@click.option("--start", type=float, default=0.0, metavar="S", help="Start of all runs in m.")
+@click.option(
+    "--start", type=float, default=0.0, metavar="S", help="Start of all runs in m along the track."
+)
 @click.option("--duration", type=float, metavar="T", help="End of all runs in s.")
 @click.option("--until", type=float, metavar="S", help="End of all runs in m along the track.")
 @load_option
 @click.option("--settings", metavar="F", help="Settings file for all runs.")
 @set_option
-@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Default: all cores.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Number of processes; default: all cores.",
+)
 @click.option(
     "--together",
     type=click.IntRange(min=1),
@@ -89,12 +96,13 @@ def _is_number(text: str) -> bool:
     metavar="N",
     show_default=True,
     help="Up to N runs that differ in the vehicle only share a call of the time loop: the same "
-    "results for 15 to 20 % less of its time. Runs that need different steps go apart.",
+    "results for 15 to 20 % less of its time. Runs with different time steps are computed "
+    "separately.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
-@click.option("--resume", is_flag=True, help="Go on with the study in DIR; compute what changed.")
+@click.option("--resume", is_flag=True, help="Continue the study in DIR; compute what has changed.")
 @overwrite_option
-@click.option("--plots", is_flag=True, help="Draw every run, and vehicles against each other.")
+@click.option("--plots", is_flag=True, help="Plot every run, and the vehicles against each other.")
 @json_option
 @quiet_option
 def command(
@@ -113,9 +121,9 @@ def command(
 ) -> int:
     """Run every combination of vehicles, tracks, speeds and the values of a grid.
 
-    One HDF5 file a run, summary.csv and study.json go to DIR.  A run that is there with the same
-    inputs is not computed again, so the same command can be typed again after an interruption.
-    With --resume alone the study that DIR holds goes on.
+    DIR receives one HDF5 file per run, summary.csv and study.json.  A finished run with the
+    same inputs is not computed again, so the same command can be repeated after an interruption.
+    --resume alone continues the study in DIR.
 
     \b
     Example:

@@ -19,7 +19,7 @@ PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
     """Check vehicle, track, settings, spring, mechanism, study and profile files.
 
-    Every fault is listed with file, key, what was found and what is allowed; remarks point to what
+    Every fault is listed with file, key, what was found and what is allowed; remarks point out what
     is allowed but unusual.  Shipped files may be given by name.
 
     \b

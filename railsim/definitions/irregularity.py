@@ -68,9 +68,9 @@ class Measured(Definition):
     recovered from them"""
     band: Literal["D1", "D2", "D3"] | Wavelengths | None = None
     """Band of wavelengths that is kept: D1 (3 to 25 m), D2 (25 to 70 m), D3 (70 to 150 m), or
-    [shortest, longest] [m]"""
+    shortest and longest [m]"""
     rows: Annotated[tuple[Row, ...], AfterValidator(_measured_rows)] | None = None
-    """What was read: rows [s, y_left, z_left, y_right, z_right] [m]"""
+    """What was read: rows of s, y_left, z_left, y_right, z_right [m]"""
     shift: Finite = 0.0
     """Added to the arc lengths of the file [m]"""
     scale: Finite = 1.0

@@ -28,7 +28,7 @@ from railsim.definitions.limits import (
 from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
-from railsim.definitions.overrides import apply_overrides
+from railsim.definitions.overrides import apply_overrides, with_values
 from railsim.definitions.scenario import SCENARIO_FORMAT, Scenario
 from railsim.definitions.settings import SETTINGS_FORMAT, Settings
 from railsim.definitions.sources import Source
@@ -121,7 +121,8 @@ def load_vehicle(path: str | Path, overrides: Iterable[str] | str = ()) -> Vehic
 
     Raises
     ------
-    InputError : everything that is wrong in the file and those that it extends.
+    InputError
+        Everything that is wrong in the file and those that it extends.
 
     Examples
     --------
@@ -161,12 +162,17 @@ def load_mechanism(path: str | Path, overrides: Iterable[str] | str = ()) -> Mec
     overrides = [overrides] if isinstance(overrides, str) else list(overrides)
     source = _file_source(path, "mechanism")
     _find_reference(source)
-    known = source.data.get("parameters", {})
-    keys = [text.partition("=")[0].strip().split(".") for text in overrides]
-    changed = [key[1] for key in keys if key[0] == "parameters" and len(key) == 2]
-    if changed := [name for name in dict.fromkeys(changed) if name in known]:
-        source.data["provenance"] = {**source.data.get("provenance", {}), "set": changed}
+    _note_parameters(source, [text.partition("=")[0].strip() for text in overrides])
     return _loaded(Mechanism, source, overrides)
+
+
+def _note_parameters(source: Source, keys: Iterable[str], earlier: Iterable[str] = ()) -> None:
+    """List parameters of a mechanism that are or were set by their keys in `provenance.set`."""
+    known = source.data.get("parameters", {})
+    paths = [key.split(".") for key in keys]
+    changed = [path[1] for path in paths if path[0] == "parameters" and len(path) == 2]
+    if changed := [name for name in dict.fromkeys([*earlier, *changed]) if name in known]:
+        source.data["provenance"] = {**source.data.get("provenance", {}), "set": changed}
 
 
 def _find_reference(source: Source) -> None:
@@ -222,12 +228,38 @@ def load_settings_json(text: str, file: str = "settings_json") -> Settings:
     return _loaded(Settings, Source(file, {"format": SETTINGS_FORMAT, **data}), ())
 
 
+def changed_definition(definition: D, values: Mapping[str, Any]) -> D:
+    """Return a definition with other values at some keys, checked as a file would be.
+
+    Parameters
+    ----------
+    definition : Definition of a file
+        It stays as it is.
+    values : mapping of str to value
+        New values by dotted keys, as in `load_vehicle`'s overrides.
+
+    Raises
+    ------
+    InputError
+        Everything that is wrong in the result.
+    """
+    model = type(definition)
+    format_name, known = _format_of(model)
+    text = definition.to_toml()
+    source = sources.text_source(text, getattr(definition, "name", known.kind), known.kind)
+    if isinstance(definition, Mechanism):
+        _note_parameters(source, values, definition.provenance.get("set", ()))
+    defaults = {**model.model_construct().model_dump(mode="json"), "format": format_name}
+    return _validated(model, with_values(source, values, known.free, defaults), known)
+
+
 def load_any(path: str | Path, overrides: Iterable[str] = ()) -> tuple[FileDefinition, Format]:
     """Load a file of whatever definition its `format` key names, or a shipped one by its name.
 
     Raises
     ------
-    InputError : everything that is wrong in it; an unknown format.
+    InputError
+        Everything that is wrong in it; an unknown format.
     """
     file = sources.find_any(path)
     head = sources.read_toml(file).get("format")
@@ -242,13 +274,20 @@ def _file_source(path: str | Path, kind: str) -> Source:
     return sources.read_source(sources.find_file(path, kind), kind)
 
 
+def _format_of(model: type[FileDefinition]) -> tuple[str, Format]:
+    return next((n, f) for n, f in FORMATS.items() if f.model is model)
+
+
 def _loaded(model: type[D], source: Source, overrides: Iterable[str]) -> D:
-    format_name, known = next((n, f) for n, f in FORMATS.items() if f.model is model)
+    format_name, known = _format_of(model)
     if source.data.get("format") != format_name:
         file = source.file_of(("format",))
         raise InputError([_format_fault(file, source.data.get("format"), [format_name])])
     defaults = model.model_construct().model_dump(mode="json")
-    source = apply_overrides(source, overrides, known.free, defaults)
+    return _validated(model, apply_overrides(source, overrides, known.free, defaults), known)
+
+
+def _validated(model: type[D], source: Source, known: Format) -> D:
     faults = [*known.prepare(source.data), *known.raw_faults(source.data)]
     faults = [_placed(fault, source) for fault in faults]
     try:

@@ -1,12 +1,13 @@
-"""Overrides ``key.path=value``, as ``--set`` gives them.
+"""Overrides: ``key.path=value`` as ``--set`` gives them, or keys and values of Python.
 
-Values are TOML; what is no TOML is taken as text, so that ``rail=60E1`` needs no quotes.
+Values of `--set` are TOML; what is no TOML is taken as text, so that ``rail=60E1`` needs no quotes.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -55,18 +56,76 @@ def apply_overrides(
     return changed
 
 
+def with_values(
+    source: Source,
+    values: Mapping[str, Any],
+    free: Sequence[str] = (),
+    defaults: Mapping[str, Any] = MappingProxyType({}),
+) -> Source:
+    """Return the source with values of Python at `key.path`s; as `apply_overrides`.
+
+    Arrays and numbers of numpy count as lists and numbers.
+
+    Raises
+    ------
+    InputError : keys that lead nowhere; all of them at once.
+    """
+    changed = replace(source, data=deepcopy(source.data), origin=dict(source.origin))
+    faults = []
+    for key, value in values.items():
+        try:
+            _assign(changed, key, partial(_given, value), free, defaults, source.file)
+        except KeyError as problem:
+            faults.append(Fault(source.file, key, str(problem.args[0]), ""))
+    if faults:
+        raise InputError(faults)
+    return changed
+
+
+def _given(value: Any, _: Any) -> Any:
+    """Return a value whatever stands in its place."""
+    return _plain(value)
+
+
+def _plain(value: Any) -> Any:
+    """Return what TOML would hold: lists for tuples and arrays, numbers for those of numpy."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(member) for key, member in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(member) for member in value]
+    return value
+
+
 def _apply(source: Source, text: str, free: Sequence[str], defaults: Mapping[str, Any]) -> None:
     key, equals, written = text.partition("=")
     if not equals:
         raise KeyError("an assignment key.path=value is needed")
-    path = key_path(key.strip())
+
+    def read(present: Any) -> Any:
+        return _value(written.strip(), isinstance(present, str))
+
+    _assign(source, key.strip(), read, free, defaults, OVERRIDE)
+
+
+def _assign(
+    source: Source,
+    key: str,
+    read: Callable[[Any], Any],
+    free: Sequence[str],
+    defaults: Mapping[str, Any],
+    origin: str,
+) -> None:
+    """Set one key to what `read` makes of the value that is there."""
+    path = key_path(key)
     if path[0] in free and len(path) > 2:
         path = [path[0], ".".join(path[1:-1]), path[-1]]
     parent, last = descend(source.data, path, path[0] in free, dict(defaults))
     present = parent[last] if not isinstance(parent, dict) or last in parent else None
-    parent[last] = _value(written.strip(), isinstance(present, str))
+    parent[last] = read(present)
     place = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
-    replace_origin(source.origin, place, parent[last], OVERRIDE)
+    replace_origin(source.origin, place, parent[last], origin)
 
 
 def _value(written: str, text_expected: bool) -> Any:

@@ -144,7 +144,7 @@ class Settings(FileDefinition):
     shear_modulus: Positive = 82e9
     """Shear modulus of wheels and rails [Pa]"""
     poisson: NonNegative = 0.28
-    """Poisson's number of wheels and rails [1]"""
+    """Poisson's ratio of wheels and rails [1]"""
     drive: Drive = Drive()
     """How the speed goes along the track"""
     start_state: Literal["run-in", "steady"] = "run-in"

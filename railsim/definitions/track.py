@@ -5,7 +5,7 @@ A transition (CLO, LIR) takes its ends from its neighbours where it does not nam
 cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -23,6 +23,7 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.irregularity import Irregularity
 from railsim.definitions.support import Support
+from railsim.drawn import Drawn
 
 TRACK_FORMAT = "railsim-track/1"
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
@@ -190,7 +191,7 @@ class FallingFriction(Definition):
     """How fast it falls with the slip velocity [s/m]"""
 
 
-class Track(FileDefinition):
+class Track(FileDefinition, Drawn):
     """A track: everything that its file says."""
 
     format: Literal["railsim-track/1"]
@@ -206,7 +207,7 @@ class Track(FileDefinition):
     inclination: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.2)] = 0.025
     """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
     friction: NonNegativePair = (0.4, 0.4)
-    """Coefficient of friction, one number or [left, right] [1]"""
+    """Coefficient of friction, one number, or left and right [1]"""
     friction_table: FrictionRows | None = None
     """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
     friction_falling: FallingFriction | None = None
@@ -237,3 +238,19 @@ class Track(FileDefinition):
     def length(self) -> float:
         """Length of the plan [m]."""
         return sum(element.length for element in self.plan)
+
+    FIGURE: ClassVar = "railsim.plot.track:track_figure"
+
+    def _table(self) -> tuple[list[str], list[list[object]]]:
+        """Return the table of the plan's elements that a notebook shows."""
+        # sections are built on the classes of this module
+        from railsim.definitions.layout import curvature_sections
+
+        rows: list[list[object]] = []
+        for section in curvature_sections(self):
+            ends = " to ".join(
+                f"{1.0 / value:.6g}" if value else "inf"
+                for value in dict.fromkeys((section.start_value, section.end_value))
+            )
+            rows.append([section.type, f"{section.begin:.6g}", f"{section.end:.6g}", ends])
+        return ["plan", "from (m)", "to (m)", "radius (m)"], rows

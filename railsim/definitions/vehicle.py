@@ -6,7 +6,7 @@ vehicle's origin, y to the right, z down from the plane through the rail tops.  
 group that stands at each of its placements; its coordinates count from there.
 """
 
-from typing import Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
@@ -24,6 +24,10 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.elements import AnyElement
 from railsim.definitions.loads import LoadCase
+from railsim.drawn import Drawn
+
+if TYPE_CHECKING:
+    from railsim.definitions.flatten import FlatVehicle
 
 VEHICLE_FORMAT = "railsim-vehicle/1"
 
@@ -52,13 +56,13 @@ class Wheelset(Definition):
     position: Vector
     """Middle of the axle [m]; z = -radius"""
     radius: PositivePair
-    """Nominal rolling radius, one number or [left, right] [m]"""
+    """Nominal rolling radius, one number, or left and right [m]"""
     profile: TextPair
     """Wheel profile, a built-in name or a file, or [left, right]"""
     back_to_back: Positive = 1.360
     """Distance between the wheels' backs [m]"""
     tape_circle_distance: Positive = 1.5
-    """Distance between the tape circles, where the radius is measured [m]"""
+    """Distance between the nominal rolling circles [m]"""
 
 
 class Axlebox(Definition):
@@ -126,7 +130,7 @@ class Service(Definition):
     """Further points at which accelerations are taken, by name"""
 
 
-class Vehicle(FileDefinition):
+class Vehicle(FileDefinition, Drawn):
     """A vehicle: everything that its file says."""
 
     format: Literal["railsim-vehicle/1"]
@@ -154,3 +158,25 @@ class Vehicle(FileDefinition):
     """Force elements by name"""
     assemblies: dict[Name, Assembly] = Field(default_factory=dict)
     """Assemblies by name"""
+
+    FIGURE: ClassVar = "railsim.plot.vehicle:vehicle_figure"
+
+    @property
+    def mass(self) -> float:
+        """Mass of all bodies in the load case [kg]."""
+        return sum(body.mass for body in self._flat().bodies)
+
+    def _flat(self) -> "FlatVehicle":
+        # flatten is built on the classes of this module
+        from railsim.definitions.flatten import flatten
+
+        return flatten(self)
+
+    def _table(self) -> tuple[list[str], list[list[object]]]:
+        """Return the table of bodies that a notebook shows."""
+        rows: list[list[object]] = []
+        for body in self._flat().bodies:
+            place = " ".join(f"{value:.3f}" for value in body.position)
+            inertia = " ".join(f"{value:.0f}" for value in body.inertia)
+            rows.append([body.name, body.kind, f"{body.mass:.0f}", inertia, place])
+        return ["body", "kind", "mass (kg)", "Ixx Iyy Izz (kg m²)", "x y z (m)"], rows

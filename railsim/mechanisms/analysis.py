@@ -137,7 +137,8 @@ class Analysis:
 
         Raises
         ------
-        InputError : there is no such result, or it never has this value.
+        InputError
+            There is no such result, or it never has this value.
         """
         if quantity not in self.output:
             found = f"no result '{quantity}'"
@@ -170,7 +171,8 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
 
     Raises
     ------
-    InputError : what the mechanism cannot do, with joint or key and the driver's value.
+    InputError
+        What the mechanism cannot do, with joint or key and the driver's value.
 
     Examples
     --------
@@ -346,7 +348,8 @@ def zone_drivers(dense: Motion) -> tuple[list[str], Floats]:
 
     Raises
     ------
-    InputError : a height is never reached.
+    InputError
+        A height is never reached.
     """
     model = dense.model
     zone, output = model.definition.zone, model.definition.output

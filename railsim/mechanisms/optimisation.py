@@ -156,7 +156,8 @@ def optimise(
 
     Raises
     ------
-    InputError : there is no [optimise]; no start within the bounds can be assembled.
+    InputError
+        There is no [optimise]; no start within the bounds can be assembled.
     """
     if definition.optimise is None:
         fault = Fault(definition.name, "optimise", "missing", "the table [optimise] is needed")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from railsim.assessment import Assessment
 from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
-from railsim.plot.style import DISTINCT, LIMIT, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
 
 
 def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
@@ -26,10 +26,11 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
 
 def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     """Bars of the worst place of each quantity, zone by zone, in per cent of the limit."""
-    zones = sorted({zone.zone for a in assessments for zone in a.zones})
+    reports = [zone for a in assessments for zone in a.zones]
+    zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
     rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
     height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
-    figure = Figure(figsize=(2.4 + 2.6 * len(zones), height), layout="constrained")
+    figure = Picture(figsize=(max(6.8, 2.4 + 2.6 * len(zones)), height), layout="constrained")
     axes = figure.subplots(1, len(zones), sharey=True, squeeze=False)[0]
     width = 0.8 / len(assessments)
     most = 110.0
@@ -59,7 +60,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
 
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean comfort and Sperling's index along the car, a line for each run."""
-    figure = Figure(figsize=(7.6, 3.4), layout="constrained")
+    figure = Picture(figsize=(7.6, 3.4), layout="constrained")
     mean, index = figure.subplots(1, 2)
     number = 0
     for assessment in assessments:
@@ -86,7 +87,7 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
 def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean wear number and rail damage of every wheel; damage over wear number, shakedown map."""
     runs = [(run, wheels) for a in assessments for run, wheels in a.wear.items()]
-    figure = Figure(figsize=(7.6, 7.0), layout="constrained")
+    figure = Picture(figsize=(7.6, 7.0), layout="constrained")
     (energy, damage), (life, map_) = figure.subplots(2, 2)
     damage.sharey(energy)
     width = 0.8 / len(runs)

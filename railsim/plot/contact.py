@@ -18,7 +18,7 @@ from railsim.contact.curves import inclined_to_track, rail_curve, tape_circle_pl
 from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
-from railsim.plot.style import DISTINCT, SIDE_LINES, styled
+from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
 
@@ -66,7 +66,7 @@ def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:
         unique = list(dict.fromkeys(measured))
         rows = 1 + bool(unique)
         height = 3.0 + 2.4 * bool(unique)
-        figure = Figure(figsize=(9.6, height))
+        figure = Picture(figsize=(9.6, height))
         figure.subplots_adjust(
             left=0.06,
             right=0.99,
@@ -166,7 +166,7 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
     """Rolling radius difference, radii, contact angles, places and roll over displacement."""
     y = 1e3 * geometry.lateral
     with styled():
-        figure = Figure(figsize=(9.6, 5.4))
+        figure = Picture(figsize=(9.6, 5.4))
         figure.subplots_adjust(
             left=0.06, right=0.99, bottom=0.085, top=0.985, wspace=0.24, hspace=0.08
         )
@@ -223,7 +223,7 @@ def conicity_figure(conicity: Mapping[str, tuple[Array, Array]]) -> Figure:
         Curves by their name.
     """
     with styled():
-        figure = Figure(figsize=(5.6, 3.6))
+        figure = Picture(figsize=(5.6, 3.6))
         figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
         axes = figure.subplots()
         for colour, (name, (amplitudes, values)) in zip(DISTINCT, conicity.items(), strict=False):
@@ -264,7 +264,7 @@ def patches_figure(
         columns = 4
         rows = -(-len(contacts) // columns)
         height = 1.75 * rows + 1.1
-        figure = Figure(figsize=(9.6, height))
+        figure = Picture(figsize=(9.6, height))
         figure.subplots_adjust(
             left=0.06,
             right=0.90 if exact else 0.99,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from railsim.contact.creep import creep_force
 from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
 from railsim.contact.kalker import kalker_coefficients
-from railsim.plot.style import DISTINCT, styled
+from railsim.plot.style import DISTINCT, Picture, styled
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def creep_curves_figure(
     """
     scale = np.linspace(0.0, 1.0, 121) ** 1.5 * LARGEST
     with styled():
-        figure = Figure(figsize=(9.6, 6.2))
+        figure = Picture(figsize=(9.6, 6.2))
         figure.subplots_adjust(
             left=0.06, right=0.99, bottom=0.13, top=0.90, wspace=0.18, hspace=0.36
         )
@@ -197,7 +197,7 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
     panel_height = width * reach_x / reach_y
     with styled():
         height = rows * (panel_height + 0.75) + 0.25
-        figure = Figure(figsize=(columns * (width + 0.3) + 1.5, height))
+        figure = Picture(figsize=(columns * (width + 0.3) + 1.5, height))
         axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
         figure.subplots_adjust(
             left=0.55 / figure.get_figwidth(),

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
-from railsim.plot.style import DISTINCT, say, styled, wheelset_colours
+from railsim.plot.style import DISTINCT, Picture, say, styled, wheelset_colours
 from railsim.stability.curving import Curving
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ def curving_figure(found: Curving, title: str) -> Figure:
     with styled():
         mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
         heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
-        figure = Figure(figsize=(10.2, sum(heights)), layout="constrained")
+        figure = Picture(figsize=(10.2, sum(heights)), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         _plan(figure.add_subfigure(rows[1]).subplots(), found)

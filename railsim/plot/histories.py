@@ -15,7 +15,16 @@ from railsim.definitions.layout import curvature_sections
 from railsim.errors import Fault, InputError
 from railsim.notation import QUANTITIES, Quantity
 from railsim.plot.selection import Line, Panel, panels
-from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, shade, spans, styled, wheelset_colours
+from railsim.plot.style import (
+    DISTINCT,
+    LIMIT,
+    SIDE_LINES,
+    Picture,
+    shade,
+    spans,
+    styled,
+    wheelset_colours,
+)
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.text import unformatted
@@ -104,7 +113,7 @@ def _figure(
 ) -> Figure:
     rows, columns = len(grid), len(grid[0])
     width = 7.0 if columns == 1 else 3.0 + 3.4 * min(columns, 4)
-    figure = Figure(figsize=(width, 1.3 + 2.1 * rows), layout="constrained")
+    figure = Picture(figsize=(width, 1.3 + 2.1 * rows), layout="constrained")
     axes = figure.subplots(
         rows, columns, sharex=True, sharey="row" if by == "wheelset" else False, squeeze=False
     )

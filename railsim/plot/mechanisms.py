@@ -22,7 +22,7 @@ from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.quantities import quantity
 from railsim.plot.point_names import name_points
-from railsim.plot.style import DISTINCT, LIMIT
+from railsim.plot.style import DISTINCT, LIMIT, Picture
 
 if TYPE_CHECKING:
     from railsim.mechanisms.optimisation import Optimum
@@ -78,13 +78,13 @@ def drawing_figure(result: Analysis) -> Figure:
     small = max(box[1] - box[0], box[3] - box[2]) < 0.6 * size
     flat = box[1] - box[0] > 1.6 * (box[3] - box[2])
     if small and flat:
-        figure = Figure(figsize=(6.6, 7.4), layout="constrained")
+        figure = Picture(figsize=(6.6, 7.4), layout="constrained")
         axes = figure.subplots(2, 1, height_ratios=[1.5, 1.0])
     elif small:
-        figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+        figure = Picture(figsize=(9.0, 4.6), layout="constrained")
         axes = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
     else:
-        figure = Figure(figsize=(6.6, 5.2), layout="constrained")
+        figure = Picture(figsize=(6.6, 5.2), layout="constrained")
         axes = [figure.subplots()]
     scale = quantity("travel", result.definition)
     for k in range(4):
@@ -144,7 +144,7 @@ def mark_points(axes: Axes, motion: Motion, box: Any) -> None:
 def kinematics_figure(result: Analysis) -> Figure:
     """Angles of the bodies over the driver, their rates and accelerations."""
     motion = result.motion
-    figure = Figure(figsize=(7.6, 5.6), layout="constrained")
+    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
     rows = figure.subplots(3, 1, sharex=True)
     travel = _values("travel", result)
     s1: Any = 1.0
@@ -176,7 +176,7 @@ def kinematics_figure(result: Analysis) -> Figure:
 
 def path_figure(result: Analysis) -> Figure:
     """Path of the output, with the zone."""
-    figure = Figure(figsize=(4.6, 5.2), layout="constrained")
+    figure = Picture(figsize=(4.6, 5.2), layout="constrained")
     axes = figure.subplots()
     x, y = _values("x", result), _values("height", result)
     axes.plot(x, y, color=MAIN)
@@ -191,7 +191,7 @@ def path_figure(result: Analysis) -> Figure:
 
 def angles_figure(result: Analysis) -> Figure:
     """Transmission angles, folded, with their limit, and pressure angles of cams."""
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    figure = Picture(figsize=(7.0, 3.6), layout="constrained")
     axes = figure.subplots()
     travel = _values("travel", result)
     names = list(result.definition.angles)
@@ -224,7 +224,7 @@ def cam_figure(result: Analysis) -> Figure:
     first = int(result.model.linkage.joint[row, 4])
     scale = quantity("travel", result.definition).scale
     beyond = 0.12 * abs(result.travel)
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    figure = Picture(figsize=(7.0, 3.6), layout="constrained")
     axes = figure.subplots()
     travel = _values("travel", result)
     rate = motion.q1[:, body, 2]
@@ -255,7 +255,7 @@ def force_figure(result: Analysis) -> Figure:
     """Ratios and force of the actuator over its length and over the height."""
     over = [name for name in ("length", "height") if name in result.output]
     shown = [name for name in ("ratio", "force") if name in result.output]
-    figure = Figure(figsize=(7.8, 5.4), layout="constrained")
+    figure = Picture(figsize=(7.8, 5.4), layout="constrained")
     grid = figure.subplots(len(shown), len(over), sharex="col", sharey="row", squeeze=False)
     for i, name in enumerate(shown):
         for j, x in enumerate(over):
@@ -279,7 +279,7 @@ def force_figure(result: Analysis) -> Figure:
 
 def pressure_figure(result: Analysis) -> Figure:
     """Pressure that the mechanism needs, over the height."""
-    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    figure = Picture(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
     axes.plot(_values("height", result), _values("pressure", result), color=MAIN, label="needed")
     if "pressure_back" in result.output:
@@ -300,7 +300,7 @@ def contact_figure(result: Analysis) -> Figure:
     """Static contact force at constant pressure, over the height."""
     contact = result.contact
     assert contact is not None
-    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    figure = Picture(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
     label = f"at {contact.pressure / 1e6:.4f} MPa"
     axes.plot(_values("height", result), contact.curve, color=MAIN, label=label)
@@ -320,7 +320,7 @@ def carpet_figure(result: Analysis) -> Figure:
     spring = result.definition.actuators[result.definition.solve.unknown]
     assert isinstance(spring, AirSpring)
     table = table_of(result.motion, spring)
-    figure = Figure(figsize=(6.6, 4.2), layout="constrained")
+    figure = Picture(figsize=(6.6, 4.2), layout="constrained")
     axes = figure.subplots()
     heights = table.heights * 1e3
     for i, pressure in enumerate(table.pressures):
@@ -342,7 +342,7 @@ def carpet_figure(result: Analysis) -> Figure:
 def gas_spring_figure(result: Analysis) -> Figure:
     """Length and force of the gas springs over the driver."""
     names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
-    figure = Figure(figsize=(7.2, 3.4), layout="constrained")
+    figure = Picture(figsize=(7.2, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     travel = _values("travel", result)
     for i, name in enumerate(names):
@@ -358,7 +358,7 @@ def gas_spring_figure(result: Analysis) -> Figure:
 
 def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     """Unknown force over the driver, for all cases of a mechanism."""
-    figure = Figure(figsize=(6.6, 3.6), layout="constrained")
+    figure = Picture(figsize=(6.6, 3.6), layout="constrained")
     axes = figure.subplots()
     for i, (name, result) in enumerate(results.items()):
         axes.plot(_values("travel", result), _values("force", result), label=name, **_line(i))
@@ -375,7 +375,7 @@ def time_figure(result: Analysis) -> Figure:
     """Motion in time: driver, output's speed and acceleration, driving force."""
     timed = result.timed
     assert timed is not None
-    figure = Figure(figsize=(7.6, 5.6), layout="constrained")
+    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
     travel = quantity("travel", result.definition)
     a.plot(timed.time, timed.motion.s * travel.scale, color=MAIN)
@@ -405,7 +405,7 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
     With `zoom`, in the zone only, and below it what they are above the first one.
     """
     first = next(iter(results.values()))
-    figure = Figure(figsize=(7.6, 6.4 if zoom else 3.8), layout="constrained")
+    figure = Picture(figsize=(7.6, 6.4 if zoom else 3.8), layout="constrained")
     panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
     for column, name in enumerate(("ratio", "force")):
         base = _over_height(first, name, zoom)
@@ -442,7 +442,7 @@ def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Float
 
 def search_figure(optimum: "Optimum") -> Figure:
     """Objective at the end of every start, feasible or not, and the best."""
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    figure = Picture(figsize=(6.4, 3.6), layout="constrained")
     axes = figure.subplots()
     starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
     for kept, marker, fill, label in (

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from railsim.linear.modes import Mode, Modes, RootLocus
-from railsim.plot.style import DISTINCT, LIMIT, say, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def locus_figure(locus: RootLocus, title: str) -> Figure:
         What was analysed.
     """
     with styled():
-        figure = Figure(figsize=(10.2, 7.4), layout="constrained")
+        figure = Picture(figsize=(10.2, 7.4), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
         damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
@@ -134,7 +134,7 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
     drawn = [mode for mode in modes.oscillations if mode.natural_frequency < SHOWN][:most]
     with styled():
         rows = max(1, (len(drawn) + 1) // 2)
-        figure = Figure(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
+        figure = Picture(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         grid = figure.add_gridspec(rows, 2)
         if not drawn:

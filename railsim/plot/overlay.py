@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from railsim.definitions.layout import curvature_sections
 from railsim.plot.histories import STUDY, check_not_empty, draw_limit, unit_label
 from railsim.plot.selection import Panel, panels
-from railsim.plot.style import DISTINCT, SIDE_LINES, shade, spans, styled
+from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, shade, spans, styled
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.text import unformatted
@@ -51,7 +51,7 @@ def overlay(
     columns = 1 if count < 3 else 2
     rows = -(-count // columns)
     with styled():
-        figure = Figure(
+        figure = Picture(
             figsize=(7.0 if columns == 1 else 9.8, 1.3 + 2.1 * rows), layout="constrained"
         )
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False)

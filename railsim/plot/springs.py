@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
 from railsim.definitions.spring import TrailingArmSuspension
-from railsim.plot.style import DISTINCT, LIMIT
+from railsim.plot.style import DISTINCT, LIMIT, Picture
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks
 from railsim.springs.arm import Arm
@@ -36,7 +36,7 @@ SPRING_COLOURS = {"outer": DISTINCT[0], "inner": DISTINCT[1]}
 
 def stiffness_figure(result: Verification) -> Figure:
     """System stiffness, and the rate that small movements feel, over load and deflection."""
-    figure = Figure(figsize=(7.6, 3.2))
+    figure = Picture(figsize=(7.6, 3.2))
     over_load, over_deflection = figure.subplots(1, 2, sharey=True)
     figure.subplots_adjust(left=0.085, right=0.985, bottom=0.15, top=0.97, wspace=0.06)
     curve = _curve(result)
@@ -59,7 +59,7 @@ def stiffness_figure(result: Verification) -> Figure:
 
 def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -> Figure:
     """Deflection, rotation of the arm and heights of the springs over the load."""
-    figure = Figure(figsize=(7.6, 5.4))
+    figure = Picture(figsize=(7.6, 5.4))
     grid = figure.add_gridspec(
         2, 2, left=0.085, right=0.985, bottom=0.09, top=0.98, wspace=0.2, hspace=0.38
     )
@@ -99,7 +99,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
             color="0.25",
         )
     heights.set_ylabel("height under load / mm")
-    heights.legend(ncols=3, loc="center right")
+    heights.legend(ncols=3, loc="upper right")
     for axes in (deflection, rotation, heights):
         axes.set_xlabel("load $P$ / kN")
     return figure
@@ -107,7 +107,7 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
 
 def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
     """Active coils that give the designed stiffness, over the wire diameter."""
-    figure = Figure(figsize=(5.6, 3.7))
+    figure = Picture(figsize=(5.6, 3.7))
     axes = figure.subplots()
     figure.subplots_adjust(left=0.1, right=0.98, bottom=0.13, top=0.85)
     listed = coils_by_wire(suspension, result)
@@ -137,7 +137,7 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
     if suspension.fatigue is None:
         raise ValueError("the suspension has no fatigue table")
     line = np.array(suspension.fatigue.goodman) * 1e-6
-    figure = Figure(figsize=(4.8, 4.9))
+    figure = Picture(figsize=(4.8, 4.9))
     axes = figure.subplots()
     figure.subplots_adjust(left=0.13, right=0.97, bottom=0.1, top=0.98)
     end = float(line[-1, 1])
@@ -172,7 +172,7 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
     # one pair of axes for all cases, each at its own origin: far quicker than many axes
     wide = 1e3 * arm.length + half_spring + 170.0
     high = max(tops) + 420.0
-    figure = Figure(figsize=(2.55 * columns, 2.55 * rows * high / wide))
+    figure = Picture(figsize=(2.55 * columns, 2.55 * rows * high / wide))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     for i, case in enumerate(cases):
         origin = np.array([(i % columns) * wide, -(i // columns) * high])
@@ -188,7 +188,7 @@ def arm_figure(suspension: TrailingArmSuspension, result: Verification) -> Figur
 
 def search_figure(result: "SearchResult") -> Figure:
     """Mass and fatigue margin of the feasible candidates and of the ranked nests."""
-    figure = Figure(figsize=(5.6, 3.6))
+    figure = Picture(figsize=(5.6, 3.6))
     axes = figure.subplots()
     figure.subplots_adjust(left=0.11, right=0.98, bottom=0.13, top=0.97)
     cloud = result.cloud[np.all(np.isfinite(result.cloud), axis=1)]
@@ -207,7 +207,7 @@ def search_figure(result: "SearchResult") -> Figure:
 
 def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -> Figure:
     """Ride height by single deviation under one load, and its range under every load."""
-    figure = Figure(figsize=(7.6, 3.5))
+    figure = Picture(figsize=(7.6, 3.5))
     single, every = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     figure.subplots_adjust(left=0.235, right=0.985, bottom=0.19, top=0.97, wspace=0.22)
     shown = next((result for result in results if result.name == tare), results[0])

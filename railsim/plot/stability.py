@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from railsim.plot.style import DISTINCT, LIMIT, say, styled
+from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
 from railsim.stability.critical_speed import CriticalSpeed
 from railsim.stability.ramp import THRESHOLD, Diagram
 
@@ -33,7 +33,7 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
     if not found.branches:
         return _linear_figure(found, title)
     with styled():
-        figure = Figure(figsize=(10.2, 6.0), layout="constrained")
+        figure = Picture(figsize=(10.2, 6.0), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         grid = figure.add_gridspec(2, 2, height_ratios=[2.2, 1.0], width_ratios=[3.0, 1.0])
         upper = figure.add_subplot(grid[0, 0])
@@ -68,7 +68,7 @@ def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
             f"{found.linear['frequency']:.2f} Hz"
         )
     with styled():
-        figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+        figure = Picture(figsize=(7.2, 4.4), layout="constrained")
         figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
         axes = figure.subplots()
         if found.conicity_over_amplitude is None:
@@ -145,7 +145,7 @@ def map_figure(
     """
     names = list(axes_values)
     with styled():
-        figure = Figure(figsize=(8.4, 4.6), layout="constrained")
+        figure = Picture(figsize=(8.4, 4.6), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         axes = figure.subplots()
         lines = axes_values[names[1]] if len(names) > 1 else [None]

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,15 @@ NARROW = 0.011
 """Share of the axes' width that a letter of a section's name takes."""
 
 LIMIT = "#b3122b"
+
+
+class Picture(Figure):
+    """A figure that a notebook shows when it is the value of a cell, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        stream = BytesIO()
+        self.savefig(stream, format="png")
+        return stream.getvalue()
 
 
 @contextmanager

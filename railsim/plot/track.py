@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_simpson
 
 from railsim.definitions.layout import Section, curvature_sections
 from railsim.definitions.track import Track
-from railsim.plot.style import DISTINCT, shade, spans, styled
+from railsim.plot.style import DISTINCT, Picture, shade, spans, styled
 from railsim.result.data import Array
 from railsim.text import unformatted
 from railsim.track.alignment import Alignment
@@ -19,8 +19,15 @@ KINDS = {"STR": ("straight", "0.35"), "CLO": ("transition", "#d99000"), "CIR": (
 RESOLUTION = 4000
 
 
-def track_figure(track: Track) -> Figure:
+def track_figure(track: Track, title: str = "") -> Figure:
     """Draw a track in plan, with its curvature and cant, and its gradient where it has one.
+
+    Parameters
+    ----------
+    track : Track
+        What to draw.
+    title : str
+        By default the name of the track.
 
     Returns
     -------
@@ -38,9 +45,9 @@ def track_figure(track: Track) -> Figure:
         functions.append(("Gradient, positive uphill", "$i$ (‰)", 1e3 * alignment.gradient(s)))
     sections = curvature_sections(track)
     with styled():
-        figure = Figure(figsize=(8.0, 3.6 + 1.5 * len(functions)), layout="constrained")
+        figure = Picture(figsize=(8.0, 3.6 + 1.5 * len(functions)), layout="constrained")
         rows = figure.subplots(1 + len(functions), 1, height_ratios=[1.9] + [1.0] * len(functions))
-        figure.suptitle(unformatted(track.name), x=0.012, ha="left")
+        figure.suptitle(unformatted(title or track.name), x=0.012, ha="left")
         _plan(rows[0], alignment, sections, s)
         shown = spans(sections, s, s)
         for axes, (words, label, values) in zip(rows[1:], functions, strict=True):

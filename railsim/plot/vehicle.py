@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from railsim.definitions.base import Vector
 from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle import Vehicle
-from railsim.plot.style import DISTINCT, styled
+from railsim.plot.style import DISTINCT, Picture, styled
 from railsim.text import unformatted
 
 SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
@@ -25,12 +25,19 @@ BOX: Any = {"ls": "", "marker": "s", "ms": 7, "mfc": "none", "mec": "0.35", "mew
 BOGIE = 4.0
 
 
-def vehicle_figure(vehicle: Vehicle) -> Figure:
+def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     """Draw a vehicle in three views with its elements.
 
     Bodies are crosses at their centres of gravity, axleboxes squares, wheels circles or lines;
     every element is drawn between its points, with a thin line from each point to the body that it
     holds on to.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What to draw.
+    title : str
+        By default the name of the vehicle.
 
     Returns
     -------
@@ -42,8 +49,8 @@ def vehicle_figure(vehicle: Vehicle) -> Figure:
     kinds = list(dict.fromkeys(_kind(element) for element in flat.elements))
     colours = {kind: DISTINCT[i % len(DISTINCT)] for i, kind in enumerate(kinds)}
     with styled():
-        figure = Figure(figsize=(11.0, 9.0), layout="constrained")
-        figure.suptitle(unformatted(vehicle.name), x=0.012, ha="left")
+        figure = Picture(figsize=(11.0, 9.0), layout="constrained")
+        figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
         grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
         end = _leading_end(flat)
         for place, view, limits in (

@@ -12,10 +12,13 @@ The left side is the mirror image.
 """
 
 from dataclasses import dataclass, field
+from html import escape
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from railsim.text import printable
 
 Kind = Literal["wheel", "rail"]
 
@@ -74,6 +77,19 @@ class Profile:
 
     def __hash__(self) -> int:
         return hash((self.name, self.kind, self.inclination, self.y.tobytes(), self.z.tobytes()))
+
+    def __repr__(self) -> str:
+        return f"<Profile {printable(self.name)!r}: {self.kind}, {self.y.size} points>"
+
+    def _repr_html_(self) -> str:
+        """Return the outline that a notebook shows, y to the right and z down, in mm."""
+        y, z = 1e3 * self.y, 1e3 * self.z
+        points = " ".join(f"{a:.2f},{b:.2f}" for a, b in zip(y, z, strict=True))
+        box = f"{y.min() - 2:.1f} {z.min() - 2:.1f} {np.ptp(y) + 4:.1f} {np.ptp(z) + 4:.1f}"
+        lines = f'<polyline points="{points}" fill="none" stroke="#004a80" stroke-width="0.6"/>'
+        caption = f"{self.name}: {self.kind} profile, y from {y.min():.1f} to {y.max():.1f} mm"
+        picture = f'<svg viewBox="{box}" width="420">{lines}</svg>'
+        return f"<p>{escape(printable(caption))}</p>{picture}"
 
     def key(self) -> bytes:
         """Everything that enters the geometry, for hashing: not the name, not the source."""

@@ -6,7 +6,9 @@ functions beside it.  Arrays that come from a file are read when they are first 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,9 +18,12 @@ from numpy.typing import NDArray
 from railsim.errors import InputError, nearest
 from railsim.notation import Quantity
 from railsim.profiles.profile import Profile
+from railsim.text import html_table
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
+    from matplotlib.figure import Figure
 
     from railsim.definitions.settings import Settings
     from railsim.definitions.track import Track
@@ -119,6 +124,20 @@ class Result:
     def __repr__(self) -> str:
         steps = self["time"].shape[0] if "time" in self else 0
         return f"<Result: {self.status}, {steps} instants, {len(self._arrays)} quantities>"
+
+    def _repr_html_(self) -> str:
+        """Return the tables that a notebook shows: the run, and what the result holds."""
+        facts = ("status", "status_reason", "speed", "start", "duration", "step", "cpu_time")
+        units = {"speed": "m/s", "start": "m", "duration": "s", "step": "s", "cpu_time": "s"}
+        rows = [
+            [name, f"{value:.6g} {units[name]}" if name in units else value]
+            for name in facts
+            if (value := self._attributes.get(name, "")) != ""
+        ]
+        rows += [["remark", remark] for remark in self.remarks]
+        held = [[q.name, q.long_name, q.unit, ", ".join(q.dims)] for q in self._quantities.values()]
+        header = ["name", "quantity", "unit", "dimensions"]
+        return html_table("Result", [], rows) + html_table("", header, held)
 
     def _names(self) -> tuple[str, ...]:
         return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
@@ -269,6 +288,51 @@ class Result:
             "resume": states.get("start"),
         }
 
+    def plot(
+        self,
+        *quantities: str,
+        over: str = "distance",
+        by: str = "wheel",
+        between: tuple[float, float] | None = None,
+        path: str | Path | None = None,
+        overwrite: bool = False,
+    ) -> "Figure":
+        """Draw quantities over distance or time, in the units of the field.
+
+        Parameters
+        ----------
+        *quantities : str
+            Quantities, with places where not all are wanted: ``"Q"``, ``"Y:1:left"``,
+            ``"body_acceleration:carbody:y"``; by default those of the curving study.
+        over : {"distance", "time"}
+            Horizontal axis.
+        by : {"wheel", "wheelset"}
+            One pair of axes for all wheels, or one for each wheelset.
+        between : (float, float), optional
+            Part of the horizontal axis [m or s].
+        path : str or Path, optional
+            File for the picture; the suffix gives its format.
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError
+            A quantity or place that the result does not have; the file exists.
+        """
+        # looked up: results lie below pictures and know none of them
+        chosen = {"selections": quantities} if quantities else {}
+        figure: Figure = resolve_name("railsim.plot.histories:histories")(
+            self, over=over, by=by, between=between, **chosen
+        )
+        if path is not None:
+            resolve_name("railsim.plot.style:save")(figure, path, overwrite=overwrite)
+        return figure
+
     # -- elsewhere ----------------------------------------------------------------------------
 
     def to_hdf5(self, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -276,7 +340,8 @@ class Result:
 
         Raises
         ------
-        InputError : the file exists and may not be overwritten, or cannot be written.
+        InputError
+            The file exists and may not be overwritten, or cannot be written.
         """
         from railsim.result.hdf5 import write
 
@@ -287,7 +352,8 @@ class Result:
 
         Raises
         ------
-        ImportError : xarray is not installed.
+        ImportError
+            Xarray is not installed.
         """
         try:
             import xarray
@@ -308,6 +374,49 @@ class Result:
             if name in variables:
                 coords[name] = variables.pop(name)
         return xarray.Dataset(variables, coords, dict(self._attributes))
+
+    def to_pandas(self, *names: str) -> "pandas.DataFrame":
+        """Return quantities over time as a `pandas.DataFrame`.
+
+        Parameters
+        ----------
+        *names : str
+            Quantities with time as their first dimension; by default all of them.
+
+        Returns
+        -------
+        DataFrame
+            Rows by time [s]; a column for each place, called as in `plot`:
+            ``Q:front.outer.wheelset:left`` [SI].  Its ``attrs["units"]`` gives the unit of every
+            column.
+
+        Raises
+        ------
+        ImportError
+            Pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError(
+                "to_pandas needs pandas; install it with: pip install 'railsim[pandas]'"
+            ) from None
+        over_time = [n for n, q in self._quantities.items() if q.dims[0] == "time" != n]
+        columns, units = {}, {}
+        for name in names or over_time:
+            array = self[name]
+            if name not in over_time:
+                raise KeyError(f"{name} is not over time; {nearest(name, over_time)}")
+            quantity = self._quantities[name]
+            places = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
+            for place, values in zip(places, array.reshape(len(array), -1).T, strict=True):
+                column = ":".join((name, *place))
+                columns[column] = values
+                own = quantity.component(place[-1]) if "component" in quantity.dims else quantity
+                units[column] = own.unit
+        frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))
+        frame.attrs["units"] = units
+        return frame
 
 
 class FrozenArrays(Mapping[str, Array]):

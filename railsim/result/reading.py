@@ -52,7 +52,8 @@ def open_result(path: str | Path) -> Result:
 
     Raises
     ------
-    InputError : there is no such file, it is not a result of railsim, or it is damaged.
+    InputError
+        There is no such file, it is not a result of railsim, or it is damaged.
     """
     path = Path(path)
     if not is_file(path):
@@ -76,7 +77,8 @@ def open_run(path: str | Path) -> Result:
 
     Raises
     ------
-    InputError : as `open_result`; the file lacks what the result of every run holds.
+    InputError
+        As `open_result`; the file lacks what the result of every run holds.
     """
     result = open_result(path)
     missing = [name for name in ATTRIBUTES if name not in result.attributes]
@@ -100,7 +102,8 @@ def check_result(path: str | Path) -> Result:
 
     Raises
     ------
-    InputError : as `open_run`; every array and every input that cannot be used.
+    InputError
+        As `open_run`; every array and every input that cannot be used.
     """
     result = open_run(path)
     faults: list[Fault] = []

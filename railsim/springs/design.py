@@ -141,8 +141,9 @@ def design(suspension: TrailingArmSuspension) -> Design:
 
     Raises
     ------
-    InputError : no target, no inner spring, or inputs without a physical solution: which input to
-        change, and in which direction.
+    InputError
+        No target, no inner spring, or inputs without a physical solution: which input to change,
+        and in which direction.
 
     Examples
     --------
@@ -184,7 +185,8 @@ def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
 
     Raises
     ------
-    InputError : no target, no inner spring, or deflections that springs or arm cannot reach.
+    InputError
+        No target, no inner spring, or deflections that springs or arm cannot reach.
     """
     target, mounting, inner = suspension.target, suspension.mounting, suspension.inner
     faults = []

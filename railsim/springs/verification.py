@@ -150,7 +150,8 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
 
     Raises
     ------
-    InputError : a wire diameter or a number of coils is missing, or a spring is solid unloaded.
+    InputError
+        A wire diameter or a number of coils is missing, or a spring is solid unloaded.
     """
     faults = [
         Fault(suspension.name, f"{name}.{key}", "missing", f"needed: {meaning}")
@@ -233,7 +234,8 @@ def load_cases(
 
     Raises
     ------
-    InputError : a spring lifts off, goes solid or buckles under a load.
+    InputError
+        A spring lifts off, goes solid or buckles under a load.
     """
     frame = mounted(suspension)
     phi = np.atleast_1d(trailing_arm.rotation(frame, np.array(list(loads.values()))))
@@ -275,7 +277,8 @@ def verify(suspension: TrailingArmSuspension) -> Verification:
 
     Raises
     ------
-    InputError : a wire diameter or number of coils is missing, or a load cannot be carried.
+    InputError
+        A wire diameter or number of coils is missing, or a load cannot be carried.
 
     Examples
     --------
@@ -311,7 +314,8 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
 
     Raises
     ------
-    InputError : no table `[fatigue]`, or a dynamic load that cannot be carried.
+    InputError
+        No table `[fatigue]`, or a dynamic load that cannot be carried.
 
     Examples
     --------

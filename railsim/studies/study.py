@@ -151,8 +151,9 @@ def study(
 
     Raises
     ------
-    InputError : everything that is wrong in the inputs; files in the folder belong to other
-        inputs and neither `resume` nor `overwrite` is given.
+    InputError
+        Everything that is wrong in the inputs; files in the folder belong to other inputs and
+        neither `resume` nor `overwrite` is given.
 
     Examples
     --------
@@ -307,8 +308,9 @@ class _State:
 
     Raises
     ------
-    InputError : everything that is wrong in what is to be computed; without `resume` also results
-        that would have to be replaced.
+    InputError
+        Everything that is wrong in what is to be computed; without `resume` also results that would
+        have to be replaced.
     """
 
     def __init__(
@@ -418,7 +420,8 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
 
     Raises
     ------
-    InputError : there is no study, or it cannot be read.
+    InputError
+        There is no study, or it cannot be read.
     """
     data: Any = None
     if is_file(folder / JOURNAL):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from independent_contact import evaluate, under_load
+from test_contact_table import worn
 
 from railsim.contact import build_contact_table, contact_geometry, hertz
 from railsim.contact.elastic import loaded_contact
@@ -131,11 +132,13 @@ def test_patches_have_the_area_of_the_boundary_elements(pairs):
 # kN/m of a wheelset, each wheel held at the load, height and roll on the contact path: boundary
 # elements, at 0.1, 0.5, 1 and 2 mm
 LATERAL_STIFFNESS = {
-    ("60E1", 0.025, 10e3): (790, 549, 181, 133),
-    ("60E1", 0.025, 54.5e3): (2230, 2132, 1728, 968),
-    ("60E1", 0.025, 100e3): (3267, 3230, 3074, 2273),
-    ("54E1", 0.025, 54.5e3): (2586, 2383, 1852, 1076),
-    ("54E1", 0.025, 100e3): (4023, 3858, 3474, 2390),
+    ("S1002", "60E1", 0.025, 10e3): (790, 549, 181, 133),
+    ("S1002", "60E1", 0.025, 54.5e3): (2230, 2132, 1728, 968),
+    ("S1002", "60E1", 0.025, 100e3): (3267, 3230, 3074, 2273),
+    ("S1002", "54E1", 0.025, 54.5e3): (2586, 2383, 1852, 1076),
+    ("S1002", "54E1", 0.025, 100e3): (4023, 3858, 3474, 2390),
+    ("S1002", "60E1", 0.05, 54.5e3): (48, 44, 47, 51),
+    ("worn 0", "60E1", 0.05, 54.5e3): (187, 178, 161, 110),
 }
 
 
@@ -145,15 +148,18 @@ def lateral_force(table, y, roll, load):
     return sum(patch.N_y for patch in right) - sum(patch.N_y for patch in left)
 
 
-@pytest.mark.parametrize(("rail_name", "inclination"), [("60E1", 0.025), ("54E1", 0.025)])
-def test_lateral_stiffness_is_that_of_the_boundary_elements(rail_name, inclination):
-    wheel, rail = load_profile("S1002"), load_profile(rail_name)
+@pytest.mark.parametrize(
+    ("wheel_name", "rail_name", "inclination"), sorted({case[:3] for case in LATERAL_STIFFNESS})
+)
+def test_lateral_stiffness_is_that_of_the_boundary_elements(wheel_name, rail_name, inclination):
+    wheel = load_profile("S1002") if wheel_name == "S1002" else worn(0)
+    rail = load_profile(rail_name)
     grid = TableGrid(s_min=-0.005, s_max=0.005, roll_max=0.003, n_w=2)
     table = build_contact_table(wheel, rail, inclination=inclination, grid=grid)
     y = 1e-3 * np.arange(0.0, 2.2, 0.05)
     roll = contact_geometry(wheel, rail, inclination=inclination, lateral=y).roll
-    for (name, turn, load), expected in LATERAL_STIFFNESS.items():
-        if (name, turn) != (rail_name, inclination):
+    for (*pair, load), expected in LATERAL_STIFFNESS.items():
+        if pair != [wheel_name, rail_name, inclination]:
             continue
         F = [lateral_force(table, a, b, load) for a, b in zip(y, roll, strict=True)]
         stiffness = np.diff(F) / 5e-5

@@ -1,0 +1,105 @@
+"""What a notebook gets: public names, tables, pictures, changed values, frames of pandas."""
+
+import math
+import subprocess
+import sys
+
+import example_result
+import numpy as np
+import pytest
+
+import railsim
+from railsim.errors import InputError
+
+COACH = "coach_manchester"
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return railsim.load_vehicle(COACH)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return example_result.example_result()
+
+
+def test_every_public_name_is_there():
+    assert [name for name in railsim.__all__ if not hasattr(railsim, name)] == []
+
+
+def test_import_loads_neither_compiler_nor_pictures():
+    heavy = "{'numba', 'matplotlib', 'scipy', 'h5py', 'pydantic', 'pandas'}"
+    code = f"import sys, railsim; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_values_are_changed_as_in_a_file(coach):
+    changed = coach.with_values(
+        {"bodies.carbody.mass": np.float64(40e3), "bodies.carbody.position": (0, 0, -1.8)}
+    )
+    text = ["bodies.carbody.mass=40e3", "bodies.carbody.position=[0, 0, -1.8]"]
+    assert changed == railsim.load_vehicle(COACH, text)
+    assert coach == railsim.load_vehicle(COACH)
+
+
+def test_lists_tables_and_settings_are_changed_too():
+    track = railsim.load_track("curve_r250").with_values(
+        {"friction": [0.2, 0.3], "plan.0.length": 60}
+    )
+    assert track.friction == (0.2, 0.3)
+    assert track.plan[0].length == 60.0
+    settings = railsim.Settings().with_values({"fastsim_grid.0": 20, "outputs.track": True})
+    assert settings.fastsim_grid == (20, 10)
+    assert settings.outputs.track
+    mechanism = railsim.load_mechanism("atr95_lift_5", "parameters.a1=0.16")
+    again = mechanism.with_values({"parameters.a2": mechanism.parameters["a2"]})
+    assert set(again.provenance["set"]) == {"a1", "a2"}
+
+
+def test_all_wrong_values_are_told_with_their_keys(coach):
+    with pytest.raises(InputError) as caught:
+        coach.with_values({"bodies.carbodi.mass": 40e3, "assemblies.bogi.bodies.frame.mass": 2e3})
+    assert len(caught.value.faults) == 2
+    with pytest.raises(InputError) as caught:
+        coach.with_values({"bodies.carbody.mass": -1.0, "wheelset": math.nan})
+    assert {"bodies.carbody.mass", "wheelset"} <= {fault.key for fault in caught.value.faults}
+
+
+def test_tables_of_a_notebook_show_names_literally(coach, result):
+    assert "<td>carbody</td>" in coach._repr_html_()
+    assert "<b>" not in coach.replace(name="<b>")._repr_html_()
+    assert repr(coach) == f"<Vehicle {coach.name!r}>"
+    assert "CIR" in railsim.load_track("curve_r250")._repr_html_()
+    assert "creep_law" in railsim.Settings()._repr_html_()
+    assert "<svg" in railsim.load_profile("S1002")._repr_html_()
+    assert repr(railsim.load_profile("S1002")).startswith("<Profile 'S1002': wheel, ")
+    assert "<td>Q</td>" in result._repr_html_()
+
+
+def test_frames_have_a_column_for_each_place(result):
+    pytest.importorskip("pandas")
+    frame = result.to_pandas("Q", "body_position")
+    wheelset, body = result.wheelsets[0], result.bodies[0]
+    np.testing.assert_array_equal(frame[f"Q:{wheelset}:right"], result.Q[:, 0, 1])
+    np.testing.assert_array_equal(frame[f"body_position:{body}:y"], result.body_position[:, 0, 1])
+    assert frame.attrs["units"][f"body_position:{body}:roll"] == "rad"
+    np.testing.assert_array_equal(frame.index, result.time)
+    with pytest.raises(KeyError, match="no quantity 'Z'"):
+        result.to_pandas("Z")
+
+
+def test_results_and_tracks_draw_themselves(result, tmp_path):
+    figure = result.plot("Q", "sum_Y", over="time", path=tmp_path / "forces.png")
+    assert [axes.get_ylabel() for axes in figure.axes] == ["$Q$ (kN)", r"$\Sigma Y$ (kN)"]
+    assert (tmp_path / "forces.png").stat().st_size > 10_000
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert railsim.load_track("curve_r250").plot().axes
+
+
+def test_static_loads_carry_the_weight(coach):
+    loads = railsim.static_loads(coach)
+    assert loads.Q0.sum() == pytest.approx(coach.mass * 9.81, rel=1e-6)
+    assert loads.axle_load.shape == (4,)
+    assert "axle load (kN)" in loads._repr_html_()

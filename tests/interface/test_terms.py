@@ -1,0 +1,51 @@
+"""Unwanted phrases of docs/terms.md occur nowhere in manual, README, changelog, examples, help."""
+
+import re
+from pathlib import Path
+
+import click
+
+from railsim.cli import railsim as command_line
+
+ROOT = Path(__file__).parents[2]
+TERMS = ROOT / "docs" / "terms.md"
+# entries of decisions are not rewritten
+OTHERS = {TERMS, ROOT / "docs" / "decisions.md"}
+
+
+def unwanted():
+    """Phrases in quotation marks: the last column of terms, the first of phrases."""
+    terms, phrases = TERMS.read_text("utf-8").split("## Phrases")
+    cells = [row.rsplit("|", 2)[1] for row in terms.splitlines() if row.startswith("|")]
+    cells += [row.split("|")[1] for row in phrases.splitlines() if row.startswith("|")]
+    return [phrase for cell in cells for phrase in re.findall('"(.+?)"', cell)]
+
+
+def help_texts(command, context):
+    yield f"{context.command_path} --help", command.get_help(context)
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            inner = command.get_command(context, name)
+            yield from help_texts(inner, click.Context(inner, info_name=name, parent=context))
+
+
+def texts():
+    pages = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"]
+    pages += sorted({*(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*.py")} - OTHERS)
+    for page in pages:
+        yield str(page.relative_to(ROOT)), page.read_text("utf-8")
+    yield from help_texts(command_line, click.Context(command_line, info_name="railsim"))
+
+
+def test_unwanted_phrases_are_used_nowhere():
+    phrases = unwanted()
+    assert len(phrases) > 50
+    # over the ends of lines too
+    patterns = (r"\s+".join(map(re.escape, phrase.split())) for phrase in phrases)
+    pattern = re.compile(rf"\b(?:{'|'.join(patterns)})\b", re.IGNORECASE)
+    found = [
+        f"{name}: {' '.join(text[max(0, m.start() - 30) : m.end() + 30].split())}"
+        for name, text in texts()
+        for m in pattern.finditer(text)
+    ]
+    assert found == [], "\n".join(found)
