@@ -219,7 +219,7 @@ class ElementArrays:
                         "name": element.name,
                         "body": self._number(element.body1),
                         "point": point,
-                        "flags": (is_torque, int(law.axes == "track")),
+                        "flags": (is_torque, int(law.axes == "track"), int(law.over == "distance")),
                         "table": np.array(table, dtype=float),
                     }
                 )
@@ -294,7 +294,7 @@ class ElementArrays:
         return Loads(
             body=_column(rows, "body", (), np.int64),
             point=_column(rows, "point", (3,)),
-            flags=_column(rows, "flags", (2,), np.int64),
+            flags=_column(rows, "flags", (3,), np.int64),
             start=_starts(tables),
             table=np.concatenate(tables) if tables else np.zeros((0, 4)),
         )

@@ -18,6 +18,9 @@ from railsim.result.filters import Floats
 SPACING = 0.25e-3  # m
 RANGE = (-0.070, 0.070)  # m from the tape circle
 SMOOTHING = 2e-3  # m, width of the smoothing of the worn profile
+ROUNDING = 0.1  # largest share of the worn area that the profile's points may miss
+WORN = " worn"
+DEEPEST = 1e-3  # m, of one step: beyond it the wear would have moved elsewhere meanwhile
 NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", "patch_T_x",
           "patch_T_y", "wheelset_roll")  # fmt: skip
 
@@ -110,18 +113,31 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     Returns
     -------
     Profile
-        Smoothed over 2 mm; the worn area is that of `depth` times `distance`.
+        Smoothed over 2 mm; the area that it loses is that of `depth` times `distance`.
+
+    Raises
+    ------
+    InputError : the wear is deeper than 1 mm; the profile's points are too far apart to show it.
     """
-    y = grid()
     worn = depth * distance
+    deepest = float(np.max(worn))
+    if deepest > DEEPEST:
+        allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / deepest:.3g} km"
+        found = f"{1e-3 * distance:g} km wear off {1e3 * deepest:.3g} mm"
+        raise InputError([Fault("wear", "step", found, allowed)])
     kernel = np.exp(-0.5 * ((np.arange(-24, 25) * SPACING) / (0.5 * SMOOTHING)) ** 2)
     smooth = np.convolve(worn, kernel / kernel.sum(), mode="same")
-    lost = float(np.sum(smooth))
-    if lost > 0.0:
-        smooth *= float(np.sum(worn)) / lost
-    z = np.asarray(profile.z) - np.interp(np.asarray(profile.y), y, smooth, left=0.0, right=0.0)
-    words = f"worn by {1e6 * SPACING * float(np.sum(worn)):.2f} mm2"
+    y = np.asarray(profile.y)
+    lost = np.interp(y, grid(), smooth, left=0.0, right=0.0)
+    area, kept = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, y))
+    if area > 0.0:
+        if abs(kept / area - 1.0) > ROUNDING:
+            found = f"its points hold {100.0 * kept / area:.0f} % of the worn area"
+            raise InputError([Fault(profile.name, "points", found, "points 1 mm apart at most")])
+        lost *= area / kept
+    words = f"worn by {1e6 * area:.2f} mm2"
+    name = f"{profile.name.removesuffix(WORN)}{WORN}"
     return Profile(
-        f"{profile.name} worn", profile.kind, np.asarray(profile.y), z,
-        f"{profile.source}; {words}", profile.inclination, (*profile.notes, words),
+        name, profile.kind, y, np.asarray(profile.z) - lost, f"{profile.source}; {words}",
+        profile.inclination, (*profile.notes, words),
     )  # fmt: skip

@@ -42,6 +42,8 @@ class WheelWear:
         Whole Life Rail Model, mean over the distance, forces on the rail against travel only [1].
     fatigue_index : float or None
         Largest FI_surf [1]; None without contact patches.
+    utilised_friction, pressure_ratio : float or None
+        T/N and p0/k of that patch, its place on the shakedown map [1]; None likewise.
     """
 
     place: str
@@ -52,6 +54,8 @@ class WheelWear:
     usfd: float | None
     rail_damage: float
     fatigue_index: float | None
+    utilised_friction: float | None
+    pressure_ratio: float | None
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
@@ -87,7 +91,8 @@ def wear_report(
     shape = radii.shape
     streams = [[StreamingPercentiles(CELL) for _ in SIDES] for _ in radii]
     sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "damage", "usfd")}
-    worst, length = np.full(shape, -np.inf), 0.0
+    # largest index of each wheel, with the place of its patch on the shakedown map
+    worst, length = np.full((3, *shape), -np.inf), 0.0
     patches = all(name in record.result for name in PATCHES)
     way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
@@ -106,10 +111,10 @@ def wear_report(
             for side, stream in enumerate(sides):
                 stream.add(T_gamma[:, w, side])
         if patches:
-            area, index = _patches(record, rows, yield_in_shear)
+            area, fatigue = _patches(record, rows, yield_in_shear)
             mass = np.where(area > 0.0, usfd(T_gamma / np.where(area > 0.0, area, 1.0)) * area, 0.0)
             sums["usfd"] += np.sum(mass * ways, axis=0)
-            worst = np.maximum(worst, index)
+            worst = np.where(fatigue[0] > worst[0], fatigue, worst)
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
         raise record.fault("time", found, f"more than the first {START:g} s, which do not count")
@@ -122,7 +127,9 @@ def wear_report(
             pearce_sherratt=float(sums["pearce"][w, k] / length),
             usfd=_area_per_distance(sums["usfd"][w, k] / length, radii[w, k]) if patches else None,
             rail_damage=float(sums["damage"][w, k] / length),
-            fatigue_index=float(worst[w, k]) if patches else None,
+            fatigue_index=float(worst[0, w, k]) if patches else None,
+            utilised_friction=float(worst[1, w, k]) if patches else None,
+            pressure_ratio=float(worst[2, w, k]) if patches else None,
         )
         for w in range(len(radii))
         for k, side in enumerate(SIDES)
@@ -130,12 +137,19 @@ def wear_report(
 
 
 def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
-    """Area of all patches of each wheel [m2], and its largest fatigue index."""
+    """Area of all patches of each wheel [m2]; its largest fatigue index with T/N and p0/k."""
     N, a, b, T_x, T_y = (record.result.part(name, rows) for name in PATCHES)
     loaded = N > 0.0
     safe = np.where(loaded, N, 1.0)
     index = surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b, k)
-    worst = np.where(loaded, index, -np.inf).max(axis=(0, 3))
+    ratio = np.hypot(T_x, T_y) / safe
+    # k/p0 is what the index lacks of T/N
+    pressure = 1.0 / np.where(loaded & (ratio > index), ratio - index, np.inf)
+    index = np.where(loaded, index, -np.inf)
+    all_of = np.stack([index, ratio, pressure]).transpose(0, 2, 3, 1, 4)
+    all_of = all_of.reshape(*all_of.shape[:3], -1)
+    at = np.argmax(all_of[0], axis=-1)[None, ..., None]
+    worst = np.take_along_axis(all_of, at, axis=-1)[..., 0]
     return np.sum(np.where(loaded, np.pi * a * b, 0.0), axis=-1), worst
 
 

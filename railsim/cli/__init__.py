@@ -38,6 +38,7 @@ COMMANDS = {
     "modes": ("modes", "Eigenfrequencies, damping and mode shapes of a vehicle."),
     "critical-speed": ("critical_speed", "Linear and non-linear critical speed."),
     "curving": ("curving", "Steady curving over radius, cant deficiency and friction."),
+    "stationary": ("stationary", "Standing on twisted track and on cant, against limits."),
     "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
     "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
     "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),

@@ -389,7 +389,7 @@ class Airspring(PointElement):
 
 def _in_time(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
     if not rising(rows):
-        raise ValueError("the time must increase from row to row")
+        raise ValueError("the time or distance must increase from row to row")
     return rows
 
 
@@ -399,7 +399,7 @@ TimeRows = Annotated[
 
 
 class AppliedForce(Element):
-    """A force and a torque on one body over time: wind, traction, a test load."""
+    """A force and a torque on one body over time or distance: wind, traction, a test load."""
 
     kind: Literal["applied_force"]
     bodies: tuple[Text]
@@ -408,10 +408,12 @@ class AppliedForce(Element):
     """Where the force acts [m]; by default at the centre of gravity"""
     axes: Literal["body", "track"] = "body"
     """Axes of force and torque: those of the body, or those of the track at its place"""
+    over: Literal["time", "distance"] = "time"
+    """First column of the tables: time, or the place of the body's nominal position on the track"""
     force_table: TimeRows | None = None
-    """Rows [time s, Fx, Fy, Fz N], linear in between, constant beyond"""
+    """Rows [time s or distance m, Fx, Fy, Fz N], linear in between, constant beyond"""
     torque_table: TimeRows | None = None
-    """Rows [time s, Mx, My, Mz N m], linear in between, constant beyond"""
+    """Rows [time s or distance m, Mx, My, Mz N m], linear in between, constant beyond"""
 
     @model_validator(mode="after")
     def _something_acts(self) -> Self:

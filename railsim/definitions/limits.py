@@ -1,6 +1,7 @@
 """Limit files: what a standard asks for, each value with its source.
 
-`railsim-limits/1` holds the limits of running tests, `railsim-comfort-limits/1` those of comfort.
+`railsim-limits/1` holds the limits of running tests, `railsim-comfort-limits/1` those of comfort,
+`railsim-stationary-limits/1` those of tests at a stand.
 
 A value is `checked` when somebody has compared it with the printed standard; until then every page
 that uses it says so.
@@ -24,6 +25,7 @@ from railsim.definitions.base import (
 
 LIMITS_FORMAT = "railsim-limits/1"
 COMFORT_LIMITS_FORMAT = "railsim-comfort-limits/1"
+STATIONARY_LIMITS_FORMAT = "railsim-stationary-limits/1"
 
 
 def _rising_rows(rows: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -247,3 +249,33 @@ class ComfortLimits(FileDefinition):
     """N_MV, N_VA, N_VD"""
     continuous: Classes
     """Continuous comfort along y and z [m/s2]"""
+
+
+class BodyTwist(Sourced):
+    """Twist over the spacing of bogies: constant + numerator / spacing, at most `greatest`."""
+
+    constant: NonNegative
+    """[1]"""
+    numerator: NonNegative
+    """[m]"""
+    greatest: Positive
+    """[1]"""
+
+
+class StationaryLimits(FileDefinition):
+    """Tests at a stand: twisted track, cant."""
+
+    format: Literal["railsim-stationary-limits/1"]
+    """Kind and version of the file"""
+    edition: Text
+    """Edition of the standards"""
+    unloading: Constant
+    """(Q0 - Q)/Q0 of the least loaded wheel on twisted track"""
+    bogie_twist: Constant
+    """Twist of the track over the wheelbase of a bogie"""
+    body_twist: BodyTwist
+    """Twist of the track over the spacing of bogies, or of the axles of a vehicle without"""
+    lean_unloading: Constant
+    """(Q0 - Q)/Q0 of the least loaded wheel on a cant equal to the admissible cant deficiency"""
+    lean_angle: Constant
+    """Angle of the floor from horizontal on it [rad]"""

@@ -20,8 +20,10 @@ from railsim.definitions.layout import track_faults, track_remarks
 from railsim.definitions.limits import (
     COMFORT_LIMITS_FORMAT,
     LIMITS_FORMAT,
+    STATIONARY_LIMITS_FORMAT,
     ComfortLimits,
     RunningLimits,
+    StationaryLimits,
 )
 from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
@@ -107,6 +109,7 @@ FORMATS: dict[str, Format] = {
     COMFORT_LIMITS_FORMAT: Format("limits", ComfortLimits),
     PUBLISHED_FORMAT: Format("published", Published),
     STUDY_FORMAT: Format("study", Study, free=("grid",)),
+    STATIONARY_LIMITS_FORMAT: Format("limits", StationaryLimits),
 }
 
 
@@ -226,6 +229,13 @@ def _beside(folder: Path, name: Any) -> Any:
 def load_published(path: str | Path, overrides: Iterable[str] | str = ()) -> Published:
     """Load published values, or shipped ones by their name; as `load_vehicle`."""
     return _loaded(Published, _file_source(path, "published"), overrides)
+
+
+def load_stationary_limits(
+    path: str | Path, overrides: Iterable[str] | str = ()
+) -> StationaryLimits:
+    """Load the limits of stationary tests, or shipped ones by their name; as `load_vehicle`."""
+    return _loaded(StationaryLimits, _file_source(path, "limits"), overrides)
 
 
 def load_vehicle_text(text: str, file: str = "vehicle_toml") -> Vehicle:

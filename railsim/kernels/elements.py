@@ -280,30 +280,31 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
 
 
 @jit_internal
-def load_component(table, first, last, time, k):
-    """Component `k` of a load at `time`: linear between its rows, constant beyond them."""
-    if time <= table[first, 0]:
+def load_component(table, first, last, at, k):
+    """Component `k` of a load at `at`: linear between its rows, constant beyond them."""
+    if at <= table[first, 0]:
         return table[first, k]
     i = first
-    while i < last - 1 and time > table[i + 1, 0]:
+    while i < last - 1 and at > table[i + 1, 0]:
         i += 1
     if i == last - 1:
         return table[i, k]
-    share = (time - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
+    share = (at - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
     return table[i, k] + share * (table[i + 1, k] - table[i, k])
 
 
 @jit_merged
-def load_forces(loads, time, bodies, frames, pose):
-    """Add the given forces and torques at `time` to the bodies' rows in `pose`."""
+def load_forces(loads, time, s, frame_offset, bodies, frames, pose):
+    """Add the given forces and torques at `time` and `s` to the bodies' rows in `pose`."""
     for e in range(loads.body.shape[0]):
         b = loads.body[e]
         first, last = loads.start[e], loads.start[e + 1]
-        c1 = load_component(loads.table, first, last, time, 1)
-        c2 = load_component(loads.table, first, last, time, 2)
-        c3 = load_component(loads.table, first, last, time, 3)
-        in_track = loads.flags[e, 1]
         f = bodies.frame[b]
+        at = s + frame_offset[f] if loads.flags[e, 2] else time
+        c1 = load_component(loads.table, first, last, at, 1)
+        c2 = load_component(loads.table, first, last, at, 2)
+        c3 = load_component(loads.table, first, last, at, 3)
+        in_track = loads.flags[e, 1]
         x, y, z = 0.0, 0.0, 0.0
         for k in range(3):
             a1 = frames[f, 3 + k * 3] if in_track else pose[b, 3 * k]

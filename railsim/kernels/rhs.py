@@ -493,7 +493,7 @@ def mechanics(system, work, state, derivative):
     )
     hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:
-        load_forces(system.loads, time, bodies, work.frames, work.pose)
+        load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     status, where, n_patches = wheel_rail(system, work, speed, state)

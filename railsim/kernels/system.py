@@ -267,15 +267,16 @@ class Curves(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Given forces and torques over time.
+    """Given forces and torques over time or distance.
 
     Attributes
     ----------
     body : int64[l]
     point : float64[l, 3]    where a force acts, body axes [m]
-    flags : int64[l, 2]      1 if: torque, axes of the track
+    flags : int64[l, 3]      1 if: torque, axes of the track, over distance
     start : int64[l + 1]     first row of each load
-    table : float64[..., 4]  time [s], three components [N or N m]; linear, constant beyond
+    table : float64[..., 4]  time [s] or place of the body's track frame [m], three components
+                             [N or N m]; linear, constant beyond
     """
 
     body: np.ndarray

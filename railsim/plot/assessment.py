@@ -7,6 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.assessment import Assessment
+from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
+from railsim.assessment.wear_report import WheelWear
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
 
 
@@ -83,10 +85,11 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
 
 
 def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
-    """Mean wear number and rail damage of every wheel, runs side by side."""
+    """Mean wear number and rail damage of every wheel; damage over wear number, shakedown map."""
     runs = [(run, wheels) for a in assessments for run, wheels in a.wear.items()]
-    figure = Picture(figsize=(7.6, 3.6), layout="constrained")
-    energy, damage = figure.subplots(1, 2, sharey=True)
+    figure = Picture(figsize=(7.6, 7.0), layout="constrained")
+    (energy, damage), (life, map_) = figure.subplots(2, 2)
+    damage.sharey(energy)
     width = 0.8 / len(runs)
     for k, (run, wheels) in enumerate(runs):
         rows = np.arange(len(wheels)) + (k - 0.5 * (len(runs) - 1)) * width
@@ -95,12 +98,49 @@ def _wear_figure(assessments: Sequence[Assessment]) -> Figure:
         damage.barh(rows, [1e6 * w.rail_damage for w in wheels], 0.9 * width, color=colour)
     energy.set_yticks(range(len(runs[0][1])), [wheel.place for wheel in runs[0][1]])
     energy.invert_yaxis()
+    damage.tick_params(labelleft=False)
+    _life_model(life, runs)
+    _shakedown_map(map_, runs)
     energy.set_xlabel(r"mean wear number $T\gamma$ (N)")
     damage.set_xlabel("rail damage a pass, WLRM ($10^{-6}$)")
     for ax in (energy, damage):
         ax.grid(axis="y", visible=False)
-    figure.legend(loc="outside lower left", ncols=2)
+    runs_only = energy.get_legend_handles_labels()
+    figure.legend(*runs_only, loc="outside lower left", ncols=2)
     return figure
+
+
+def _life_model(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) -> None:
+    """Whole Life Rail Model with the wear numbers' 50 and 95 % values of every wheel."""
+    model = WholeLifeRailModel()
+    values = [w.percentiles[p] for _, wheels in runs for w in wheels for p in ("50", "95")]
+    T = np.linspace(0.0, max(200.0, 1.05 * max(values)), 400)
+    axes.plot(T, 1e6 * model(T), color="0.3", lw=1.0)
+    axes.axhline(0.0, color="0.7", lw=0.7)
+    for k, (_, wheels) in enumerate(runs):
+        for percentile, marker in (("50", "o"), ("95", "^")):
+            T = np.array([w.percentiles[percentile] for w in wheels])
+            axes.plot(T, 1e6 * model(T), marker, color=DISTINCT[k % len(DISTINCT)], ms=4)
+    axes.plot([], [], "o", color="0.3", ms=4, label="50 % of the time below")
+    axes.plot([], [], "^", color="0.3", ms=4, label="95 %")
+    axes.set(xlabel=r"wear number $T\gamma$ (N)", ylabel="damage a pass, WLRM ($10^{-6}$)")
+    _legend(axes)
+
+
+def _shakedown_map(axes: Axes, runs: Sequence[tuple[str, Sequence[WheelWear]]]) -> None:
+    """Worst patch of every wheel against the elastic shakedown limit."""
+    mu = np.linspace(0.0, 0.6, 200)
+    axes.plot(mu, shakedown_limit(mu), color=LIMIT, lw=1.2, label="elastic shakedown limit")
+    for k, (_, wheels) in enumerate(runs):
+        found = [
+            (w.utilised_friction, w.pressure_ratio) for w in wheels if w.pressure_ratio is not None
+        ]
+        if found:
+            axes.plot(*zip(*found, strict=True), "o", color=DISTINCT[k % len(DISTINCT)], ms=4)
+    if not any(w.pressure_ratio is not None for _, wheels in runs for w in wheels):
+        axes.set_title("needs outputs.contact_patches", fontsize=9)
+    axes.set(xlabel="utilised friction $T/N$", ylabel="$p_0/k$", xlim=(0.0, None), ylim=(0.0, None))
+    _legend(axes)
 
 
 def _legend(axes: Axes) -> None:

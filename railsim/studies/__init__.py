@@ -12,6 +12,7 @@
 `own.py`        own quantities by a Python function
 `summary.py`    ``summary.csv`` and ``study.json``
 `study.py`      `study`: the whole job
+`stationary.py` a vehicle at a stand on twisted track and on cant, against limits
 ==============  ===========================================================================
 
 Begin reading in `study.py`.

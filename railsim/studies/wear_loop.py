@@ -29,14 +29,15 @@ class WearStep:
     ----------
     distance : float
         Distance run before the step [m].
-    profile : Profile
-        Wheel profile in this step.
+    profile, worn : Profile
+        Wheel profile in this step, and after it.
     depth : float64[place]
         Its depth of wear per distance, mean of all wheels, over `wear_depth.grid` [m/m].
     """
 
     distance: float
     profile: Profile
+    worn: Profile
     depth: Floats
 
 
@@ -59,7 +60,7 @@ def wear_loop(
         Tracks with their speeds [m/s] and shares of the distance.
     step : float
         Distance between two updates of the profile [m]: so short that no step wears off more
-        than some tenths of a millimetre.
+        than some tenths of a millimetre; more than 1 mm is refused.
     steps : int
         Number of updates.
     settings : Settings, optional
@@ -69,7 +70,7 @@ def wear_loop(
 
     Raises
     ------
-    InputError : different profiles; no route.
+    InputError : different profiles; no route; a step that wears off too much.
     ModelError : a run ended early.
     """
     names = {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
@@ -89,11 +90,12 @@ def wear_loop(
             result = simulate(vehicle, track, speed=speed, settings=given, profiles=profiles)
             own = share / total * _mean_depth(result)
             depth = own if not depth.size else depth + own
-        done = WearStep(number * step, profile, depth)
+        worn = worn_profile(profile, depth, step)
+        done = WearStep(number * step, profile, worn, depth)
         found_steps.append(done)
         if on_step is not None:
             on_step(done)
-        profile = worn_profile(profile, depth, step)
+        profile = worn
     return found_steps
 
 

@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -105,6 +107,21 @@ def test_film_has_a_picture_for_each_frame(result, tmp_path):
     with Image.open(path) as film:
         assert film.n_frames == 4
         assert np.asarray(film.convert("RGB")).std() > 10.0
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
+def test_mp4_has_a_picture_for_each_frame(result, tmp_path):
+    path = write_movie(result_scene(result, frames=4), tmp_path / "run.mp4")
+    asked = ["ffmpeg", "-loglevel", "error", "-i", str(path), str(tmp_path / "frame%d.png")]
+    subprocess.run(asked, check=True)
+    assert len(list(tmp_path.glob("frame*.png"))) == 4
+
+
+def test_mp4_without_ffmpeg_is_told(result, tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    with pytest.raises(InputError, match="MP4 needs ffmpeg"):
+        write_movie(result_scene(result, frames=4), tmp_path / "run.mp4")
+    assert not list(tmp_path.iterdir())
 
 
 def test_wrong_calls_end_with_status_2(result, tmp_path, capsys):

@@ -80,7 +80,11 @@ ELEMENTS = [
     (AIR.replace("[1e5, 1e5]", "[1, 1, 1]"), ".horizontal_stiffness", "3 values; a list of 2"),
     (AIR.replace("orifice_damping=1e4, ", ""), ".orifice_damping", "missing; needed: Damping of"),
     (LOAD, "", "'force_table' or 'torque_table' is needed"),
-    (f"{LOAD}, force_table=[[1, 0, 0, 0], [0, 0, 0, 0]]", ".force_table", "the time must increase"),
+    (
+        f"{LOAD}, force_table=[[1, 0, 0, 0], [0, 0, 0, 0]]",
+        ".force_table",
+        "must increase from row to row",
+    ),
     (f"{LOAD}, force_table=[[0, 1]]", ".force_table.0", "2 values; a list of 4"),
     (f'{LOAD}, axes="rail", force_table=[[0, 0, 0, 0]]', ".axes", "'rail'; must be"),
     (f"{STOP}, table=[[0.1, 0.0], [1.0, 2.0]]", ".table", "the first column must begin at 0"),

@@ -5,6 +5,7 @@ of ISO 2631-1:1997, tables 3 and 4.
 """
 
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from railsim.assessment.wear import (
     surface_fatigue_index,
     usfd,
 )
+from railsim.assessment.wear_report import _patches
 from railsim.assessment.weighting import WEIGHTINGS
 from railsim.profiles import load_profile
 from railsim.result.filters import (
@@ -341,3 +343,18 @@ def test_climb_counts_a_lifted_wheel_and_the_longest_stretch():
 def test_overturning_is_one_when_one_side_is_without_load():
     Q = np.array([[[80e3, 0.0], [70e3, 0.0]], [[50e3, 50e3], [50e3, 50e3]]])
     assert overturning(Q).tolist() == [1.0, 0.0]
+
+
+def test_worst_patch_stands_on_the_shakedown_map_where_its_index_says():
+    """Two instants, two patches: FI = T/N - k/p0 of the worst one that carries."""
+    N = np.array([50e3, 80e3, 60e3, 0.0]).reshape(2, 1, 1, 2)
+    size = {"patch_a": np.full(N.shape, 6e-3), "patch_b": np.full(N.shape, 4e-3)}
+    forces = {"patch_T_x": 0.1 * N + 5.0, "patch_T_y": 0.2 * N * np.array([1.0, 1.5])}
+    record = Mock()
+    record.result.part = lambda name, rows: {"patch_N": N, **size, **forces}[name][rows]
+    area, (index, friction, pressure) = _patches(record, slice(0, 2), 300e6)
+    p0 = 1.5 * 80e3 / (np.pi * 6e-3 * 4e-3)
+    assert pressure.item() == pytest.approx(p0 / 300e6)
+    assert friction.item() == pytest.approx(np.hypot(0.1 * 80e3 + 5.0, 0.3 * 80e3) / 80e3)
+    assert index.item() == pytest.approx(friction.item() - 1.0 / pressure.item())
+    assert area.ravel() == pytest.approx(np.pi * 6e-3 * 4e-3 * np.array([2.0, 1.0]))

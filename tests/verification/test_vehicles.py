@@ -189,15 +189,18 @@ def with_loads(vehicle, body, **tables):
     return Vehicle.model_validate(data)
 
 
-def test_wind_is_carried_by_the_rails():
+@pytest.mark.parametrize(("over", "until", "height"), [("time", 3.0, 1.8), ("distance", 60.0, 2.6)])
+def test_wind_is_carried_by_the_rails(over, until, height):
     """A side force of 20 kN and a torque about z: sums of Y, of Y x and of the lateral load."""
     force, torque = 20e3, 30e3
     coach = with_loads(
         load_vehicle("coach_manchester"),
         "carbody",
-        force_table=[[0.0, 0.0, 0.0, 0.0], [3.0, 0.0, force, 0.0]],
-        torque_table=[[0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, torque]],
+        force_table=[[0.0, 0.0, 0.0, 0.0], [until, 0.0, force, 0.0]],
+        torque_table=[[0.0, 0.0, 0.0, 0.0], [until, 0.0, 0.0, torque]],
+        point=[0.0, 0.0, -height],
         axes="track",
+        over=over,
     )
     result = simulate(coach, load_track("straight"), speed=20.0, duration=20.0)
     sum_Y = result.sum_Y[-1]
@@ -206,10 +209,25 @@ def test_wind_is_carried_by_the_rails():
     # longitudinal creep forces carry a part of the moment about z: all of it with what Y leaves
     assert 0.2 * torque < (sum_Y * x).sum() < 1.2 * torque
     Q = result.Q[-1]
-    # moment about the track's centre: force at 1.8 m and the car's own weight moved aside
+    # moment about the track's centre: force at its height and the car's own weight moved aside
     shifted = sum(mass * 9.81 * y for mass, y in _moved(result))
     transfer = 0.753 * (Q[:, 1] - Q[:, 0]).sum()
-    assert transfer == pytest.approx(force * 1.8 + shifted, rel=0.01)
+    assert transfer == pytest.approx(force * height + shifted, rel=0.01)
+
+
+def test_gust_over_distance_is_that_over_time_at_the_place_of_its_body():
+    """The rear bogie's frame, 9.5 m behind, at constant speed: but for round-off the same."""
+    rows = [[0.1, 0.0, 0.0, 0.0], [0.3, 0.0, 5e3, 0.0], [0.4, 0.0, 0.0, -2e3]]
+    placed = [[5.0 - 9.5 + 20.0 * t, *force] for t, *force in rows]
+    coach = load_vehicle("coach_manchester")
+    runs = [
+        simulate(with_loads(coach, "rear.frame", point=[-9.5, 0.3, -1.0], **given),
+                 load_track("straight"), speed=20.0, start=5.0, duration=0.5)
+        for given in ({"force_table": rows}, {"over": "distance", "force_table": placed})
+    ]  # fmt: skip
+    assert np.ptp(runs[0].sum_Y) > 500.0
+    assert pytest.approx(runs[0].Q, abs=0.1) == runs[1].Q
+    assert pytest.approx(runs[0].Y, abs=0.1) == runs[1].Y
 
 
 def _moved(result):

@@ -1,5 +1,7 @@
 """Depth of wear over the profile: areas are kept, places are those of the patches."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from railsim.assessment.wear_depth import SPACING, grid, spread, worn_depth, wor
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.profiles import load_profile
+from railsim.studies.wear_loop import wear_loop
 
 
 @given(st.floats(-0.05, 0.05), st.floats(0.5e-3, 8e-3))
@@ -30,9 +33,47 @@ def test_worn_profile_loses_the_area_of_the_wear():
     worn = worn_profile(profile, depth, 1e6)
     y = np.linspace(-0.069, 0.059, 20_001)
     lost = np.interp(y, profile.y, profile.z) - np.interp(y, worn.y, worn.z)
-    # points of the profile up to 1 mm apart
-    assert np.trapezoid(lost, y) == pytest.approx(4e-6, rel=0.02)
+    assert np.trapezoid(lost, y) == pytest.approx(4e-6, rel=1e-4)  # S1002: points 0.05 mm apart
     assert lost.min() > -1e-12
+
+
+def test_wear_too_deep_for_one_step_is_refused_with_the_step_that_is_not():
+    depth = spread(np.array([0.0]), np.array([5e-3]), np.array([1e-11]))
+    with pytest.raises(InputError, match=r"2000 km wear off 2\.5\d* mm; .*at most 1 mm: 78\d km"):
+        worn_profile(load_profile("S1002"), depth, 2e6)
+
+
+def test_profile_of_few_points_is_refused():
+    profile = load_profile("S1002")
+    coarse = dataclasses.replace(profile, y=profile.y[::300], z=profile.z[::300])
+    depth = spread(np.array([0.0]), np.array([2e-3]), np.array([1e-12]))
+    with pytest.raises(InputError, match="points 1 mm apart at most"):
+        worn_profile(coarse, depth, 1e6)
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_worn_profile_goes_back_into_the_simulation():
+    """Two steps of 100 km in a curve: what a step wears off is missing in the next one's wheels."""
+    curve = railsim.load_track("curve_r250").replace(
+        plan=[{"type": "CIR", "length": 6.0, "radius": 1500.0}],
+        cant=[{"type": "CST", "length": 6.0, "cant": 0.05}],
+    )
+    told = []
+    first, second = wear_loop(
+        railsim.load_vehicle("coach_manchester"), [(curve, 20.0, 1.0)], step=1e5, steps=2,
+        settings=Settings(start_state="steady"), on_step=told.append,
+    )  # fmt: skip
+    assert told == [first, second]
+    assert (first.distance, second.distance) == (0.0, 1e5)
+    assert first.profile.name == "S1002"
+    assert second.profile is first.worn
+    for step in (first, second):
+        lost = np.asarray(step.profile.z) - np.asarray(step.worn.z)
+        worn = 1e5 * SPACING * np.sum(step.depth)
+        assert np.trapezoid(lost, step.profile.y) == pytest.approx(worn, rel=1e-9)
+        assert step.worn.name == "S1002 worn"
+    # other contacts on worn wheels
+    assert np.max(np.abs(second.depth - first.depth)) > 0.01 * np.max(first.depth)
 
 
 def test_outer_leading_wheel_wears_at_its_flange_in_a_curve():

@@ -1,0 +1,104 @@
+"""``railsim stationary``: a vehicle at a stand on twisted track and on cant."""
+
+import math
+from typing import TYPE_CHECKING
+
+import click
+
+from railsim.cli.common import (
+    echo,
+    json_option,
+    load_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+    table,
+)
+
+if TYPE_CHECKING:
+    from railsim.studies.stationary import Stationary
+
+FILES = ("stationary.json",)
+
+
+@click.command()
+@click.argument("vehicle", metavar="VEHICLE")
+@click.option("--cant", type=float, metavar="H", help="Default: the admissible cant deficiency, m.")
+@click.option("--rolling", is_flag=True, help="Do not hold the wheelsets across the track.")
+@click.option(
+    "--limits", default="stationary", show_default=True, metavar="F",
+    help="Limits file, or the name of a shipped one.",
+)  # fmt: skip
+@click.option("--track", metavar="F", help="Rails, gauge, friction, support; default straight.")
+@click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
+@click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
+@click.option("--out", metavar="DIR", help="Folder for stationary.json.")
+@load_option
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    vehicle: str,
+    cant: float | None,
+    rolling: bool,
+    limits: str,
+    track: str | None,
+    settings: str | None,
+    fail: bool,
+    out: str | None,
+    load: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Put a vehicle on twisted track and on cant, and compare wheel loads and floor with limits.
+
+    Unloading on the twists of EN 14363, 6.1, unloading and angle of the floor on a cant equal to
+    the admissible cant deficiency, and the roll coefficient.
+
+    \b
+    Example:
+      railsim stationary coach_manchester
+      railsim stationary coach_manchester --cant 0.15 --rolling
+    """  # noqa: D301 - click reads the escape
+    from railsim.cli import DONE, LIMIT_EXCEEDED
+    from railsim.cli.analysis import Folder, load_inputs
+    from railsim.definitions.loading import load_stationary_limits
+    from railsim.studies.stationary import stationary
+
+    inputs = load_inputs(vehicle, track, settings, assignments, load)
+    folder = Folder(out, FILES, overwrite)
+    found = stationary(
+        inputs.vehicle, inputs.track, load_stationary_limits(limits), cant=cant, held=not rolling,
+        settings=inputs.settings,
+    )  # fmt: skip
+    folder.write_json(FILES[0], found.record())
+    if as_json:
+        print_json(found.record())
+    else:
+        echo("\n".join(_lines(found, quiet=quiet)))
+        folder.tell()
+    return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
+
+
+def _lines(found: "Stationary", *, quiet: bool) -> list[str]:
+    lines = [f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}"]
+    lines += [f"  {reason}" for reason in found.reasons]
+    rows = []
+    for value in found.values:
+        in_degrees = value.quantity.startswith("angle")
+        shown = [
+            "" if v is None or math.isnan(v) else f"{math.degrees(v):.2f} deg"
+            if in_degrees else f"{v:.3f}" for v in (value.value, value.limit)
+        ]  # fmt: skip
+        rows.append([value.case, value.quantity, value.place, *shown])
+    lines += ["", *table(["standing on", "quantity", "place", "value", "limit"], rows, numbers=3)]
+    if not quiet:
+        how = "held across the track" if found.held else "free across the track"
+        lines += ["", f"note: wheelsets {how}"]
+        if not all(v.checked for v in found.values if v.limit is not None):
+            lines.append("note: limits not checked against the standard")
+    return lines

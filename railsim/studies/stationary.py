@@ -1,0 +1,221 @@
+"""Tests at a stand: unloading on twisted track (EN 14363, 6.1), cant, roll coefficient.
+
+Each is solved by Newton's method (`railsim.linear.stationary`), the twists to both sides.  A case
+without a steady state is told, and the verdict is then no pass.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.assembly import assemble
+from railsim.definitions.flatten import FlatVehicle, flatten
+from railsim.definitions.limits import Constant, StationaryLimits
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.equilibrium import equilibrium
+from railsim.errors import Fault, InputError
+from railsim.linear.stationary import WALKING_PACE, Standing, on_cant, on_twist, roll_coefficient
+from railsim.linear.steady import NotConverged
+from railsim.result.filters import Floats
+from railsim.track.alignment import CANT_BASE
+
+
+@dataclass(frozen=True)
+class StationaryValue:
+    """One quantity of one case against its limit.
+
+    Attributes
+    ----------
+    case, quantity : str
+        What the vehicle stands on; what is compared.
+    value : float
+        nan where no steady state was found [1 or rad].
+    limit : float or None
+        None where a value is only told.
+    place : str
+        Wheel, or body.
+    source : str
+        Of the limit.
+    checked : bool
+        Whether somebody has compared the limit with the printed standard.
+    """
+
+    case: str
+    quantity: str
+    value: float
+    limit: float | None
+    place: str
+    source: str = ""
+    checked: bool = False
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether the limit is exceeded; a case that was not found exceeds nothing."""
+        return self.limit is not None and self.value > self.limit
+
+
+@dataclass(frozen=True)
+class Stationary:
+    """A vehicle's tests at a stand.
+
+    Attributes
+    ----------
+    vehicle, edition : str
+    held : bool
+        Whether the wheelsets were held across the track.
+    values : tuple of StationaryValue
+    reasons : tuple of str
+        Cases without a steady state, a sentence each.
+    """
+
+    vehicle: str
+    edition: str
+    held: bool
+    values: tuple[StationaryValue, ...]
+    reasons: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """``fail`` where a limit is exceeded, ``incomplete`` where a case was not found."""
+        if any(value.exceeded for value in self.values):
+            return "fail"
+        return "incomplete" if self.reasons else "pass"
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI."""
+        values = [{**v.__dict__, "exceeded": v.exceeded} for v in self.values]
+        return {
+            "vehicle": self.vehicle, "edition": self.edition, "verdict": self.verdict,
+            "reasons": list(self.reasons), "held": self.held, "values": values,
+        }  # fmt: skip
+
+
+def stationary(
+    vehicle: Vehicle,
+    track: Track,
+    limits: StationaryLimits,
+    *,
+    cant: float | None = None,
+    held: bool = True,
+    settings: Settings | None = None,
+) -> Stationary:
+    """Put a vehicle on twisted track and on cant.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        On two bogies, or on two axles.
+    track : Track
+        Whose rails and friction count.
+    limits : StationaryLimits
+    cant : float, optional
+        [m]; by default the admissible cant deficiency of the service table.
+    held : bool
+        Hold the wheelsets across the track, as the closed formulas do.
+    settings : Settings, optional
+
+    Raises
+    ------
+    InputError : no cant; neither two bogies nor two axles; a cant beyond 0.5 m.
+    """
+    flat = flatten(vehicle)
+    if cant is None:
+        cant = _admissible_cant(vehicle)
+    if not 0.0 < cant <= 0.5:
+        raise InputError([Fault("cant", "", f"{cant:g} m", "above 0, up to 0.5 m")])
+    height = cant
+    twists = twist_heights(flat, limits)
+    balance = equilibrium(assemble(vehicle, track, settings or Settings()), WALKING_PACE)
+    values: list[StationaryValue] = []
+    reasons: list[str] = []
+
+    def found(case: str, stand: Callable[[], Standing]) -> Standing | None:
+        try:
+            return stand()
+        except NotConverged as error:
+            reasons.append(f"{case}: {error}")
+            return None
+
+    def twisted(case: str, heights: Floats) -> Standing | None:
+        return found(case, lambda: on_twist(balance, track, heights, held=held))
+
+    for name, heights in twists.items():
+        stands = [twisted(name, heights), twisted(name, -heights)]
+        values.append(_unloading(name, stands, limits.unloading))
+    name = f"cant {1e3 * height:g} mm"
+    standing = found(name, lambda: on_cant(balance, track, height, held=held))
+    values.append(_unloading(name, [standing], limits.lean_unloading))
+    body, slope = flat.reference, float(np.arcsin(height / CANT_BASE))
+    share = roll_coefficient(balance.model, standing, height, body) if standing else float("nan")
+    lean = limits.lean_angle
+    values.append(StationaryValue(
+        name, "angle of the floor", slope * (1.0 + share), lean.value, body, lean.source,
+        lean.checked,
+    ))  # fmt: skip
+    values.append(StationaryValue(name, "roll coefficient", share, None, body))
+    return Stationary(vehicle.name, limits.edition, held, tuple(values), tuple(reasons))
+
+
+def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floats]:
+    """Left rail over the right one at each wheelset, by the name of the twist [m].
+
+    A vehicle on two bogies stands on the twist over their wheelbase, over their spacing, and on
+    both; one on two axles on that over their spacing.
+
+    Raises
+    ------
+    InputError : neither two bogies nor two axles.
+    """
+    wheelsets = flat.of_kind("wheelset")
+    x = np.array([wheelset.position[0] for wheelset in wheelsets])
+    ends = np.array([wheelset.name.split(".")[0] for wheelset in wheelsets])
+    names = list(dict.fromkeys(ends.tolist()))
+    if len(names) != 2:
+        found = f"{len(wheelsets)} wheelsets in {len(names)} assemblies"
+        allowed = "two bogies, or two axles, each an assembly or a wheelset of the vehicle"
+        raise InputError([Fault(flat.name, "wheelsets", found, allowed)])
+    middles = np.array([x[ends == name].mean() for name in names])
+    of_wheelset = np.array([middles[names.index(end)] for end in ends])
+    spacing = float(abs(middles[0] - middles[1]))
+    rule = limits.body_twist
+    over_body = min(rule.constant + rule.numerator / spacing, rule.greatest)
+    body = over_body * (of_wheelset - middles.mean())
+    name = f"twist {1e3 * over_body:.2f} permille over {spacing:g} m"
+    within = x - of_wheelset
+    if not np.any(within):
+        return {name: body}
+    base = float(np.ptp(within))
+    bogie = limits.bogie_twist.value * within
+    return {
+        f"twist {1e3 * limits.bogie_twist.value:g} permille over {base:g} m": bogie,
+        name: body,
+        "both twists": bogie + body,
+    }
+
+
+def _admissible_cant(vehicle: Vehicle) -> float:
+    if vehicle.service is None:
+        allowed = "give --cant, or add [service] with cant_deficiency"
+        raise InputError([Fault(vehicle.name, "service", "missing", allowed)])
+    return vehicle.service.cant_deficiency
+
+
+def _unloading(case: str, stands: Sequence[Standing | None], limit: Constant) -> StationaryValue:
+    """Return the worst wheel of some standings; nan where one of them was not found."""
+    worst, place = -np.inf, ""
+    for standing in stands:
+        if standing is None:
+            worst, place = np.nan, ""
+            break
+        shares = (standing.Q0 - standing.Q) / standing.Q0
+        w, side = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        if shares[w, side] > worst:
+            worst = float(shares[w, side])
+            place = f"wheelset {w + 1} {('left', 'right')[side]}"
+    words = "unloading (Q0 - Q)/Q0"
+    return StationaryValue(
+        case, words, float(worst), limit.value, place, limit.source, limit.checked
+    )

@@ -1,0 +1,74 @@
+"""`railsim stationary`: values computed apart from this program, verdicts, bad input."""
+
+import json
+
+import pytest
+
+import railsim
+import railsim.studies.stationary
+from railsim.cli import main
+from railsim.definitions.loading import load_stationary_limits
+from railsim.linear.steady import NotConverged
+from railsim.studies.stationary import stationary
+
+COACH = ["stationary", "benchmark_vehicle1", "--cant", "0.1"]
+
+
+def test_values_of_the_benchmark_coach(capsys):
+    """Q3, Q4 (`tests/verification/test_steady_curving.py`): twists of 7 permille, 53 mm."""
+    assert main([*COACH, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    values = {(v["case"].split()[0], v["quantity"].split()[0]): v for v in found["values"]}
+    on_twists = [v["value"] for v in found["values"] if "twist" in v["case"]]
+    # 15/19 + 2 = 2.789 permille over 19 m are 52.99 mm
+    assert on_twists == pytest.approx([0.1781, 0.1387, 0.3169], rel=1e-2)
+    assert values["cant", "roll"]["value"] == pytest.approx(0.1899, rel=5e-3)
+    slope = 0.1 / 1.5
+    assert values["cant", "angle"]["value"] == pytest.approx(slope * 1.1899, rel=2e-3)
+    assert found["verdict"] == "pass"
+    assert not any(v["checked"] for v in found["values"])
+
+
+def test_exceeded_limit_fails(tmp_path, capsys):
+    limits = tmp_path / "mine.toml"
+    limits.write_text('extends = "stationary"\nunloading = { value = 0.15, source = "mine" }\n')
+    assert main([*COACH, "--limits", str(limits), "--fail", "--out", str(tmp_path / "out")]) == 4
+    shown = capsys.readouterr().out
+    assert "verdict: fail" in shown
+    record = json.loads((tmp_path / "out" / "stationary.json").read_text())
+    assert [v["exceeded"] for v in record["values"][:3]] == [True, False, True]
+
+
+def test_case_without_steady_state_is_no_pass(monkeypatch):
+    def never(*_, **__):
+        raise NotConverged("no steady state was found")
+
+    monkeypatch.setattr(railsim.studies.stationary, "on_cant", never)
+    found = stationary(
+        railsim.load_vehicle("benchmark_vehicle1"), railsim.load_track("straight"),
+        load_stationary_limits("stationary"), cant=0.1,
+    )  # fmt: skip
+    assert found.verdict == "incomplete"
+    assert found.reasons == ("cant 100 mm: no steady state was found",)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--cant", "0.9"], "above 0, up to 0.5 m"),
+        (["--cant", "nan"], "above 0, up to 0.5 m"),
+        (["--limits", "comfort"], "format"),
+        (["--limits", "nothing"], "nothing"),
+    ],
+)
+def test_bad_input_is_told_in_a_line(capsys, arguments, words):
+    assert main(["stationary", "coach_manchester", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Traceback" not in error
+
+
+def test_without_service_table_a_cant_is_asked_for():
+    coach = railsim.load_vehicle("coach_manchester").replace(service=None)
+    with pytest.raises(railsim.InputError, match="give --cant"):
+        stationary(coach, railsim.load_track("straight"), load_stationary_limits("stationary"))
