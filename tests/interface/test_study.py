@@ -486,7 +486,7 @@ def begun(folder):
 def test_interrupt_leaves_only_whole_files(tmp_path, everyone, name, status):
     process = begun(tmp_path)
     (os.killpg if everyone else os.kill)(process.pid, getattr(signal, name))
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=300)
     assert process.returncode == status
     assert "Traceback" not in errors
     assert set(os.listdir(tmp_path)) == LEFT
@@ -497,7 +497,7 @@ def test_interrupt_leaves_only_whole_files(tmp_path, everyone, name, status):
 def test_processes_end_after_a_study_that_was_killed(tmp_path):
     process = begun(tmp_path)
     process.kill()
-    process.communicate(timeout=60)  # the standard error stays open as long as one of them lives
+    process.communicate(timeout=300)  # the standard error stays open as long as one of them lives
     assert {path for path in os.listdir(tmp_path) if not path.endswith(".partial")} == {
         "study.journal"
     }

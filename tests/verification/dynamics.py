@@ -87,6 +87,7 @@ def advance(system, state, h, n_steps, scheme="rk4", model=None):
 
 def evaluate(system, state):
     """Work arrays and derivative of one state."""
+    state = np.array(state)  # of a result it can be read only
     work, derivative = work_arrays(system), np.zeros_like(state)
     status, *_ = right_hand_side(system, work, state, derivative)
     assert status == 0
