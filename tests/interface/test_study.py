@@ -279,17 +279,17 @@ def test_result_that_was_changed_in_its_file_is_computed_again(tmp_path, simulat
 
 
 def test_resume_goes_on_from_any_folder(tmp_path, simulated, monkeypatch):
-    (tmp_path / "work").mkdir()
+    (tmp_path / "begun").mkdir()
     (tmp_path / "elsewhere").mkdir()
-    coach = tmp_path / "work" / "coach.toml"
+    coach = tmp_path / "begun" / "coach.toml"
     coach.write_text((ROOT / "vehicles" / f"{COACH}.toml").read_text(encoding="utf-8"))
-    monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.chdir(tmp_path / "begun")
     given = ["--vehicles", "coach.toml", "--tracks", CURVE, "--speeds", "10", "15", "20"]
     assert main(["study", *given, "--out", "out", "--workers", "1"]) == 130
     monkeypatch.setattr(railsim.studies.run, "simulate", lambda *a, sink, **how: feed(sink))
     monkeypatch.chdir(tmp_path / "elsewhere")
-    out = tmp_path / "work" / "out"
-    assert main(["study", "--resume", "--out", "../work/out", "--workers", "1"]) == 0
+    out = tmp_path / "begun" / "out"
+    assert main(["study", "--resume", "--out", "../begun/out", "--workers", "1"]) == 0
     assert [row["status"] for row in rows(out)] == ["complete"] * 3
 
 
