@@ -6,10 +6,26 @@ looked up when a picture is asked for.
 
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def drawn(
+    function: str, *arguments: Any, path: str | Path | None, overwrite: bool, **how: Any
+) -> "Figure":
+    """Call a function of pictures by its name, ``module:name``, and write what it draws to `path`.
+
+    Raises
+    ------
+    InputError
+        The file exists or cannot be written.
+    """
+    figure: Figure = resolve_name(function)(*arguments, **how)
+    if path is not None:
+        resolve_name("railsim.plot.style:save")(figure, Path(path), overwrite=overwrite)
+    return figure
 
 
 class Drawn:
@@ -46,7 +62,4 @@ class Drawn:
         InputError
             The file exists or cannot be written.
         """
-        figure: Figure = resolve_name(self.FIGURE)(self, title)
-        if path is not None:
-            resolve_name("railsim.plot.style:save")(figure, Path(path), overwrite=overwrite)
-        return figure
+        return drawn(self.FIGURE, self, title, path=path, overwrite=overwrite)

@@ -61,6 +61,25 @@ def set_option(function: F) -> F:
     )(function)
 
 
+def linearisation_options(function: F) -> F:
+    """Add ``--linearisation`` and ``--amplitude``."""
+    function = click.option(
+        "--amplitude",
+        type=float,
+        default=3e-3,
+        show_default=True,
+        metavar="A",
+        help="Lateral amplitude of the wheelsets in m, for harmonic.",
+    )(function)
+    return click.option(
+        "--linearisation",
+        default="tangent",
+        show_default=True,
+        type=click.Choice(["tangent", "harmonic"]),
+        help="Contact: its derivative, or its first harmonic for --amplitude.",
+    )(function)
+
+
 def load_option(function: F) -> F:
     """Add ``--load NAME`` as the argument `load`."""
     return click.option(

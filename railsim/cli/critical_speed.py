@@ -9,6 +9,7 @@ import click
 from railsim.cli.common import (
     echo,
     json_option,
+    linearisation_options,
     load_option,
     overwrite_option,
     print_json,
@@ -64,21 +65,7 @@ FILES = ("critical_speed.json", "critical_speed.png")
     metavar="N",
     help="Speeds of a bifurcation diagram.",
 )
-@click.option(
-    "--linearisation",
-    default="tangent",
-    show_default=True,
-    type=click.Choice(["tangent", "harmonic"]),
-    help="Contact: its derivative, or its first harmonic for --amplitude.",
-)
-@click.option(
-    "--amplitude",
-    type=float,
-    default=3e-3,
-    show_default=True,
-    metavar="A",
-    help="Lateral amplitude of the wheelsets in m, for harmonic.",
-)
+@linearisation_options
 @click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")
 @click.option("--friction", metavar="MU or A:B:N", help="Friction; several values: a map.")
 @click.option(

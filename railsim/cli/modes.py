@@ -8,6 +8,7 @@ import click
 from railsim.cli.common import (
     echo,
     json_option,
+    linearisation_options,
     load_option,
     overwrite_option,
     print_json,
@@ -47,21 +48,7 @@ ANIMATION = "mode.html"
     metavar="BODY",
     help="Hold this body in the moving track frame; may be given several times.",
 )
-@click.option(
-    "--linearisation",
-    default="tangent",
-    show_default=True,
-    type=click.Choice(["tangent", "harmonic"]),
-    help="Contact: its derivative, or its first harmonic for --amplitude.",
-)
-@click.option(
-    "--amplitude",
-    type=float,
-    default=3e-3,
-    show_default=True,
-    metavar="A",
-    help="Lateral amplitude of the wheelsets in m, for harmonic.",
-)
+@linearisation_options
 @click.option("--conicity", type=float, metavar="G", help="Straight cones of this slope as wheels.")
 @click.option(
     "--radius",

@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.drawn import drawn
 from railsim.errors import InputError, nearest
 from railsim.notation import Quantity
 from railsim.profiles.profile import Profile
@@ -338,12 +338,16 @@ class Result:
         """
         # looked up: results lie below pictures and know none of them
         chosen = {"selections": quantities} if quantities else {}
-        figure: Figure = resolve_name("railsim.plot.histories:histories")(
-            self, over=over, by=by, between=between, **chosen
+        return drawn(
+            "railsim.plot.histories:histories",
+            self,
+            path=path,
+            overwrite=overwrite,
+            over=over,
+            by=by,
+            between=between,
+            **chosen,
         )
-        if path is not None:
-            resolve_name("railsim.plot.style:save")(figure, path, overwrite=overwrite)
-        return figure
 
     # -- elsewhere ----------------------------------------------------------------------------
 

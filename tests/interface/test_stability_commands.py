@@ -39,9 +39,9 @@ def test_linear_critical_speed(capsys, tmp_path):
     assert (folder / "critical_speed.png").stat().st_size > 1000
 
 
-def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
-    folder = tmp_path / "map"
-    command = [
+def map_command(folder):
+    """Arguments of a map of two linear critical speeds, kept in `folder`."""
+    return [
         "critical-speed",
         "coach_manchester",
         "--method",
@@ -58,6 +58,11 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
         str(folder),
         "--quiet",
     ]
+
+
+def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
+    folder = tmp_path / "map"
+    command = map_command(folder)
     assert main(command) == 0
     assert "friction" in capsys.readouterr().out
     kept = sorted((folder / "points").iterdir())
@@ -86,23 +91,7 @@ def test_map_of_critical_speeds_goes_on_where_it_stopped(capsys, tmp_path):
 )
 def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path, damage):
     folder = tmp_path / "map"
-    command = [
-        "critical-speed",
-        "coach_manchester",
-        "--method",
-        "linear",
-        "--friction",
-        "0.2,0.4",
-        "--from",
-        "20",
-        "--to",
-        "80",
-        "--workers",
-        "1",
-        "--out",
-        str(folder),
-        "--quiet",
-    ]
+    command = map_command(folder)
     assert main(command) == 0
     told = capsys.readouterr().out
     whole = {path: path.read_bytes() for path in (folder / "points").iterdir()}
