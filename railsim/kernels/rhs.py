@@ -39,6 +39,7 @@ from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
     AS_GIVEN,
+    MOST_CORRECTIONS,
     correct_support,
     evaluations,
     locate_support,
@@ -519,12 +520,14 @@ def mechanics(system, work, state, derivative, rails):
     status, where, n_patches = wheel_rail(system, work, speed, state)
     while left > 0 and status == RUNNING:
         if rails == AFTER_STEP:
-            moved = correct_support(system, work, state)
+            moved = correct_support(system, work, state, left == MOST_CORRECTIONS)
         else:
             moved = settle_rates(system, work, state)
         if not moved:
             break
         left -= 1
+        if left == 0:
+            work.parts[2] += 1
         keep_counts(work.events, 2, 0)
         status, where, n_patches = wheel_rail(system, work, speed, state)
     if rails == AFTER_STEP:

@@ -88,7 +88,9 @@ SUPPORT_COLUMNS = 16
 # columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's motion
 # before the step, see `note_wheelset`, and the factors of pads and ballast
 MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
-SUPPORT_STEP = 24
+# imbalance of the rails one correction ago, and what corrections are multiplied by
+BEFORE, STRETCH = DOF + 13, DOF + 17
+SUPPORT_STEP = 32
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
 
@@ -451,8 +453,28 @@ def step_support(system, work, state, h):
             state[first + MEAN_RATE + k] = track[k]
 
 
+@jit_inline
+def stretch_correction(track, i, stretch, first_time):
+    """Multiply the imbalance of one rail so that the next correction does what the last missed.
+
+    The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
+    dominates, convergence as with the secant.
+    """
+    y, z = track[i], track[i + 1]
+    if first_time:
+        track[stretch] = 1.0
+    else:
+        d_y, d_z = y - track[BEFORE + i], z - track[BEFORE + i + 1]
+        square = d_y * d_y + d_z * d_z
+        if square > 0.0:
+            share = -(track[BEFORE + i] * d_y + track[BEFORE + i + 1] * d_z) / square
+            track[stretch] = min(3.0, max(0.3, share * track[stretch]))
+    track[BEFORE + i], track[BEFORE + i + 1] = y, z
+    track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
+
+
 @jit_merged
-def correct_support(system, work, state):
+def correct_support(system, work, state, first_time):
     """One Newton step for the rails after a step of the fast scheme.
 
     `step_support` foresees the forces by the slopes of one evaluation.  Where the contact moves
@@ -478,6 +500,8 @@ def correct_support(system, work, state):
         if worst < SETTLED * system.contact.load[w]:
             continue
         moved = True
+        for side in range(2):
+            stretch_correction(track, 2 * side, STRETCH + side, first_time)
         solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
         for k in range(DOF):
             r = track[k]
