@@ -66,7 +66,7 @@ def test_default_scheme_agrees_with_the_reference_scheme_on_irregular_elastic_ra
     def forces(**settings):
         result = simulate(
             load_vehicle(vehicle),
-            load_track(track),
+            load_track(track).replace(support={"preset": "ballasted"}),
             speed=speed,
             until=until,
             settings=Settings(output_rate=1000.0, **settings),
@@ -76,6 +76,8 @@ def test_default_scheme_agrees_with_the_reference_scheme_on_irregular_elastic_ra
 
     reference = forces(scheme="rk4", step=0.25e-3)
     for found, expected in zip(forces(), reference, strict=True):
+        rows = min(len(found), len(expected))  # a run may end with one more output
+        found, expected = found[:rows], expected[:rows]
         assert np.abs(found).max() == pytest.approx(np.abs(expected).max(), rel=5e-3)
         assert np.sqrt(np.mean((found - expected) ** 2)) < 0.02 * np.std(expected)
 
