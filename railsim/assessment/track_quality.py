@@ -4,6 +4,8 @@ Order 4 Butterworth band pass without phase over wavelengths D1 = 3 to 25 m, D2 
 D3 = 70 to 150 m (EN 13848-1; EN 14363 annex M); per section, the worse of the two rails.
 """
 
+import math
+
 import numpy as np
 
 from railsim.definitions.track import Track
@@ -12,6 +14,7 @@ from railsim.track.irregularity import displacement
 
 RANGES = {"D1": (3.0, 25.0), "D2": (25.0, 70.0), "D3": (70.0, 150.0)}
 SPACING = 0.25  # m
+AT_ONCE = 20_000  # places that are evaluated at once, for the memory of long tracks
 
 # UIC 518 (2009): speed up to [km/h], QN1 and QN2 of alignment and level, standard deviations [mm],
 # from public re-entries
@@ -53,7 +56,8 @@ class TrackQuality:
         self._bands: dict[str, Floats] = {}
         if function is None:
             return
-        rails = np.asarray(function(self._s)[0]).reshape(4, -1).T
+        parts = np.array_split(self._s, math.ceil(len(self._s) / AT_ONCE))
+        rails = np.concatenate([np.asarray(function(part)[0]).reshape(4, -1).T for part in parts])
         for name in ranges:
             short, long = RANGES[name]
             response = butterworth(1.0 / long, 1.0 / short)

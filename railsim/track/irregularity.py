@@ -239,7 +239,8 @@ def _random(part: Random, track: Track) -> Displacement:
         shares *= spectrum.half_base if channel == "cross_level" else 1.0
         amplitudes = _amplitudes(spectrum, channel, part.wavelengths, period)
         waves = _waves(amplitudes, _phases(part.seed, channel, amplitudes.size), period, n_points)
-        lattice += shares[:, None] * waves[:, None, :]
+        for k in np.flatnonzero(shares):
+            lattice[:, k] += shares[k] * waves
     window = _window(part.begin, end, part.fade)
 
     def moved(s: Array) -> tuple[Array, Array]:
