@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from railsim.result import Result
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
-FILES = ("assessment.json", "assessment.csv", "assessment.png")
+FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sections.png")
 
 
 @click.command()
@@ -159,21 +159,23 @@ def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list
     import json
 
     from railsim.cli.common import plain
-    from railsim.plot.assessment import assessment_figure
+    from railsim.plot.assessment import assessment_figure, sections_figure
     from railsim.plot.style import save
 
     make_folder(folder)
-    record, rows, picture = (folder / name for name in FILES)
+    record, rows, *pictures = (folder / name for name in FILES)
     with whole_file(record) as partial:
         data = plain([assessment.record() for assessment in assessments])
         partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     with whole_file(rows) as partial:
         partial.write_text(assessment_csv(assessments), encoding="utf-8")
-    figure = assessment_figure(assessments)
-    if figure is None:
-        return [record, rows]
-    save(figure, picture, overwrite=True)
-    return [record, rows, picture]
+    written = [record, rows]
+    for path, draw in zip(pictures, (assessment_figure, sections_figure), strict=True):
+        figure = draw(assessments)
+        if figure is not None:
+            save(figure, path, overwrite=True)
+            written.append(path)
+    return written
 
 
 def assessment_csv(assessments: "Sequence[Assessment]") -> str:

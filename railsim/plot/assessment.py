@@ -1,12 +1,15 @@
 """Assessments as pictures: estimates in per cent of their limits, comfort along the car, wear."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from railsim.assessment import Assessment
+from railsim.assessment.verdict import ZoneReport
 from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
@@ -56,6 +59,61 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     figure.suptitle(f"{edition}\n{verdicts}", x=0.012, ha="left", fontsize=10)
     figure.legend(loc="outside lower left", ncols=2)
     return figure
+
+
+def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
+    """Draw the values of the sections over the distance; None where there are no zones.
+
+    A row of axes for each vehicle, one for each zone; of each quantity the place with the largest
+    share of its limit.
+    """
+    reports = [zone for a in assessments for zone in a.zones if zone.values and zone.rows]
+    if not reports:
+        return None
+    zones = sorted({zone.zone for zone in reports})
+    names = list(dict.fromkeys(row.rule.name for zone in reports for row in zone.rows))
+    n = len(DISTINCT)
+    looks = {
+        name: {"color": DISTINCT[k % n], "marker": "o^"[k // n % 2], "ls": "", "ms": 4}
+        for k, name in enumerate(names)
+    }
+    with styled():
+        figure = Picture(
+            figsize=(max(6.8, 1.2 + 2.8 * len(zones)), 1.8 + 2.4 * len(assessments)),
+            layout="constrained",
+        )
+        grid = figure.subplots(len(assessments), len(zones), sharex="col", squeeze=False)
+        for axes, assessment in zip(grid, assessments, strict=True):
+            for ax, zone in zip(axes, zones, strict=True):
+                report = next((z for z in assessment.zones if z.zone == zone), None)
+                if report is not None:
+                    _sections(ax, report, looks)
+                ax.axhline(100.0, color=LIMIT, lw=1.0)
+                ax.set_ylim(bottom=0.0)
+                ax.set_title(f"{assessment.vehicle}, zone {zone}", fontsize=9)
+            axes[0].set_ylabel("section value / limit (%)")
+        for ax in grid[-1]:
+            ax.set_xlabel("middle of the section (km)")
+        words = {row.rule.name: row.rule.words for zone in reports for row in zone.rows}
+        handles = [Line2D([], [], label=words[name], **look) for name, look in looks.items()]
+        figure.legend(handles=handles, loc="outside lower left", ncols=2)
+    return figure
+
+
+def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any]]) -> None:
+    """Largest share of its limit of every quantity in every section of a zone."""
+    for name, look in looks.items():
+        limits = {row.place: row.limit for row in report.rows if row.rule.name == name}
+        points = [
+            (
+                5e-4 * (values.section.begin + values.section.end),
+                100.0 * max(max(values.values[name, place]) / limit for place, limit in there),
+            )
+            for values in report.values
+            if (there := [(p, limit) for p, limit in limits.items() if (name, p) in values.values])
+        ]
+        if points:
+            ax.plot(*zip(*points, strict=True), **look)
 
 
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:

@@ -11,6 +11,7 @@ from made_record import Q0, curve, made, track
 import railsim
 from railsim.assessment import assess
 from railsim.cli import main
+from railsim.cli.assess import FILES
 from railsim.definitions.vehicle import Service
 from railsim.errors import InputError
 
@@ -256,7 +257,7 @@ def test_command_prints_writes_and_fails_only_when_asked(hunting, tmp_path, caps
     keys = {"name", "place", "mean", "deviation", "estimate", "limit", "share", "source", "checked"}
     assert keys <= set(data["zones"][0]["quantities"][0])
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert names == {"assessment.json", "assessment.csv", "assessment.png"}
+    assert names == set(FILES)
     assert main(["assess", path, "--out", str(tmp_path / "out")]) == 2
     assert main(["assess", path, "--fail"]) == 0
     bad = made(track(STRAIGHT), FAST, Y=lambda t, s: both_sides(60e3 + 0.0 * s))
