@@ -73,7 +73,7 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
     zones = sorted({zone.zone for zone in reports})
     names = list(dict.fromkeys(row.rule.name for zone in reports for row in zone.rows))
     n = len(DISTINCT)
-    looks = {
+    looks: dict[str, dict[str, Any]] = {
         name: {"color": DISTINCT[k % n], "marker": "o^"[k // n % 2], "ls": "", "ms": 4}
         for k, name in enumerate(names)
     }
