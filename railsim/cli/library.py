@@ -11,8 +11,8 @@ from railsim.cli.common import echo, json_option, overwrite_option, print_json, 
 
 PROFILES = "profiles"
 # Marks of trust beside a number, as the shipped files explain them: read, re-entered, computed,
-# recalled, assumed.
-MARK = re.compile(r"\[(D|R|C|M|A|assumed)\]")
+# recalled, assumed; a short name of the source may follow, [D G].
+MARK = re.compile(r"\[(D|R|C|M|A|assumed)(?: \w+)?\]")
 MEANING = {
     "D": "data sheet or printed table, read",
     "R": "re-entered in public code that names its source",

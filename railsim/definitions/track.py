@@ -13,8 +13,10 @@ from railsim.definitions.base import (
     Definition,
     FileDefinition,
     Finite,
+    Flag,
     NonNegative,
     NonNegativePair,
+    Positive,
     Text,
     TextPair,
     one_or_two,
@@ -200,6 +202,13 @@ class Track(FileDefinition, Drawn):
     """What the track is called in tables and plots"""
     source: Text | None = None
     """Where the numbers come from"""
+    speed: Positive | None = None
+    """Highest speed permitted on the track [m/s]: remarks on the alignment refer to it, and the
+    speed `permitted` of a study"""
+    mileage: Finite = 0.0
+    """Mileage of s = 0 [m]; results hold the mileage of the reference body"""
+    falling_mileage: Flag = False
+    """The mileage falls in the direction of travel"""
     gauge: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.3, le=2.5)] = 1.435
     """Distance between the gauge faces, 14 mm below the rail tops [m]"""
     rail: TextPair = ("60E1", "60E1")

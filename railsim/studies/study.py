@@ -38,7 +38,7 @@ from railsim.studies.journal import JOURNAL, Journal, Record, Records
 from railsim.studies.keep import ALL, EVERYTHING, Keep, parse_keep
 from railsim.studies.own import Function, fingerprint, named
 from railsim.studies.points import Point
-from railsim.studies.rows import speed_of
+from railsim.studies.rows import PERMITTED, speed_of
 from railsim.studies.summary import (
     Inputs,
     checked,
@@ -571,13 +571,13 @@ def _several(values: Any) -> list[Any]:
     return [values] if single else list(values)
 
 
-def _speeds(speeds: Any) -> list[float | None]:
-    """Return speeds as numbers; those of a range, and with units [m/s]."""
+def _speeds(speeds: Any) -> list[float | str | None]:
+    """Return speeds as numbers, those of a range, and with units [m/s]; `PERMITTED` as it is."""
     if speeds is None:
         return [None]
-    found: list[float | None] = []
+    found: list[float | str | None] = []
     for speed in _several(speeds):
-        if isinstance(speed, str):
+        if isinstance(speed, str) and speed != PERMITTED:
             found += [speed_of(text) for text in _texts("speeds", speed)]
         else:
             found.append(speed)
