@@ -34,6 +34,7 @@ from railsim.run_in import start_state
 from railsim.settling import DOING
 from railsim.settling import Progress as SettlingProgress
 from railsim.time_step import SCHEMES
+from railsim.track.irregularity import measured_remarks
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -486,7 +487,7 @@ def prepare(
     model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
     step, _ = pace.at(speed)
-    remarks: list[str] = [*balance.remarks]
+    remarks: list[str] = [*balance.remarks, *measured_remarks(track)]
     if before is None:
         state = start_state(
             model,

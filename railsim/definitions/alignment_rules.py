@@ -9,7 +9,7 @@ with V in km/h and cant d, deficiency I in mm over the cant base of 1.5 m:
 - change of the deficiency of 75 mm/s at most, exceptionally 90;
 - transitions of d V/180, I V/270 and 60 m at least.
 
-A track without `speed` is judged by the rules that need none.
+A track without `speed` is not judged.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ ROUND_OFF = 1.0 + 1e-6
 
 
 def alignment_remarks(
-    plan: Sequence["Section"], cant: Sequence["Section"], speed: float | None
+    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
 ) -> list[Remark]:
     """Return where a plan with its cant breaks the rules.
 
@@ -39,14 +39,15 @@ def alignment_remarks(
     ----------
     plan, cant : sequences of Section
         Curvature [1/m] and cant [m] over arc length.
-    speed : float or None
+    speed : float
         Permitted speed [m/s].
     """
-    found = [*_cants(plan, cant, speed)]
-    if speed is not None:
-        found += [*_ramps(cant, speed), *_deficiencies(plan, cant, speed)]
-        found += _transitions(plan, cant, speed)
-    return found
+    return [
+        *_cants(plan, cant, speed),
+        *_ramps(cant, speed),
+        *_deficiencies(plan, cant, speed),
+        *_transitions(plan, cant, speed),
+    ]
 
 
 def height(cant: Sequence["Section"], s: float) -> float:
@@ -63,10 +64,9 @@ def deficiency(kappa: float, cant: float, speed: float) -> float:
 
 
 def _cants(
-    plan: Sequence["Section"], cant: Sequence["Section"], speed: float | None
+    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
 ) -> Iterator[Remark]:
-    fast = speed is not None and 3.6 * speed >= HIGH_SPEED
-    most = MOST_CANT_HIGH_SPEED if fast else MOST_CANT
+    most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
     for section in plan:
         if section.type != "CIR":
             continue

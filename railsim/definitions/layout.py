@@ -120,7 +120,8 @@ def track_remarks(track: Track) -> list[Remark]:
     remarks = _curvature_steps(plan) + _gradient_steps(vertical)
     remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
     remarks += _cant_sizes(cant) + _cant_sides(cant, plan)
-    remarks += alignment_remarks(plan, cant, track.speed)
+    if track.speed is not None:
+        remarks += alignment_remarks(plan, cant, track.speed)
     for section in (*plan, *cant, *vertical):
         if section.slope != 0.0 and section.length < track.rounding - SMALL:
             text = (

@@ -5,7 +5,7 @@ A transition (CLO, LIR) takes its ends from its neighbours where it does not nam
 cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
 """
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -27,6 +27,7 @@ from railsim.definitions.irregularity import Irregularity
 from railsim.definitions.support import Support
 from railsim.drawn import Drawn
 
+Place = TypeVar("Place", float, Any)
 TRACK_FORMAT = "railsim-track/1"
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
@@ -247,6 +248,10 @@ class Track(FileDefinition, Drawn):
     def length(self) -> float:
         """Length of the plan [m]."""
         return sum(element.length for element in self.plan)
+
+    def mileage_at(self, s: "Place") -> "Place":
+        """Mileage at an arc length, or at an array of them [m]."""
+        return self.mileage - s if self.falling_mileage else self.mileage + s
 
     FIGURE: ClassVar = "railsim.plot.track:track_figure"
 

@@ -173,7 +173,7 @@ class Plan:
             short = {"vehicle": short_name(vehicle), "track": short_name(track)}
             for row, overrides in zip(rows, own, strict=True):
                 asked = speed if row.speed is None else row.speed
-                if asked == PERMITTED:
+                if isinstance(asked, str):
                     first = self._permitted(vehicle, track, overrides)
                 else:
                     first = self._first_speed(overrides["settings"], asked)
@@ -270,9 +270,9 @@ class Plan:
             self._tell([Fault(str(track), "speed", "missing", allowed)])
         if service.service is None or line.speed is None:
             return None
-        return min(service.service.admissible_speed, line.speed)
+        return float(min(service.service.admissible_speed, line.speed))
 
-    def _first_speed(self, overrides: Overrides, speed: Any) -> float | None:
+    def _first_speed(self, overrides: Overrides, speed: float | None) -> float | None:
         settings = self._loaded(load_settings, self._settings, overrides)
         if settings is None:
             return speed

@@ -153,7 +153,7 @@ class Outcome:
 def study(
     vehicles: Sequence[str | Path | Vehicle] | str | Path | Vehicle,
     tracks: Sequence[str | Path | Track] | str | Path | Track,
-    speeds: Sequence[float | None] | float | str | None,
+    speeds: Sequence[float | str | None] | float | str | None,
     *,
     out: str | Path,
     grid: Mapping[str, Iterable[object] | float | str] | None = None,
@@ -187,7 +187,7 @@ def study(
         of the folder.
     speeds : sequence of float, a single one, or a range such as ``"15:25:11"``; None
         Speeds [m/s]; None where the settings have a speed table, or `linked` or `sample` vary
-        ``speed``.
+        ``speed``; ``"permitted"`` is the lower of the vehicle's and the track's speed.
     out : str or Path
         Folder of the study; made if need be.
     grid : mapping of str to values, optional
@@ -259,7 +259,7 @@ def study(
     vehicles = as_files(_several(vehicles), folder)
     tracks = as_files(_several(tracks), folder)
     (settings,) = as_files([settings], folder)
-    speeds = _speeds(speeds)
+    asked = _speeds(speeds)
     written = _written("grid", grid or {})
     tables = [_written("linked", table) for table in linked]
     drawn = None if sample is None else _sample(sample)
@@ -267,7 +267,7 @@ def study(
     plan = Plan(
         vehicles,
         tracks,
-        speeds,
+        asked,
         written,
         linked=tables,
         sample=drawn,
@@ -284,7 +284,7 @@ def study(
         "folder": os.path.relpath(Path.cwd(), folder),  # where names of files begin
         "vehicles": [str(vehicle) for vehicle in vehicles],
         "tracks": [str(track) for track in tracks],
-        "speeds": list(speeds),
+        "speeds": asked,
         "grid": written,
         "linked": tables,
         "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
