@@ -63,9 +63,7 @@ def deficiency(kappa: float, cant: float, speed: float) -> float:
     return 1e3 * (CANT_BASE * speed**2 * kappa / GRAVITY - cant)
 
 
-def _cants(
-    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
-) -> Iterator[Remark]:
+def _cants(plan: Sequence["Section"], cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
     most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
     for section in plan:
         if section.type != "CIR":
