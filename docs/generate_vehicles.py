@@ -70,7 +70,7 @@ def lines_of(text: str) -> list[Line]:
             continue
         if not key:
             key, _, code = (part.strip() for part in code.partition("="))
-            comments = [c for c in above if MARKS.search(c)] if not comment else []
+            comments = [c for c in above if where and not comment and MARKS.search(c)]
             above = []
         value = f"{value} {code}".strip()
         comments += [comment] if comment else []
@@ -289,7 +289,7 @@ def modes(vehicle: Vehicle) -> list[str]:
     listed = table(("mode", "frequency (Hz)", "damping (%)"), rows)
     worst = least_damped(vehicle, SEVERITY * V)
     verdict = (
-        f"At {3.6 * SEVERITY * V:.0f} km/h, {SEVERITY - 1:.0%} above the admissible speed, with the "
+        f"At {3.6 * SEVERITY * V:.0f} km/h, {100.0 * (SEVERITY - 1.0):.0f} % above the admissible speed, with the "
         f"contact linearised for lateral amplitudes of {1e3 * AMPLITUDE:g} mm, the least damped mode "
         f"is {worst['name']} at {worst['natural_frequency']:.2f} Hz with a damping of "
         f"{100.0 * worst['damping_ratio']:.2f} %."
