@@ -16,17 +16,17 @@ from generate import filled, table
 from PIL import Image
 
 import railsim
-from railsim.assembly import assemble
 from railsim.cli.library import MEANING, trust
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.settings import Settings
 from railsim.definitions.sources import read_toml, shipped_folder
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
+from railsim.model.statics import SLOW
 from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, save, shade, spans, styled
 from railsim.plot.vehicle import vehicle_figure
-from railsim.statics import SLOW
 
 DOCS = Path(__file__).parent
 PAGES, IMAGES, OVERVIEW = DOCS / "library", DOCS / "img" / "library", DOCS / "user" / "library.md"
