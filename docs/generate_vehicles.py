@@ -289,21 +289,21 @@ def modes(vehicle: Vehicle) -> list[str]:
     listed = table(("mode", "frequency (Hz)", "damping (%)"), rows)
     worst = least_damped(vehicle, SEVERITY * V)
     verdict = (
-        f"At {3.6 * SEVERITY * V:.0f} km/h, {100.0 * (SEVERITY - 1.0):.0f} % above the admissible speed, with the "
-        f"contact linearised for lateral amplitudes of {1e3 * AMPLITUDE:g} mm, the least damped mode "
-        f"is {worst['name']} at {worst['natural_frequency']:.2f} Hz with a damping of "
-        f"{100.0 * worst['damping_ratio']:.2f} %."
+        f"At {3.6 * SEVERITY * V:.0f} km/h, {100.0 * (SEVERITY - 1.0):.0f} % above the admissible "
+        f"speed, with the contact linearised for lateral amplitudes of {1e3 * AMPLITUDE:g} mm, the "
+        f"least damped mode is {worst['name']} at {worst['natural_frequency']:.2f} Hz with a "
+        f"damping of {100.0 * worst['damping_ratio']:.2f} %."
     )
     if worst["damping_ratio"] < 0.0:
         verdict += (
             " Dry friction, which linear analysis takes as sticking, limits this motion; see "
-            "[Vehicles and tracks](../validation/vehicles_and_tracks.md) for runs at the admissible "
-            "speed."
+            "[Vehicles and tracks](../validation/vehicles_and_tracks.md) for runs at the "
+            "admissible speed."
         )
     return [
         "## Modes\n",
-        f"Straight track, {3.6 * V:.0f} km/h, friction 0.4, up to {FASTEST:g} Hz, undamped frequency; "
-        "dry friction sticks:\n",
+        f"Straight track, {3.6 * V:.0f} km/h, friction 0.4, up to {FASTEST:g} Hz, undamped "
+        "frequency; dry friction sticks:\n",
         listed,
         verdict + "\n",
     ]
@@ -325,13 +325,13 @@ def curve(name: str, vehicle: Vehicle) -> str:
     track = railsim.load_track(CURVE)
     result = railsim.simulate(vehicle, track, speed=CURVE_SPEED)
     small(curve_figure(result, track), IMAGES / f"{name}_curve.png")
+    yaw = 1e3 * np.abs(result.wheelset_yaw[:, 0]).max()
     values = (
         ("lateral force of the leading outer wheel", -result.Y[:, 0, 0].min() / 1e3, "kN", 1),
         ("largest derailment quotient", np.nanmax(result.Y_over_Q), "", 2),
         ("largest wheel unloading", -100.0 * result.dQ_over_Q0.min(), "%", 1),
-        ("yaw of the leading wheelset against the track", 1e3 * np.abs(result.wheelset_yaw[:, 0]).max(),
-         "mrad", 2),
-    )  # fmt: skip
+        ("yaw of the leading wheelset against the track", yaw, "mrad", 2),
+    )
     words = "; ".join(
         f"{what} {value:.{digits}f} {unit}".strip() for what, value, unit, digits in values
     )
