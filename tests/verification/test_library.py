@@ -20,6 +20,7 @@ from railsim.definitions.sources import library_files, shipped_folder
 from railsim.model.assembly import assemble
 from railsim.model.element_arrays import vertical_support
 from railsim.model.equilibrium import equilibrium
+from railsim.studies.combine import combinations
 from railsim.track.alignment import Alignment
 
 GRAVITY = 9.81
@@ -185,6 +186,29 @@ def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
     ratio = mode(deflated, "carbody", 0) / mode(inflated, "carbody", 0)
     # the frames' masses, of 11 % of the body's, count in the stiffer vehicle
     assert ratio == pytest.approx(bounce(2.4e6) / bounce(0.37e6), rel=0.05)
+
+
+# runs ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "track", "until"),
+    # of all combinations (docs/validation/vehicles_and_tracks.md) those that ask most: three axles
+    # in the tightest curve, play and stops, friction at its limit, walls of the table, high speed
+    [
+        ("locomotive_coco_a", "depot_r150", 150.0),
+        ("wagon_y25", "turnout_190_1in9", 120.0),
+        ("wagon_uic_link", "crossover_300_1in9", 140.0),
+        ("wagon_three_piece_25t", "curve_r250", 420.0),
+        ("metro_b_motor", "s_curve_r150", 140.0),
+        ("coach_crh380a", "straight", 200.0),
+    ],
+)
+def test_vehicle_runs_its_track_at_the_permitted_speed(vehicle, track, until):
+    (case,) = combinations([vehicle], [track], ["permitted"], until=until)
+    result = railsim.simulate(case.vehicle, case.track, speed=case.speed, until=until)
+    assert result.status == "complete"
+    assert not any("beyond all experience" in remark for remark in result.remarks)
 
 
 # tracks -------------------------------------------------------------------------------------------
