@@ -16,7 +16,7 @@ from generate import filled, table
 from PIL import Image
 
 import railsim
-from railsim.cli.library import MEANING, trust
+from railsim.cli.library import MEANING, text_with_bases, trust
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.settings import Settings
 from railsim.definitions.sources import read_toml, shipped_folder
@@ -121,6 +121,11 @@ def data(name: str) -> str:
     return "\n".join(parts)
 
 
+def letters_of(kind: str, name: str) -> str:
+    """Letters of a file and what it extends, the most frequent first."""
+    return trust(text_with_bases(file_of(kind, name), kind))
+
+
 def letters() -> str:
     """What the letters mean."""
     return "; ".join(f"**{letter}** {words}" for letter, words in MEANING.items()) + "."
@@ -140,7 +145,7 @@ def facts(name: str, vehicle: Vehicle) -> str:
             f"`{name}`" + (f"; load cases {', '.join(vehicle.loads)}" if vehicle.loads else ""),
         ),
         ("source", vehicle.source or ""),
-        ("reliability", trust(file_of("vehicle", name).read_text("utf-8")) or "as its base"),
+        ("reliability", letters_of("vehicle", name)),
         (
             "mass, mean wheel load",
             f"{mass / 1e3:.2f} t, {mass * GRAVITY / 2e3 / len(wheelsets):.2f} kN",
@@ -202,7 +207,7 @@ def vehicles_table() -> str:
             (
                 f"[`{name}`](../library/{name}.md)",
                 vehicle.name,
-                trust(file_of("vehicle", name).read_text("utf-8")),
+                letters_of("vehicle", name),
                 ", ".join(vehicle.loads),
                 f"{vehicle.mass / 1e3:.2f}",
                 f"{load:.2f}",
@@ -210,7 +215,7 @@ def vehicles_table() -> str:
             )
         )
     head = ("file", "what it is", "reliability", "load cases", "mass (t)", "Q0 (kN)", "V (km/h)")
-    return table(head, rows)
+    return table(head, rows, "---")
 
 
 def tracks_table() -> str:
@@ -228,7 +233,7 @@ def tracks_table() -> str:
             (
                 f"`{name}`",
                 track.name,
-                trust(file_of("track", name).read_text("utf-8")),
+                letters_of("track", name),
                 f"{track.length:.0f}",
                 f"{min(radii, key=abs):g}" if radii else "straight",
                 f"{1e3 * cant:.0f}",

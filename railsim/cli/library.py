@@ -90,7 +90,7 @@ def _entries(kind: str) -> list[dict[str, Any]]:
             "kind": kind,
             "name": name,
             "title": str(read_toml(path).get("name", "")),
-            "trust": trust(path.read_text("utf-8")),
+            "trust": trust(text_with_bases(path, _kinds()[kind])),
             "file": str(path),
         }
         for name, path in library_files(_kinds()[kind]).items()
@@ -109,6 +109,20 @@ def trust(text: str) -> str:
     comments = [comment for value, _, comment in lines if value.strip()]
     letters = Counter(mark[0].upper() for line in comments for mark in MARK.findall(line))
     return "".join(letter for letter, _ in letters.most_common())
+
+
+def text_with_bases(path: Path, kind: str) -> str:
+    """Return the text of a file with those of all files that it extends."""
+    from railsim.definitions.sources import find_file, read_toml
+
+    texts: dict[Path, str] = {}
+    while path.resolve() not in texts:  # a circle is reported where the file is loaded
+        texts[path.resolve()] = path.read_text("utf-8")
+        base = read_toml(path).get("extends")
+        if not isinstance(base, str):
+            break
+        path = find_file(base, kind, path)
+    return "\n".join(texts.values())
 
 
 def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:
