@@ -111,10 +111,10 @@ def data(name: str) -> str:
         f"![Drawing of {name}](../img/library/{name}.png)\n",
         facts(name, vehicle),
         "## Data\n",
-        f"As `vehicles/{name}.toml` has them, in SI units"
-        + (f"; everything else as in [`{base}`]({base}.md)" if base else "")
-        + f". {letters()}\n",
-        data_table(text),
+        f"`vehicles/{name}.toml`, in SI units; the letters: {letters()}"
+        + (f" Everything else is as in [`{base}`]({base}.md)." if base else "")
+        + "\n",
+        f'```toml\n--8<-- "vehicles/{name}.toml"\n```\n',
         "## Gaps\n",
         gaps(text),
     ]
@@ -128,7 +128,7 @@ def letters_of(kind: str, name: str) -> str:
 
 def letters() -> str:
     """What the letters mean."""
-    return "; ".join(f"**{letter}** {words}" for letter, words in MEANING.items()) + "."
+    return ", ".join(f"**{letter}** {words}" for letter, words in MEANING.items()) + "."
 
 
 def facts(name: str, vehicle: Vehicle) -> str:
@@ -160,22 +160,6 @@ def facts(name: str, vehicle: Vehicle) -> str:
     return table(("", ""), rows, "---")
 
 
-def data_table(text: str) -> str:
-    """Every key of the file with its value and its letter."""
-    rows, before = [], None
-    for line in lines_of(text):
-        if line.table == "" and line.key in ("format", "name", "source", "extends", "reference"):
-            continue
-        mark = (
-            " ".join(dict.fromkeys(MARKS.findall(line.comment))).replace("[", "").replace("]", "")
-        )
-        words = MARKS.sub("", line.comment).strip(" ;:").replace("|", "\\|")
-        where = "" if line.table == before else f"`{line.table}`" if line.table else ""
-        before = line.table
-        rows.append((where, line.key, f"`{line.value}`", mark, words))
-    return table(("table", "key", "value", "", "remark"), rows, "---")
-
-
 def gaps(text: str) -> str:
     """The numbers that are assumed or recalled."""
     found = [
@@ -188,11 +172,14 @@ def gaps(text: str) -> str:
         return "No number of the file is assumed or recalled.\n"
     items = []
     for letter, words in (("A", "Assumed"), ("M", "Recalled, not read")):
-        keys = [
-            f"`{line.table}.{line.key}`".replace("`.", "`") for line, own in found if own == letter
-        ]
-        if keys:
-            items.append(f"{words} in whole or in part ({len(keys)}): {', '.join(keys)}.\n")
+        tables: dict[str, list[str]] = {}
+        for line, own in found:
+            if own == letter:
+                tables.setdefault(line.table, []).append(line.key)
+        if tables:
+            number = sum(len(keys) for keys in tables.values())
+            keys = "; ".join(f"`{table}` {', '.join(keys)}" for table, keys in tables.items())
+            items.append(f"{words}, in whole or in part ({number}): {keys}.\n")
     return "\n".join(items)
 
 
@@ -208,13 +195,12 @@ def vehicles_table() -> str:
                 f"[`{name}`](../library/{name}.md)",
                 vehicle.name,
                 letters_of("vehicle", name),
-                ", ".join(vehicle.loads),
                 f"{vehicle.mass / 1e3:.2f}",
                 f"{load:.2f}",
                 f"{3.6 * vehicle.service.admissible_speed:.0f}",
             )
         )
-    head = ("file", "what it is", "reliability", "load cases", "mass (t)", "Q0 (kN)", "V (km/h)")
+    head = ("file", "what it is", "reliability", "mass (t)", "Q0 (kN)", "V (km/h)")
     return table(head, rows, "---")
 
 
@@ -240,8 +226,8 @@ def tracks_table() -> str:
                 f"{track.speed:g} ({3.6 * track.speed:.0f})",
             )
         )
-    head = ("file", "what it is", "reliability", "length (m)", "smallest radius (m)",
-            "largest cant (mm)", "speed, m/s (km/h)")  # fmt: skip
+    head = ("file", "what it is", "reliability", "length (m)", "radius (m)",
+            "cant (mm)", "speed, m/s (km/h)")  # fmt: skip
     return table(head, rows)
 
 
