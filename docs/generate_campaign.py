@@ -13,6 +13,7 @@ from pathlib import Path
 
 from generate import fill_page, table
 
+from railsim.definitions.sources import library_files
 from railsim.studies.summary import read_index
 
 PAGE = Path(__file__).parent / "validation" / "vehicles_and_tracks.md"
@@ -63,7 +64,9 @@ def campaign(found: list[dict]) -> str:
         "largest derailment quotient, track",
         "largest track shifting force (kN), track",
     )
-    text = table(head, rows, "---")
+    every = len(library_files("vehicle")) * len(library_files("track"))
+    text = f"{len(found)} of {every} combinations have been computed.\n\n"
+    text += table(head, rows, "---")
     if ended:
         ends = [
             (f"`{run['labels']['vehicle']}`", f"`{run['labels']['track']}`",
