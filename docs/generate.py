@@ -76,9 +76,11 @@ def filled(text: str, known: dict[str, str]) -> str:
     return TABLE.sub(lambda match: f"{match[1]}\n{known[match[2]]}\n{match[3]}", text)
 
 
-def fill_page(page: Path, makers: Mapping[str, Callable[[], str]]) -> None:
-    """Make the tables of a page that the command line asks for, all by default."""
-    wanted = sys.argv[1:] or list(makers)
+def fill_page(
+    page: Path, makers: Mapping[str, Callable[[], str]], wanted: Sequence[str] = ()
+) -> None:
+    """Make the wanted tables of a page: by default those of the command line, else all."""
+    wanted = wanted or sys.argv[1:] or list(makers)
     text = page.read_text("utf-8")
     known = {name: make() for name, make in makers.items() if name in wanted}
     for match in TABLE.finditer(text):  # tables that were not asked for stay

@@ -7,7 +7,7 @@ range of validity.
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 
@@ -52,6 +52,29 @@ def words_of(error: OSError | MemoryError) -> str:
         return str(error).partition("\n")[0]
     # HDF5 tells the cause in several lines
     return os.strerror(error.errno) + (f": {error.filename}" if error.filename else "")
+
+
+def counted(faults: Iterable[Fault]) -> list[Fault]:
+    """Return faults of the rows of a file, those of one kind as one with their number.
+
+    Faults are of one kind where file and remedy agree.
+
+    Examples
+    --------
+    >>> rows = [Fault("a.csv", f"line {n}", "not a number", "numbers only") for n in range(2, 22)]
+    >>> print(*counted(rows))
+    a.csv: line 2: not a number, and 19 more like it up to line 21; numbers only
+    """
+    kinds: dict[tuple[str, str], list[Fault]] = {}
+    for fault in faults:
+        kinds.setdefault((fault.file, fault.allowed), []).append(fault)
+    found = []
+    for first, *others in kinds.values():
+        if others:
+            more = f"{first.found}, and {len(others)} more like it up to {others[-1].key}"
+            first = replace(first, found=more)
+        found.append(first)
+    return found
 
 
 class RailsimError(Exception):

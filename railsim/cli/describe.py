@@ -9,6 +9,7 @@ from railsim.cli.common import table
 
 if TYPE_CHECKING:
     from railsim.definitions.elements import Element
+    from railsim.definitions.irregularity import Irregularity
     from railsim.definitions.layout import Section
     from railsim.definitions.mechanism import Mechanism
     from railsim.definitions.spring import TrailingArmSuspension
@@ -290,10 +291,31 @@ def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
         "plan": [_plan_row(section, cant, speeds) for section in plan],
         "cant": [_row(section) for section in cant],
         "vertical": [_row(section) for section in gradient_sections(track)],
-        "irregularities": [
-            part.model_dump(exclude_none=True, exclude={"rows"}) for part in track.irregularities
-        ],
+        "speed": track.speed,
+        "mileage": (track.mileage_at(0.0), track.mileage_at(track.length)),
+        "irregularities": [_irregularity(part) for part in track.irregularities],
     }
+
+
+def _irregularity(part: "Irregularity") -> dict[str, Any]:
+    """Return an irregularity; of a measured one what its rows hold in place of the rows."""
+    from railsim.definitions.irregularity import READING, Measured
+
+    data = part.model_dump(exclude_none=True, exclude={"rows"})
+    if isinstance(part, Measured) and part.rows is not None:
+        from railsim.track.irregularity import largest_between_rows
+
+        found = largest_between_rows(part)
+        data = {key: value for key, value in data.items() if key not in READING}
+        data |= {
+            "number": len(part.rows),
+            "first": part.rows[0][0] + part.shift,
+            "last": part.rows[-1][0] + part.shift,
+            "column": found.column,
+            "largest_at_rows": found.at_rows,
+            "largest_between_rows": found.between,
+        }
+    return data
 
 
 def _row(section: "Section") -> dict[str, Any]:
@@ -345,6 +367,11 @@ def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
         f"friction {'by table' if track.friction_table else _either(track.friction)}, "
         f"rounded over {track.rounding:g} m",
     ]
+    if track.speed is not None:
+        lines.append(f"  permitted speed {track.speed:g} m/s ({3.6 * track.speed:.0f} km/h)")
+    if track.mileage or track.falling_mileage:
+        begin, end = (f"{1e-3 * value:.3f}" for value in data["mileage"])
+        lines.append(f"  mileage from km {begin} to km {end}")
     if track.cant_rotation == "inner_rail":
         lines.append("  cant turns the track about the inner rail")
     if track.gauge_widening:

@@ -61,6 +61,7 @@ def command(
         _show_result(file, as_json)
         return
     from railsim.definitions.loading import load_any
+    from railsim.definitions.track import Track
 
     definition, known = load_any(file, with_load(assignments, load))
     if draw is not None:
@@ -70,7 +71,12 @@ def command(
         print_json(data)
         return
     echo("\n".join(lines))
-    for remark in known.remarks(definition):
+    remarks = [str(remark) for remark in known.remarks(definition)]
+    if isinstance(definition, Track):
+        from railsim.track.irregularity import measured_remarks
+
+        remarks += measured_remarks(definition)
+    for remark in remarks:
         echo(f"remark: {remark}")
 
 

@@ -11,8 +11,8 @@ from railsim.cli.common import echo, json_option, overwrite_option, print_json, 
 
 PROFILES = "profiles"
 # Marks of trust beside a number, as the shipped files explain them: read, re-entered, computed,
-# recalled, assumed.
-MARK = re.compile(r"\[(D|R|C|M|A|assumed)\]")
+# recalled, assumed; a short name of the source may follow, [D G].
+MARK = re.compile(r"\[(D|R|C|M|A|assumed)(?: \w+)?\]")
 MEANING = {
     "D": "data sheet or printed table, read",
     "R": "re-entered in public code that names its source",
@@ -90,7 +90,7 @@ def _entries(kind: str) -> list[dict[str, Any]]:
             "kind": kind,
             "name": name,
             "title": str(read_toml(path).get("name", "")),
-            "trust": trust(path.read_text("utf-8")),
+            "trust": trust(text_with_bases(path, _kinds()[kind])),
             "file": str(path),
         }
         for name, path in library_files(_kinds()[kind]).items()
@@ -109,6 +109,20 @@ def trust(text: str) -> str:
     comments = [comment for value, _, comment in lines if value.strip()]
     letters = Counter(mark[0].upper() for line in comments for mark in MARK.findall(line))
     return "".join(letter for letter, _ in letters.most_common())
+
+
+def text_with_bases(path: Path, kind: str) -> str:
+    """Return the text of a file with those of all files that it extends."""
+    from railsim.definitions.sources import find_file, read_toml
+
+    texts: dict[Path, str] = {}
+    while path.resolve() not in texts:  # a circle is reported where the file is loaded
+        texts[path.resolve()] = path.read_text("utf-8")
+        base = read_toml(path).get("extends")
+        if not isinstance(base, str):
+            break
+        path = find_file(base, kind, path)
+    return "\n".join(texts.values())
 
 
 def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:

@@ -70,7 +70,8 @@ def _is_number(text: str) -> bool:
     "--speeds",
     multiple=True,
     metavar="V...",
-    help="Speeds in m/s, or with a unit (72km/h); ranges first:last:number.",
+    help="Speeds in m/s, or with a unit (72km/h); ranges first:last:number; permitted: the lower "
+    "of the vehicle's and the track's speed.",
 )
 @click.option(
     "--grid",

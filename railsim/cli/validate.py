@@ -86,13 +86,21 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         return f"study of {len(index.runs)} runs, {index.status}", []
 
     from railsim.definitions.loading import load_any
+    from railsim.definitions.track import Track
     from railsim.errors import InputError
     from railsim.profiles.used import profile_faults
 
     definition, known = load_any(file)
     if faults := profile_faults(definition, file):
         raise InputError(faults)
-    return known.kind, [dict(vars(remark)) for remark in known.remarks(definition)]
+    remarks = [dict(vars(remark)) for remark in known.remarks(definition)]
+    if isinstance(definition, Track):
+        from railsim.track.irregularity import measured_remarks
+
+        remarks += [
+            {"key": "irregularities", "text": text} for text in measured_remarks(definition)
+        ]
+    return known.kind, remarks
 
 
 def _is_profile(name: str) -> bool:

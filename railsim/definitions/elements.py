@@ -159,7 +159,8 @@ class FreeLength(Definition):
     def _one_origin_of_the_preload(self) -> Self:
         if self.free_length is not None and self.load_at_length is not None:
             raise ValueError("either 'free_length' or 'load_at_length', not both")
-        if self.has_free_length and "preload" in self.model_fields_set:
+        given = vars(self).get("preload", 0.0) not in ("auto", 0.0)
+        if self.has_free_length and given:  # defaults stand in the files that results carry
             raise ValueError("either 'preload' or a length, not both")
         return self
 

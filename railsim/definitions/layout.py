@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from railsim.definitions.alignment_rules import alignment_remarks
 from railsim.definitions.base import Remark
 from railsim.definitions.irregularity import Measured, Random
 from railsim.definitions.track import (
@@ -119,6 +120,8 @@ def track_remarks(track: Track) -> list[Remark]:
     remarks = _curvature_steps(plan) + _gradient_steps(vertical)
     remarks += _too_long("cant", cant, plan) + _too_long("vertical", vertical, plan)
     remarks += _cant_sizes(cant) + _cant_sides(cant, plan)
+    if track.speed is not None:
+        remarks += alignment_remarks(plan, cant, track.speed)
     for section in (*plan, *cant, *vertical):
         if section.slope != 0.0 and section.length < track.rounding - SMALL:
             text = (

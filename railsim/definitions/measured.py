@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from railsim.definitions.irregularity import COLUMNS, READING, Measured
 from railsim.definitions.recording import BANDS, band_passed, equal_step, from_chord
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, counted, nearest
 from railsim.files import TABLE_BYTES, is_file, read_text
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
@@ -30,7 +30,6 @@ SHARES = {
     "cross_level": (0.0, -0.5, 0.0, 0.5),
     "gauge": (-0.5, 0.0, 0.5, 0.0),
 }
-MOST_FAULTS = 20
 LARGEST = 0.5  # m
 # Change of a displacement over distance between two rows beyond which no wheel could follow: a step
 # in the record, or a wrong unit.
@@ -154,7 +153,7 @@ def _rows_of(path: Path, text: str, how: Reading) -> tuple[Rows, list[Fault]]:
         faults.append(Fault(str(path), "", f"{len(rows)} rows", "four rows at least"))
     if not faults and (how.chord or how.band):
         rows, faults = _filtered(path, rows, how)
-    return rows, faults[:MOST_FAULTS]
+    return rows, counted(faults)
 
 
 def _filtered(path: Path, rows: Rows, how: Reading) -> tuple[Rows, list[Fault]]:

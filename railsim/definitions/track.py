@@ -5,7 +5,7 @@ A transition (CLO, LIR) takes its ends from its neighbours where it does not nam
 cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
 """
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -13,8 +13,10 @@ from railsim.definitions.base import (
     Definition,
     FileDefinition,
     Finite,
+    Flag,
     NonNegative,
     NonNegativePair,
+    Positive,
     Text,
     TextPair,
     one_or_two,
@@ -25,6 +27,7 @@ from railsim.definitions.irregularity import Irregularity
 from railsim.definitions.support import Support
 from railsim.drawn import Drawn
 
+Place = TypeVar("Place", float, Any)
 TRACK_FORMAT = "railsim-track/1"
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
@@ -200,6 +203,13 @@ class Track(FileDefinition, Drawn):
     """What the track is called in tables and plots"""
     source: Text | None = None
     """Where the numbers come from"""
+    speed: Positive | None = None
+    """Highest speed permitted on the track [m/s]: remarks on the alignment refer to it, and the
+    speed `permitted` of a study"""
+    mileage: Finite = 0.0
+    """Mileage of s = 0 [m]; results hold the mileage of the reference body"""
+    falling_mileage: Flag = False
+    """The mileage falls in the direction of travel"""
     gauge: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.3, le=2.5)] = 1.435
     """Distance between the gauge faces, 14 mm below the rail tops [m]"""
     rail: TextPair = ("60E1", "60E1")
@@ -238,6 +248,10 @@ class Track(FileDefinition, Drawn):
     def length(self) -> float:
         """Length of the plan [m]."""
         return sum(element.length for element in self.plan)
+
+    def mileage_at(self, s: "Place") -> "Place":
+        """Mileage at an arc length, or at an array of them [m]."""
+        return self.mileage - s if self.falling_mileage else self.mileage + s
 
     FIGURE: ClassVar = "railsim.plot.track:track_figure"
 

@@ -1,6 +1,11 @@
-"""A track as a picture: the plan seen from above, curvature, cant and gradient over distance."""
+"""A track as a picture: the plan seen from above, below it over distance what the rails do.
+
+Curvature and cant are always shown; gradient, irregularities, gauge, friction and support where
+they are not constant.  Constants stand in the line under the title.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,19 +13,36 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.integrate import cumulative_simpson
 
-from railsim.definitions.layout import Section, curvature_sections
+from railsim.definitions.layout import (
+    Section,
+    cant_sections,
+    curvature_sections,
+    gradient_sections,
+    track_remarks,
+)
 from railsim.definitions.track import Track
-from railsim.plot.style import DISTINCT, Picture, shade, spans, styled
+from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, shade, spans, styled
 from railsim.result.data import Array
 from railsim.text import unformatted
 from railsim.track.alignment import Alignment
+from railsim.track.irregularity import displacement
 
 KINDS = {"STR": ("straight", "0.35"), "CLO": ("transition", "#d99000"), "CIR": ("curve", "#004a80")}
-RESOLUTION = 4000
+RESOLUTION = 16000
+MOST_REMARKS = 8
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One pair of axes over the distance: curves by their names; a single one needs no name."""
+
+    title: str
+    label: str
+    curves: dict[str, Array]
 
 
 def track_figure(track: Track, title: str = "") -> Figure:
-    """Draw a track in plan, with its curvature and cant, and its gradient where it has one.
+    """Draw a track: plan, curvature, cant, and what else is not constant along it.
 
     Parameters
     ----------
@@ -33,35 +55,156 @@ def track_figure(track: Track, title: str = "") -> Figure:
     -------
     Figure
         The plan with equal scales, right of the track downwards; below it the functions of the
-        distance as they act, with their kinks rounded.
+        distance as they act, with their kinks rounded; at the end what is unusual in the
+        alignment, with the places marked.
     """
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, RESOLUTION + 1)
-    functions = [
-        ("Curvature, positive to the right", r"$\kappa$ (1/km)", 1e3 * alignment.curvature(s)),
-        ("Cant, positive with the left rail higher", "$h$ (mm)", 1e3 * alignment.cant(s)),
+    rows = [
+        *_alignment_rows(track, alignment, s),
+        *_rail_rows(track, s),
+        *_friction_rows(track, s),
+        *_support_rows(track, s),
+    ]
+    sections = curvature_sections(track)
+    remarks = _marked(track)
+    with styled():
+        height = 3.9 + 1.4 * len(rows) + 0.17 * len(remarks)
+        figure = Picture(figsize=(8.0, height), layout="constrained")
+        axes = figure.subplots(1 + len(rows), 1, height_ratios=[1.9] + [1.0] * len(rows))
+        name = unformatted(title or track.name)
+        figure.suptitle(f"{name}\n ", x=0.012, ha="left")
+        figure.text(0.012, 1.0 - 0.30 / height, _constants(track), fontsize=8.5, va="top")
+        _plan(axes[0], alignment, sections, s)
+        shown = spans(sections, s, s)
+        for k, row in enumerate(rows):
+            _draw(axes[1 + k], row, s)
+            if k:
+                axes[1 + k].sharex(axes[1])
+            shade(axes[1 + k], shown, named=k == 0)
+            if k + 1 < len(rows):
+                axes[1 + k].tick_params(labelbottom=False)
+        for place, _ in remarks:
+            axes[1].plot(
+                place, 0.0, marker="^", ms=5, color=LIMIT, clip_on=False,
+                transform=axes[1].get_xaxis_transform(),
+            )  # fmt: skip
+        axes[-1].set_xlabel("Distance along the track $s$ (m)")
+        if remarks:
+            words = "\n".join(f"s = {place:.0f} m: {text}" for place, text in remarks)
+            figure.supxlabel(f"Remarks\n{words}", x=0.012, ha="left", fontsize=8, color=LIMIT)
+        return figure
+
+
+def _draw(axes: Axes, row: _Row, s: Array) -> None:
+    for k, (name, values) in enumerate(row.curves.items()):
+        line = SIDE_LINES["right" if k else "left"]  # the second shows where both agree
+        axes.plot(s, values, color=DISTINCT[k], ls=line, label=name)
+    if any(values.min() < 0.0 for values in row.curves.values()):
+        axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+    if len(row.curves) > 1:
+        place = (1.0, 0.93)  # beside the title
+        axes.legend(loc="lower right", bbox_to_anchor=place, ncols=len(row.curves))
+    axes.set_title(row.title)
+    axes.set_ylabel(row.label)
+    axes.margins(x=0.0)
+    if all(np.ptp(values) == 0.0 for values in row.curves.values()):
+        axes.set_ylim(min(axes.get_ylim()[0], -1.0), max(axes.get_ylim()[1], 1.0))
+
+
+def _alignment_rows(track: Track, alignment: Alignment, s: Array) -> list[_Row]:
+    rows = [
+        _Row(
+            "Curvature, positive to the right",
+            r"$\kappa$ (1/km)",
+            {"curvature": 1e3 * alignment.curvature(s)},
+        ),
+        _Row(
+            "Cant, positive with the left rail higher",
+            "$h$ (mm)",
+            {"cant": 1e3 * alignment.cant(s)},
+        ),
     ]
     if track.vertical:
-        functions.append(("Gradient, positive uphill", "$i$ (‰)", 1e3 * alignment.gradient(s)))
-    sections = curvature_sections(track)
-    with styled():
-        figure = Picture(figsize=(8.0, 3.6 + 1.5 * len(functions)), layout="constrained")
-        rows = figure.subplots(1 + len(functions), 1, height_ratios=[1.9] + [1.0] * len(functions))
-        figure.suptitle(unformatted(title or track.name), x=0.012, ha="left")
-        _plan(rows[0], alignment, sections, s)
-        shown = spans(sections, s, s)
-        for axes, (words, label, values) in zip(rows[1:], functions, strict=True):
-            axes.plot(s, values, color=DISTINCT[0])
-            axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
-            axes.set_title(words)
-            axes.set_ylabel(label)
-            axes.margins(x=0.0)
-            axes.sharex(rows[1])
-            shade(axes, shown, named=axes is rows[1])
-        for axes in rows[1:-1]:
-            axes.tick_params(labelbottom=False)
-        rows[-1].set_xlabel("Distance along the track $s$ (m)")
-        return figure
+        gradient = {"gradient": 1e3 * alignment.gradient(s)}
+        rows.append(_Row("Gradient, positive uphill", "$i$ (‰)", gradient))
+    return rows
+
+
+def _rail_rows(track: Track, s: Array) -> list[_Row]:
+    """Displacements of the rails by irregularities, and the gauge where it changes."""
+    moved = displacement(track)
+    if moved is None:
+        return []
+    y_left, z_left, y_right, z_right = 1e3 * moved(s)[0]
+    gauge = 1e3 * track.gauge + y_right - y_left
+    rows = []
+    if track.irregularities:
+        rows = [
+            _Row(
+                "Lateral displacement of the rails, positive to the right",
+                "$y$ (mm)",
+                {"left": y_left, "right": y_right},
+            ),
+            _Row(
+                "Vertical displacement of the rails, positive downwards",
+                "$z$ (mm)",
+                {"left": z_left, "right": z_right},
+            ),
+        ]
+    if np.ptp(gauge) > 1e-6:
+        rows.append(_Row("Gauge", "(mm)", {"gauge": gauge}))
+    return rows
+
+
+def _friction_rows(track: Track, s: Array) -> list[_Row]:
+    if track.friction_table is None:
+        return []
+    place, left, right = np.array(track.friction_table).T
+    curves = {"left": np.interp(s, place, left), "right": np.interp(s, place, right)}
+    return [_Row("Friction", r"$\mu$", curves)]
+
+
+def _support_rows(track: Track, s: Array) -> list[_Row]:
+    if track.support.variation is None or track.support.preset == "rigid":
+        return []
+    place, pads, ballast = np.array(track.support.variation).T
+    curves = {"pads": np.interp(s, place, pads), "ballast": np.interp(s, place, ballast)}
+    return [_Row("Stiffness and damping of the support, times those of the preset", "", curves)]
+
+
+def _constants(track: Track) -> str:
+    """Return a line of what is the same along the track."""
+    rail = " / ".join(dict.fromkeys(unformatted(name) for name in track.rail))
+    tilt = f"1:{1.0 / track.inclination:.3g}" if track.inclination else "upright"
+    words = [f"gauge {1e3 * track.gauge:g} mm", f"rail {rail} {tilt}"]
+    if track.friction_table is None:
+        words.append(f"friction {' / '.join(f'{mu:g}' for mu in dict.fromkeys(track.friction))}")
+    words.append(f"support {track.support.preset}")
+    if track.speed is not None:
+        words.append(f"permitted {3.6 * track.speed:.0f} km/h")
+    return ", ".join(words)
+
+
+def _marked(track: Track) -> list[tuple[float, str]]:
+    """Return place and text of what is unusual in the alignment; equal texts once."""
+    sections = {
+        section.key: section
+        for part in (curvature_sections(track), cant_sections(track), gradient_sections(track))
+        for section in part
+    }
+    found: dict[str, list[float]] = {}
+    for remark in track_remarks(track):
+        if remark.key in sections:
+            found.setdefault(remark.text, []).append(sections[remark.key].begin)
+    marked = sorted(
+        (min(places), text + (f"; {len(places)} times" if len(places) > 1 else ""))
+        for text, places in found.items()
+    )
+    if len(marked) <= MOST_REMARKS:
+        return marked
+    *shown, (place, text) = marked[:MOST_REMARKS]
+    return [*shown, (place, f"{text}; and {len(marked) - MOST_REMARKS} more")]
 
 
 def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Array) -> None:
@@ -94,7 +237,7 @@ def _name_curve(axes: Axes, section: Section, s: Array, x: Array, y: Array, head
     at = int(np.searchsorted(s, 0.5 * (section.begin + section.end)))
     outwards = -np.sign(section.start_value) * np.array([-np.sin(heading[at]), np.cos(heading[at])])
     axes.annotate(
-        f"R {abs(1.0 / section.start_value):.6g} m",
+        f"R {1.0 / section.start_value:.6g} m".replace("-", "\N{MINUS SIGN}"),
         (x[at], y[at]),
         xytext=(12.0 * outwards[0], -12.0 * outwards[1]),  # Y points down on the page
         textcoords="offset points",

@@ -53,7 +53,7 @@ _LOG = logging.getLogger(__name__)
 PEAKS = "peaks"  # group of largest and smallest values over all steps
 CHUNK_BYTES = 2**18
 ROWS_AT_ONCE = 2048  # of the coach 4 MB
-DOUBLE = ("time", "distance")
+DOUBLE = ("time", "distance", "mileage")
 
 
 @dataclass(frozen=True)

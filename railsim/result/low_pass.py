@@ -21,7 +21,7 @@ from railsim.result.data import Array, Attributes, Result
 from railsim.result.sinks import ALWAYS, NOTHING, Sink, SinkContext
 
 ATTENUATION = 80.0  # dB
-UNFILTERED = ("time", "distance")
+UNFILTERED = ("time", "distance", "mileage", "curvature", "cant")
 
 
 class LowPassSink(SinkContext):

@@ -27,7 +27,7 @@ from railsim.track.irregularity import displacement
 Floats = NDArray[np.float64]
 
 ROLL, YAW, LATERAL = 3, 5, 1
-NEEDED = ("time", "distance", "Q0")
+NEEDED = ("time", "distance", "mileage", "curvature", "cant", "Q0")
 
 
 def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
@@ -158,6 +158,7 @@ class OutputPlan:
         self._sensors = sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
         self._alignment = Alignment(track)
+        self._track_file = track
         self._irregularity = displacement(track)
         known = {
             name: (group, index)
@@ -229,6 +230,7 @@ class OutputPlan:
     def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
         """Quantities of the first `rows` records by name."""
         values = dict(quantities(self._model, recorder, rows, Q0))
+        values |= self._place(values["distance"])
         if self.elements:
             values |= _elements(recorder.element[:rows])
         if self._sensors:
@@ -249,6 +251,13 @@ class OutputPlan:
                 "rail_deflection_vertical": deflection[..., 1],
             }
         return values
+
+    def _place(self, distance: Floats) -> dict[str, Floats]:
+        return {
+            "mileage": self._track_file.mileage_at(distance),
+            "curvature": self._alignment.curvature(distance),
+            "cant": self._alignment.cant(distance),
+        }
 
     def _track(self, place: Floats) -> dict[str, Floats]:
         rails = np.zeros((4, *place.shape))

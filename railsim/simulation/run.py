@@ -34,6 +34,7 @@ from railsim.simulation.right_samples import filtering, low_pass_remark, output_
 from railsim.simulation.run_in import start_state
 from railsim.simulation.settling import DOING
 from railsim.simulation.settling import Progress as SettlingProgress
+from railsim.track.irregularity import measured_remarks
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -486,7 +487,7 @@ def prepare(
     model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
     step, _ = pace.at(speed)
-    remarks: list[str] = [*balance.remarks]
+    remarks: list[str] = [*balance.remarks, *measured_remarks(track)]
     if before is None:
         state = start_state(
             model,

@@ -21,7 +21,7 @@ from railsim.profiles.used import profile_faults
 from railsim.simulation.run import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
 from railsim.studies.points import Fingerprints, Grid, Overrides, Point, check_number, point_key
-from railsim.studies.rows import made_rows
+from railsim.studies.rows import PERMITTED, made_rows
 from railsim.units import ALLOWED
 
 T = TypeVar("T", bound=FileDefinition)
@@ -97,7 +97,8 @@ class Plan:
     Parameters
     ----------
     vehicles, tracks, speeds : sequences
-        What is combined, vehicles outermost.
+        What is combined, vehicles outermost.  The speed `PERMITTED` is the lower of the vehicle's
+        admissible speed and the track's speed.
     grid : mapping of str to sequence of str, optional
         Values, written as in a file, of further keys.
     settings, start, duration, until, assignments
@@ -125,7 +126,7 @@ class Plan:
         self,
         vehicles: Sequence[str | Path],
         tracks: Sequence[str | Path],
-        speeds: Sequence[float | None],
+        speeds: Sequence[float | str | None],
         grid: Grid | None = None,
         *,
         settings: str | Path | None = None,
@@ -172,7 +173,10 @@ class Plan:
             short = {"vehicle": short_name(vehicle), "track": short_name(track)}
             for row, overrides in zip(rows, own, strict=True):
                 asked = speed if row.speed is None else row.speed
-                first = self._first_speed(overrides["settings"], asked)
+                if isinstance(asked, str):
+                    first = self._permitted(vehicle, track, overrides)
+                else:
+                    first = self._first_speed(overrides["settings"], asked)
                 key = point_key(
                     fingerprint("vehicle", vehicle, overrides["vehicle"]),
                     fingerprint("track", track, overrides["track"]),
@@ -251,6 +255,23 @@ class Plan:
         own = self._split([f"{key}={value}" for key, value in row.items()])
         return {kind: common[kind] + own[kind] for kind in own}
 
+    def _permitted(
+        self, vehicle: str | Path, track: str | Path, overrides: Mapping[str, Overrides]
+    ) -> float | None:
+        """Return the lower of the admissible speed of a vehicle and the speed of a track [m/s]."""
+        service = self._loaded(load_vehicle, vehicle, overrides["vehicle"])
+        line = self._loaded(load_track, track, overrides["track"])
+        if service is None or line is None:
+            return None  # reported by now
+        allowed = f"needed for the speed '{PERMITTED}'"
+        if service.service is None:
+            self._tell([Fault(str(vehicle), "service.admissible_speed", "missing", allowed)])
+        if line.speed is None:
+            self._tell([Fault(str(track), "speed", "missing", allowed)])
+        if service.service is None or line.speed is None:
+            return None
+        return float(min(service.service.admissible_speed, line.speed))
+
     def _first_speed(self, overrides: Overrides, speed: float | None) -> float | None:
         settings = self._loaded(load_settings, self._settings, overrides)
         if settings is None:
@@ -261,7 +282,7 @@ class Plan:
             self._tell(error.faults)
             return None
 
-    def _simulated_time(self, track: str | Path, speed: float | None) -> float:
+    def _simulated_time(self, track: str | Path, speed: float | str | None) -> float:
         """Guess how long a run is [s]: that of the first track and speed."""
         if self._duration is not None:
             return self._duration
@@ -269,7 +290,8 @@ class Plan:
             length = self._until or load_track(track).length
         except InputError:
             return 0.0
-        return max(0.0, length - self._start) / max(speed or 1.0, 0.5)
+        first = speed if isinstance(speed, float | int) else 1.0
+        return max(0.0, length - self._start) / max(first, 0.5)
 
 
 def _as_written(fault: Fault, kind: str, grid: Grid) -> Fault:

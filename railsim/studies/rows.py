@@ -12,6 +12,7 @@ from railsim.studies.points import Grid
 from railsim.units import number_with_unit
 
 SPEED = "speed"  # a key that is none of a file: the speed of the run
+PERMITTED = "permitted"  # as a speed: the lower of those of the vehicle and the track
 
 
 @dataclass(frozen=True)

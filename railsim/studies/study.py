@@ -38,7 +38,7 @@ from railsim.studies.journal import JOURNAL, Journal, Record, Records
 from railsim.studies.keep import ALL, EVERYTHING, Keep, parse_keep
 from railsim.studies.own import Function, fingerprint, named
 from railsim.studies.points import Point
-from railsim.studies.rows import speed_of
+from railsim.studies.rows import PERMITTED, speed_of
 from railsim.studies.summary import (
     Inputs,
     checked,
@@ -153,7 +153,7 @@ class Outcome:
 def study(
     vehicles: Sequence[str | Path | Vehicle] | str | Path | Vehicle,
     tracks: Sequence[str | Path | Track] | str | Path | Track,
-    speeds: Sequence[float | None] | float | str | None,
+    speeds: Sequence[float | str | None] | float | str | None,
     *,
     out: str | Path,
     grid: Mapping[str, Iterable[object] | float | str] | None = None,
@@ -187,7 +187,7 @@ def study(
         of the folder.
     speeds : sequence of float, a single one, or a range such as ``"15:25:11"``; None
         Speeds [m/s]; None where the settings have a speed table, or `linked` or `sample` vary
-        ``speed``.
+        ``speed``; ``"permitted"`` is the lower of the vehicle's and the track's speed.
     out : str or Path
         Folder of the study; made if need be.
     grid : mapping of str to values, optional
@@ -259,7 +259,7 @@ def study(
     vehicles = as_files(_several(vehicles), folder)
     tracks = as_files(_several(tracks), folder)
     (settings,) = as_files([settings], folder)
-    speeds = _speeds(speeds)
+    asked = _speeds(speeds)
     written = _written("grid", grid or {})
     tables = [_written("linked", table) for table in linked]
     drawn = None if sample is None else _sample(sample)
@@ -267,7 +267,7 @@ def study(
     plan = Plan(
         vehicles,
         tracks,
-        speeds,
+        asked,
         written,
         linked=tables,
         sample=drawn,
@@ -284,7 +284,7 @@ def study(
         "folder": os.path.relpath(Path.cwd(), folder),  # where names of files begin
         "vehicles": [str(vehicle) for vehicle in vehicles],
         "tracks": [str(track) for track in tracks],
-        "speeds": list(speeds),
+        "speeds": asked,
         "grid": written,
         "linked": tables,
         "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
@@ -571,13 +571,13 @@ def _several(values: Any) -> list[Any]:
     return [values] if single else list(values)
 
 
-def _speeds(speeds: Any) -> list[float | None]:
-    """Return speeds as numbers; those of a range, and with units [m/s]."""
+def _speeds(speeds: Any) -> list[float | str | None]:
+    """Return speeds as numbers, those of a range, and with units [m/s]; `PERMITTED` as it is."""
     if speeds is None:
         return [None]
-    found: list[float | None] = []
+    found: list[float | str | None] = []
     for speed in _several(speeds):
-        if isinstance(speed, str):
+        if isinstance(speed, str) and speed != PERMITTED:
             found += [speed_of(text) for text in _texts("speeds", speed)]
         else:
             found.append(speed)

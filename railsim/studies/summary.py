@@ -92,7 +92,7 @@ class Inputs(BaseModel):
     scenario: str | None = None
     vehicles: list[str]
     tracks: list[str]
-    speeds: list[float | None]
+    speeds: list[float | str | None]
     grid: dict[str, list[str]] = {}
     linked: list[dict[str, list[str]]] = []
     sample: dict[str, Any] | None = None

@@ -12,6 +12,7 @@ seed.  The period is as long as the irregularity, and 20 of its longest waveleng
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.irregularity import (
     CHANNELS,
+    COLUMNS,
     Dip,
     Irregularity,
     Kink,
@@ -50,6 +52,9 @@ POINTS_PER_WAVE = 32
 PERIOD_IN_WAVES = 20.0
 # Share of the range of the rows around by which a spline between measured rows may leave it.
 OVERSHOOT = 0.25
+_INNER = np.arange(1, 8) / 8.0  # places within an interval, over its length
+# Largest displacement between the rows over that at the rows, from which on it is remarked on.
+BEYOND_ROWS = 1.05
 
 
 def displacement(track: Track) -> Displacement | None:
@@ -138,12 +143,9 @@ def _triangle(middle: float, length: float) -> Displacement:
 
 
 def _measured(part: Measured) -> Displacement:
-    rows = np.array(part.rows)
-    places = rows[:, 0] + part.shift
-    values = part.scale * rows[:, 1:].T
     from scipy.interpolate import CubicHermiteSpline  # a quarter of a second; most need none
 
-    slopes = np.stack([shape_preserving_slopes(places, row) for row in values])
+    places, values, slopes = _interpolation(part)
     spline = CubicHermiteSpline(places, values, slopes, axis=1)
     slope = spline.derivative()
     window = _window(places[0], places[-1], part.fade)
@@ -153,6 +155,73 @@ def _measured(part: Measured) -> Displacement:
         return _windowed(spline(at), slope(at), *window(s))
 
     return moved
+
+
+def _interpolation(part: Measured) -> tuple[Array, Array, Array]:
+    """Places of the rows [m], and displacements [m] and slopes [1] there by columns."""
+    rows = np.array(part.rows)
+    places = rows[:, 0] + part.shift
+    values = part.scale * rows[:, 1:].T
+    return places, values, np.stack([shape_preserving_slopes(places, row) for row in values])
+
+
+def _between(places: Array, values: Array, slopes: Array) -> Array:
+    """Cubic Hermite interpolation at seven places within every interval between the rows."""
+    h = np.diff(places)
+    t = _INNER
+    basis = np.stack(
+        ((1.0 + 2.0 * t) * (1.0 - t) ** 2, t * (1.0 - t) ** 2, t**2 * (3.0 - 2.0 * t),
+         t**2 * (t - 1.0))
+    )  # fmt: skip
+    ends = (values[..., :-1], h * slopes[..., :-1], values[..., 1:], h * slopes[..., 1:])
+    return np.asarray(np.stack(ends, axis=-1) @ basis)
+
+
+@dataclass(frozen=True)
+class Between:
+    """Largest displacement of a record at its rows, and of the rails between them [m]."""
+
+    column: str
+    at_rows: float
+    between: float
+    place: float
+
+
+def largest_between_rows(part: Measured) -> Between:
+    """Return the largest displacement between the rows, of the column where it differs most.
+
+    A record that does not resolve the shortest wave that it holds lets the rails go further than
+    any row says.
+    """
+    places, values, slopes = _interpolation(part)
+    found = np.abs(_between(places, values, slopes)).reshape(4, -1)
+    inner = places[:-1, None] + np.diff(places)[:, None] * _INNER
+    at_rows = np.abs(values).max(axis=1)
+    further = np.where(at_rows > 0.0, found.max(axis=1) - at_rows, -np.inf)
+    column = int(np.argmax(further))
+    place = int(np.argmax(found[column]))
+    return Between(
+        COLUMNS[column],
+        float(at_rows[column]),
+        float(found[column, place]),
+        float(inner.ravel()[place]),
+    )
+
+
+def measured_remarks(track: Track) -> list[str]:
+    """Remark on records between whose rows the rails go further than the rows by 5 % or more."""
+    remarks = []
+    for index, part in enumerate(track.irregularities):
+        if not isinstance(part, Measured):
+            continue
+        found = largest_between_rows(part)
+        if found.between > BEYOND_ROWS * found.at_rows:
+            remarks.append(
+                f"The rails go further between the rows of irregularities.{index} than at them: "
+                f"{found.column} reaches {1e3 * found.between:.3g} mm at s = {found.place:.1f} m, "
+                f"the largest row is {1e3 * found.at_rows:.3g} mm."
+            )
+    return remarks
 
 
 def shape_preserving_slopes(places: Array, values: Array) -> Array:
@@ -175,7 +244,7 @@ def shape_preserving_slopes(places: Array, values: Array) -> Array:
     ndarray, shape (n,)
         Slopes [1].
     """
-    from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
+    from scipy.interpolate import CubicSpline, PchipInterpolator
 
     slopes = CubicSpline(places, values)(places, 1)
     monotone = PchipInterpolator(places, values)(places, 1)
@@ -183,9 +252,8 @@ def shape_preserving_slopes(places: Array, values: Array) -> Array:
     around = np.stack([padded[i : i + len(values) - 1] for i in range(4)])
     low, high = around.min(axis=0), around.max(axis=0)
     allowed = OVERSHOOT * (high - low)
-    inner = places[:-1, None] + np.diff(places)[:, None] * np.arange(1, 8) / 8.0
     while True:
-        inside = CubicHermiteSpline(places, values, slopes)(inner)
+        inside = _between(places, values, slopes)
         lowest, highest = inside.min(axis=1), inside.max(axis=1)
         wrong = (lowest < low - allowed) | (highest > high + allowed)
         ends = np.zeros(len(places), dtype=bool)

@@ -56,6 +56,9 @@ def arrays(speed=20.0, duration=49.0, rate=50.0, gain=1.0):
     return {
         "time": time,
         "distance": distance,
+        "mileage": 1000.0 + distance,
+        "curvature": ramp[:, 0] / 250.0,
+        "cant": 0.15 * ramp[:, 0],
         "Q": q,
         "Y": y,
         "Y_over_Q": y / q * np.array([-1.0, 1.0]),

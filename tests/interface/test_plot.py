@@ -180,6 +180,37 @@ def test_track_is_drawn_by_name(tmp_path, monkeypatch, capsys):
     assert "quantities belong to results" in capsys.readouterr().err
 
 
+def test_track_figure_shows_everything_that_changes_along_the_track():
+    track = load_track("curve_r250").replace(
+        friction_table=[[0.0, 0.4], [100.0, 0.4, 0.2]],
+        gauge_widening=[[50.0, 0.0, 0.0], [60.0, 0.0, 0.015]],
+        vertical=[{"type": "CST", "length": 10.0, "gradient": 0.01}],
+        support={"variation": [[200.0, 1.0], [205.0, 3.0]]},
+        irregularities=[{"type": "dip", "s": 80.0, "length": 3.0, "depth": 0.006, "rail": "left"}],
+    )
+    figure = track_figure(track)
+    titles = [axes.get_title(loc="left").partition(",")[0] for axes in figure.axes]
+    assert titles[1:] == [
+        "Curvature",
+        "Cant",
+        "Gradient",
+        "Lateral displacement of the rails",
+        "Vertical displacement of the rails",
+        "Gauge",
+        "Friction",
+        "Stiffness and damping of the support",
+    ]
+    gauge = figure.axes[6].lines[0].get_ydata()
+    assert (gauge.min(), gauge.max()) == pytest.approx((1435.0, 1450.0))
+    words = figure.get_supxlabel()
+    assert "s = 360 m: a cant of 150 mm is more than (R - 100 m)/2 = 75 mm" in words
+
+
+def test_radii_in_the_plan_have_their_sign():
+    plan = track_figure(load_track("s_curve_r150")).axes[0]
+    assert [text.get_text() for text in plan.texts] == ["R 150 m", "R \N{MINUS SIGN}150 m"]
+
+
 def test_track_figure_shows_curvature_and_cant_as_they_act():
     plan, curvature, cant = track_figure(load_track("curve_r250")).axes
     s, kappa = drawn(curvature)[0].get_data()

@@ -64,6 +64,17 @@ def test_track_is_seen_at_each_wheelset(result):
     assert np.all(result.rail_vertical == 0.0)
 
 
+def test_curvature_cant_and_mileage_are_those_of_the_reference_body(result):
+    assert result.curvature[0] == pytest.approx(1.0 / 250.0, rel=1e-6)
+    assert result.cant[0] == pytest.approx(0.15, rel=1e-6)
+    np.testing.assert_array_equal(result.mileage, result.distance)
+
+
+def test_mileage_counts_as_the_track_says():
+    track = railsim.load_track("curve_r250").replace(mileage=12_300.0, falling_mileage=True)
+    np.testing.assert_array_equal(track.mileage_at(np.array([0.0, 250.0])), [12_300.0, 12_050.0])
+
+
 def test_unknown_element_is_refused_with_the_nearest_name():
     settings = Settings(outputs={"elements": ["front.outer.primery.left"]})
     with pytest.raises(InputError, match=r"front.outer.primary.left"):

@@ -203,3 +203,19 @@ def test_definitions_in_python_are_written_and_run(tmp_path, simulated):
     assert again.computed == 0
     with (tmp_path / "summary.csv").open() as file:
         assert "own end" in next(csv.reader(file))
+
+
+def test_permitted_speed_is_the_lower_one_of_vehicle_and_track():
+    cases = combinations(["wagon_c62a", COACH], ["straight", "twist"], ["permitted"])
+    assert [case.speed for case in cases] == pytest.approx([22.22, 3.0, 44.44444, 3.0])
+    assert cases[0].name == "wagon_c62a_straight_22.22"
+
+
+def test_permitted_speed_needs_both_speeds(tmp_path):
+    (tmp_path / "line.toml").write_text(
+        'format = "railsim-track/1"\nname = "t"\nplan = [{ type = "STR", length = 9.0 }]\n'
+    )
+    with pytest.raises(InputError) as caught:
+        combinations([COACH], [tmp_path / "line.toml"], ["permitted"])
+    (fault,) = caught.value.faults
+    assert (fault.key, fault.found) == ("speed", "missing")

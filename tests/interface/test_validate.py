@@ -28,23 +28,23 @@ def write(tmp_path):
 
 
 def test_good_files_pass(capsys):
-    assert cli.main(["validate", "coach_manchester", "benchmark_vehicle1", "curve_r250"]) == 0
+    assert cli.main(["validate", "coach_manchester", "benchmark_vehicle1", "curve_r500"]) == 0
     out, err = capsys.readouterr()
     assert out.splitlines() == [
         "coach_manchester: vehicle, no faults",
         "benchmark_vehicle1: vehicle, no faults",
-        "curve_r250: track, no faults",
+        "curve_r500: track, no faults",
     ]
     assert err == ""
 
 
 def test_every_fault_is_one_line_on_stderr(write, capsys):
     path = write("mine.toml", COACH + "[bodies.carbody]\nmass = -1\nmas = 2\n")
-    assert cli.main(["validate", path, "curve_r250"]) == 2
+    assert cli.main(["validate", path, "curve_r500"]) == 2
     out, err = capsys.readouterr()
     assert len(err.splitlines()) == 2
     assert all(line.startswith(path) for line in err.splitlines())
-    assert out == "curve_r250: track, no faults\n"
+    assert out == "curve_r500: track, no faults\n"
 
 
 def test_json_lists_faults_and_remarks(write, capsys):

@@ -102,9 +102,48 @@ def test_unusual_track_is_remarked_on(plan, cant, more, expected):
     assert any(expected in remark for remark in remarks), remarks
 
 
-@pytest.mark.parametrize("name", ["straight", "curve_r250", "curve_r500"])
+@pytest.mark.parametrize("name", ["straight", "curve_r500"])
 def test_shipped_track_gives_no_cause_for_remarks(name):
     assert track_remarks(load_track(name)) == []
+
+
+def test_cant_of_the_curving_study_is_high_for_its_radius():
+    (remark,) = track_remarks(load_track("curve_r250"))
+    assert str(remark) == "plan.2: a cant of 150 mm is more than (R - 100 m)/2 = 75 mm"
+
+
+# R 300 m at 20 m/s: I + d = 1500 * 400/(9.81 * 300) = 203.9 mm
+@pytest.mark.parametrize(
+    ("cant", "length", "speed", "expected"),
+    [
+        (0.10, 80.0, 20.0, None),  # 100/80 mm/m, I 104 mm, 26 mm/s: within all rules
+        (0.10, 59.0, 20.0, "a transition of 59 m is shorter than 60 m"),
+        (0.10, 35.0, 20.0, "a ramp of 2.86 mm/m is steeper than 180/V = 2.50 mm/m at 72 km/h"),
+        (0.10, 30.0, 20.0, "216/V"),
+        (0.10, 80.0, 24.0, "a cant deficiency of 194 mm at 86 km/h is more than 160 mm"),
+        (0.10, 60.0, 24.0, "changes by 77 mm/s, more than 75"),
+        (0.11, 80.0, 20.0, "more than (R - 100 m)/2 = 100 mm"),
+        (0.17, 80.0, 20.0, "a cant of 170 mm is more than 160 mm"),
+        (0.16, 100.0, 7.0, "a cant excess of 135 mm at 25 km/h is more than 110 mm"),
+    ],
+)
+def test_rules_of_alignment_at_the_permitted_speed(cant, length, speed, expected):
+    ramp = {"type": "LIR", "length": length}
+    curve = track(
+        [
+            {"type": "STR", "length": 50.0},
+            {"type": "CLO", "length": length},
+            {"type": "CIR", "length": 90.0, "radius": 300.0},
+        ],
+        [{"type": "CST", "length": 50.0, "cant": 0.0}, ramp,
+         {"type": "CST", "length": 90.0, "cant": cant}],
+        speed=speed,
+    )  # fmt: skip
+    remarks = [str(remark) for remark in track_remarks(curve)]
+    if expected is None:
+        assert remarks == []
+    else:
+        assert any(expected in remark for remark in remarks), remarks
 
 
 def test_cant_list_shorter_than_the_plan_is_usual():

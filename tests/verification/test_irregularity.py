@@ -8,7 +8,7 @@ from scipy.signal import welch
 from railsim.definitions.loading import load_track
 from railsim.definitions.track import Track
 from railsim.errors import InputError
-from railsim.track.irregularity import displacement
+from railsim.track.irregularity import displacement, largest_between_rows, measured_remarks
 from railsim.track.spectra import ERRI_B176, SPECTRA
 from railsim.track.tables import track_tables
 
@@ -482,3 +482,28 @@ def test_space_curve_is_recovered_from_chord_offsets(tmp_path):
 def test_a_recording_that_cannot_be_read_is_refused(tmp_path, text, keys, message):
     with pytest.raises(InputError, match=message):
         recorded(tmp_path, text, **keys)
+
+
+def test_equal_faults_of_a_recording_are_one_line_with_their_number(tmp_path):
+    rows = "".join(f"{s},x\n" for s in range(25))
+    with pytest.raises(InputError) as caught:
+        recorded(tmp_path, f"s,z\n{rows}40,0,0\n")
+    assert [str(fault).partition("rec.csv: ")[2] for fault in caught.value.faults] == [
+        "line 2: not a number, and 24 more like it up to line 26; numbers only",
+        "line 27: 3 values; 2 values as in the header",
+    ]
+
+
+def test_largest_value_between_the_rows_is_reported(tmp_path):
+    """Eight rows a wave: with one on the crest, and with the crest between two."""
+    s = np.arange(0.0, 60.0, 1.0)
+    met = recorded(tmp_path, written(s, 4e-3 * np.sin(2.0 * np.pi * s / 8.0)))
+    assert measured_remarks(met) == []
+    z = 4e-3 * np.sin(2.0 * np.pi * s / 8.0 + np.pi / 8.0)
+    found = largest_between_rows(recorded(tmp_path, written(s, z)).irregularities[0])
+    assert found.column == "z_left"
+    assert found.at_rows == pytest.approx(4e-3 * np.cos(np.pi / 8.0), rel=1e-6)
+    assert found.between == pytest.approx(4e-3, rel=0.01)
+    (remark,) = measured_remarks(recorded(tmp_path, written(s, z)))
+    assert "z_left reaches 4 mm" in remark
+    assert "the largest row is 3.7 mm" in remark

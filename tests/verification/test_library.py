@@ -4,16 +4,27 @@ Masses, wheel loads and undamped vertical modes (vertical springs alone, wheels 
 vehicles were computed outside railsim from the sources' numbers; a mistyped number shows.
 """
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.linalg import eigh
 
+import railsim
 from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_track, load_vehicle
-from railsim.definitions.sources import library_files
+from railsim.definitions.settings import Settings
+from railsim.definitions.sources import library_files, shipped_folder
+from railsim.model.assembly import assemble
 from railsim.model.element_arrays import vertical_support
+from railsim.model.equilibrium import equilibrium
+from railsim.studies.combine import combinations
+from railsim.track.alignment import Alignment
 
 GRAVITY = 9.81
+DOCS = Path(__file__).parents[2] / "docs"
 # mass t, Q0 kN, bounce, bogie bounce, pitch, frame pitch Hz
 FIGURES = {
     "coach_25t": (49.32, 60.48, 0.903, 7.44, 0.951, 7.98),
@@ -28,7 +39,15 @@ MASSES = {  # t, sums of the sources' tables
     "locomotive_coco_b": 124.0,
     "wagon_three_piece_25t": 90.0 + 2 * 0.596 + 4 * 0.46 + 4 * 1.145,
     "wagon_c62a_empty": 14.6 + 2 * 0.47 + 4 * 0.33 + 4 * 1.2,
+    "wagon_y25": 22.0,
+    "wagon_uic_link": 45.0,
+    "wagon_uic_link_empty": 12.0,
+    "metro_b_trailer": 22.0 + 2 * 2.56 + 4 * 1.42,
 }
+# km/h at which the sources say that a vehicle runs stably, or 110 % of its admissible speed
+STABLE = {"coach_25t": 176.0, "coach_zhai_high_speed": 250.0}
+# Friction holds them: linear analysis, in which it sticks, says little about their stability.
+FRICTION = ("wagon_",)
 
 
 def mass(flat):
@@ -87,6 +106,114 @@ def test_mass_is_the_sum_of_the_source(name):
     assert 1e-3 * mass(flatten(load_vehicle(name))) == pytest.approx(MASSES[name], abs=0.05)
 
 
+@pytest.mark.parametrize(
+    "name", [n for n in library_files("vehicle") if not n.startswith(FRICTION)]
+)
+def test_stable_at_110_per_cent_of_the_admissible_speed(name):
+    """S1002 on 60E1 1:40, friction 0.4, lateral amplitudes of 3 mm: every oscillation decays."""
+    vehicle = load_vehicle(name)
+    speed = STABLE.get(name, 1.1 * 3.6 * vehicle.service.admissible_speed) / 3.6
+    found = railsim.modes(vehicle, speed=speed, linearisation="harmonic", amplitude=3e-3)
+    for mode in found.record()["modes"]:
+        # rolling along the track and the wheels' spin are no oscillations
+        if mode["natural_frequency"] > 0.05 and not mode["name"].startswith("rolling"):
+            assert mode["damping_ratio"] > 0.0, mode["name"]
+
+
+# load cases ---------------------------------------------------------------------------------------
+
+
+def standing(name, **changes):
+    """Depth of the car body [m], static wheel loads [N], moment of all weights to the right."""
+    vehicle = load_vehicle(name)
+    vehicle = vehicle.replace(**changes) if changes else vehicle
+    track = load_track("straight").with_values({"support.preset": "rigid"})
+    model = assemble(vehicle, track, Settings())
+    balance = equilibrium(model, 10.0)
+    moved = balance.state[: 6 * len(model.index.bodies)].reshape(-1, 6)
+    places = {name: (moved[k, 1], moved[k, 2]) for k, name in enumerate(model.index.bodies)}
+    moment = sum(
+        body.mass * GRAVITY * (body.position[1] + places[body.name][0])
+        for body in flatten(vehicle).bodies
+        if body.name in places
+    )
+    return float(places[vehicle.reference][1]), balance.Q0, moment
+
+
+def test_y25_wagon_sinks_by_its_two_stage_springs_under_load():
+    tare, _, _ = standing("wagon_y25")
+    laden, Q0, _ = standing("wagon_y25", load="laden")
+    sprung = 1e3 * (22.0 - 4 * 1.4) * GRAVITY / 8.0, 1e3 * (90.0 - 4 * 1.4) * GRAVITY / 8.0
+    np.testing.assert_allclose(Q0, 90e3 * GRAVITY / 8.0, rtol=1e-4)
+    # outer springs 1.0 MN/m of free length 260 mm, inner ones 1.6 MN/m that are 26 mm shorter
+    compressed = [
+        force / 1e6 if force < 26e3 else 0.026 + (force - 26e3) / 2.6e6 for force in sprung
+    ]
+    # two pads of 50 MN/m and two side bearers of 0.55 MN/m on each bogie
+    pads = (80.2e3 - 12.2e3) * GRAVITY / 2.0 / 101.1e6
+    # Hertz: 27 and 110 kN of wheel load, some 0.05 mm
+    assert laden - tare == pytest.approx(compressed[1] - compressed[0] + pads, abs=0.15e-3)
+
+
+def test_uneven_load_gives_the_wheel_loads_of_its_moment():
+    _, Q0, moment = standing("wagon_y25", load="uneven")
+    # the contacts stand some millimetres beside 0.75 m
+    assert 0.75 * (Q0[:, 1] - Q0[:, 0]).sum() == pytest.approx(moment, rel=0.02)
+    # 75 mm to the right, and the body leans on the stops of its side bearers: 12 mm at 0.85 m
+    lever = moment / (80.2e3 * GRAVITY)
+    assert 0.075 + (1.90 - 0.85) * 0.012 / 0.85 < lever < 0.11
+
+
+def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
+    empty, _, _ = standing("wagon_c62a_empty")
+    laden, _, _ = standing("wagon_c62a")
+    change = (77.0e3 - 14.6e3) * GRAVITY
+    pads, bearers = 4 * 50e6, 2 * 0.3e6  # centre plate and side bearers of one bogie
+    k = [2 * (pads + bearers), 4 * 5.32e6, 8 * 100e6]  # body on bolsters, springs, adapters
+    # Hertz: 26 and 103 kN of wheel load, some 0.05 mm
+    expected = change * sum(1.0 / part for part in k)
+    assert laden - empty == pytest.approx(expected, abs=0.1e-3)
+
+
+def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
+    """2.4 MN/m in place of 0.37: bounce rises with the stiffness of both stages in series."""
+
+    def bounce(secondary):
+        primary = 2 * 0.991e6  # of one bogie side
+        return np.sqrt(4.0 / (1.0 / secondary + 1.0 / primary) / 38.6e3) / (2.0 * np.pi)
+
+    inflated, deflated = (flatten(load_vehicle(n)) for n in ("coach_25t", "coach_25t_deflated"))
+    ratio = mode(deflated, "carbody", 0) / mode(inflated, "carbody", 0)
+    # the frames' masses, of 11 % of the body's, count in the stiffer vehicle
+    assert ratio == pytest.approx(bounce(2.4e6) / bounce(0.37e6), rel=0.05)
+
+
+# runs ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "track", "until"),
+    # of all combinations (docs/validation/vehicles_and_tracks.md) those that ask most: three axles
+    # in the tightest curve, play and stops, friction at its limit, walls of the table, high speed
+    [
+        ("locomotive_coco_a", "depot_r150", 150.0),
+        ("wagon_y25", "turnout_190_1in9", 120.0),
+        ("wagon_uic_link", "crossover_300_1in9", 140.0),
+        ("wagon_three_piece_25t", "curve_r250", 420.0),
+        ("metro_b_motor", "s_curve_r150", 140.0),
+        ("coach_crh380a", "straight", 200.0),
+    ],
+)
+def test_vehicle_runs_its_track_at_the_permitted_speed(vehicle, track, until):
+    (case,) = combinations([vehicle], [track], ["permitted"], until=until)
+    result = railsim.simulate(case.vehicle, case.track, speed=case.speed, until=until)
+    assert result.status == "complete"
+    assert not any("beyond all experience" in remark for remark in result.remarks)
+
+
+# tracks -------------------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize("name", [n for n in library_files("track") if n.startswith("turnout")])
 def test_arc_of_a_turnout_turns_by_its_angle(name):
     track = load_track(name)
@@ -94,6 +221,56 @@ def test_arc_of_a_turnout_turns_by_its_angle(name):
     ratio = float(name.rsplit("1in", 1)[1])
     # arc lengths are given to the millimetre
     assert arc.length == pytest.approx(arc.radius * np.arctan(1.0 / ratio), abs=5e-4)
+
+
+def test_crossover_leads_to_the_other_track():
+    alignment = Alignment(load_track("crossover_300_1in9"))
+    length = load_track("crossover_300_1in9").length
+    across, _ = quad(lambda s: np.sin(float(alignment.heading(s))), 0.0, length, limit=200)
+    assert float(alignment.heading(length)) == pytest.approx(0.0, abs=1e-12)
+    assert across == pytest.approx(4.5, abs=2e-3)  # distance of the tracks; lengths in millimetres
+
+
+def test_twisted_track_has_the_twists_of_the_standard():
+    h = Alignment(load_track("twist")).cant
+    # 15/(2a*) + 2 = 2.857 per mille over 17.5 m, 7 per mille over 2.5 m, kinks rounded over 0.5 m
+    assert float(h(68.0) - h(49.5)) == pytest.approx(17.5 * (15.0 / 17.5 + 2.0) * 1e-3, rel=1e-6)
+    assert float(h(67.2) - h(65.3)) / 1.9 == pytest.approx(7e-3, rel=1e-3)
+
+
+# files and pages ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def pages():
+    spec = importlib.util.spec_from_file_location("vehicles", DOCS / "generate_vehicles.py")
+    module = importlib.util.module_from_spec(spec)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(DOCS))
+        spec.loader.exec_module(module)
+    return module
+
+
+def test_pages_of_the_library_are_up_to_date(pages):
+    mended_by = "python docs/generate_vehicles.py --data, or without --data where vehicles changed"
+    for name in pages.VEHICLES:
+        written = (pages.PAGES / f"{name}.md").read_text("utf-8")
+        assert written.startswith(pages.data(name)), mended_by
+    overview = pages.OVERVIEW.read_text("utf-8")
+    assert overview == pages.overview(overview), mended_by
+
+
+def test_a_letter_stands_beside_every_number_of_a_vehicle(pages):
+    # what follows from the other numbers of its table, or tells nothing of the vehicle
+    free = ("kind", "bodies", "sides", "axis", "wheelset", "category", "description", "reference",
+            "levelling", "format", "name", "source", "extends", "remove", "load")  # fmt: skip
+    silent = [
+        f"{name}: {line.table}.{line.key}"
+        for name in pages.VEHICLES
+        for line in pages.lines_of((shipped_folder("vehicle") / f"{name}.toml").read_text("utf-8"))
+        if line.key not in free and not pages.MARKS.search(line.comment)
+    ]
+    assert silent == []
 
 
 @pytest.mark.parametrize("name", library_files("vehicle"))

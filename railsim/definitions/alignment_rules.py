@@ -1,0 +1,128 @@
+"""Rules of a railway for its plan and cant at the permitted speed: remarks where they are broken.
+
+The rules are those of a French network for lines up to 230 km/h, as printed in its instructions,
+with V in km/h and cant d, deficiency I in mm over the cant base of 1.5 m:
+
+- cant at most 160 mm (180 mm on high-speed lines), and at most (R - 100)/2 with R in m;
+- cant deficiency at most 160 mm, cant excess at most 110 mm;
+- cant ramps of 180/V mm/m at most, exceptionally 216/V;
+- change of the deficiency of 75 mm/s at most, exceptionally 90;
+- transitions of d V/180, I V/270 and 60 m at least.
+
+A track without `speed` is not judged.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from railsim.definitions.base import Remark
+
+if TYPE_CHECKING:
+    from railsim.definitions.layout import Section
+
+GRAVITY, CANT_BASE = 9.81, 1.5
+HIGH_SPEED = 230.0  # km/h: the cant of high-speed lines from here on
+MOST_CANT, MOST_CANT_HIGH_SPEED = 160.0, 180.0  # mm
+MOST_DEFICIENCY, MOST_EXCESS = 160.0, 110.0  # mm
+RAMP, RAMP_EXCEPTIONAL = 180.0, 216.0  # mm/m times km/h
+CHANGE, CHANGE_EXCEPTIONAL = 75.0, 90.0  # mm/s
+SHORTEST = 60.0  # m
+ROUND_OFF = 1.0 + 1e-6
+
+
+def alignment_remarks(
+    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
+) -> list[Remark]:
+    """Return where a plan with its cant breaks the rules.
+
+    Parameters
+    ----------
+    plan, cant : sequences of Section
+        Curvature [1/m] and cant [m] over arc length.
+    speed : float
+        Permitted speed [m/s].
+    """
+    return [
+        *_cants(plan, cant, speed),
+        *_ramps(cant, speed),
+        *_deficiencies(plan, cant, speed),
+        *_transitions(plan, cant, speed),
+    ]
+
+
+def height(cant: Sequence["Section"], s: float) -> float:
+    """Cant at an arc length [m]; the last value continues."""
+    for section in cant:
+        if s <= section.end:
+            return section.value(s)
+    return cant[-1].end_value if cant else 0.0
+
+
+def deficiency(kappa: float, cant: float, speed: float) -> float:
+    """Cant deficiency, positive towards the outer rail of a right-hand curve [mm]."""
+    return 1e3 * (CANT_BASE * speed**2 * kappa / GRAVITY - cant)
+
+
+def _cants(plan: Sequence["Section"], cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
+    most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
+    for section in plan:
+        if section.type != "CIR":
+            continue
+        d = 1e3 * abs(height(cant, 0.5 * (section.begin + section.end)))
+        radius = 1.0 / abs(section.start_value)
+        if d > most * ROUND_OFF:
+            yield Remark(section.key, f"a cant of {d:.0f} mm is more than {most:g} mm")
+        small = 0.5 * (radius - 100.0)
+        if d > max(small, 0.0) * ROUND_OFF:
+            text = f"a cant of {d:.0f} mm is more than (R - 100 m)/2 = {max(small, 0.0):.0f} mm"
+            yield Remark(section.key, text)
+
+
+def _ramps(cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
+    for section in cant:
+        slope = 1e3 * abs(section.slope)
+        V = 3.6 * speed
+        if slope > RAMP / V * ROUND_OFF:
+            rule = f"180/V = {RAMP / V:.2f} mm/m at {V:.0f} km/h"
+            beyond = ", and more than 216/V" if slope > RAMP_EXCEPTIONAL / V * ROUND_OFF else ""
+            yield Remark(section.key, f"a ramp of {slope:.2f} mm/m is steeper than {rule}{beyond}")
+
+
+def _deficiencies(
+    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
+) -> Iterator[Remark]:
+    for section in plan:
+        if section.type != "CIR":
+            continue
+        kappa = section.start_value
+        h = height(cant, 0.5 * (section.begin + section.end))
+        outwards = deficiency(kappa, h, speed) * (1.0 if kappa > 0.0 else -1.0)
+        at = f"at {3.6 * speed:.0f} km/h"
+        if outwards > MOST_DEFICIENCY * ROUND_OFF:
+            text = f"a cant deficiency of {outwards:.0f} mm {at} is more than {MOST_DEFICIENCY:g}"
+            yield Remark(section.key, f"{text} mm")
+        if -outwards > MOST_EXCESS * ROUND_OFF:
+            text = f"a cant excess of {-outwards:.0f} mm {at} is more than {MOST_EXCESS:g} mm"
+            yield Remark(section.key, text)
+
+
+def _transitions(
+    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
+) -> Iterator[Remark]:
+    for section in plan:
+        if section.type != "CLO":
+            continue
+        heights = [height(cant, s) for s in (section.begin, section.end)]
+        values = (section.start_value, section.end_value)
+        ends = [deficiency(k, h, speed) for k, h in zip(values, heights, strict=True)]
+        change = abs(ends[1] - ends[0]) / section.length * speed
+        if change > CHANGE * ROUND_OFF:
+            beyond = ", and than 90" if change > CHANGE_EXCEPTIONAL * ROUND_OFF else ""
+            text = f"the cant deficiency changes by {change:.0f} mm/s, more than {CHANGE:g}{beyond}"
+            yield Remark(section.key, text)
+        V = 3.6 * speed
+        d = 1e3 * abs(heights[1] - heights[0])
+        needed = max(d * V / 180.0, abs(ends[1] - ends[0]) * V / 270.0, SHORTEST)
+        if section.length * ROUND_OFF < needed:
+            text = f"a transition of {section.length:g} m is shorter than {needed:.0f} m"
+            yield Remark(section.key, f"{text}, the largest of d V/180, I V/270 and 60 m")
