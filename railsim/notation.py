@@ -343,6 +343,16 @@ REQUESTED: dict[str, Quantity] = _table(
         1e-3,
         "taken from the bodies",
     ),
+    Quantity(
+        "frictional_power",
+        "frictional power of the wheel",
+        "P_f",
+        "W",
+        _WHEEL,
+        "kW",
+        1e-3,
+        "turned into heat in the contact, spin included, summed over the patches",
+    ),
     Quantity("patch_N", "normal force of the patch", "N", "N", _PATCH, "kN", 1e-3),
     Quantity(
         "patch_pressure",

@@ -7,29 +7,13 @@ predicted: the sum of the parts is a lower bound of what they take in the time l
 
 from railsim.kernels import jit
 from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up, stretched_roll
+from railsim.kernels.creepages import creepages
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
+from railsim.kernels.patches import side_by_side
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
-from railsim.kernels.wheel_rail import (
-    BEYOND,
-    C11,
-    C22,
-    C23,
-    C33,
-    M_Z,
-    MU_N,
-    PHI,
-    T_X,
-    T_Y,
-    XI_X,
-    XI_Y,
-    A,
-    B,
-    add_creep_forces,
-    creepages,
-    normal_contact,
-    wheel_rail,
-)
+from railsim.kernels.wheel_contact import normal_contact
+from railsim.kernels.wheel_rail import add_creep_forces, wheel_rail
 
 
 @jit
@@ -119,43 +103,15 @@ def many_creepages(system, work, state, patches, n):
     patch = work.patch
     for _ in range(n):
         creepages(system, work, patches, state[-1], state)
-        kalker_lookup(
-            patches,
-            patch[A],
-            patch[B],
-            system.contact.creep,
-            patch[C11],
-            patch[C22],
-            patch[C23],
-            patch[C33],
-            patch[BEYOND],
-        )
+        kalker_lookup(patches, side_by_side(patch), system.contact.kalker)
 
 
 @jit
 def many_fastsims(system, work, state, patches, n):
     """FASTSIM of all patches."""
-    patch = work.patch
+    law, arrays = system.contact.law, side_by_side(work.patch)
     for _ in range(n):
-        fastsim(
-            patches,
-            system.contact.n_x,
-            system.contact.n_y,
-            patch[A],
-            patch[B],
-            patch[MU_N],
-            patch[C11],
-            patch[C22],
-            patch[C23],
-            system.contact.shear_modulus,
-            patch[XI_X],
-            patch[XI_Y],
-            patch[PHI],
-            work.fastsim,
-            patch[T_X],
-            patch[T_Y],
-            patch[M_Z],
-        )
+        fastsim(patches, law.n_x, law.n_y, arrays, law.G, work.creep.strips)
 
 
 @jit
@@ -204,25 +160,7 @@ def many_look_ups(system, work, state, derivative, n):
 
 
 @jit
-def many_fastsim_patches(patches, n_x, n_y, inputs, shear_modulus, work, out, n):
-    """FASTSIM of `patches` equal patches; rows of inputs: a, b, mu_N, c11, c22, c23, xi, phi."""
+def many_fastsim_patches(patches, n_x, n_y, arrays, shear_modulus, work, n):
+    """FASTSIM of the first `patches` of some arrays of patches."""
     for _ in range(n):
-        fastsim(
-            patches,
-            n_x,
-            n_y,
-            inputs[0],
-            inputs[1],
-            inputs[2],
-            inputs[3],
-            inputs[4],
-            inputs[5],
-            shear_modulus,
-            inputs[6],
-            inputs[7],
-            inputs[8],
-            work,
-            out[0],
-            out[1],
-            out[2],
-        )
+        fastsim(patches, n_x, n_y, arrays, shear_modulus, work)

@@ -229,15 +229,7 @@ def _support(track: "Track") -> str:
 
 def _irregularity_lines(track: "Track") -> list[str]:
     """Say what displaces the rails, in one line; nothing where they are smooth."""
-    words = []
-    for part in track.irregularities:
-        if part.type == "random":
-            low, high = part.wavelengths
-            words.append(f"{part.spectrum}, seed {part.seed}, {low:g} to {high:g} m")
-        elif part.type == "measured":
-            words.append(f"measured, {len(part.rows or ())} places")
-        else:
-            words.append(f"{part.type} at {part.s:g} m")
+    words = [part.summary() for part in track.irregularities]
     if len(words) > 3:
         words[2:] = [f"{len(words) - 2} more"]
     return [f"  rails     {'; '.join(words)}"] if words else []
@@ -257,11 +249,11 @@ def _friction(track: "Track") -> str:
 
 
 def _creep_law(settings: "Settings") -> str:
-    names = {"fastsim": "FASTSIM", "fastrip": "FaStrip"}
-    if settings.creep_law not in names:
-        return f"creep law {settings.creep_law}"
+    from railsim.definitions.creep_law import CREEP_LAWS
+
+    law = CREEP_LAWS[settings.creep_law]
     nx, ny = settings.fastsim_grid
-    return f"{names[settings.creep_law]} {nx} x {ny}"
+    return f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
 
 
 def _listed(names: "Any") -> str:

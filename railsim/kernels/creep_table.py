@@ -104,35 +104,33 @@ _sum_of_rows = _sum_of_rows_plain if numba.config.DISABLE_JIT else sum_of_rows
 
 
 @jit
-def table_forces(
-    n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work, T_x, T_y, M_z, outside
-):  # fmt: skip
+def table_forces(n, patches, G, table, scale, scratch):
     """Tangential forces on the rail of n elliptic contact patches by the tabulated full theory.
 
     Parameters
     ----------
     n : int
         Number of patches.
-    a, b, mu_N, G, xi_x, xi_y, phi
-        As in `railsim.kernels.fastsim.fastsim`.
+    patches : Patches
+        Read: semi-axes, mu N, creepages; written: T_x, T_y, M_z, outside: 1 for a loaded patch
+        whose ratio a/b is outside the table; it got the values of the table's end.
+    G : float
+        Shear modulus [Pa].
     table : ndarray of float32, one dimension
         `railsim.contact.creep_table.CreepTable.coefficients`, flattened.
     scale : ndarray, shape (N_RATIO + 3, 4)
         `railsim.contact.creep_table.CreepTable.scale`.
-    offsets : ndarray of int64, shape (16,)
-        Scratch.
-    work : ndarray, shape (>= 5, >= 128), C-contiguous
-        Scratch: that of `railsim.kernels.fastsim.fastsim_workspace` will do.
-    T_x, T_y, M_z : ndarray, shape (>= n,), written
-        Force on the rail and moment about the normal [N, N, N m].
-    outside : ndarray, shape (>= n,), written
-        1 for a loaded patch whose ratio a/b is outside the table, else 0; it got the values of the
-        table's end.
+    scratch : CreepScratch
+        Any, its strips of shape (>= 5, >= 128).
 
     Notes
     -----
     Source: Kalker's full theory by our own solver; docs/validation/creep.md has the errors.
     """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    xi_x, xi_y, phi, outside = patches.xi_x, patches.xi_y, patches.phi, patches.outside
+    T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
+    work, offsets = scratch.strips, scratch.offsets
     width = work.shape[1]
     for first in range(0, n, _BLOCK):
         count = min(_BLOCK, n - first)

@@ -8,8 +8,8 @@ smallest one; columns the quantities of each wheelset.
 import numpy as np
 
 from railsim.kernels import jit_inline
+from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.support import HALF_BASE, SUPPORT_SIZE, support_begin
-from railsim.kernels.wheel_rail import W_Q, W_T_GAMMA, W_Y
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
 (

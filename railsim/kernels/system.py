@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels.internal import Internal
+from railsim.kernels.patches import CreepLaw, CreepScratch
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
@@ -125,13 +126,10 @@ class Contact(NamedTuple):
     shear : float64[t]           lever of roll in the tables' lateral coordinate [m]
     coupling : float64[t, 2]     compliance between neighbouring patches [m/N]
     y0, dy, roll0, droll, dw : float   grid of the tables [m, rad, rad2]
-    creep : float64[k, 4]        Kalker's c11 c22 c23 c33 over log(a/b)
-    shear_modulus, damping : float   [Pa], [N s/m]
-    n_x, n_y : int               cells of FASTSIM along and across
-    law : int                    creep law, see `creep.LAW_NUMBERS`
-    reduction, slip_reduction : float   third-body factors of Kalker's coefficients
+    damping : float              normal to the patch [N s/m]
+    kalker : float64[k, 4]       c11 c22 c23 c33 over (a - b)/(a + b)
+    law : CreepLaw               creep law with its material, its grid and its data
     friction_rest, friction_decay : float   friction falling with slip [1], [s/m]
-    law_table : float32[], law_scale : float64[k, 4]   table of the full theory; else empty
     """
 
     body: np.ndarray
@@ -145,18 +143,11 @@ class Contact(NamedTuple):
     roll0: float
     droll: float
     dw: float
-    creep: np.ndarray
-    shear_modulus: float
     damping: float
-    n_x: int
-    n_y: int
-    law: int
-    reduction: float
-    slip_reduction: float
+    kalker: np.ndarray
+    law: CreepLaw
     friction_rest: float
     friction_decay: float
-    law_table: np.ndarray
-    law_scale: np.ndarray
 
 
 class Links(NamedTuple):
@@ -364,7 +355,7 @@ class Work(NamedTuple):
     look_up, weights, stiffness, approach : of the wheel at hand, see `contact_table`
     patch_index : int64[p, 3]   wheelset, side and patch of each active contact patch
     patch : float64[PATCH_ROWS, p]  see `wheel_rail`
-    fastsim : float64[WORK_ROWS, ...];  offsets : int64[16]   scratch of the creep laws
+    creep : CreepScratch        of the creep laws
     wheel : float64[w, 2, WHEEL_COLUMNS]  see `wheel_rail`
     support : float64[w, 2, SUPPORT_COLUMNS];  support_step : float64[w, SUPPORT_STEP]
                                 of each wheelset's track, see `support`; w = 0 on rigid rails
@@ -406,8 +397,7 @@ class Work(NamedTuple):
     approach: np.ndarray
     patch_index: np.ndarray
     patch: np.ndarray
-    fastsim: np.ndarray
-    offsets: np.ndarray
+    creep: CreepScratch
     support: np.ndarray
     support_step: np.ndarray
     compliance: np.ndarray

@@ -13,10 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
+from railsim.kernels.contact_columns import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
+from railsim.kernels.driving import table_value_slope
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.internal import MAXWELL_CURVE, PAD, advanced, constant_decays, within_table
-from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
+from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import (
     note_wheelsets,
@@ -41,7 +43,6 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import OMEGA_S
 from railsim.kernels.vibration import high_pass, watch
-from railsim.kernels.wheel_rail import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
 
 FAST, RK4 = range(2)
 # Weight of the last acceleration in the smoothed one, by which speeds are extrapolated: high enough
@@ -73,6 +74,25 @@ class Recorder(NamedTuple):
     patch: np.ndarray
     chosen: np.ndarray
     element: np.ndarray
+
+
+class Chunk(NamedTuple):
+    """Which steps one call of the time loop takes.
+
+    Attributes
+    ----------
+    first : int     number of steps already taken
+    steps : int     how many to take
+    every : int     states are recorded where the count is a multiple of it, before the step
+    fresh : int     1 where nothing was before the state: the scheme's memory begins here
+    closing : int   1 to evaluate and record the state after the last step as well
+    """
+
+    first: int
+    steps: int
+    every: int
+    fresh: int = 0
+    closing: int = 0
 
 
 @jit_internal
@@ -385,22 +405,8 @@ def all_finite(state):
 
 
 @jit
-def time_loop(
-    system,
-    work,
-    state,
-    derivative,
-    stages,
-    recorder,
-    scheme,
-    h,
-    first_step,
-    n_steps,
-    every,
-    fresh,
-    closing,
-):
-    """Advance by `n_steps` steps of length `h` [s], recording every `every`-th state.
+def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chunk):
+    """Advance by some steps of length `h` [s], recording states on the way.
 
     Parameters
     ----------
@@ -408,13 +414,10 @@ def time_loop(
         Changed in place.
     derivative : float64[n_state];  stages : float64[3, n_state]
         Work arrays.
-    first_step : int
-        Number of steps already taken; states are recorded where the count is a multiple of
-        `every`, before the step.
-    fresh : int
-        1 where nothing was before `state`: the memory of the fast scheme begins here.
-    closing : int
-        1 to evaluate and record the state after the last step as well.
+    scheme : int
+        FAST or RK4.
+    chunk : Chunk
+        Which steps, and what is recorded.
 
     Returns
     -------
@@ -430,10 +433,11 @@ def time_loop(
         step_compliance(system.support, h, work.compliance)
     b0, a1, a2, fading = high_pass(h)
     rows = np.int64(0)
-    step, end = first_step, first_step + n_steps
+    first_step, every = chunk.first, chunk.every
+    step, end = first_step, first_step + chunk.steps
     left = np.int64(0)  # parts of a divided step that are still to be taken
     decay, length = work.decay, h
-    while step < end + closing:
+    while step < end + chunk.closing:
         if scheme == RK4:
             status, where, patches = balanced_mechanics(system, work, state, derivative)
         else:
@@ -448,9 +452,9 @@ def time_loop(
                     record(recorder, rows, system, state, derivative, work, patches)
                     rows += 1
                 if step == end:
-                    return RUNNING, 0, n_steps, rows
+                    return RUNNING, 0, chunk.steps, rows
                 watch(work.wheel, work.vibration, b0, a1, a2, fading, h, state[-2])
-                if scheme == FAST and fresh and step == first_step:
+                if scheme == FAST and chunk.fresh and step == first_step:
                     remember(system, work, state, derivative, h)
                 decay, length = work.decay, h
                 w = striking(system.contact, work.swing, h, work.watch[1]) if parts > 0 else -1
@@ -479,4 +483,4 @@ def time_loop(
             return status, where, step - first_step, rows
         if left == 0:
             step += 1
-    return RUNNING, 0, n_steps, rows
+    return RUNNING, 0, chunk.steps, rows

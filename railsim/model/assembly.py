@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.contact.coupling import coupling
-from railsim.contact.creep_table import NO_TABLE, creep_table
+from railsim.contact.creep import creep_law, creep_scratch
 from railsim.contact.kalker import creep_tables
 from railsim.contact.table import ContactTable, cached_contact_table
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
@@ -24,11 +24,11 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
+from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
-from railsim.kernels.creep import LAW_NUMBERS
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
-from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.lanes import LANES
+from railsim.kernels.patches import CreepLaw
 from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_ROW, SUPPORT_SIZE, SUPPORT_STEP
 from railsim.kernels.system import (
@@ -52,7 +52,6 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.vibration import VIBRATION
-from railsim.kernels.wheel_rail import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.model.element_arrays import ElementArrays
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
@@ -260,8 +259,7 @@ def work_arrays(system: System) -> Work:
         approach=aligned_zeros(N_PATCH),
         patch_index=aligned_zeros((n_patches, 3), np.int64),
         patch=aligned_zeros((PATCH_ROWS, n_patches)),
-        fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
-        offsets=aligned_zeros(16, np.int64),
+        creep=creep_scratch(n_patches, system.contact.law),
         support=aligned_zeros((n_tracks, 2, SUPPORT_COLUMNS)),
         support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
         compliance=aligned_zeros(2),
@@ -504,7 +502,6 @@ def _contact(
     first = tables[0]
     y0, values = on_common_grid(tables)
     falling = track.friction_falling
-    law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
     names = _names(flat.bodies)
     weight = GRAVITY * sum(body.mass for body in flat.bodies)
     contact = Contact(
@@ -521,17 +518,33 @@ def _contact(
         roll0=first.roll0,
         droll=first.droll,
         dw=first.dw,
-        creep=creep_tables(settings.poisson),
-        shear_modulus=settings.shear_modulus,
         damping=settings.contact_damping,
-        n_x=settings.fastsim_grid[0],
-        n_y=settings.fastsim_grid[1],
-        law=LAW_NUMBERS[settings.creep_law],
-        reduction=track.third_body[0],
-        slip_reduction=track.third_body[1],
+        kalker=creep_tables(settings.poisson),
+        law=_creep_law(settings, track),
         friction_rest=falling.rest if falling else 1.0,
         friction_decay=falling.decay if falling else 0.0,
-        law_table=law_table.coefficients,
-        law_scale=law_table.scale,
     )
     return contact, tuple(tables)
+
+
+def _creep_law(settings: Settings, track: Track) -> CreepLaw:
+    """Creep law of the settings with the third body of the track."""
+    if settings.adhesion_curve is not None and track.third_body != (1.0, 1.0):
+        raise InputError(
+            [
+                Fault(
+                    "track",
+                    "third_body",
+                    f"found {list(track.third_body)} together with settings.adhesion_curve",
+                    "[1.0, 1.0]: a measured curve holds the third body",
+                )
+            ]
+        )
+    return creep_law(
+        settings.creep_law,
+        settings.fastsim_grid,
+        settings.shear_modulus,
+        settings.poisson,
+        track.third_body,
+        settings.adhesion_curve,
+    )

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
+from railsim.kernels.contact_columns import NORMAL, W_Q
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.element_outputs import DEFLECTION, LINK, MOUNT
 from railsim.kernels.internal import AIR
@@ -28,9 +29,8 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import AXLEBOX, FIXED, N_SCALARS, RIGID, WHEELSET, Links, Mounts, System
-from railsim.kernels.time_loop import FAST, time_loop
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
-from railsim.kernels.wheel_rail import NORMAL, W_Q
 from railsim.model.assembly import Model, components_of, level_track, work_arrays
 from railsim.model.element_arrays import vertical_support
 from railsim.model.time_step import empty_recorder
@@ -526,11 +526,7 @@ class _Balance:
                 recorder,
                 FAST,
                 1.0,
-                0,
-                0,
-                1,
-                0,
-                1,
+                Chunk(0, 0, 1, closing=1),
             )
             if status != RUNNING:
                 return []

@@ -21,7 +21,7 @@ from railsim.definitions.settings import Settings
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import VIBRATION
 from railsim.model.assembly import Model, no_extremes, work_arrays
 from railsim.model.equilibrium import Equilibrium
@@ -301,11 +301,7 @@ class _Convoy:
                 self._ensemble.recorder,
                 self._scheme,
                 step,
-                at,
-                min(most, end - at),
-                every,
-                int(self._fresh),
-                closing,
+                Chunk(at, min(most, end - at), every, fresh=int(self._fresh), closing=closing),
             )
             at, rows = at + steps, rows + new
             self._fresh = self._fresh and steps == 0

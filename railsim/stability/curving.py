@@ -21,11 +21,11 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
 from railsim.errors import Fault, InputError, ModelError
+from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.kernels.wheel_rail import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
@@ -377,11 +377,7 @@ class _Search:
                 recorder,
                 FAST,
                 step,
-                1,
-                round(1.0 / step),
-                1 << 40,
-                int(second == 0),
-                0,
+                Chunk(1, round(1.0 / step), 1 << 40, fresh=int(second == 0)),
             )
             if status != RUNNING:
                 return self._values(solver, state, FAILED)

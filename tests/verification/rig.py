@@ -13,7 +13,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
-from railsim.kernels.time_loop import FAST, RK4, time_loop
+from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import assemble, level_track, work_arrays
 from railsim.model.time_step import empty_recorder
 
@@ -214,11 +214,7 @@ def step_by_step(model, state, h, n_steps, scheme="rk4"):
             recorder,
             RK4 if scheme == "rk4" else FAST,
             h,
-            1,
-            1,
-            1 << 40,
-            int(step == 0),
-            0,
+            Chunk(1, 1, 1 << 40, fresh=int(step == 0)),
         )
         assert status == 0
         yield state

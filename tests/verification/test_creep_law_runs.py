@@ -11,7 +11,7 @@ from rig import DATA, test_vehicle
 from railsim import cli
 from railsim.contact.creep import LAWS, creep_force
 from railsim.definitions.mirror import mirrored_track
-from railsim.kernels import wheel_rail as columns
+from railsim.kernels import contact_columns as columns
 from railsim.kernels.contact_table import A1, B1, D_B1
 from railsim.result import open_result
 from railsim.simulation import prepare, simulate

@@ -10,7 +10,7 @@ from rig import test_vehicle
 from railsim.contact import table
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillations
 from railsim.linear.modes import modes, root_locus
 from railsim.linear.system import Linearisation
@@ -180,11 +180,7 @@ def run_from(prepared, mode, speed, scheme):
             empty_recorder(model, 1),
             SCHEMES[scheme],
             h,
-            min(k, 1),
-            steps,
-            1 << 40,
-            int(k == 0),
-            0,
+            Chunk(min(k, 1), steps, 1 << 40, fresh=int(k == 0)),
         )
         assert status == 0
         time.append((k + 1) * steps * h)

@@ -7,8 +7,8 @@ from rig import test_vehicle
 
 import railsim
 from railsim.definitions.settings import Settings
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.wheel_rail import W_Q, W_Y
 from railsim.linear.steady import NotConverged
 from railsim.model.assembly import assemble, work_arrays
 from railsim.model.equilibrium import equilibrium

@@ -1,0 +1,124 @@
+"""How the speed of travel acts on the bodies: traction, the held reference body, fixed bodies."""
+
+from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels.rotation import sine_cosine
+from railsim.kernels.system import AXLEBOX, FORCE, FREE, TABLE, Y_0, Z_0
+from railsim.kernels.track_frame import OMEGA, OMEGA_S
+
+
+@jit
+def table_value_slope(table, x):
+    """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
+    last = table.shape[0] - 1
+    if x < table[0, 0] or last == 0:
+        return table[0, 1], 0.0
+    if x >= table[last, 0]:
+        return table[last, 1], 0.0
+    i = 0
+    while x >= table[i + 1, 0]:
+        i += 1
+    slope = (table[i + 1, 1] - table[i, 1]) / (table[i + 1, 0] - table[i, 0])
+    return table[i, 1] + slope * (x - table[i, 0]), slope
+
+
+@jit_merged
+def add_traction(drive, bodies, frames, speed, pose):
+    """Traction less running resistance of a free-running vehicle, on the reference body."""
+    force, _ = table_value_slope(drive.table, speed)
+    force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
+    b = bodies.references[0]
+    f = bodies.frame[b]
+    for k in range(3):
+        pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
+
+
+@jit_merged
+def speed_change(drive, bodies, frames, state, derivative):
+    """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
+    if drive.mode == TABLE:
+        # V(s) gives V' = V dV/ds
+        _, slope = table_value_slope(drive.table, state[-2])
+        return state[-1] * slope
+    if drive.mode == FREE:
+        b = bodies.references[0]
+        f = bodies.frame[b]
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
+        return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
+            1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y
+        )
+    return 0.0
+
+
+@jit_merged
+def apply_speed_change(bodies, frames, state, rate, derivative):
+    """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
+    n = bodies.kind.shape[0]
+    for b in range(n):
+        if bodies.kind[b] == AXLEBOX:
+            continue
+        f = bodies.frame[b]
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        x = state[6 * b]
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
+        v = 6 * n + 6 * b
+        derivative[v] -= rate * (1.0 + w2 * z - w3 * y)
+        derivative[v + 1] -= rate * (w3 * x - w1 * z)
+        derivative[v + 2] -= rate * (w1 * y - w2 * x)
+
+
+@jit_merged
+def hold_reference(bodies, relative, acceleration, derivative):
+    """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
+    n = bodies.kind.shape[0]
+    for k in range(bodies.references.shape[0]):
+        b = bodies.references[k]
+        held = 6 * n + 6 * b
+        for i in range(3):
+            acceleration[b, i] -= derivative[held] * relative[b, i]
+        derivative[6 * b] = 0.0
+        derivative[held] = 0.0
+
+
+@jit_inline
+def turn_fixed(bodies, frames, speed, state):
+    """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
+    n = bodies.kind.shape[0]
+    for k in range(bodies.fixed.shape[0]):
+        b = bodies.fixed[k]
+        f = bodies.frame[b]
+        sr, cr = sine_cosine(state[6 * b + 3])
+        sp, cp = sine_cosine(state[6 * b + 4])
+        sy, cy = sine_cosine(state[6 * b + 5])
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        # C^T = Ry(-pitch) Rx(-roll) Rz(-yaw)
+        w1, w2 = cy * w1 + sy * w2, cy * w2 - sy * w1
+        w2, w3 = cr * w2 + sr * w3, cr * w3 - sr * w2
+        w1, w3 = cp * w1 - sp * w3, cp * w3 + sp * w1
+        v = 6 * n + 6 * b
+        state[v], state[v + 1], state[v + 2] = 0.0, 0.0, 0.0
+        state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
+
+
+@jit_inline
+def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
+    """Keep fixed bodies where they are; what holds them is part of their accelerations.
+
+    u' = C^T (V^2 omega_s + V' omega), `rate` being V'.
+    """
+    n = bodies.kind.shape[0]
+    for k in range(bodies.fixed.shape[0]):
+        b = bodies.fixed[k]
+        f, v = bodies.frame[b], 6 * n + 6 * b
+        for i in range(3):
+            turn = 0.0
+            for j in range(3):
+                acceleration[b, i] -= derivative[v + j] * C[b, 3 * j + i]
+                turn += C[b, 3 * j + i] * (
+                    speed * speed * frames[f, OMEGA_S + j] + rate * frames[f, OMEGA + j]
+                )
+            acceleration[b, 3 + i] = turn
+        for i in range(6):
+            derivative[6 * b + i] = 0.0
+            derivative[v + i] = 0.0
