@@ -21,8 +21,8 @@ from railsim.kernels import fastsim_simd
 from railsim.kernels.creep import creep_forces
 from railsim.kernels.patches import Patches
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 
 GRIDS = (5, 10, 20, 50)

@@ -17,8 +17,8 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.time_loop import RK4, Chunk, time_loop
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 from railsim.simulation.advance import Preparation
 from railsim.simulation.outputs import quantities

@@ -13,8 +13,8 @@ from railsim.definitions.settings import Settings
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.patches import Patches
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 from railsim.simulation.advance import Preparation
 

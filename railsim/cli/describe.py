@@ -191,7 +191,7 @@ def static_lines(static: dict[str, Any]) -> list[str]:
 
 def mechanism_lines(mechanism: "Mechanism") -> list[str]:
     """Return a mechanism file in a screenful: parts, driver, parameters with their provenance."""
-    from railsim.definitions.mechanism_faults import parameter_values
+    from railsim.definitions.mechanism_values import parameter_values
 
     values = parameter_values(mechanism)
     driver = mechanism.driver

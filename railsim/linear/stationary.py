@@ -18,8 +18,9 @@ from railsim.kernels.system import FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.steady import SteadyRolling, led
-from railsim.model.assembly import Model, level_track
+from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
+from railsim.model.work import level_track
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 

@@ -26,7 +26,8 @@ from railsim.kernels.support import RATE, REFERENCE_MASS
 from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.coordinates import track_places
-from railsim.model.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
+from railsim.model.assembly import Model
+from railsim.model.work import CONSTANT_SPEED, components_of, work_arrays
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]

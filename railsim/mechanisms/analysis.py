@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.expressions import Expression
-from railsim.definitions.mechanism import AUTO, AirSpring, Cylinder, GasSpring, Mechanism
-from railsim.definitions.mechanism_faults import ends
+from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism_parts import AUTO, AirSpring, Cylinder, GasSpring
+from railsim.definitions.mechanism_values import ends
 from railsim.errors import Fault, InputError, nearest
 from railsim.mechanisms.cams import Transition, cam_rows, transitions
 from railsim.mechanisms.dynamics import FreeMotion, TimedMotion, driven_motion, free_motion

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import Cam
+from railsim.definitions.mechanism_parts import Cam
 from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel

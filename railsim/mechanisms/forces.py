@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import (
-    Actuator,
+from railsim.definitions.mechanism import Actuator
+from railsim.definitions.mechanism_parts import (
     AirSpring,
     Cylinder,
     Damper,
@@ -30,7 +30,7 @@ from railsim.definitions.mechanism import (
     Stop,
     Torque,
 )
-from railsim.definitions.mechanism_faults import ends
+from railsim.definitions.mechanism_values import ends
 from railsim.errors import Fault, InputError
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.components import AirSpringTable, cylinder_area, gas_spring_force

@@ -20,7 +20,8 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import N_SCALARS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, Recorder, time_loop
-from railsim.model.assembly import Model, work_arrays
+from railsim.model.assembly import Model
+from railsim.model.work import work_arrays
 
 Floats = NDArray[np.float64]
 Situation = tuple[System, Floats]

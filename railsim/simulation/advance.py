@@ -23,9 +23,10 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import VIBRATION
-from railsim.model.assembly import Model, no_extremes, work_arrays
+from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
+from railsim.model.work import no_extremes, work_arrays
 from railsim.result import Sink
 from railsim.simulation.ensemble import Ensemble, contact_grid
 from railsim.simulation.outputs import OutputPlan

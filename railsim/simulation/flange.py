@@ -14,7 +14,8 @@ from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.model.assembly import CONSTANT_SPEED, Model
+from railsim.model.assembly import Model
+from railsim.model.work import CONSTANT_SPEED
 from railsim.simulation.settling import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables

@@ -41,8 +41,9 @@ from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.steady import NotConverged, led
-from railsim.model.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium, initial_state
+from railsim.model.work import CONSTANT_SPEED, work_arrays
 from railsim.simulation.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables

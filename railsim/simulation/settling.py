@@ -11,8 +11,9 @@ from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.model.assembly import Model, work_arrays
+from railsim.model.assembly import Model
 from railsim.model.time_step import divide_strikes, empty_recorder
+from railsim.model.work import work_arrays
 
 Floats = NDArray[np.float64]
 # called with the time that has been simulated, and all of it [s]; it may raise, as on Ctrl-C

@@ -20,7 +20,8 @@ import tomli_w
 
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
 from railsim.errors import Fault, InputError
-from railsim.springs.verification import Case, load_cases
+from railsim.springs.verification import load_cases
+from railsim.springs.verification_checks import Case
 
 _DIGITS = 7
 _INNERMOST_ARRAY = re.compile(r"\[\n([^\[\]]+)\]")

@@ -31,9 +31,10 @@ from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
-from railsim.model.assembly import GRAVITY, Model, assemble, check_fixed, work_arrays
+from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
+from railsim.model.work import GRAVITY, work_arrays
 from railsim.profiles import Profile
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables

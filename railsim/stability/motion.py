@@ -18,8 +18,8 @@ from railsim.kernels.system import TABLE, Drive
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import PLACE
 from railsim.linear.vehicle import LinearVehicle
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
+from railsim.model.work import work_arrays
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import PLACE
-from railsim.model.assembly import CONSTANT_SPEED, work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import CONSTANT_SPEED, work_arrays
 from railsim.stability.motion import VehicleMotion
 
 Floats = NDArray[np.float64]

@@ -19,9 +19,10 @@ from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import AXLEBOX, N_SCALARS, WHEELSET
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.track_frame import FRAME_SIZE
-from railsim.model.assembly import assemble, work_arrays
+from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import SCHEMES, empty_recorder
+from railsim.model.work import work_arrays
 
 NEVER = 1 << 40
 

@@ -14,8 +14,9 @@ from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
-from railsim.model.assembly import assemble, level_track, work_arrays
+from railsim.model.assembly import assemble
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import level_track, work_arrays
 
 DATA = Path(__file__).parent.parent / "data" / "vehicles"
 

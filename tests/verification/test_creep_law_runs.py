@@ -14,8 +14,7 @@ from railsim.definitions.mirror import mirrored_track
 from railsim.kernels import contact_columns as columns
 from railsim.kernels.contact_table import A1, B1, D_B1
 from railsim.result import open_result
-from railsim.simulation import prepare, simulate
-from railsim.simulation import preparation
+from railsim.simulation import preparation, prepare, simulate
 
 SPEED = 20.0
 MIDDLE = 390.0  # m, of the circular curve

@@ -15,8 +15,8 @@ from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillation
 from railsim.linear.modes import modes, root_locus
 from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
-from railsim.model.assembly import CONSTANT_SPEED, level_track_with_friction, work_arrays
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
+from railsim.model.work import CONSTANT_SPEED, level_track_with_friction, work_arrays
 from railsim.profiles import Profile
 from railsim.profiles.builtin import arc_chain_rail
 

@@ -10,8 +10,8 @@ from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
 from railsim.linear.steady import NotConverged, led
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation.run_in import settled
 from railsim.track.tables import track_tables
 

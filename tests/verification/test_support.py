@@ -11,8 +11,8 @@ from railsim.kernels.contact_table import K2, K
 from railsim.kernels.support import RATE, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import SCHEMES, empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import simulate
 from railsim.simulation.outputs import rail_deflection
 
