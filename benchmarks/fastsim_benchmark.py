@@ -14,22 +14,22 @@ from numpy_fastsim import numpy_patches, plain_python
 from railsim.bench.loops import many_fastsim_patches
 from railsim.bench.machine import hardware, vector_instructions, versions
 from railsim.bench.parts import PATCHES, least_time, patch_inputs
+from railsim.kernels import compiled
 from railsim.kernels import fastsim as module
-from railsim.kernels import jit
 from railsim.kernels.fastsim import fastsim_workspace
 
 G = 82e9
 CELLS = 10
 
 
-@jit
+@compiled
 def many_marches_plain(work, columns, nx, bounds, n):
     """The march as the compiler vectorises it."""
     for _ in range(n):
         module._march_plain(work, columns, nx, bounds)
 
 
-@jit
+@compiled
 def many_marches(work, columns, nx, bounds, n):
     """The march that this machine uses."""
     for _ in range(n):

@@ -7,7 +7,7 @@ range of validity.
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 
@@ -18,24 +18,56 @@ class Fault:
     Attributes
     ----------
     file : str
-        File (or command line option) that holds the fault.
+        File or parameter of a function that holds the fault.
     key : str
         Dotted path of the key within the file, or ``line 12``; empty for the file as a whole.
     found : str
         What was found.
     allowed : str
         What is allowed instead, or how to mend it.
+    option : str
+        The command line's option for a parameter; empty for a file.
     """
 
     file: str
     key: str
     found: str
     allowed: str
+    option: str = ""
 
     def __str__(self) -> str:
         place = f"{self.file}: {self.key}" if self.key else self.file
         remedy = f"; {self.allowed}" if self.allowed else ""
         return f"{place}: {self.found}{remedy}"
+
+    def on_command_line(self) -> "Fault":
+        """Return the fault as the command line names it: by the option of the parameter."""
+        return replace(self, file=self.option) if self.option else self
+
+
+def argument_fault(
+    parameter: str, key: str, found: str, allowed: str, option: str | None = None
+) -> Fault:
+    """Return what is wrong with an argument of a function.
+
+    Parameters
+    ----------
+    parameter : str
+        Its name in Python.
+    key, found, allowed : str
+        As in `Fault`.
+    option : str, optional
+        The command line's option, where it is not called as the parameter.
+
+    Examples
+    --------
+    >>> fault = argument_fault("cant_deficiency", "", "found 2 m", "0.3 m at most")
+    >>> print(fault)
+    cant_deficiency: found 2 m; 0.3 m at most
+    >>> print(fault.on_command_line())
+    --cant-deficiency: found 2 m; 0.3 m at most
+    """
+    return Fault(parameter, key, found, allowed, option or "--" + parameter.replace("_", "-"))
 
 
 def words_of(error: OSError | MemoryError) -> str:

@@ -139,7 +139,7 @@ def _status(arguments: list[str]) -> int:
             return _called(arguments)
         except InputError as error:
             for fault in error.faults:
-                echo(fault, err=True)
+                echo(fault.on_command_line(), err=True)
             return WRONG_INPUT
         except ModelError as error:
             echo(f"railsim: {error}", err=True)

@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from railsim.kernels import jit_inline
+from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -36,7 +36,7 @@ from railsim.kernels.support import (
 )
 
 
-@jit_inline
+@compiled(inline=True)
 def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
     """Slopes of the creep force along and across over the creepage in that direction [N].
 
@@ -59,7 +59,7 @@ def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
     return G * ab * c11 * along, G * ab * c22 * across
 
 
-@jit_inline
+@compiled(inline=True)
 def begin_support(support):
     """Nothing yet acts on the rails."""
     for w in range(support.shape[0]):
@@ -68,7 +68,7 @@ def begin_support(support):
                 support[w, side, k] = 0.0
 
 
-@jit_inline
+@compiled(inline=True)
 def add_slopes(support, w, side, patch, k, across):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
 
@@ -97,7 +97,7 @@ def add_slopes(support, w, side, patch, k, across):
     support[w, side, D_Z_ROLL] += damping * f_z * lever - across * s * arm
 
 
-@jit_inline
+@compiled(inline=True)
 def add_damping(jacobian, b, patch, k, across):
     """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
 

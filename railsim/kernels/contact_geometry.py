@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit_outside
+from railsim.kernels import compiled
 
 
-@jit_outside
+@compiled(in_loop=False)
 def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
     """Trace line of a wheel relative to the wheelset's centre, in track axes.
 
@@ -49,7 +49,7 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
         c_z[k] = u[k] * l_z + r[k] * (along * l_z + across * l_y) / m
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rail_height(Y, Y0, dY, z, slope):
     """Height of the rail's surface and its slope at the lateral place `Y`, cubic, straight beyond.
 
@@ -87,7 +87,7 @@ def rail_height(Y, Y0, dY, z, slope):
 R_GAP, R_U, R_RADIUS, R_PLACE, R_SLOPE, R_INDEX = range(6)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y, roll, out):
     """First contact of a rigid wheel that is lowered onto its rail, without yaw.
 
@@ -140,7 +140,7 @@ def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y,
     out[R_INDEX] = index
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _gap_slope(wheel, k, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine):
     """Derivative of the gap with respect to u at a candidate [1]."""
     u, r, t = wheel[0, k], wheel[1, k], wheel[2, k]
@@ -157,14 +157,14 @@ class RigidPair(NamedTuple):
     rail_slope: np.ndarray
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _pair_contact(pair, rail_dY, centre_height, y, roll, out):
     rigid_contact(
         pair.wheel, pair.rail_Y0, rail_dY, pair.rail_z, pair.rail_slope, centre_height, y, roll, out
     )
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rigid_sweep(lateral, right_pair, left_pair, rail_dY, centre_height, roll_max, roll, contacts):
     """Roll of a rigid wheelset on both rails, and its contacts, over the lateral displacement.
 

@@ -6,7 +6,7 @@ every loop.
 
 import math
 
-from . import jit
+from . import compiled
 from .creep_laws import adhesion_curve, fastrip, linear_saturated, polach
 from .creep_table import table_forces
 from .fastsim import fastsim
@@ -15,7 +15,7 @@ from .fastsim import fastsim
 FASTSIM, TABLE, FASTRIP, POLACH, LINEAR, ADHESION_CURVE = range(6)
 
 
-@jit
+@compiled
 def falling_friction(n, patches, speed, rest, decay):
     """Reduce the friction of n patches with the slip velocity (Polach 2005).
 
@@ -44,7 +44,7 @@ def falling_friction(n, patches, speed, rest, decay):
         mu_N[i] *= (1.0 - rest) * math.exp(-decay * slip) + rest
 
 
-@jit
+@compiled
 def creep_forces(n, law, patches, scratch):
     """Tangential forces on the rail of n patches.
 

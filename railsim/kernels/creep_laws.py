@@ -7,7 +7,7 @@ contact or friction give zero.  docs/theory/creep.md derives and compares them.
 
 import math
 
-from . import jit, jit_ordered
+from . import compiled
 
 # FaStrip: flexibilities go over to a single one around this much creepage ...
 _BLEND_CREEPAGE = 2.1
@@ -22,7 +22,7 @@ _NO_LOAD = 1e-200  # a bound below this is none: its inverse would overflow [N]
 _EXCESS_POINTS = 16
 
 
-@jit_ordered
+@compiled(ordered=True)
 def linear_saturated(n, patches, G):
     """Kalker's linear theory, saturated after Shen, Hedrick and Elkins (1983), spin included.
 
@@ -66,7 +66,7 @@ def linear_saturated(n, patches, G):
         M_z[i] = factor * m
 
 
-@jit_ordered
+@compiled(ordered=True)
 def polach(n, patches, G, k_adhesion, k_slip):
     """Creep force after Polach, with reduction factors for the areas of adhesion and slip.
 
@@ -133,7 +133,7 @@ def polach(n, patches, G, k_adhesion, k_slip):
         T_y[i] = y
 
 
-@jit_ordered
+@compiled(ordered=True)
 def adhesion_curve(n, patches, curve):
     """Creep force by a measured adhesion curve, T/(mu N) over creepage.
 
@@ -179,7 +179,7 @@ def adhesion_curve(n, patches, curve):
         patches.M_z[i] = 0.0
 
 
-@jit
+@compiled
 def _fastrip_strips(n, nx, ny, patches, G, work):
     """Prepare the strips of all patches for `_fastrip_march`.
 
@@ -253,14 +253,14 @@ def _fastrip_strips(n, nx, ny, patches, G, work):
             work[10, c] = _ellipse_area(end) - _ellipse_area(max(rear, -1.0))
 
 
-@jit
+@compiled
 def _ellipse_area(x):
     """Integral of sqrt(1 - x^2) from 0 to x, |x| <= 1."""
     x = min(max(x, -1.0), 1.0)
     return 0.5 * (x * math.sqrt(1.0 - x * x) + math.asin(x))
 
 
-@jit
+@compiled
 def _stick_zone(kappa, lam_d, psi, d):
     """Integrals over the stick zone 2 d - 1 < x < 1 of a strip: p_x, p_y, x p_y.
 
@@ -294,7 +294,7 @@ def _stick_zone(kappa, lam_d, psi, d):
     return x_sum, y_sum, m_sum
 
 
-@jit
+@compiled
 def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
     """One cell of all m strips: FASTSIM's direction, and its share of the slip zone added up."""
     grow_x, grow_y, grow_s, slip_end = work[0], work[1], work[2], work[3]
@@ -326,7 +326,7 @@ def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
         sum_m[c] += factor * y * x_cell
 
 
-@jit
+@compiled
 def fastrip(n, nx, ny, patches, G, work):
     """Tangential forces on the rail after the idea of FaStrip: strip theory joined to FASTSIM.
 

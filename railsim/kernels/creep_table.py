@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from . import jit
+from . import compiled
 from .creep_table_simd import sum_of_rows
 
 RATIO_MAX = 20.0  # the table covers 1/20 <= a/b <= 20
@@ -43,7 +43,7 @@ _NO_LOAD = 1e-200  # a bound below this is none [N]
 _TINY = 1e-300
 
 
-@jit
+@compiled
 def _weights(place, intervals):
     """Interval of a uniform grid and the four weights of the cubic B-splines there."""
     place = place if place > 0.0 else 0.0  # also for NaN, which must not become an index
@@ -60,7 +60,7 @@ def _weights(place, intervals):
     )
 
 
-@jit
+@compiled
 def _angle(y, x):
     """atan2(y, x) for x, y >= 0, not both zero, by a polynomial (Hastings type, error 2e-8).
 
@@ -79,7 +79,7 @@ def _angle(y, x):
     return 0.5 * math.pi - angle if y > x else angle
 
 
-@jit
+@compiled
 def _along_ratio(scale, r, column, r0, r1, r2, r3):
     """Factor of a creepage in q at the place r in log(a/b)."""
     return (
@@ -103,7 +103,7 @@ def _sum_of_rows_plain(table, start, strides, weights, first, sums):
 _sum_of_rows = _sum_of_rows_plain if numba.config.DISABLE_JIT else sum_of_rows
 
 
-@jit
+@compiled
 def table_forces(n, patches, G, table, scale, scratch):
     """Tangential forces on the rail of n elliptic contact patches by the tabulated full theory.
 

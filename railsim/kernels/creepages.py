@@ -1,6 +1,6 @@
 """Places and creepages of the contact patches: see `wheel_rail` for the equations."""
 
-from railsim.kernels import jit_inline
+from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -35,7 +35,7 @@ from railsim.kernels.system import Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
 
 
-@jit_inline
+@compiled(inline=True)
 def creepages(system, work, n, speed, state):
     """Places and creepages of the active patches, see the module's equations."""
     patch, C, frames, plane = work.patch, work.relative, work.frames, work.plane

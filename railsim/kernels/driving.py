@@ -1,12 +1,12 @@
 """How the speed of travel acts on the bodies: traction, the held reference body, fixed bodies."""
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.rotation import sine_cosine
 from railsim.kernels.system import AXLEBOX, FORCE, FREE, TABLE, Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
 
 
-@jit
+@compiled
 def table_value_slope(table, x):
     """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
     last = table.shape[0] - 1
@@ -21,7 +21,7 @@ def table_value_slope(table, x):
     return table[i, 1] + slope * (x - table[i, 0]), slope
 
 
-@jit_merged
+@compiled(merge=True)
 def add_traction(drive, bodies, frames, speed, pose):
     """Traction less running resistance of a free-running vehicle, on the reference body."""
     force, _ = table_value_slope(drive.table, speed)
@@ -32,7 +32,7 @@ def add_traction(drive, bodies, frames, speed, pose):
         pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
 
 
-@jit_merged
+@compiled(merge=True)
 def speed_change(drive, bodies, frames, state, derivative):
     """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
     if drive.mode == TABLE:
@@ -50,7 +50,7 @@ def speed_change(drive, bodies, frames, state, derivative):
     return 0.0
 
 
-@jit_merged
+@compiled(merge=True)
 def apply_speed_change(bodies, frames, state, rate, derivative):
     """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
     n = bodies.kind.shape[0]
@@ -68,7 +68,7 @@ def apply_speed_change(bodies, frames, state, rate, derivative):
         derivative[v + 2] -= rate * (w1 * y - w2 * x)
 
 
-@jit_merged
+@compiled(merge=True)
 def hold_reference(bodies, relative, acceleration, derivative):
     """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
     n = bodies.kind.shape[0]
@@ -81,7 +81,7 @@ def hold_reference(bodies, relative, acceleration, derivative):
         derivative[held] = 0.0
 
 
-@jit_inline
+@compiled(inline=True)
 def turn_fixed(bodies, frames, speed, state):
     """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
     n = bodies.kind.shape[0]
@@ -101,7 +101,7 @@ def turn_fixed(bodies, frames, speed, state):
         state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
 
 
-@jit_inline
+@compiled(inline=True)
 def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
     """Keep fixed bodies where they are; what holds them is part of their accelerations.
 

@@ -23,7 +23,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from . import fastsim_simd, jit, jit_ordered
+from . import compiled, fastsim_simd
 from .aligned import aligned_zeros
 from .fastsim_simd import BOUNDS, PER_L, RESULTS, W_ACROSS, W_ALONG, W_SUM, Y_PER_L
 
@@ -64,7 +64,7 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
     return work
 
 
-@jit_ordered
+@compiled(ordered=True)
 def kalker_lookup(n, patches, table):
     """Kalker's coefficients of n patches from the table of `railsim.contact.kalker.creep_tables`.
 
@@ -96,7 +96,7 @@ def kalker_lookup(n, patches, table):
         c33[i] = table[node, 3] + w * (table[node + 1, 3] - table[node, 3])
 
 
-@jit_ordered
+@compiled(ordered=True)
 def _patch_slopes(n, nx, patches, G, work):
     """Growth per cell of the scaled traction of every patch, at the middle strip.
 
@@ -127,7 +127,7 @@ def _patch_slopes(n, nx, patches, G, work):
         spin_b[i] = scale * across
 
 
-@jit
+@compiled
 def _march_plain(work, m, nx, bounds):
     """Go along m strips from the leading edge: grow, cut back to the bound, add up.
 
@@ -159,7 +159,7 @@ def _march_plain(work, m, nx, bounds):
             sum_m[c] += sum_y[c]
 
 
-@jit
+@compiled
 def _march_simd(work, m, nx, bounds):
     """Do what `_march_plain` does in blocks of 3 to 5 vectors of 8 strips; m >= 24."""
     vectors = m // 8
@@ -205,7 +205,7 @@ _spread, _gather = (
 )
 
 
-@jit_ordered
+@compiled(ordered=True)
 def fastsim(n, nx, ny, patches, G, work):
     """Tangential forces on the rail of n elliptic contact patches by FASTSIM.
 

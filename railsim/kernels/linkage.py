@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit_internal
+from railsim.kernels import compiled
 
 REVOLUTE, LINK, CAM, SLOT, PARALLEL = 0, 1, 2, 3, 4
 ANGLE, LENGTH, X, Y = 0, 1, 2, 3
@@ -102,7 +102,7 @@ class Linkage(NamedTuple):
     driver_value: Any
 
 
-@jit_internal
+@compiled(python=False)
 def place(linkage, lane, q, b, p, at):
     """Write A u of point p on body b to at[0:2] and its place to at[2:4] [m]."""
     u, v = linkage.point[lane, p, 0], linkage.point[lane, p, 1]
@@ -113,7 +113,7 @@ def place(linkage, lane, q, b, p, at):
     at[3] = q[b, 1] + at[1]
 
 
-@jit_internal
+@compiled(python=False)
 def add_row(J, row, b, nx, ny, lever):
     """Add a point's contribution n . r to the row of the Jacobian."""
     if b > 0:
@@ -123,7 +123,7 @@ def add_row(J, row, b, nx, ny, lever):
         J[row, k + 2] += lever
 
 
-@jit_internal
+@compiled(python=False)
 def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
     """Residual and Jacobian of joints and driver.
 
@@ -186,7 +186,7 @@ def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
     drive(linkage, lane, q, s, Phi, J, n - 1, one, two)
 
 
-@jit_internal
+@compiled(python=False)
 def drive(linkage, lane, q, s, Phi, J, row, one, two):
     """Write the driver's residual and row of the Jacobian."""
     kind, p1, p2 = linkage.driver[0], linkage.driver[1], linkage.driver[2]
@@ -215,7 +215,7 @@ def drive(linkage, lane, q, s, Phi, J, row, one, two):
         add_row(J, row, b1, 0.0, 1.0, one[0])
 
 
-@jit_internal
+@compiled(python=False)
 def curvature(linkage, lane, arc, q, v, right, one, two):
     """Write `-(Phi_qq v) v`, the right-hand side for the second derivative; v as q."""
     n = 3 * linkage.n_bodies
@@ -274,7 +274,7 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
             right[row] = -(vx * vx + vy * vy + dx * gx + dy * gy) / radius
 
 
-@jit_internal
+@compiled(python=False)
 def worst_joint(linkage, arc, q, s, Phi, J, one, two):
     """Joint with the largest residual; the number of joints stands for the driver."""
     constraints(linkage, 0, arc, q, s, Phi, J, one, two)
@@ -289,7 +289,7 @@ def worst_joint(linkage, arc, q, s, Phi, J, one, two):
     return joint
 
 
-@jit_internal
+@compiled(python=False)
 def move_along_cams(linkage, q, arc, one, two):
     """Put every roller on the arc that it has reached: 1 if moved, 0 if not, -1-k off cam k."""
     moved = 0

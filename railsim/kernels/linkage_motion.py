@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from railsim.kernels import jit_internal, jit_outside
+from railsim.kernels import compiled
 from railsim.kernels.linkage import (
     BEYOND,
     BEYOND_CAM,
@@ -22,7 +22,7 @@ from railsim.kernels.linkage import (
 )
 
 
-@jit_internal
+@compiled(python=False)
 def factor(J, pivots, n):
     """LU factors in place with row pivoting; returns the sign of the determinant, 0 if singular."""
     sign = 1.0
@@ -49,7 +49,7 @@ def factor(J, pivots, n):
     return sign
 
 
-@jit_internal
+@compiled(python=False)
 def substitute(J, pivots, x, n):
     """Solve with the factors of `factor`; x is overwritten."""
     for k in range(n):
@@ -65,7 +65,7 @@ def substitute(J, pivots, x, n):
         x[i] /= J[i, i]
 
 
-@jit_internal
+@compiled(python=False)
 def derivatives(linkage, arc, q, J, pivots, x, v, a, one, two):
     """Write q' and q'' to v and a (as q), J holding the factors."""
     n = 3 * linkage.n_bodies
@@ -81,7 +81,7 @@ def derivatives(linkage, arc, q, J, pivots, x, v, a, one, two):
         a[1 + i // 3, i % 3] = x[i]
 
 
-@jit_internal
+@compiled(python=False)
 def newton(linkage, arc, q, s, Phi, J, pivots, one, two):
     """Assemble at s from the pose q, which is overwritten: determinant's sign, 0 on failure."""
     n = 3 * linkage.n_bodies
@@ -106,7 +106,7 @@ def newton(linkage, arc, q, s, Phi, J, pivots, one, two):
     return 0.0
 
 
-@jit_internal
+@compiled(python=False)
 def settle(linkage, arc, q, s, Phi, J, pivots, one, two):
     """`newton` with every roller on its arc: determinant's sign, 0 or -2-k on failure."""
     sign = newton(linkage, arc, q, s, Phi, J, pivots, one, two)
@@ -122,7 +122,7 @@ def settle(linkage, arc, q, s, Phi, J, pivots, one, two):
     return sign
 
 
-@jit_internal
+@compiled(python=False)
 def predict(linkage, h, now, v, a, new):
     """Write the pose a driver's step `h` ahead, of second order, to `new`; its largest change."""
     largest = 0.0
@@ -136,7 +136,7 @@ def predict(linkage, h, now, v, a, new):
     return largest
 
 
-@jit_internal
+@compiled(python=False)
 def correction_of(linkage, h, now, v, a, new):
     """Largest difference of the pose `new` from the predicted one."""
     largest = 0.0
@@ -150,7 +150,7 @@ def correction_of(linkage, h, now, v, a, new):
     return largest
 
 
-@jit_outside
+@compiled(in_loop=False)
 def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
     """Positions and derivatives for all values of the driver, on one branch.
 
@@ -255,7 +255,7 @@ def track(linkage, s, start, arc_start, q, v, a, arcs, failure):
     return OK, s.shape[0]
 
 
-@jit_outside
+@compiled(in_loop=False)
 def tangents(real, linkage, s, q, v, a, arcs, second):
     """Positions and derivatives with their derivatives by a parameter in the imaginary parts.
 
@@ -313,7 +313,7 @@ def tangents(real, linkage, s, q, v, a, arcs, second):
                     bend[1 + k // 3, k % 3] += 1j * x[k]
 
 
-@jit_outside
+@compiled(in_loop=False)
 def jacobians(linkage, s, q, arcs, residual, J):
     """Residuals, shape (position, n), and Jacobians, shape (position, n, n), at given poses."""
     one, two = np.zeros(4), np.zeros(4)

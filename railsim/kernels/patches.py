@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     BEYOND,
     C11,
@@ -100,7 +100,7 @@ class CreepScratch(NamedTuple):
     offsets: np.ndarray
 
 
-@jit_merged
+@compiled(merge=True)
 def side_by_side(patch):
     """Return the arrays of `Work.patch` that the creep laws take."""
     return Patches(

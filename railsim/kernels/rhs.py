@@ -21,7 +21,7 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.driving import (
     add_traction,
     apply_speed_change,
@@ -66,7 +66,7 @@ from railsim.kernels.wheel_rail import wheel_rail
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@jit_inline
+@compiled(inline=True)
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -82,7 +82,7 @@ def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     return RUNNING
 
 
-@jit_inline
+@compiled(inline=True)
 def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     """Rates of roll, pitch, yaw from the angular velocity relative to the frame, body axes.
 
@@ -93,7 +93,7 @@ def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     return about_x, w2 - yaw_rate * sin_roll, yaw_rate
 
 
-@jit_merged
+@compiled(merge=True)
 def kinematics(bodies, frames, speed, state, relative, pose, rates):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
@@ -148,7 +148,7 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
     axlebox_kinematics(bodies, state, pose, rates)
 
 
-@jit_inline
+@compiled(inline=True)
 def axlebox_kinematics(bodies, state, pose, rates):
     """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
     n = bodies.kind.shape[0]
@@ -184,7 +184,7 @@ def axlebox_kinematics(bodies, state, pose, rates):
         )
 
 
-@jit_merged
+@compiled(merge=True)
 def hold_axleboxes(bodies, axles, frames, C, state, pose):
     """Take from the moments of elements on a wheelset what would turn it about its axle.
 
@@ -214,7 +214,7 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
             pose[b, FORCE + k] += along * frames[f, ATTITUDE + 3 * k]
 
 
-@jit_inline
+@compiled(inline=True)
 def axlebox_dynamics(bodies, pose, rates, derivative):
     """Pitch accelerations of the axleboxes; everything else they hand to their wheelsets."""
     n = bodies.kind.shape[0]
@@ -241,7 +241,7 @@ def axlebox_dynamics(bodies, pose, rates, derivative):
         store_rows(rates, starts(own, RATES_SIZE), 0, (zero, zero, zero, zero, acceleration, zero))
 
 
-@jit_merged
+@compiled(merge=True)
 def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, rates, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
@@ -303,7 +303,7 @@ def right_hand_side(system, work, state, derivative):
     return right_hand_sides(system, work, state[None], derivative[None])
 
 
-@jit
+@compiled
 def right_hand_sides(system, work, states, derivatives):
     """Derivatives of several states, one a row, as for difference quotients.
 
@@ -319,7 +319,7 @@ def right_hand_sides(system, work, states, derivatives):
     return status, where, n_patches
 
 
-@jit_merged
+@compiled(merge=True)
 def rates_of_state(system, work, state, derivative):
     """As `right_hand_side`, within compiled code."""
     status, where, n_patches = mechanics(system, work, state, derivative)
@@ -328,7 +328,7 @@ def rates_of_state(system, work, state, derivative):
     return status, where, n_patches
 
 
-@jit_merged
+@compiled(merge=True)
 def internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
     first = 12 * system.bodies.kind.shape[0]
@@ -338,7 +338,7 @@ def internal_rates(system, work, state, derivative):
         )
 
 
-@jit_merged
+@compiled(merge=True)
 def mechanics(system, work, state, derivative):
     """Derivative of coordinates, velocities, place and speed; drives of the internal states.
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -96,7 +96,7 @@ FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
 
-@jit_inline
+@compiled(inline=True)
 def normal_contact(system, work, speed, state):
     """Look up all wheels, add elastic normal forces, list the active patches.
 
@@ -182,7 +182,7 @@ class Meeting(NamedTuple):
     yaw_rate: float
 
 
-@jit_inline
+@compiled(inline=True)
 def meeting(work, w, side, speed):
     """How the wheel `side` of wheelset `w`, which `work.above` describes, stands on its rail."""
     rail, above, motion = work.rail, work.above, work.rail_motion
@@ -201,7 +201,7 @@ def meeting(work, w, side, speed):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def wheel_contact(system, work, w, side, speed, n):
     """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
 
@@ -244,7 +244,7 @@ def wheel_contact(system, work, w, side, speed, n):
     return RUNNING, n
 
 
-@jit_inline
+@compiled(inline=True)
 def clear_wheel(wheel, w, side, lift):
     """Nothing yet acts on a wheel."""
     wheel[w, side, W_Q] = 0.0
@@ -258,7 +258,7 @@ def clear_wheel(wheel, w, side, lift):
     wheel[w, side, W_LIFT] = lift
 
 
-@jit_inline
+@compiled(inline=True)
 def patch_contact(system, work, w, side, patch, meet, n):
     """Normal force of one patch; where it carries, the patch becomes number `n` of the active ones.
 
@@ -322,7 +322,7 @@ def patch_contact(system, work, w, side, patch, meet, n):
     return n
 
 
-@jit_inline
+@compiled(inline=True)
 def add_normal_force(work, b, w, side, meet, p, k, vertical):
     """Add a patch's generalised normal forces to those of wheelset `w`, body `b`.
 
@@ -343,7 +343,7 @@ def add_normal_force(work, b, w, side, meet, p, k, vertical):
     work.wheel[w, side, W_Y] -= q_y
 
 
-@jit
+@compiled
 def all_far(contact, table, iy, ir, iw, tr, z):
     """Whether every patch is more than LIFT_RANGE away from its rail."""
     for patch in range(N_PATCH):
@@ -352,7 +352,7 @@ def all_far(contact, table, iy, ir, iw, tr, z):
     return True
 
 
-@jit
+@compiled
 def outside(where):
     """Status code for a look-up outside the contact table."""
     if where == ABOVE_Y:
@@ -364,7 +364,7 @@ def outside(where):
     return YAW_RANGE
 
 
-@jit_merged
+@compiled(merge=True)
 def complete_normal_force(b, bodies, frames, C, state, force):
     """Moment vector from the generalised moments, and the force along the track.
 

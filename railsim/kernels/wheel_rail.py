@@ -22,7 +22,7 @@ Forces on the rail in the plane of the rails: Y = T_y cos g + N sin g, Q = -T_y 
 the angle g > 0 where the normal leans to the right; on the wheel the opposite, with moment c x F.
 """
 
-from railsim.kernels import jit_inline
+from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -72,7 +72,7 @@ from railsim.kernels.support import F_Y, F_Z, rail_motions
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
 
-@jit_inline
+@compiled(inline=True)
 def add_creep_forces(system, work, n, speed):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
@@ -138,7 +138,7 @@ def add_creep_forces(system, work, n, speed):
                 work.support[w, side, F_Z] = wheel[w, side, W_Q]
 
 
-@jit_inline
+@compiled(inline=True)
 def wheel_rail(system, work, speed, state):
     """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
 

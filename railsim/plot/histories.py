@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.definitions.layout import curvature_sections
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.notation import QUANTITIES, Quantity
 from railsim.plot.selection import LIMITS, STUDY, Line, Panel, panels
 from railsim.plot.style import (
@@ -89,7 +89,7 @@ def _window(horizontal: Array, between: tuple[float, float]) -> slice:
     if stop - start < 2:
         found = f"nothing between {between[0]:g} and {between[1]:g}"
         allowed = f"the run goes from {horizontal[0]:.6g} to {horizontal[-1]:.6g}"
-        raise InputError([Fault("--between", "", found, allowed)])
+        raise InputError([argument_fault("between", "", found, allowed)])
     return slice(int(start), int(stop))
 
 

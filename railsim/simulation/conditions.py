@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, argument_fault
 from railsim.result import Result
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,9 @@ def initial_speed(settings: Settings, speed: float | None, start: float) -> floa
         place, value = np.array(settings.drive.speed_table).T
         return float(np.interp(start, place, value))
     if speed is None:
-        raise InputError([Fault("--speed", "", "no speed is given", "a speed in m/s, e.g. 20")])
+        raise InputError(
+            [argument_fault("speed", "", "no speed is given", "a speed in m/s, e.g. 20")]
+        )
     return speed
 
 
@@ -74,17 +76,19 @@ def check_range(
     faults = []
     low, high = SPEED_RANGE
     if not (math.isfinite(speed) and low <= speed <= high):
-        faults.append(Fault("--speed", "", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s"))
+        faults.append(
+            argument_fault("speed", "", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s")
+        )
     if not (math.isfinite(start) and 0.0 <= start < track.length):
-        faults.append(Fault("--start", "", f"found {start:g} m", f"0 to {track.length:g} m"))
+        faults.append(argument_fault("start", "", f"found {start:g} m", f"0 to {track.length:g} m"))
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
-        faults.append(Fault("--duration", "", f"found {duration:g} s", "a positive number"))
+        faults.append(argument_fault("duration", "", f"found {duration:g} s", "a positive number"))
     if duration is not None and until is not None:
-        faults.append(Fault("--duration", "", "given together with --until", "one of the two"))
+        faults.append(argument_fault("duration", "", "given together with until", "one of the two"))
     if until is not None and not start < until <= track.length:
         faults.append(
-            Fault(
-                "--until",
+            argument_fault(
+                "until",
                 "",
                 f"found {until:g} m",
                 f"more than the start, {start:g} m, and at most {track.length:g} m, "
@@ -111,30 +115,33 @@ def state_before(
     faults = []
     if "end" not in resume.groups.get("state", {}):
         faults.append(
-            Fault(
-                "--continue",
+            argument_fault(
+                "resume",
                 "",
                 "the result holds no state at its end",
                 "a result of `railsim run`",
+                "--continue",
             )
         )
     for kind, text in (("vehicle", vehicle.to_toml()), ("track", track.to_toml())):
         if text != resume.attributes[f"{kind}_toml"]:
             faults.append(
-                Fault(
-                    "--continue",
+                argument_fault(
+                    "resume",
                     "",
                     f"the result is of another {kind}",
                     f"the {kind} and the --set {kind}... of the result",
+                    "--continue",
                 )
             )
     here, there = settings.model_dump(mode="json"), resume.settings().model_dump(mode="json")
     faults += [
-        Fault(
-            "--continue",
+        argument_fault(
+            "resume",
             f"settings.{key}",
             f"found {here[key]}",
             f"{there[key]}, as in the result (--settings, --set)",
+            "--continue",
         )
         for key in here
         if key not in OUTPUT_SETTINGS and here[key] != there[key]

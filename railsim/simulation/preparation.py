@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.model.assembly import Model, SharedTables, assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import SCHEMES
@@ -81,11 +81,12 @@ def _taken_up(model: Model, before: Floats) -> Floats:
     if before.shape != (model.n_state,):
         raise InputError(
             [
-                Fault(
-                    "--continue",
+                argument_fault(
+                    "resume",
                     "",
                     f"a state of {before.size} values",
                     f"{model.n_state} values, those of this vehicle",
+                    "--continue",
                 )
             ]
         )

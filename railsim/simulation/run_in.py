@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.track import Track
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
     ASIDE,
@@ -257,8 +257,8 @@ def _run(
     if status != RUNNING:
         raise InputError(
             [
-                Fault(
-                    "--start",
+                argument_fault(
+                    "start",
                     "",
                     f"the vehicle does not stay on the track at s = {start:g} m, "
                     f"{where}, at {state[-1]:g} m/s",

@@ -20,7 +20,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
@@ -242,33 +242,33 @@ def _check(
     for value in radius:
         if not (math.isfinite(value) and abs(value) >= SMALLEST_RADIUS):
             faults.append(
-                Fault(
-                    "--radius",
+                argument_fault(
+                    "radius",
                     "",
                     f"found {value:g} m",
                     f"{SMALLEST_RADIUS:g} m at least, negative to the left",
                 )
             )
     if not 0.0 <= cant <= LARGEST_CANT:
-        faults.append(Fault("--cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
+        faults.append(argument_fault("cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
     for value in friction:
         if not 0.0 < value <= 2.0:
-            faults.append(Fault("--friction", "", f"found {value:g}", "above 0, at most 2"))
+            faults.append(argument_fault("friction", "", f"found {value:g}", "above 0, at most 2"))
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
         if not all(low <= v <= high for v in speeds) or not math.isfinite(value):
             faults.append(
-                Fault(
-                    "--cant-deficiency",
+                argument_fault(
+                    "cant_deficiency",
                     "",
                     f"found {value:g} m with a cant of {cant:g} m",
                     f"a sum that gives speeds of {low:g} to {high:g} m/s",
                 )
             )
-    for name, values in (("--radius", radius), ("--cant-deficiency", deficiency)):
+    for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
         if not len(values):
-            faults.append(Fault(name, "", "no value", "one at least"))
+            faults.append(argument_fault(name, "", "no value", "one at least"))
     if faults:
         raise InputError(faults)
 

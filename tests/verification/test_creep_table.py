@@ -97,9 +97,9 @@ def test_both_sums_of_rows_agree():
     sums = np.zeros((2, 16))
     kernel._sum_of_rows_plain(table, 37, strides, weights, 5, sums[0])
 
-    from railsim.kernels import jit
+    from railsim.kernels import compiled
 
-    @jit
+    @compiled
     def compiled(table, start, strides, weights, first, sums):
         kernel._sum_of_rows(table, start, strides, weights, first, sums)
 

@@ -192,7 +192,7 @@ def run_from(prepared, mode, speed, scheme):
 
 
 def test_an_amplitude_beyond_the_contact_table_is_refused():
-    with pytest.raises(InputError, match="--amplitude"):
+    with pytest.raises(InputError, match="amplitude"):
         modes(load_vehicle("coach_manchester"), STRAIGHT, linearisation="harmonic", amplitude=0.1)
 
 
