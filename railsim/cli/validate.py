@@ -2,12 +2,15 @@
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from railsim.cli.common import echo, json_option, print_json, quiet_option
 from railsim.files import RESULTS, is_file
+
+if TYPE_CHECKING:
+    from railsim.errors import Fault
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
@@ -43,9 +46,14 @@ def _report(file: str) -> dict[str, Any]:
     try:
         kind, remarks = checked(file)
     except InputError as error:
-        faults = [dict(vars(fault), text=str(fault)) for fault in error.faults]
+        faults = [_record(fault) for fault in error.faults]
         return {"file": file, "kind": None, "faults": faults, "remarks": []}
     return {"file": file, "kind": kind, "faults": [], "remarks": remarks}
+
+
+def _record(fault: "Fault") -> dict[str, str]:
+    keys = ("file", "key", "found", "allowed")
+    return {key: getattr(fault, key) for key in keys} | {"text": str(fault)}
 
 
 def _print(report: dict[str, Any], quiet: bool) -> None:
