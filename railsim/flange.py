@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model
+from railsim.assembly import CONSTANT_SPEED, Model, without_loads
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
@@ -79,11 +79,10 @@ def in_flange_contact(
         (float(np.max(rail[:, 4, 0])), float(np.max(rail[:, 5, 0]))),
         TIMES,
     )
-    smooth = system._replace(
+    smooth = without_loads(system)._replace(
         track=track_tables(auxiliary),
         drive=CONSTANT_SPEED,
         support=system.support._replace(variation=system.support.variation[:0]),
-        loads=system.loads._replace(body=system.loads.body[:0]),
     )
     contact = smooth.contact
     damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.assembly import CONSTANT_SPEED, Model, without_loads, work_arrays
 from railsim.definitions.track import Track
 from railsim.equilibrium import Equilibrium, initial_state
 from railsim.errors import Fault, InputError, ModelError
@@ -138,10 +138,7 @@ def _arrived(
     state[-2] = place
     if steps:
         follow_rails(model, state)
-        system = model.system._replace(
-            drive=CONSTANT_SPEED,
-            loads=model.system.loads._replace(body=model.system.loads.body[:0]),
-        )
+        system = without_loads(model.system)._replace(drive=CONSTANT_SPEED)
         _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
     state[-3:] = 0.0, start, speed
     return state
@@ -346,10 +343,8 @@ def settled(
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
-    system = model.system._replace(
-        track=track_tables(auxiliary),
-        drive=CONSTANT_SPEED,
-        loads=model.system.loads._replace(body=model.system.loads.body[:0]),
+    system = without_loads(model.system)._replace(
+        track=track_tables(auxiliary), drive=CONSTANT_SPEED
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)

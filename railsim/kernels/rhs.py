@@ -40,16 +40,21 @@ from railsim.kernels.support import locate_support, support_rates
 from railsim.kernels.system import (
     AXLEBOX,
     BODY_SIZE,
+    BRAKES,
     COS_ROLL,
     FORCE,
     FREE,
     I_2,
     MOMENT,
+    OVER_DISTANCE,
     POSE_SIZE,
     PUSH,
+    RADIUS,
     RATES_SIZE,
     RELATIVE_SIZE,
     SIN_ROLL,
+    SLIP_BEGIN,
+    SLIP_END,
     TABLE,
     Y_0,
     Z_0,
@@ -58,6 +63,9 @@ from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, OMEGA_S, ce
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
+BRAKES_FULLY = (
+    0.1  # m/s; speed of the wheel's rim below which a brake's torque fades to that at rest
+)
 
 
 @jit_inline
@@ -316,6 +324,33 @@ def add_traction(drive, bodies, frames, speed, pose):
 
 
 @jit_merged
+def add_axle_torques(drives, time, s, frame_offset, bodies, speed, state, pose):
+    """Driving and braking torques on wheelsets, their reactions on the bodies that carry them."""
+    n = bodies.kind.shape[0]
+    for e in range(drives.body.shape[0]):
+        b, w = drives.body[e, 0], drives.body[e, 1]
+        first, demand, end = drives.start[2 * e], drives.start[2 * e + 1], drives.start[2 * e + 2]
+        torque, _ = table_value_slope(drives.table[first:demand], speed)
+        if end > demand:
+            over_distance = drives.row[e, OVER_DISTANCE] > 0.0
+            at = s + frame_offset[bodies.frame[w]] if over_distance else time
+            factor, _ = table_value_slope(drives.table[demand:end], at)
+            torque *= factor
+        # forwards it turns about the negative y axis
+        rolling = -state[6 * n + 6 * w + 4] * bodies.row[w, RADIUS]
+        if drives.row[e, BRAKES] > 0.0:
+            torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
+        if drives.row[e, SLIP_END] > 0.0:
+            begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
+            slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed
+            torque *= min(1.0, max(0.0, (gone - slip) / (gone - begin)))
+        for k in range(3):
+            moment = torque * pose[w, 3 * k + 1]
+            pose[w, MOMENT + k] -= moment
+            pose[b, MOMENT + k] += moment
+
+
+@jit_merged
 def speed_change(drive, bodies, frames, state, derivative):
     """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
     if drive.mode == TABLE:
@@ -494,6 +529,10 @@ def mechanics(system, work, state, derivative):
     hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:
         load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
+    if system.drives.body.shape[0] > 0:
+        add_axle_torques(
+            system.drives, time, s, system.frame_offset, bodies, speed, state, work.pose
+        )
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     status, where, n_patches = wheel_rail(system, work, speed, state)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
+from railsim.assembly import CONSTANT_SPEED, Model, components_of, without_loads, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
@@ -75,9 +75,7 @@ class SteadyRolling:
 
     def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
         self.model = model
-        self.system = system._replace(
-            drive=CONSTANT_SPEED, loads=system.loads._replace(body=system.loads.body[:0])
-        )
+        self.system = without_loads(system)._replace(drive=CONSTANT_SPEED)
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
         self._unknowns, self._equations, self._inertias = _conditions(model, system, held)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, SharedTables, assemble, check_fixed
+from railsim.assembly import Model, SharedTables, assemble, check_fixed, without_loads
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -146,7 +146,7 @@ class LinearVehicle:
         self._rest[-2] = PLACE
         there = circle(track, curvature=self.curvature, cant=cant)
         check_fixed(assembled.flat, there)
-        self.system = self.model.system._replace(track=track_tables(there))
+        self.system = without_loads(self.model.system)._replace(track=track_tables(there))
 
     @property
     def remarks(self) -> tuple[str, ...]:
