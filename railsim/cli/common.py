@@ -43,7 +43,7 @@ def remarks_on(definition: "FileDefinition", known: "Format") -> list["Remark"]:
 
     found = known.remarks(definition)
     if isinstance(definition, Vehicle):
-        from railsim.experience import vehicle_remarks
+        from railsim.model.experience import vehicle_remarks
 
         found = [*found, *vehicle_remarks(definition)]
     return found

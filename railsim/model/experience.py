@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from railsim.assembly import GRAVITY, Model, without_rails
 from railsim.definitions.base import Remark
 from railsim.definitions.elements import (
     Airspring,
@@ -25,9 +24,10 @@ from railsim.definitions.elements import (
 )
 from railsim.definitions.flatten import FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle import Vehicle
-from railsim.element_arrays import vertical_support
-from railsim.equilibrium import static_shares
 from railsim.errors import ModelError
+from railsim.model.assembly import GRAVITY, Model, without_rails
+from railsim.model.element_arrays import vertical_support
+from railsim.model.equilibrium import static_shares
 
 Floats = NDArray[np.float64]
 
