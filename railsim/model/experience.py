@@ -37,8 +37,8 @@ HIGHEST = 500.0
 """Vertical frequency of a body on steel [Hz], a light bolster under a centre plate 100 Hz."""
 DAMPED = 1.5
 """Damping ratio of the lowest vertical mode; secondary dampers give 0.1 to 0.4."""
-WHEEL_LOAD = (5e3, 250e3)
-"""Mean static wheel load [N]: a park railway, an iron-ore wagon of 40 t axle load."""
+WHEEL_LOAD = (8e3, 250e3)
+"""Mean static wheel load [N]: an empty light railcar has 20 kN, an ore wagon 200 kN."""
 SPRING_LOAD = (0.6, 1.5)
 """Static load of a spring over the load at which its length was measured."""
 SPRING_TRAVEL = 0.7

@@ -18,15 +18,17 @@ from numpy.typing import NDArray
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError
 from railsim.kernels.status import NOT_FINITE, STATUS
 from railsim.model.assembly import Model, SharedTables, assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.model.experience import vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.simulation.advance import Preparation, Run, advance
+from railsim.simulation.disturbance import disturb
 from railsim.simulation.outputs import OutputPlan, run_extremes
 from railsim.simulation.pace import Pace
 from railsim.simulation.remarks import run_remarks
@@ -39,6 +41,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 _LOG = logging.getLogger(__name__)
+_START = logging.getLogger("railsim.start")  # remarks on a run that begins
 SPEED_RANGE = (0.5, 150.0)  # m/s
 # settings that a continued run may have of its own; it has no start and no initial disturbance
 OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial", "start_state")
@@ -345,6 +348,8 @@ def _begun(
         on_judgement=told.of_judgement,
         on_run_in=told.of_run_in,
     )
+    for remark in prepared.remarks:
+        _START.warning(remark)
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
     stored = StoredPeaks(sink)
     sink = filtering(stored, settings)
@@ -412,7 +417,8 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
         },
     )
     for remark in result.remarks:
-        if remark != low_pass_remark(settings):  # what was asked for is no warning
+        # what was asked for is no warning, and others were given at the start
+        if remark != low_pass_remark(settings) and remark not in prepared.remarks:
             _LOG.warning(remark)
     return result
 
@@ -486,7 +492,8 @@ def prepare(
     model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
     step, _ = pace.at(speed)
-    remarks: list[str] = [*balance.remarks]
+    unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
+    remarks: list[str] = [*balance.remarks, *unusual]
     if before is None:
         state = start_state(
             model,
@@ -498,7 +505,7 @@ def prepare(
             on_run_in,
             remarks.append if settings.start_state == "steady" else None,
         )
-        _disturb(model, settings, state)
+        remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(model, before)
     return Preparation(
@@ -576,40 +583,6 @@ def _taken_up(model: Model, before: Floats) -> Floats:
             ]
         )
     return before.copy()
-
-
-def _disturb(model: Model, settings: Settings, state: Floats) -> None:
-    """Add the initial disturbance of the settings to a state."""
-    n = model.index.n_bodies
-    for name, change in settings.initial.items():
-        if name not in model.index.bodies:
-            raise InputError(
-                [
-                    Fault(
-                        "settings",
-                        f"initial.{name}",
-                        "no such body",
-                        nearest(name, model.index.bodies),
-                    )
-                ]
-            )
-        place = model.index.coordinate(name, 0)
-        state[place : place + 6] += (
-            change.x,
-            change.y,
-            change.z,
-            change.roll,
-            change.pitch,
-            change.yaw,
-        )
-        state[6 * n + place : 6 * n + place + 6] += (
-            change.vx,
-            change.vy,
-            change.vz,
-            change.vroll,
-            change.vpitch,
-            change.vyaw,
-        )
 
 
 def _sentence(model: Model, status: int, where: int) -> str:
