@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
+from railsim.kernels import compiled
 
 MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
 
@@ -43,7 +43,7 @@ class Internal(NamedTuple):
     curve: np.ndarray
 
 
-@jit
+@compiled
 def curve_value(curves, index, x):
     """Piecewise linear table, continued linearly beyond its ends."""
     first = curves.start[index]
@@ -55,7 +55,7 @@ def curve_value(curves, index, x):
     return curves.f[i] + slope * (x - curves.x[i])
 
 
-@jit
+@compiled
 def curve_speed(curves, index, f, v):
     """Speed at which a rising table has the value `f`; on a flat part the one nearest to `v`."""
     first = curves.start[index]
@@ -72,7 +72,7 @@ def curve_speed(curves, index, f, v):
     return min(max(v, slow), fast)
 
 
-@jit
+@compiled
 def speed_on_branch(curves, i, f, flat):
     """Speed at which branch `i`, continued, has the value `f`; `flat` where it has no slope."""
     rise = curves.f[i + 1] - curves.f[i]
@@ -81,7 +81,7 @@ def speed_on_branch(curves, i, f, flat):
     return curves.x[i] + (f - curves.f[i]) * (curves.x[i + 1] - curves.x[i]) / rise
 
 
-@jit_internal
+@compiled(python=False)
 def curve_advanced(curves, index, k_s, f, v, h):
     """Force of a damper with the table `index` behind a spring `k_s` after a step at constant `v`.
 
@@ -119,7 +119,7 @@ def curve_advanced(curves, index, k_s, f, v, h):
     return f
 
 
-@jit
+@compiled
 def within_table(curves, index, f):
     """`f`, but not beyond the end of a table that is flat there."""
     first = curves.start[index]
@@ -131,7 +131,7 @@ def within_table(curves, index, f):
     return f
 
 
-@jit
+@compiled
 def relaxation_time(internal, i):
     """Time constant of state `i`, a linear one [s]."""
     p = internal.parameter
@@ -140,7 +140,7 @@ def relaxation_time(internal, i):
     return p[i, 2] / (p[i, 0] + p[i, 1])
 
 
-@jit
+@compiled
 def steady_value(internal, i, drive):
     """Value to which state `i`, a linear one, relaxes at a constant drive."""
     p = internal.parameter
@@ -149,7 +149,7 @@ def steady_value(internal, i, drive):
     return p[i, 0] * drive / (p[i, 0] + p[i, 1])
 
 
-@jit_merged
+@compiled(merge=True)
 def internal_rate(internal, curves, i, x, drive, limit):
     """Time derivative of state `i`."""
     if internal.kind[i] == PAD:
@@ -167,13 +167,13 @@ def internal_rate(internal, curves, i, x, drive, limit):
     return (p[i, 0] * (drive - x) - p[i, 1] * x) / p[i, 2]
 
 
-@jit_inline
+@compiled(inline=True)
 def slides_together(internal, i):
     """Whether state `i` is the last of a pad that slides in any direction."""
     return internal.kind[i] == PAD and internal.parameter[i, 1] > 1.0
 
 
-@jit_internal
+@compiled(python=False)
 def hold_within(internal, last, first, drive, state):
     """Bring the forces of a pad that slides in any direction back to their limit.
 
@@ -194,7 +194,7 @@ def hold_within(internal, last, first, drive, state):
             state[first + i] /= size
 
 
-@jit
+@compiled
 def constant_decays(internal, h, decay):
     """e^(-h/tau) of the linear states, 0 for the others."""
     for i in range(internal.kind.shape[0]):
@@ -204,7 +204,7 @@ def constant_decays(internal, h, decay):
             decay[i] = 0.0
 
 
-@jit_inline
+@compiled(inline=True)
 def advanced(internal, curves, i, x, drive, limit, h, decay):
     """State `i` after a step `h` at constant drive."""
     if internal.kind[i] == PAD:
