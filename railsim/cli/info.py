@@ -11,6 +11,7 @@ from railsim.cli.common import (
     load_option,
     overwrite_option,
     print_json,
+    remarks_on,
     set_option,
     with_load,
 )
@@ -70,7 +71,7 @@ def command(
         print_json(data)
         return
     echo("\n".join(lines))
-    for remark in known.remarks(definition):
+    for remark in remarks_on(definition, known):
         echo(f"remark: {remark}")
 
 

@@ -1,5 +1,7 @@
 """``railsim run``: one vehicle on one track at one speed."""
 
+import logging
+from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +23,7 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from railsim.compare import Comparison
     from railsim.definitions.settings import Settings
@@ -100,7 +102,7 @@ def command(
             echo(f"{track}: {remark}", err=True)
     if not (quiet or as_json):
         echo("\n".join(_assumption_lines(case)))
-    with progress_bar(case.name, quiet=quiet) as progress:
+    with progress_bar(case.name, quiet=quiet) as progress, _start_remarks(case, quiet=quiet):
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **result_record(result)}
     lines = _report_lines(result, path)
@@ -122,6 +124,31 @@ def command(
     else:
         echo("\n".join(lines))
     return DONE if result.status == "complete" else ENDED_EARLY
+
+
+@contextmanager
+def _start_remarks(case: "Case", *, quiet: bool) -> "Iterator[None]":
+    """Show what is remarked when the run begins, not only at its end."""
+    handler = _Shown(case.name)
+    start = logging.getLogger("railsim.start")
+    if not quiet:
+        start.addHandler(handler)
+    try:
+        yield
+    finally:
+        start.removeHandler(handler)
+
+
+class _Shown(logging.Handler):
+    """Prints log records on stderr as remarks."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name = name
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record."""
+        echo(f"{self._name}: {record.getMessage()}", err=True)
 
 
 def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, print_json, quiet_option
+from railsim.cli.common import echo, json_option, print_json, quiet_option, remarks_on
 from railsim.files import RESULTS, is_file
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     definition, known = load_any(file)
     if faults := profile_faults(definition, file):
         raise InputError(faults)
-    return known.kind, [dict(vars(remark)) for remark in known.remarks(definition)]
+    return known.kind, [dict(vars(remark)) for remark in remarks_on(definition, known)]
 
 
 def _is_profile(name: str) -> bool:

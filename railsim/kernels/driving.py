@@ -2,8 +2,25 @@
 
 from railsim.kernels import compiled
 from railsim.kernels.rotation import sine_cosine
-from railsim.kernels.system import AXLEBOX, FORCE, FREE, TABLE, Y_0, Z_0
+from railsim.kernels.system import (
+    AXLEBOX,
+    BRAKES,
+    FORCE,
+    FREE,
+    MOMENT,
+    OVER_DISTANCE,
+    RADIUS,
+    SLIP_BEGIN,
+    SLIP_END,
+    TABLE,
+    Y_0,
+    Z_0,
+)
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
+
+BRAKES_FULLY = (
+    0.1  # m/s; speed of the wheel's rim below which a brake's torque fades to that at rest
+)
 
 
 @compiled
@@ -30,6 +47,33 @@ def add_traction(drive, bodies, frames, speed, pose):
     f = bodies.frame[b]
     for k in range(3):
         pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
+
+
+@compiled(merge=True)
+def add_axle_torques(drives, time, s, frame_offset, bodies, speed, state, pose):
+    """Driving and braking torques on wheelsets, their reactions on the bodies that carry them."""
+    n = bodies.kind.shape[0]
+    for e in range(drives.body.shape[0]):
+        b, w = drives.body[e, 0], drives.body[e, 1]
+        first, demand, end = drives.start[2 * e], drives.start[2 * e + 1], drives.start[2 * e + 2]
+        torque, _ = table_value_slope(drives.table[first:demand], speed)
+        if end > demand:
+            over_distance = drives.row[e, OVER_DISTANCE] > 0.0
+            at = s + frame_offset[bodies.frame[w]] if over_distance else time
+            factor, _ = table_value_slope(drives.table[demand:end], at)
+            torque *= factor
+        # forwards it turns about the negative y axis
+        rolling = -state[6 * n + 6 * w + 4] * bodies.row[w, RADIUS]
+        if drives.row[e, BRAKES] > 0.0:
+            torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
+        if drives.row[e, SLIP_END] > 0.0:
+            begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
+            slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed
+            torque *= min(1.0, max(0.0, (gone - slip) / (gone - begin)))
+        for k in range(3):
+            moment = torque * pose[w, 3 * k + 1]
+            pose[w, MOMENT + k] -= moment
+            pose[b, MOMENT + k] += moment
 
 
 @compiled(merge=True)

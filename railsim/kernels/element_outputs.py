@@ -98,7 +98,8 @@ def mount_output(system, work, inner, index, e, out):
     vy = v2 - v1 - a3 * gx + a1 * gz
     vz = w2 - w1 - a1 * gy + a2 * gx
     if mounts.flags[index, TRANSLATES]:
-        normal = pad_load(mounts, index, pose[i, 2] * gx + pose[i, 5] * gy + pose[i, 8] * gz)
+        z = pose[i, 2] * gx + pose[i, 5] * gy + pose[i, 8] * gz
+        normal = pad_load(mounts, curves, index, z)
         for k in range(3):
             d = pose[i, k] * gx + pose[i, 3 + k] * gy + pose[i, 6 + k] * gz
             rate = pose[i, k] * vx + pose[i, 3 + k] * vy + pose[i, 6 + k] * vz

@@ -16,6 +16,8 @@ force times rate.  Dampers with a series stiffness, friction pads and air spring
 states (see `internal`).
 """
 
+from math import sqrt
+
 from railsim.kernels import compiled
 from railsim.kernels.internal import AIR, PAD, curve_value
 from railsim.kernels.lanes import (
@@ -32,10 +34,12 @@ from railsim.kernels.lanes import (
 from railsim.kernels.rotation import cross, turned, turned_back
 from railsim.kernels.system import (
     BOTH_ENDS,
+    DAMPING_Z,
     FORCE,
     FRICTION,
     LINK_SIZE,
     MOUNT_SIZE,
+    ONE_SIDED,
     POSE_SIZE,
     PRELOAD_Z,
     PUSH,
@@ -140,6 +144,33 @@ def link_forces(links, curves, inner, drive, laws, pose):
 
 
 @compiled(inline=True)
+def limit_of(mounts, e, k, normal):
+    """Largest friction force of mount `e` along axis `k` under the load `normal`."""
+    return mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal
+
+
+@compiled(python=False)
+def grip(mounts, internal, e, normal, inner):
+    """Factor that brings the friction forces of a pad that slides in any direction to its limit.
+
+    With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
+    wedge without mass, on a spring force F and under a smooth face at `angle` to the column,
+    presses on the column with N = (F + T_z)/tan(angle), T_z being the friction force on the side
+    frame, downwards positive: |T| <= mu N.
+    """
+    square, z, skew = 0.0, 0.0, 0.0
+    for k in range(3):
+        m = mounts.internal[e, k]
+        if m >= 0:
+            limit = limit_of(mounts, e, k, normal)
+            z = inner[m] / limit if limit > 0.0 else 0.0
+            square += z * z
+            skew = internal.parameter[m, 2]
+    size = sqrt(square) - skew * z
+    return 1.0 / size if size > 1.0 else 1.0
+
+
+@compiled(inline=True)
 def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
     """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
     force = 0.0
@@ -148,24 +179,51 @@ def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * abs(normal)
+            limit = limit_of(mounts, e, k, normal)
             drive[m, 0], drive[m, 1] = rate, limit
-            force += min(limit, max(-limit, inner[m]))
+            if internal.parameter[m, 1] == 0.0:
+                force += min(limit, max(-limit, inner[m]))
+            elif limit > 0.0:
+                force += inner[m] * grip(mounts, internal, e, normal, inner)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
         else:
             drive[m, 0] = rate
             force += inner[m]
+    if k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED:
+        force += lifted_part(mounts, e, d, rate, normal)
     return force
 
 
 @compiled(inline=True)
-def pad_load(mounts, e, z):
-    """Vertical spring force that loads the friction pads of mount `e` at its deflection `z`."""
-    if mounts.flags[e, FRICTION]:
-        return mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
-    return 0.0
+def pad_load(mounts, curves, e, z):
+    """Vertical spring force that loads the friction pads of mount `e` at its deflection `z`.
+
+    It counts in the direction of the preload; of a pad without tension, which body 1 carries, as
+    compression.
+    """
+    if mounts.flags[e, FRICTION] == 0:
+        return 0.0
+    preload = mounts.row[e, PRELOAD_Z]
+    force = preload + mounts.row[e, STIFFNESS_Z] * z
+    if mounts.flags[e, FRICTION] == ONE_SIDED:
+        if mounts.curve[e, 2] >= 0:
+            force += curve_value(curves, mounts.curve[e, 2], z)
+        return max(0.0, force)
+    if preload == 0.0:
+        return abs(force)
+    return max(0.0, force if preload > 0.0 else -force)
+
+
+@compiled(inline=True)
+def lifted_part(mounts, e, z, rate, normal):
+    """What takes the tension out of the spring and damper of a pad that only presses."""
+    spring = mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
+    damper = mounts.row[e, DAMPING_Z] * rate
+    if normal <= 0.0:
+        return -spring - damper
+    return max(0.0, normal + damper) - normal - damper
 
 
 @compiled(inline=True)
@@ -175,7 +233,7 @@ def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
         lane = e - first
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
-        normal = pad_load(mounts, e, laws[2 * LANES + lane])
+        normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
         laws[(6 + k) * LANES + lane] = axis_law(
             mounts, internal, curves, e, k, d, rate, normal, inner, drive
         )

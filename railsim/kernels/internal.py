@@ -8,12 +8,15 @@ MAXWELL        force of a damper c with a series stiffness k_s, F' = k_s (v - F/
 MAXWELL_CURVE  the same with a force-velocity table F_d(u): F' = k_s (v - u), F = F_d(u); exact over
                a step at constant v, branch of the table by branch
 PAD            force of a friction pad that sticks elastically and slides at a limit,
-               F' = k_t v, |F| <= F_max (Masing 1926): no creep at rest, loss = work of sliding
+               F' = k_t v, |F| <= F_max (Masing 1926): no creep at rest, loss = work of sliding.
+               States of a pad that slides in any direction follow each other; their forces over
+               their limits, q, stay within |q| - e q_z = 1: a circle, of a wedge (e > 0) a conic
+               with its focus at no force, see `elements`
 AIR            deflection w of the reservoir, c w' = k_1 (z - w) - k_2 w (Nishimura 1984); exact
                over a step at constant z
 """
 
-from math import exp, log
+from math import exp, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +32,9 @@ class Internal(NamedTuple):
     Attributes
     ----------
     kind : int64[m]
-    parameter : float64[m, 3]  MAXWELL: c, k_s; MAXWELL_CURVE: -, k_s; PAD: k_t; AIR: k_1, k_2, c
+    parameter : float64[m, 3]  MAXWELL: c, k_s; MAXWELL_CURVE: -, k_s; AIR: k_1, k_2, c;
+                               PAD: k_t, 0 for a state alone, of several that slide together their
+                               number in the last and 1 in the others, e in the last
     curve : int64[m]           force-velocity table of MAXWELL_CURVE, else -1
     """
 
@@ -149,6 +154,8 @@ def internal_rate(internal, curves, i, x, drive, limit):
     """Time derivative of state `i`."""
     if internal.kind[i] == PAD:
         rate = internal.parameter[i, 0] * drive
+        if internal.parameter[i, 1] > 0.0:  # `hold_within` brings it back
+            return rate
         sliding = (x >= limit and rate > 0.0) or (x <= -limit and rate < 0.0)
         return 0.0 if sliding else rate
     if internal.kind[i] == MAXWELL_CURVE:
@@ -158,6 +165,33 @@ def internal_rate(internal, curves, i, x, drive, limit):
     if internal.kind[i] == MAXWELL:
         return p[i, 1] * (drive - x / p[i, 0])
     return (p[i, 0] * (drive - x) - p[i, 1] * x) / p[i, 2]
+
+
+@compiled(inline=True)
+def slides_together(internal, i):
+    """Whether state `i` is the last of a pad that slides in any direction."""
+    return internal.kind[i] == PAD and internal.parameter[i, 1] > 1.0
+
+
+@compiled(python=False)
+def hold_within(internal, last, first, drive, state):
+    """Bring the forces of a pad that slides in any direction back to their limit.
+
+    They stand in `state` from `first` on; the limits in `drive`; `last` is the pad's last state.
+    """
+    square, z = 0.0, 0.0
+    begin = last + 1 - int(internal.parameter[last, 1])
+    for i in range(begin, last + 1):
+        z = 0.0
+        if drive[i, 1] > 0.0:
+            z = state[first + i] / drive[i, 1]
+        else:
+            state[first + i] = 0.0
+        square += z * z
+    size = sqrt(square) - internal.parameter[last, 2] * z
+    if size > 1.0:
+        for i in range(begin, last + 1):
+            state[first + i] /= size
 
 
 @compiled
@@ -174,7 +208,8 @@ def constant_decays(internal, h, decay):
 def advanced(internal, curves, i, x, drive, limit, h, decay):
     """State `i` after a step `h` at constant drive."""
     if internal.kind[i] == PAD:
-        return min(limit, max(-limit, x + h * internal.parameter[i, 0] * drive))
+        x += h * internal.parameter[i, 0] * drive
+        return x if internal.parameter[i, 1] > 0.0 else min(limit, max(-limit, x))
     if internal.kind[i] == MAXWELL_CURVE:
         return curve_advanced(curves, internal.curve[i], internal.parameter[i, 1], x, drive, h)
     end = steady_value(internal, i, drive)

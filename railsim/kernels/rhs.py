@@ -23,6 +23,7 @@ Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 
 from railsim.kernels import compiled
 from railsim.kernels.driving import (
+    add_axle_torques,
     add_traction,
     apply_speed_change,
     hold_fixed,
@@ -382,6 +383,10 @@ def mechanics(system, work, state, derivative):
     hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:
         load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
+    if system.drives.body.shape[0] > 0:
+        add_axle_torques(
+            system.drives, time, s, system.frame_offset, bodies, speed, state, work.pose
+        )
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     status, where, n_patches = wheel_rail(system, work, speed, state)

@@ -51,10 +51,14 @@ SHARE_1, SHARE_2, STIFFNESS_X, DAMPING_X, PRELOAD_X, ROTATION_X, ROTATION_DAMPIN
     17,
     20,
 )
-STIFFNESS_Z, PRELOAD_Z = STIFFNESS_X + 2, PRELOAD_X + 2
+STIFFNESS_Z, DAMPING_Z, PRELOAD_Z = STIFFNESS_X + 2, DAMPING_X + 2, PRELOAD_X + 2
 MOUNT_SIZE = 24
 # columns of Mounts.flags
 TRANSLATES, BOTH_ENDS, ROTATES, FRICTION = range(4)
+ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and never pull
+
+# columns of Drives.row
+BRAKES, OVER_DISTANCE, SLIP_BEGIN, SLIP_END = range(4)
 
 # columns of Work.pose: attitude R (0 to 8), position, velocity, angular velocity, force, moment
 POSITION, VELOCITY, ANGULAR, FORCE, MOMENT = 9, 12, 15, 18, 21
@@ -199,9 +203,8 @@ class Mounts(NamedTuple):
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
     flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
-                                 part, friction pads
-    law : int64[l]               3 times the mount plus the axis, rising, of all tables and internal
-                                 states
+                                 part, friction pads (`ONE_SIDED` where they may lift)
+    law : int64[l]               see `mount_laws`
     """
 
     body: np.ndarray
@@ -243,6 +246,13 @@ class Mounts(NamedTuple):
         return self.row[:, ROTATION_DAMPING_X : ROTATION_DAMPING_X + 3]
 
 
+def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """3 times the mount plus the axis, rising, of all that is more than spring and damper."""
+    has_law = (internal >= 0) | (curve >= 0)
+    has_law[:, 2] |= flags[:, FRICTION] == ONE_SIDED
+    return np.flatnonzero(has_law)
+
+
 class Curves(NamedTuple):
     """Piecewise linear tables, one after the other; beyond its ends a table continues linearly.
 
@@ -273,6 +283,24 @@ class Loads(NamedTuple):
     body: np.ndarray
     point: np.ndarray
     flags: np.ndarray
+    start: np.ndarray
+    table: np.ndarray
+
+
+class Drives(NamedTuple):
+    """Torques between wheelsets and the bodies that take their reactions.
+
+    Attributes
+    ----------
+    body : int64[d, 2]       body that takes the reaction, wheelset
+    row : float64[d, 4]      1 for a brake, 1 for a demand over distance, slips between which the
+                             torque is taken back (0 for none)
+    start : int64[2 d + 1]   first row of the table of the torque and of that of the demand of each
+    table : float64[..., 2]  speed [m/s] and torque [N m]; time [s] or distance [m] and factor
+    """
+
+    body: np.ndarray
+    row: np.ndarray
     start: np.ndarray
     table: np.ndarray
 
@@ -328,6 +356,7 @@ class System(NamedTuple):
     curves: Curves
     internal: Internal
     loads: Loads
+    drives: Drives
     drive: Drive
     gravity: float
 

@@ -17,7 +17,15 @@ from railsim.kernels.contact_columns import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_
 from railsim.kernels.driving import table_value_slope
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.extremes import note_extremes, note_unloaded
-from railsim.kernels.internal import MAXWELL_CURVE, PAD, advanced, constant_decays, within_table
+from railsim.kernels.internal import (
+    MAXWELL_CURVE,
+    PAD,
+    advanced,
+    constant_decays,
+    hold_within,
+    slides_together,
+    within_table,
+)
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import (
@@ -307,6 +315,8 @@ def step_fast(system, work, state, derivative, decay, h):
         state[k] = advanced(
             system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h, decay[i]
         )
+        if slides_together(system.internal, i):
+            hold_within(system.internal, i, 12 * n, work.drive, state)
     state[-4] = h
     advance_place(system.drive, state, derivative, h)
     if system.support.elastic:
@@ -328,7 +338,9 @@ def settle_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
         k = first + i
-        if internal.kind[i] == PAD:
+        if slides_together(internal, i):
+            hold_within(internal, i, first, drive, state)
+        elif internal.kind[i] == PAD and internal.parameter[i, 1] == 0.0:
             state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
         elif internal.kind[i] == MAXWELL_CURVE:
             state[k] = within_table(curves, internal.curve[i], state[k])

@@ -21,6 +21,7 @@ from railsim.linear.steady import SteadyRolling, SteadyState, led
 from railsim.linear.system import Linearisation
 from railsim.model.assembly import Model, SharedTables, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
+from railsim.model.work import without_loads
 from railsim.profiles import Profile
 from railsim.profiles.builtin import cone
 from railsim.track.tables import track_tables
@@ -148,7 +149,7 @@ class LinearVehicle:
         self._rest[-2] = PLACE
         there = circle(track, curvature=self.curvature, cant=cant)
         check_fixed(assembled.flat, there)
-        self.system = self.model.system._replace(track=track_tables(there))
+        self.system = without_loads(self.model.system)._replace(track=track_tables(there))
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -152,23 +152,48 @@ def assemble(
     if shared.track is None:
         shared.track = track_tables(track)
     contact, tables = _contact(flat, track, settings, book, shared.contact)
+    system, index = _suspension(flat)
+    system = system._replace(
+        track=shared.track,
+        support=support_arrays(track.support),
+        contact=contact,
+        drive=drive_arrays(settings.drive),
+    )
+    design = None
+    if vehicle.load is not None:
+        unloaded = vehicle.model_copy(update={"load": None})
+        design = assemble(unloaded, track, settings, profiles, shared)
+    return Model(system, index, flat, tables, book.used, design)
+
+
+def without_rails(vehicle: Vehicle) -> Model:
+    """Return the model of a vehicle without wheels' contacts and track, for statics alone."""
+    flat = flatten(vehicle)
+    system, index = _suspension(flat)
+    return Model(system, index, flat, (), {})
+
+
+def _suspension(flat: FlatVehicle) -> tuple[System, Index]:
+    """Bodies and elements as arrays, and their names; no track and no contacts."""
     elements = ElementArrays({body.name: body for body in flat.bodies})
     for element in flat.elements:
         elements.add(element)
     elements.sort()
     bodies, offsets = _bodies(flat)
+    nothing: Any = None
     system = System(
         bodies=bodies,
         frame_offset=offsets,
-        track=shared.track,
-        support=support_arrays(track.support),
-        contact=contact,
+        track=nothing,
+        support=nothing,
+        contact=nothing,
         links=elements.links(),
         mounts=elements.mounts(),
         curves=elements.curves(),
         internal=elements.internal(),
         loads=elements.loads(),
-        drive=drive_arrays(settings.drive),
+        drives=elements.drives(),
+        drive=CONSTANT_SPEED,
         gravity=GRAVITY,
     )
     index = Index(
@@ -177,11 +202,7 @@ def assemble(
         links=tuple(row["name"] for row in elements.link_rows),
         mounts=tuple(row["name"] for row in elements.mount_rows),
     )
-    design = None
-    if vehicle.load is not None:
-        unloaded = vehicle.model_copy(update={"load": None})
-        design = assemble(unloaded, track, settings, profiles, shared)
-    return Model(system, index, flat, tables, book.used, design)
+    return system, index
 
 
 def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> None:

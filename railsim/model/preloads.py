@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.flatten import FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.system import AXLEBOX, RIGID, Links, Mounts, System
@@ -44,6 +45,53 @@ def with_preloads(model: Model) -> Model:
         "no static equilibrium: the springs with preload cannot carry the vehicle in its "
         "nominal position; unbalanced: " + "; ".join(unbalanced)
     )
+
+
+def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
+    """Compression of all springs that carry weight at rest in the nominal position, by name [N].
+
+    As `with_preloads`, of a load case with its own weights, and of springs with known lengths as if
+    their preloads were to be found; a given preload counts as it is.  Positive where the spring
+    pushes its bodies apart.  With `solved` the model's preloads are taken as they are.
+
+    Raises
+    ------
+    ModelError
+        The springs cannot carry the vehicle.
+    """
+    support = _auto_preloads(model, known_lengths=True)
+    filled = model
+    if not solved:
+        conditions = _conditions(model.system)
+        filled, rest = _with_solved_preloads(model, support, conditions)
+        unbalanced = _unbalanced(model, conditions, rest)
+        if unbalanced and not len(model.system.bodies.fixed):
+            raise ModelError(
+                "the springs cannot carry the vehicle in its nominal position; unbalanced: "
+                + "; ".join(unbalanced)
+            )
+    flat = {element.name: element for element in model.flat.elements}
+    shares = {}
+    for group, i in support:
+        name = getattr(model.index, group)[i]
+        if group == "links":
+            shares[name] = -float(filled.system.links.spring[i, 2])
+            continue
+        # the body below is pushed down by what stands on it
+        below = 1.0 if _is_below(model, flat[name]) else -1.0
+        shares[name] = below * float(filled.system.mounts.preload[i, 2])
+    return shares
+
+
+def _is_below(model: Model, element: FlatElement) -> bool:
+    """Whether body 1 of an element carries body 2."""
+    if element.point1[2] != element.point2[2]:
+        return element.point1[2] > element.point2[2]
+    one, two = model.flat.body(element.body1), model.flat.body(element.body2)
+    # a frame may have its centre of gravity below the axles on which it stands
+    if (one.kind == "body") != (two.kind == "body"):
+        return two.kind == "body"
+    return one.position[2] >= two.position[2]
 
 
 def _levelled(model: Model) -> Model:
@@ -122,12 +170,16 @@ def least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:
     return np.asarray(solution, dtype=float)
 
 
-def _auto_preloads(model: Model) -> dict[tuple[str, int], float]:
-    """Elements whose preload is to be found, with the stiffness by which they share the weight."""
+def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[tuple[str, int], float]:
+    """Elements whose preload is to be found, with the stiffness by which they share the weight.
+
+    With `known_lengths` also those whose preload follows from their lengths.
+    """
     auto = {
         element.name: vertical_support(element.definition)
         for element in model.flat.elements
         if getattr(element.definition, "preload", None) == "auto"
+        or (known_lengths and getattr(element.definition, "has_free_length", False))
     }
     groups = {"links": model.index.links, "mounts": model.index.mounts}
     return {

@@ -110,11 +110,18 @@ def level_track(system: System) -> System:
     start = float(np.min(system.frame_offset)) - length / 2.0
     coefficients[:, 0, 0] += start + length
     track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0)
-    nothing = system.loads._replace(
-        body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
-    )
     even = system.support._replace(variation=system.support.variation[:0])
-    return system._replace(track=track, support=even, drive=CONSTANT_SPEED, loads=nothing)
+    return without_loads(system)._replace(track=track, support=even, drive=CONSTANT_SPEED)
+
+
+def without_loads(system: System) -> System:
+    """Return the system without given forces and torques, which analyses without a clock omit."""
+    return system._replace(
+        loads=system.loads._replace(
+            body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
+        ),
+        drives=system.drives._replace(body=system.drives.body[:0], row=system.drives.row[:0]),
+    )
 
 
 def level_track_with_friction(system: System) -> System:

@@ -7,6 +7,7 @@
 - `advance`: the time loop, chunk by chunk
 - `pace`: step and output interval at any speed; `flange`: the step judged in flange contact
 - `run_in`: the state in which a run starts, also in curves; `settling`: run-ins
+- `disturbance`: initial disturbances, wheelsets kept on their rails
 - `ensemble`: several vehicles as one system
 - `outputs`: from raw records to the quantities of a result
 - `right_samples`: low-pass filter before storage

@@ -67,7 +67,8 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         },
     )
     for remark in result.remarks:
-        if remark != low_pass_remark(settings):  # what was asked for is no warning
+        # what was asked for is no warning, and others were given at the start
+        if remark != low_pass_remark(settings) and remark not in prepared.remarks:
             _LOG.warning(remark)
     return result
 

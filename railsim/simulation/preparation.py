@@ -1,5 +1,6 @@
 """From definitions to a run that can begin: model, equilibrium, step, state, output."""
 
+import logging
 import math
 import time
 from collections.abc import Mapping
@@ -10,15 +11,17 @@ from numpy.typing import NDArray
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, argument_fault, nearest
+from railsim.errors import InputError, argument_fault
 from railsim.model.assembly import Model, SharedTables, assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.model.experience import vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
 from railsim.result import Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.simulation.advance import Preparation, Run
 from railsim.simulation.conditions import Inputs
+from railsim.simulation.disturbance import disturb
 from railsim.simulation.outputs import OutputPlan, run_extremes
 from railsim.simulation.pace import Pace
 from railsim.simulation.right_samples import filtering, low_pass_remark, output_words, sampled
@@ -27,6 +30,7 @@ from railsim.simulation.settling import Progress as SettlingProgress
 from railsim.simulation.told import Told
 
 Floats = NDArray[np.float64]
+_START = logging.getLogger("railsim.start")  # remarks on a run that begins
 
 
 def prepare(
@@ -49,7 +53,8 @@ def prepare(
     model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
     step, _ = pace.at(speed)
-    remarks: list[str] = [*balance.remarks]
+    unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
+    remarks: list[str] = [*balance.remarks, *unusual]
     if before is None:
         state = start_state(
             model,
@@ -61,7 +66,7 @@ def prepare(
             on_run_in,
             remarks.append if settings.start_state == "steady" else None,
         )
-        _disturb(model, settings, state)
+        remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(model, before)
     return Preparation(
@@ -93,40 +98,6 @@ def _taken_up(model: Model, before: Floats) -> Floats:
     return before.copy()
 
 
-def _disturb(model: Model, settings: Settings, state: Floats) -> None:
-    """Add the initial disturbance of the settings to a state."""
-    n = model.index.n_bodies
-    for name, change in settings.initial.items():
-        if name not in model.index.bodies:
-            raise InputError(
-                [
-                    Fault(
-                        "settings",
-                        f"initial.{name}",
-                        "no such body",
-                        nearest(name, model.index.bodies),
-                    )
-                ]
-            )
-        place = model.index.coordinate(name, 0)
-        state[place : place + 6] += (
-            change.x,
-            change.y,
-            change.z,
-            change.roll,
-            change.pitch,
-            change.yaw,
-        )
-        state[6 * n + place : 6 * n + place + 6] += (
-            change.vx,
-            change.vy,
-            change.vz,
-            change.vroll,
-            change.vpitch,
-            change.vyaw,
-        )
-
-
 def begin(
     vehicle: Vehicle,
     inputs: Inputs,
@@ -153,6 +124,8 @@ def begin(
         on_judgement=told.of_judgement,
         on_run_in=told.of_run_in,
     )
+    for remark in prepared.remarks:
+        _START.warning(remark)
     plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
     stored = StoredPeaks(sink)
     sink = filtering(stored, settings)
