@@ -82,6 +82,16 @@ class Definition(BaseModel):
     # built when first used: a part of a vehicle is built as part of it, not once more by itself
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
+    def __copy__(self) -> Self:
+        """Return a copy without what was worked out from the values: those of the copy may differ.
+
+        `model_copy` changes values of such a copy.
+        """
+        copied = super().__copy__()
+        for name in set(copied.__dict__) - set(type(self).model_fields):
+            del copied.__dict__[name]
+        return copied
+
 
 @cache
 def meanings(model: type[BaseModel]) -> dict[str, str]:

@@ -81,6 +81,9 @@ class FlatElement:
     definition: Element
 
 
+KEPT = "_flattened"
+
+
 @dataclass(frozen=True)
 class FlatVehicle:
     """A vehicle without assemblies.
@@ -157,18 +160,21 @@ def _places(
 
 
 def flatten(vehicle: Vehicle) -> FlatVehicle:
-    """Return the vehicle as plain lists of bodies and elements.
+    """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
     Raises
     ------
     InputError : names that mean nothing or are used twice, parts that do not fit together.
     """
-    faults = vehicle_faults(vehicle)
-    if faults:
-        raise InputError(
-            Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
-        )
-    return _flat(vehicle)
+    kept: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
+    if KEPT not in kept:
+        faults = vehicle_faults(vehicle)
+        if faults:
+            raise InputError(
+                Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
+            )
+        kept[KEPT] = _flat(vehicle)
+    return kept[KEPT]
 
 
 def vehicle_faults(vehicle: Vehicle) -> list[Fault]:
