@@ -82,6 +82,7 @@ class FlatElement:
 
 
 KEPT = "_flattened"
+GRAVITY = 9.81  # m/s2
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,16 @@ class FlatVehicle:
     def of_kind(self, kind: str) -> tuple[FlatBody, ...]:
         """Return the bodies of one kind, in their order."""
         return tuple(body for body in self.bodies if body.kind == kind)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all bodies [kg]."""
+        return sum(body.mass for body in self.bodies)
+
+    @property
+    def mean_wheel_load(self) -> float:
+        """Weight over the number of wheels [N]."""
+        return self.mass * GRAVITY / (2 * len(self.of_kind("wheelset")))
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ class Vehicle(FileDefinition, Drawn):
     @property
     def mass(self) -> float:
         """Mass of all bodies in the load case [kg]."""
-        return sum(body.mass for body in self._flat().bodies)
+        return self._flat().mass
 
     def _flat(self) -> "FlatVehicle":
         # flatten is built on the classes of this module
