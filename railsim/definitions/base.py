@@ -24,6 +24,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
+from railsim.definitions.offered import offered
 from railsim.text import html_table, printable
 
 LONGEST_VALUE = 60  # characters of a value in the table of a notebook
@@ -151,10 +152,8 @@ class FileDefinition(Definition):
         >>> coach.with_values({"bodies.carbody.mass": 40e3}).bodies["carbody"].mass
         40000.0
         """
-        # what is checked is known to the reader of files, which is built on this module
-        from railsim.definitions.loading import changed_definition
-
-        return changed_definition(self, values)
+        changed: Self = offered("changed_definition")(self, values)
+        return changed
 
     def __repr__(self) -> str:
         kind = type(self).__name__

@@ -14,6 +14,7 @@ from railsim.definitions.base import Vector
 from railsim.definitions.elements import Element
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
+from railsim.definitions.offered import offers
 from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
 from railsim.errors import Fault, InputError
 
@@ -170,6 +171,7 @@ def _places(
             yield from _places(assembly, place.inner(name, placement))
 
 
+@offers
 def flatten(vehicle: Vehicle) -> FlatVehicle:
     """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
