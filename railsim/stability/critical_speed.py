@@ -222,7 +222,7 @@ def _check(methods: Sequence[str], low: float, high: float, points: int) -> None
                 "low",
                 "",
                 f"found {low:g} m/s",
-                f"less than the upper speed, {high:g} m/s",
+                f"less than the highest, {high:g} m/s",
                 "--from",
             )
         )
