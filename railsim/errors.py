@@ -6,6 +6,7 @@ range of validity.
 """
 
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -41,8 +42,18 @@ class Fault:
         return f"{place}: {self.found}{remedy}"
 
     def on_command_line(self) -> "Fault":
-        """Return the fault as the command line names it: by the option of the parameter."""
-        return replace(self, file=self.option) if self.option else self
+        """Return the fault as the command line names it: by options, also those in backquotes."""
+        if not self.option:
+            return self
+        found, allowed = (_PARAMETER.sub(_option, text) for text in (self.found, self.allowed))
+        return replace(self, file=self.option, found=found, allowed=allowed)
+
+
+_PARAMETER = re.compile(r"`(\w+)`")
+
+
+def _option(parameter: re.Match[str]) -> str:
+    return "--" + parameter[1].replace("_", "-")
 
 
 def argument_fault(
@@ -66,6 +77,8 @@ def argument_fault(
     cant_deficiency: found 2 m; 0.3 m at most
     >>> print(fault.on_command_line())
     --cant-deficiency: found 2 m; 0.3 m at most
+    >>> print(argument_fault("duration", "", "given with `until`", "").on_command_line())
+    --duration: given with --until
     """
     return Fault(parameter, key, found, allowed, option or "--" + parameter.replace("_", "-"))
 

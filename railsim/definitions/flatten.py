@@ -14,6 +14,7 @@ from railsim.definitions.base import Vector
 from railsim.definitions.elements import AxleTorque, Element
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
+from railsim.definitions.offered import offers
 from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
 from railsim.errors import Fault, InputError
 
@@ -81,6 +82,10 @@ class FlatElement:
     definition: Element
 
 
+KEPT = "_flattened"
+GRAVITY = 9.81  # m/s2
+
+
 @dataclass(frozen=True)
 class FlatVehicle:
     """A vehicle without assemblies.
@@ -110,6 +115,16 @@ class FlatVehicle:
     def of_kind(self, kind: str) -> tuple[FlatBody, ...]:
         """Return the bodies of one kind, in their order."""
         return tuple(body for body in self.bodies if body.kind == kind)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all bodies [kg]."""
+        return sum(body.mass for body in self.bodies)
+
+    @property
+    def mean_wheel_load(self) -> float:
+        """Weight over the number of wheels [N]."""
+        return self.mass * GRAVITY / (2 * len(self.of_kind("wheelset")))
 
 
 @dataclass(frozen=True)
@@ -156,19 +171,23 @@ def _places(
             yield from _places(assembly, place.inner(name, placement))
 
 
+@offers
 def flatten(vehicle: Vehicle) -> FlatVehicle:
-    """Return the vehicle as plain lists of bodies and elements.
+    """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
     Raises
     ------
     InputError : names that mean nothing or are used twice, parts that do not fit together.
     """
-    faults = vehicle_faults(vehicle)
-    if faults:
-        raise InputError(
-            Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
-        )
-    return _flat(vehicle)
+    kept: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
+    if KEPT not in kept:
+        faults = vehicle_faults(vehicle)
+        if faults:
+            raise InputError(
+                Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
+            )
+        kept[KEPT] = _flat(vehicle)
+    return kept[KEPT]
 
 
 def vehicle_faults(vehicle: Vehicle) -> list[Fault]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from railsim.definitions.base import Remark
+from railsim.definitions.offered import offers
 from railsim.definitions.track import (
     CantElement,
     Circle,
@@ -80,6 +81,7 @@ class _Draft:
     ramp: bool
 
 
+@offers
 def curvature_sections(track: Track) -> list[Section]:
     """Return the plan as curvature over arc length [1/m]."""
     return _sections("plan", [_plan_draft(element) for element in track.plan])[0]

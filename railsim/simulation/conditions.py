@@ -84,7 +84,9 @@ def check_range(
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
         faults.append(argument_fault("duration", "", f"found {duration:g} s", "a positive number"))
     if duration is not None and until is not None:
-        faults.append(argument_fault("duration", "", "given together with until", "one of the two"))
+        faults.append(
+            argument_fault("duration", "", "given together with `until`", "one of the two")
+        )
     if until is not None and not start < until <= track.length:
         faults.append(
             argument_fault(
