@@ -107,6 +107,9 @@ class Outputs(Definition):
 
     quantities: tuple[Text, ...] = ()
     """Which of the usual quantities to keep, `*` standing for any letters; by default all"""
+    evaluate_after: NonNegative | None = None
+    """Time after the start that tables of peaks leave out [s]; by default 1 s, and no more than a
+    tenth of the run; 0: none"""
     low_pass: LowPass | None = None
     """Low pass of all quantities before they are stored at `output_rate`"""
     sensors: Flag = False

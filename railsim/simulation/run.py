@@ -10,7 +10,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ Progress = Callable[[float], None]
 _LOG = logging.getLogger(__name__)
 _START = logging.getLogger("railsim.start")  # remarks on a run that begins
 SPEED_RANGE = (0.5, 150.0)  # m/s
+# of the start, before peaks are evaluated: time, and share of the run at most
+LEFT_OUT, SHARE_LEFT_OUT = 1.0, 0.1  # s, 1
 # settings that a continued run may have of its own; it has no start and no initial disturbance
 OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial", "start_state")
 
@@ -377,6 +379,9 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
     began = time.perf_counter()
     prepared, settings = run.prepared, inputs.settings
     simulated = float(run.state[-3] - prepared.state[-3])
+    # a run that ended before its evaluation began is evaluated as a whole
+    evaluates = run.state[-3] > prepared.evaluation
+    of_peaks = run.evaluated if evaluates else run.extremes
     attributes: dict[str, str | float | int] = {
         "status": STATUS[run.status][0],
         "status_reason": _sentence(prepared.model, run.status, run.where),
@@ -387,6 +392,7 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
         "speed": float(inputs.speed),
         "start": float(inputs.start),
         "duration": simulated,
+        "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[-3]),
         **{
             f"asked_{name}": float(value)
             for name, value in (("duration", inputs.duration), ("until", inputs.until))
@@ -412,7 +418,7 @@ def _ended(run: Run, vehicle: Vehicle, inputs: _Inputs, before: Floats | None) -
             **(
                 {}
                 if settings.outputs.low_pass is not None
-                else {"peaks": run_extremes(run.extremes, prepared.balance.Q0)}
+                else {"peaks": run_extremes(of_peaks, prepared.balance.Q0)}
             ),
         },
     )
@@ -508,7 +514,7 @@ def prepare(
         remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(model, before)
-    return Preparation(
+    prepared = Preparation(
         model,
         balance,
         state,
@@ -518,6 +524,18 @@ def prepare(
         fresh=before is None,
         remarks=tuple(remarks),
     )
+    return replace(prepared, evaluation=_evaluation(prepared, settings))
+
+
+def _evaluation(prepared: Preparation, settings: Settings) -> float:
+    """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
+    begin = float(prepared.state[-3])
+    if not prepared.fresh:
+        return begin
+    asked = settings.outputs.evaluate_after
+    if asked is None:
+        return begin + min(LEFT_OUT, SHARE_LEFT_OUT * prepared.left(prepared.state))
+    return begin + asked
 
 
 def state_before(
