@@ -113,7 +113,8 @@ class Outputs(Definition):
     low_pass: LowPass | None = None
     """Low pass of all quantities before they are stored at `output_rate`"""
     sensors: Flag = False
-    """Readings of accelerometers on the floor, the bogie frames and the vehicle's own points"""
+    """Motion of points: floor, bogie frames, axleboxes and the vehicle's `sensors`; accelerations
+    also as accelerometers read them"""
 
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""
