@@ -58,7 +58,9 @@ def test_a_sensor_in_the_centre_of_gravity_moves_as_its_body():
 
 
 def test_velocity_is_the_rate_of_the_displacement_and_acceleration_that_of_the_velocity():
-    """Central differences over 2 ms; on straight track the frame moves evenly.  To first order.
+    """Central differences over 2 ms; on straight track the frame moves evenly.
+
+    From 50 ms on, when the start has decayed.
 
     The absolute acceleration is in the axes of the body, 10 mrad off.
     """
@@ -66,8 +68,8 @@ def test_velocity_is_the_rate_of_the_displacement_and_acceleration_that_of_the_v
     for name in ("seat", "axlebox_1_left"):
         u, v, a = (of(name, q) for q in ("displacement", "velocity", "absolute_acceleration"))
         for rate, of_what in ((v, u), (a, v)):
-            found = np.gradient(of_what, time, axis=0)[3:-3, 1:]
-            error = np.max(np.abs(found - rate[3:-3, 1:]))
+            found = np.gradient(of_what, time, axis=0)[50:-3, 1:]
+            error = np.max(np.abs(found - rate[50:-3, 1:]))
             assert error < 0.06 * np.max(np.abs(rate)) + 1e-3
 
 

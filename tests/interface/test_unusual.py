@@ -153,3 +153,17 @@ def test_peaks_of_a_run_leave_out_its_start():
     assert np.max(late["Q"][late["time"] >= 0.2]) <= largest.value < peak(usual, "Q").value
     # what runs were told of is not forgotten
     assert any("times the static wheel load" in remark for remark in late.remarks)
+
+
+@pytest.mark.parametrize("command", ["validate", "info"])
+def test_twenty_equal_faults_are_one_line_with_a_count(command, tmp_path, capsys):
+    path = tmp_path / "many.toml"
+    data = vehicle().model_dump(exclude_none=True)
+    data["bodies"] |= {f"box_{k}": BODY for k in range(20)}
+    text = Vehicle.model_validate(data).to_toml()
+    assert text.count("mass = 8000.0") == 21
+    path.write_text(text.replace("mass = 8000.0", "mass = -8.0"))
+    assert cli.main([command, str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "mass" in line
+    assert "(and 20 more: " in line
