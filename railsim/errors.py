@@ -83,6 +83,31 @@ def argument_fault(
     return Fault(parameter, key, found, allowed, option or "--" + parameter.replace("_", "-"))
 
 
+EQUAL = 5
+"""More faults than these that differ in their keys alone are one line with a count."""
+
+
+def fault_lines(faults: Iterable[Fault]) -> list[str]:
+    """Return a line for each fault; many that differ in their keys alone as one with a count.
+
+    Examples
+    --------
+    >>> fault_lines(Fault("a.toml", f"bodies.b{k}.mass", "found 0", "> 0") for k in range(20))
+    ['a.toml: bodies.b0.mass: found 0; > 0 (and 19 more: bodies.b1.mass ... bodies.b19.mass)']
+    """
+    alike: dict[tuple[str, str, str], list[Fault]] = {}
+    for fault in faults:
+        alike.setdefault((fault.file, fault.found, fault.allowed), []).append(fault)
+    lines = []
+    for group in alike.values():
+        keys = [fault.key for fault in group]
+        if len(group) <= EQUAL or not all(keys):
+            lines += [str(fault) for fault in group]
+        else:
+            lines.append(f"{group[0]} (and {len(group) - 1} more: {keys[1]} ... {keys[-1]})")
+    return lines
+
+
 def words_of(error: OSError | MemoryError) -> str:
     """Return what the system refused, in a line: no space on the device, no memory.
 

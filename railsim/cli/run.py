@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from railsim.compare import Comparison
     from railsim.definitions.settings import Settings
     from railsim.definitions.track import Track
+    from railsim.notation import Quantity
     from railsim.result import MidCurve, Peak, Result
+    from railsim.result.data import Array
     from railsim.studies.case import Case
 
 
@@ -324,11 +326,12 @@ def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
                 number,
                 peak.labels.get("side", ""),
                 peak.quantity.text(peak.value),
+                "" if isnan(peak.smooth) else peak.quantity.text(peak.smooth),
                 f"{peak.time:.2f}",
                 f"{peak.distance:.1f}",
             ]
         )
-    header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "t (s)", "s (m)"]
+    header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "20 Hz", "t (s)", "s (m)"]
     return table(header, rows, numbers=4)
 
 
@@ -354,17 +357,28 @@ def _step_lines(result: "Result", differences: "Sequence[Comparison]") -> list[s
     return table(header, rows, numbers=2)
 
 
+def _with_scatter(quantity: "Quantity", values: "Array", scatter: "Array") -> list[str]:
+    """Return values with their scatter, where there is any to the digits that are shown."""
+    cells = []
+    for value, spread in zip(values, scatter, strict=True):
+        around = quantity.text(spread)
+        zero = float(around) == 0.0 if around != "nan" else True
+        cells.append(quantity.text(value) + ("" if zero else f" ± {around}"))
+    return cells
+
+
 def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:
     rows = []
-    for name, values in curve.values.items():
-        quantity = result.quantities[name]
+    for name, values in curve.medians.items():
+        quantity, spread = result.quantities[name], curve.scatter[name]
         if quantity.dims[1:] == ("wheelset", "side"):
             for side, label in enumerate(result.coordinates["side"]):
-                cells = [quantity.text(value) for value in values[:, side]]
+                cells = _with_scatter(quantity, values[:, side], spread[:, side])
                 rows.append([name, quantity.words, label, *cells])
         elif quantity.dims[1:] == ("wheelset",):
-            rows.append([name, quantity.words, "", *(quantity.text(value) for value in values)])
+            rows.append([name, quantity.words, "", *_with_scatter(quantity, values, spread)])
     numbers = [str(index + 1) for index in range(len(result.wheelsets))]
-    title = f"Mid-curve R {curve.radius:.6g} m, t = {curve.time:.2f} s, s = {curve.distance:.1f} m"
+    begin, end = curve.full_curve
+    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: median and scatter"
     header = ["", "wheelset", "side", *numbers]
     return [title, *table(header, rows, numbers=3)]

@@ -57,8 +57,12 @@ def _record(fault: "Fault") -> dict[str, str]:
 
 
 def _print(report: dict[str, Any], quiet: bool) -> None:
-    for fault in report["faults"]:
-        echo(fault["text"], err=True)
+    from railsim.errors import Fault, fault_lines
+
+    faults = [Fault(*(fault[key] for key in ("file", "key", "found", "allowed")))
+              for fault in report["faults"]]  # fmt: skip
+    for line in fault_lines(faults):
+        echo(line, err=True)
     if quiet or report["faults"]:
         return
     echo(f"{report['file']}: {report['kind']}, no faults")

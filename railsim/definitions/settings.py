@@ -120,10 +120,14 @@ class Outputs(Definition):
 
     quantities: tuple[Text, ...] = ()
     """Which of the usual quantities to keep, `*` standing for any letters; by default all"""
+    evaluate_after: NonNegative | None = None
+    """Time after the start that tables of peaks leave out [s]; by default 1 s, and no more than a
+    tenth of the run; 0: none"""
     low_pass: LowPass | None = None
     """Low pass of all quantities before they are stored at `output_rate`"""
     sensors: Flag = False
-    """Readings of accelerometers on the floor, the bogie frames and the vehicle's own points"""
+    """Motion of points: floor, bogie frames, axleboxes and the vehicle's `sensors`; accelerations
+    also as accelerometers read them"""
 
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""

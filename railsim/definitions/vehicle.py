@@ -146,6 +146,9 @@ class Vehicle(FileDefinition, Drawn):
     else the first wheelset"""
     service: Service | None = None
     """What the vehicle is admitted for; assessments need it"""
+    sensors: dict[Name, Point] = Field(default_factory=dict)
+    """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
+    standard ones"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
     """Bodies by name"""
     wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)

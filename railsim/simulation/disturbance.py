@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 CLOSE = 1e-6  # error of a wheel load over the static one
 IMPACT = 0.5  # change of a wheel load over the static one
 LONGEST, TURN = 2.5e-4, 5e-3  # way and angle over which the contacts are followed at once [m, rad]
+FARTHEST, WIDEST = 0.012, 0.1  # beyond, a wheelset is where it is put [m, rad]
 _STEPS = 30
 
 
@@ -59,7 +60,9 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
     if before is not None:
         for w, name in enumerate(model.index.wheelsets):
             change = settings.initial.get(name, InitialState())
-            if (change.y or change.yaw) and not (change.z or change.roll):
+            given = change.z or change.roll
+            near = abs(change.y) <= FARTHEST and abs(change.yaw) <= WIDEST
+            if (change.y or change.yaw) and near and not given:
                 _follow_contacts(model, w, change, before[w], state)
         remarks = _impact(model, before, Q0, state)
     return tuple(remarks)

@@ -27,6 +27,9 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
     began = time.perf_counter()
     prepared, settings = run.prepared, inputs.settings
     simulated = float(run.state[-3] - prepared.state[-3])
+    # a run that ended before its evaluation began is evaluated as a whole
+    evaluates = run.state[-3] > prepared.evaluation
+    of_peaks = run.evaluated if evaluates else run.extremes
     attributes: dict[str, str | float | int] = {
         "status": STATUS[run.status][0],
         "status_reason": _sentence(prepared.model, run.status, run.where),
@@ -37,6 +40,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         "speed": float(inputs.speed),
         "start": float(inputs.start),
         "duration": simulated,
+        "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[-3]),
         **{
             f"asked_{name}": float(value)
             for name, value in (("duration", inputs.duration), ("until", inputs.until))
@@ -62,7 +66,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
             **(
                 {}
                 if settings.outputs.low_pass is not None
-                else {"peaks": run_extremes(run.extremes, prepared.balance.Q0)}
+                else {"peaks": run_extremes(of_peaks, prepared.balance.Q0)}
             ),
         },
     )

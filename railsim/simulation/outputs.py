@@ -28,7 +28,7 @@ from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
-from railsim.result.sensors import readings, sensors
+from railsim.result.sensors import all_sensors, motions, readings
 from railsim.track.alignment import CANT_BASE, Alignment
 from railsim.track.irregularity import displacement
 
@@ -176,7 +176,7 @@ class OutputPlan:
 
     def __init__(self, model: Model, settings: Settings, track: Track, vehicle: Vehicle) -> None:
         self._model = model
-        self._sensors = sensors(vehicle) if settings.outputs.sensors else {}
+        self._sensors = all_sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
         self._alignment = Alignment(track)
         self._irregularity = displacement(track)
@@ -223,7 +223,7 @@ class OutputPlan:
         prefixes = ["element_"] * bool(self.elements)
         prefixes += ["patch_"] * self._asked.contact_patches
         prefixes += ["frictional_power"] * self._asked.frictional_power
-        prefixes += ["track_", "rail_"] * self._asked.track
+        prefixes += ["track_", "rail_", "wheelset_"] * self._asked.track
         prefixes += ["sensor_"] * bool(self._sensors)
         more = [q for name, q in REQUESTED.items() if name.startswith(tuple(prefixes))]
         return (*QUANTITIES.values(), *(more if prefixes else ()))
@@ -261,6 +261,7 @@ class OutputPlan:
                 self._alignment,
                 recorder.state[:rows, -1],
             )
+            values |= motions(self._sensors, values, self._model.index.bodies)
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows])
         if self._asked.frictional_power:
@@ -271,6 +272,9 @@ class OutputPlan:
             values |= {
                 "rail_deflection_lateral": deflection[..., 0],
                 "rail_deflection_vertical": deflection[..., 1],
+                "wheelset_lateral_on_rails": (
+                    values["wheelset_lateral"] - values["rail_lateral"].mean(axis=-1)
+                ),
             }
         return values
 

@@ -4,6 +4,7 @@ import logging
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ from railsim.simulation.settling import Progress as SettlingProgress
 from railsim.simulation.told import Told
 
 Floats = NDArray[np.float64]
+# of the start, before peaks are evaluated: time, and share of the run at most
+LEFT_OUT, SHARE_LEFT_OUT = 1.0, 0.1  # s, 1
 _START = logging.getLogger("railsim.start")  # remarks on a run that begins
 
 
@@ -69,7 +72,7 @@ def prepare(
         remarks += disturb(model, balance.Q0, settings, state)
     else:
         state = _taken_up(model, before)
-    return Preparation(
+    prepared = Preparation(
         model,
         balance,
         state,
@@ -79,6 +82,18 @@ def prepare(
         fresh=before is None,
         remarks=tuple(remarks),
     )
+    return replace(prepared, evaluation=_evaluation(prepared, settings))
+
+
+def _evaluation(prepared: Preparation, settings: Settings) -> float:
+    """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
+    begin = float(prepared.state[-3])
+    if not prepared.fresh:
+        return begin
+    asked = settings.outputs.evaluate_after
+    if asked is None:
+        return begin + min(LEFT_OUT, SHARE_LEFT_OUT * prepared.left(prepared.state))
+    return begin + asked
 
 
 def _taken_up(model: Model, before: Floats) -> Floats:

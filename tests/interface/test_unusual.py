@@ -9,6 +9,7 @@ import railsim
 from railsim import cli
 from railsim.definitions.vehicle import Vehicle
 from railsim.model.experience import vehicle_remarks
+from railsim.result import peak
 
 BODY = {"mass": 8e3, "inertia": [5e3, 9e3, 9e3], "position": [0.0, 0.0, -1.2]}
 AXLE = {
@@ -101,14 +102,17 @@ def test_they_are_shown_by_validate_info_and_at_the_start_of_a_run(tmp_path, cap
 
 
 @cache
-def disturbed(**change):
+def disturbed(duration=0.02, after=None, **change):
     """The first instants of a coach with its leading wheelset moved."""
-    settings = {"initial": {"front.outer.wheelset": change}}
+    settings = {
+        "initial": {"front.outer.wheelset": change},
+        "outputs": {} if after is None else {"evaluate_after": after},
+    }
     return railsim.simulate(
         railsim.load_vehicle("coach_manchester"),
         railsim.load_track("straight"),
         speed=20.0,
-        duration=0.02,
+        duration=duration,
         settings=railsim.Settings.model_validate(settings),
     )
 
@@ -135,3 +139,31 @@ def test_an_impact_at_the_start_is_remarked():
     found = [remark for remark in result.remarks if "impact" in remark]
     assert found[0].startswith("The initial disturbance is an impact: Q of front.outer.wheelset")
     assert "392.2 kN at t = 0" in found[0]
+
+
+def test_peaks_of_a_run_leave_out_its_start():
+    """By a tenth of a short run, by what the settings say; the histories are the same."""
+    whole, late, usual = (disturbed(0.4, after, y=0.003, z=1e-9) for after in (0.0, 0.2, None))
+    assert np.array_equal(whole["Q"], late["Q"])
+    assert peak(whole, "Q").value == np.max(whole["Q"])  # the impact at t = 0
+    assert usual.attributes["evaluation_start"] == pytest.approx(0.04)
+    assert peak(usual, "Q").time >= 0.04
+    largest = peak(late, "Q")
+    assert largest.time >= 0.2
+    assert np.max(late["Q"][late["time"] >= 0.2]) <= largest.value < peak(usual, "Q").value
+    # what runs were told of is not forgotten
+    assert any("times the static wheel load" in remark for remark in late.remarks)
+
+
+@pytest.mark.parametrize("command", ["validate", "info"])
+def test_twenty_equal_faults_are_one_line_with_a_count(command, tmp_path, capsys):
+    path = tmp_path / "many.toml"
+    data = vehicle().model_dump(exclude_none=True)
+    data["bodies"] |= {f"box_{k}": BODY for k in range(20)}
+    text = Vehicle.model_validate(data).to_toml()
+    assert text.count("mass = 8000.0") == 21
+    path.write_text(text.replace("mass = 8000.0", "mass = -8.0"))
+    assert cli.main([command, str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "mass" in line
+    assert "(and 20 more: " in line
