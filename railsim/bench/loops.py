@@ -5,7 +5,7 @@ microseconds and Python's part in it does not count.  Everything is in the cache
 predicted: the sum of the parts is a lower bound of what they take in the time loop.
 """
 
-from railsim.kernels import jit
+from railsim.kernels import compiled
 from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up, stretched_roll
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
@@ -33,21 +33,21 @@ from railsim.kernels.wheel_rail import (
 )
 
 
-@jit
+@compiled
 def many_right_hand_sides(system, work, state, derivative, n):
     """Everything, as RK4 calls it."""
     for _ in range(n):
         rates_of_state(system, work, state, derivative)
 
 
-@jit
+@compiled
 def many_mechanics(system, work, state, derivative, n):
     """Everything, as the fast scheme calls it."""
     for _ in range(n):
         mechanics(system, work, state, derivative, AS_GIVEN)
 
 
-@jit
+@compiled
 def many_frames(system, work, state, derivative, n):
     """Track frames of all bodies."""
     origin = system.bodies.frame[system.bodies.references[0]]
@@ -63,7 +63,7 @@ def many_frames(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_kinematics(system, work, state, derivative, n):
     """Positions, attitudes and velocities of all bodies."""
     for _ in range(n):
@@ -78,7 +78,7 @@ def many_kinematics(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_links(system, work, state, derivative, n):
     """Point-to-point elements."""
     first = 12 * system.bodies.kind.shape[0]
@@ -87,7 +87,7 @@ def many_links(system, work, state, derivative, n):
         link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
 
 
-@jit
+@compiled
 def many_mounts(system, work, state, derivative, n):
     """Elements with three axes."""
     first = 12 * system.bodies.kind.shape[0]
@@ -98,14 +98,14 @@ def many_mounts(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_wheel_rail(system, work, state, derivative, n):
     """All of the wheel-rail contact."""
     for _ in range(n):
         wheel_rail(system, work, state[-1], state)
 
 
-@jit
+@compiled
 def many_normal_contacts(system, work, state, derivative, n):
     """Table look-up and normal forces of all wheels; the number of patches."""
     patches = 0
@@ -114,7 +114,7 @@ def many_normal_contacts(system, work, state, derivative, n):
     return patches
 
 
-@jit
+@compiled
 def many_creepages(system, work, state, patches, n):
     """Creepages and Kalker's coefficients of all patches."""
     patch = work.patch
@@ -133,7 +133,7 @@ def many_creepages(system, work, state, patches, n):
         )
 
 
-@jit
+@compiled
 def many_fastsims(system, work, state, patches, n):
     """FASTSIM of all patches."""
     patch = work.patch
@@ -159,14 +159,14 @@ def many_fastsims(system, work, state, patches, n):
         )
 
 
-@jit
+@compiled
 def many_creep_forces(system, work, state, patches, n):
     """Creep forces put on the wheelsets, outputs of the wheels gathered."""
     for _ in range(n):
         add_creep_forces(system, work, patches, state[-1])
 
 
-@jit
+@compiled
 def many_dynamics(system, work, state, derivative, n):
     """Accelerations of all bodies."""
     for _ in range(n):
@@ -184,7 +184,7 @@ def many_dynamics(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_look_ups(system, work, state, derivative, n):
     """Look-ups of the tread of the leading right wheel; the number of them."""
     contact = system.contact
@@ -204,7 +204,7 @@ def many_look_ups(system, work, state, derivative, n):
     return done
 
 
-@jit
+@compiled
 def many_fastsim_patches(patches, n_x, n_y, inputs, shear_modulus, work, out, n):
     """FASTSIM of `patches` equal patches; rows of inputs: a, b, mu_N, c11, c22, c23, xi, phi."""
     for _ in range(n):

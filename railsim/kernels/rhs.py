@@ -21,7 +21,7 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.lanes import (
@@ -69,7 +69,7 @@ from railsim.kernels.wheel_rail import wheel_rail
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@jit_inline
+@compiled(inline=True)
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -85,7 +85,7 @@ def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     return RUNNING
 
 
-@jit_inline
+@compiled(inline=True)
 def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     """Rates of roll, pitch, yaw from the angular velocity relative to the frame, body axes.
 
@@ -96,7 +96,7 @@ def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     return about_x, w2 - yaw_rate * sin_roll, yaw_rate
 
 
-@jit_merged
+@compiled(merge=True)
 def kinematics(bodies, frames, speed, state, relative, pose, rates):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
@@ -151,7 +151,7 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
     axlebox_kinematics(bodies, state, pose, rates)
 
 
-@jit_inline
+@compiled(inline=True)
 def axlebox_kinematics(bodies, state, pose, rates):
     """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
     n = bodies.kind.shape[0]
@@ -187,7 +187,7 @@ def axlebox_kinematics(bodies, state, pose, rates):
         )
 
 
-@jit_merged
+@compiled(merge=True)
 def hold_axleboxes(bodies, axles, frames, C, state, pose):
     """Take from the moments of elements on a wheelset what would turn it about its axle.
 
@@ -217,7 +217,7 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
             pose[b, FORCE + k] += along * frames[f, ATTITUDE + 3 * k]
 
 
-@jit_inline
+@compiled(inline=True)
 def axlebox_dynamics(bodies, pose, rates, derivative):
     """Pitch accelerations of the axleboxes; everything else they hand to their wheelsets."""
     n = bodies.kind.shape[0]
@@ -244,7 +244,7 @@ def axlebox_dynamics(bodies, pose, rates, derivative):
         store_rows(rates, starts(own, RATES_SIZE), 0, (zero, zero, zero, zero, acceleration, zero))
 
 
-@jit_merged
+@compiled(merge=True)
 def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, rates, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
@@ -298,7 +298,7 @@ def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, 
         store_rows(derivative, starts(own, 6), 6 * n, (ax, ay, az, d1, d2, d3))
 
 
-@jit
+@compiled
 def table_value_slope(table, x):
     """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
     last = table.shape[0] - 1
@@ -313,7 +313,7 @@ def table_value_slope(table, x):
     return table[i, 1] + slope * (x - table[i, 0]), slope
 
 
-@jit_merged
+@compiled(merge=True)
 def add_traction(drive, bodies, frames, speed, pose):
     """Traction less running resistance of a free-running vehicle, on the reference body."""
     force, _ = table_value_slope(drive.table, speed)
@@ -324,7 +324,7 @@ def add_traction(drive, bodies, frames, speed, pose):
         pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
 
 
-@jit_merged
+@compiled(merge=True)
 def speed_change(drive, bodies, frames, state, derivative):
     """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
     if drive.mode == TABLE:
@@ -342,7 +342,7 @@ def speed_change(drive, bodies, frames, state, derivative):
     return 0.0
 
 
-@jit_merged
+@compiled(merge=True)
 def apply_speed_change(bodies, frames, state, rate, derivative):
     """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
     n = bodies.kind.shape[0]
@@ -360,7 +360,7 @@ def apply_speed_change(bodies, frames, state, rate, derivative):
         derivative[v + 2] -= rate * (w1 * y - w2 * x)
 
 
-@jit_merged
+@compiled(merge=True)
 def hold_reference(bodies, relative, acceleration, derivative):
     """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
     n = bodies.kind.shape[0]
@@ -373,7 +373,7 @@ def hold_reference(bodies, relative, acceleration, derivative):
         derivative[held] = 0.0
 
 
-@jit_inline
+@compiled(inline=True)
 def turn_fixed(bodies, frames, speed, state):
     """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
     n = bodies.kind.shape[0]
@@ -393,7 +393,7 @@ def turn_fixed(bodies, frames, speed, state):
         state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
 
 
-@jit_inline
+@compiled(inline=True)
 def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
     """Keep fixed bodies where they are; what holds them is part of their accelerations.
 
@@ -424,7 +424,7 @@ def right_hand_side(system, work, state, derivative):
     return right_hand_sides(system, work, state[None], derivative[None])
 
 
-@jit
+@compiled
 def right_hand_sides(system, work, states, derivatives):
     """Derivatives of several states, one a row, as for difference quotients.
 
@@ -440,7 +440,7 @@ def right_hand_sides(system, work, states, derivatives):
     return status, where, n_patches
 
 
-@jit_merged
+@compiled(merge=True)
 def rates_of_state(system, work, state, derivative):
     """As `right_hand_side`, within compiled code."""
     status, where, n_patches = mechanics(system, work, state, derivative, AS_GIVEN)
@@ -449,7 +449,7 @@ def rates_of_state(system, work, state, derivative):
     return status, where, n_patches
 
 
-@jit_merged
+@compiled(merge=True)
 def internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
     first = 12 * system.bodies.kind.shape[0]
@@ -459,7 +459,7 @@ def internal_rates(system, work, state, derivative):
         )
 
 
-@jit_inline
+@compiled(inline=True)
 def keep_counts(events, first, to):
     """Copy the counts of patches: of repeated evaluations only the last one counts."""
     for w in range(events.shape[0]):
@@ -467,7 +467,7 @@ def keep_counts(events, first, to):
         events[w, to + 1] = events[w, first + 1]
 
 
-@jit_merged
+@compiled(merge=True)
 def mechanics(system, work, state, derivative, rails):
     """Derivative of coordinates, velocities, place and speed; drives of the internal states.
 

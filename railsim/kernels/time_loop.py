@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.internal import MAXWELL_CURVE, PAD, advanced, constant_decays, within_table
@@ -74,7 +74,7 @@ class Recorder(NamedTuple):
     element: np.ndarray
 
 
-@jit_internal
+@compiled(python=False)
 def record(recorder, row, system, state, derivative, work, n_patches):
     """Copy the state and the by-products of its evaluation into row `row`."""
     for k in range(recorder.state.shape[1]):
@@ -101,7 +101,7 @@ def record(recorder, row, system, state, derivative, work, n_patches):
         )
 
 
-@jit_internal
+@compiled(python=False)
 def record_patches(out, row, work, n_patches):
     """Copy the active contact patches to their places; the others are zero."""
     for w in range(out.shape[1]):
@@ -115,7 +115,7 @@ def record_patches(out, row, work, n_patches):
             out[row, w, side, k, c] = work.patch[c, i]
 
 
-@jit_inline
+@compiled(inline=True)
 def implicitness(z):
     """Share of the new value at h times the damping rate: the trapezoid's 1/2, for large z 1 - 1/z.
 
@@ -124,7 +124,7 @@ def implicitness(z):
     return 0.5 if z < 2.0 else 1.0 - 1.0 / z
 
 
-@jit_inline
+@compiled(inline=True)
 def soften(rate, before, i, damping, inverse, h):
     """Take a damper of one coordinate linearly implicit; `inverse`: 1/mass."""
     z = h * damping * inverse
@@ -132,7 +132,7 @@ def soften(rate, before, i, damping, inverse, h):
     rate[i] = (rate[i] + theta_z * before[i]) / (1.0 + theta_z)
 
 
-@jit_inline
+@compiled(inline=True)
 def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
     """Take a damper of the speed of coordinate i + lever times that of j linearly implicit."""
     z = h * damping * (inverse_i + lever * lever * inverse_j)
@@ -143,7 +143,7 @@ def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
     rate[j] -= force * lever * inverse_j
 
 
-@jit_inline
+@compiled(inline=True)
 def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     """Take what the contact takes from the speeds in y, z and roll linearly implicit.
 
@@ -179,7 +179,7 @@ def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def soften_contact(bodies, jacobian, b, rate, before, h):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
@@ -208,7 +208,7 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
 
 
-@jit_inline
+@compiled(inline=True)
 def remember(system, work, state, derivative, h):
     """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
@@ -228,7 +228,7 @@ def remember(system, work, state, derivative, h):
     state[-4] = -h
 
 
-@jit_inline
+@compiled(inline=True)
 def step_fast(system, work, state, derivative, decay, h):
     """Advance `state` by `h` with the derivative already evaluated there.
 
@@ -292,7 +292,7 @@ def step_fast(system, work, state, derivative, decay, h):
         step_support(system, work, state, h)
 
 
-@jit_inline
+@compiled(inline=True)
 def advance_place(drive, state, derivative, h):
     """Time, place and speed after a step; a speed table is met exactly."""
     state[-2] += h * (state[-1] + 0.5 * h * derivative[-1])
@@ -302,7 +302,7 @@ def advance_place(drive, state, derivative, h):
         state[-1], _ = table_value_slope(drive.table, state[-2])
 
 
-@jit_inline
+@compiled(inline=True)
 def settle_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
@@ -313,7 +313,7 @@ def settle_limits(internal, curves, first, drive, state):
             state[k] = within_table(curves, internal.curve[i], state[k])
 
 
-@jit_inline
+@compiled(inline=True)
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
@@ -340,7 +340,7 @@ def step_rk4(system, work, state, derivative, stages, h):
     return RUNNING, 0
 
 
-@jit_inline
+@compiled(inline=True)
 def striking(contact, swing, h, share):
     """First wheelset with a contact force about to change by more than a share of the wheel load.
 
@@ -352,7 +352,7 @@ def striking(contact, swing, h, share):
     return -1
 
 
-@jit_merged
+@compiled(merge=True)
 def all_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
     for k in range(state.shape[0]):
@@ -361,7 +361,7 @@ def all_finite(state):
     return -1
 
 
-@jit
+@compiled
 def time_loop(
     system,
     work,

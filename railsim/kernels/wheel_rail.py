@@ -26,7 +26,7 @@ from math import sqrt
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.contact_table import (
     ABOVE_Y,
     BELOW_Y,
@@ -167,7 +167,7 @@ FADE = 30e-6  # penetration over which the contact damping is faded in (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
 
-@jit_inline
+@compiled(inline=True)
 def normal_contact(system, work, speed, state):
     """Look up all wheels, add elastic normal forces, list the active patches.
 
@@ -232,7 +232,7 @@ def normal_contact(system, work, speed, state):
     return RUNNING, 0, n
 
 
-@jit_inline
+@compiled(inline=True)
 def wheel_contact(system, work, w, side, speed, n):
     """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
 
@@ -359,7 +359,7 @@ def wheel_contact(system, work, w, side, speed, n):
     return RUNNING, n
 
 
-@jit
+@compiled
 def all_far(contact, table, iy, ir, iw, tr, z):
     """Whether every patch is more than LIFT_RANGE away from its rail."""
     for patch in range(N_PATCH):
@@ -368,7 +368,7 @@ def all_far(contact, table, iy, ir, iw, tr, z):
     return True
 
 
-@jit
+@compiled
 def outside(where):
     """Status code for a look-up outside the contact table."""
     if where == ABOVE_Y:
@@ -380,7 +380,7 @@ def outside(where):
     return YAW_RANGE
 
 
-@jit_inline
+@compiled(inline=True)
 def creepages(system, work, n, speed, state):
     """Places and creepages of the active patches, see the module's equations."""
     patch, C, frames, plane = work.patch, work.relative, work.frames, work.plane
@@ -454,7 +454,7 @@ def creepages(system, work, n, speed, state):
         patch[PHI, k] = (a2 * s + a3 * c - a1 * (turn_y * s + turn_z * c)) / rolling
 
 
-@jit_inline
+@compiled(inline=True)
 def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
     """Slopes of the creep force along and across over the creepage in that direction [N].
 
@@ -477,7 +477,7 @@ def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
     return G * ab * c11 * along, G * ab * c22 * across
 
 
-@jit_inline
+@compiled(inline=True)
 def begin_support(support):
     """Nothing yet acts on the rails."""
     for w in range(support.shape[0]):
@@ -486,7 +486,7 @@ def begin_support(support):
                 support[w, side, k] = 0.0
 
 
-@jit_inline
+@compiled(inline=True)
 def add_slopes(support, w, side, patch, k, across):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
 
@@ -517,7 +517,7 @@ def add_slopes(support, w, side, patch, k, across):
     support[w, side, D_Z_SLIP] -= across * s * c
 
 
-@jit_inline
+@compiled(inline=True)
 def add_damping(jacobian, b, patch, k, across):
     """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
 
@@ -552,7 +552,7 @@ def add_damping(jacobian, b, patch, k, across):
     jacobian[b, J_NORMAL + 8] += f_roll * lever
 
 
-@jit_inline
+@compiled(inline=True)
 def add_creep_forces(system, work, n, speed):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
@@ -618,7 +618,7 @@ def add_creep_forces(system, work, n, speed):
                 work.support[w, side, F_Z] = wheel[w, side, W_Q]
 
 
-@jit_inline
+@compiled(inline=True)
 def wheel_rail(system, work, speed, state):
     """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
 
@@ -706,7 +706,7 @@ def wheel_rail(system, work, speed, state):
     return RUNNING, 0, n
 
 
-@jit_merged
+@compiled(merge=True)
 def complete_normal_force(b, bodies, frames, C, state, force):
     """Moment vector from the generalised moments, and the force along the track.
 
