@@ -219,11 +219,7 @@ def _check(methods: Sequence[str], low: float, high: float, points: int) -> None
     if not faults and low >= high:
         faults.append(
             argument_fault(
-                "low",
-                "",
-                f"found {low:g} m/s",
-                f"less than the highest, {high:g} m/s",
-                "--from",
+                "low", "", f"found {low:g} m/s", f"less than the highest, {high:g} m/s", "--from"
             )
         )
     if not 2 <= points <= 200:
