@@ -12,6 +12,7 @@ from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
+from railsim.kernels.support import AS_GIVEN
 from railsim.kernels.wheel_contact import normal_contact
 from railsim.kernels.wheel_rail import add_creep_forces, wheel_rail
 
@@ -27,7 +28,7 @@ def many_right_hand_sides(system, work, state, derivative, n):
 def many_mechanics(system, work, state, derivative, n):
     """Everything, as the fast scheme calls it."""
     for _ in range(n):
-        mechanics(system, work, state, derivative)
+        mechanics(system, work, state, derivative, AS_GIVEN)
 
 
 @compiled
