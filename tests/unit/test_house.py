@@ -9,7 +9,11 @@ import railsim
 PACKAGE = Path(railsim.__file__).parent
 PARAMETERS, FUNCTION, MODULE = 10, 80, 500
 # beyond a limit, with the reason
-LARGER = {"notation.py": "the table of quantities", "studies/study.py": "to be divided"}
+LARGER = {
+    "kernels/support.py": "to be divided",
+    "notation.py": "the table of quantities",
+    "studies/study.py": "to be divided",
+}
 # public functions that take the numbers of one patch or pair of profiles
 MORE_PARAMETERS = {"creep_force", "exact_creep_force"}
 
