@@ -15,14 +15,14 @@ import numba
 import numpy as np
 
 from railsim import load_settings, load_track, load_vehicle
-from railsim.contact.creep_table import creep_table
+from railsim.contact.creep import LAWS, creep_law, creep_scratch
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels import fastsim_simd
-from railsim.kernels.creep import LAW_NUMBERS, creep_forces
-from railsim.kernels.fastsim import fastsim_workspace
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.model.assembly import work_arrays
+from railsim.kernels.creep import creep_forces
+from railsim.kernels.patches import Patches
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 
 GRIDS = (5, 10, 20, 50)
@@ -31,11 +31,9 @@ STEPS = 50
 
 
 @numba.njit
-def repeated(times, law, n, nx, ny, inputs, G, table, scale, offsets, work, out):
-    a, b, mu_N, c11, c22, c23, c33, xi_x, xi_y, phi = inputs
+def repeated(times, n, law, inputs, scratch):
     for _ in range(times):
-        creep_forces(law, n, nx, ny, a, b, mu_N, c11, c22, c23, c33, G, 1.0, 1.0, xi_x, xi_y, phi,
-                     table, scale, offsets, work, out[0], out[1], out[2], out[3])  # fmt: skip
+        creep_forces(n, law, inputs, scratch)
 
 
 def patches(n):
@@ -49,17 +47,15 @@ def patches(n):
     unit = mu_N / (82e9 * a * b)
     creepages = [rng.normal(size=n) * unit / c for c in coefficients[:3]]
     creepages[2] /= size
-    return tuple(np.ascontiguousarray(v) for v in (a, b, mu_N, *coefficients, *creepages))
+    arrays = (a, b, mu_N, *coefficients, *creepages, *np.zeros((4, n)))
+    return Patches(*(np.ascontiguousarray(v) for v in arrays))
 
 
 def nanoseconds(law, n, grid, inputs, rounds=25):
     """Least time per patch and call."""
-    table, scale = creep_table()
-    work, offsets = fastsim_workspace(n, grid, grid), np.zeros(16, dtype=np.int64)
-    out = [np.zeros(n) for _ in range(4)]
+    chosen = creep_law(law, (grid, grid), 82e9, 0.28)
     times = max(10, 200_000 // (grid * grid * n))
-    arguments = (LAW_NUMBERS[law], n, grid, grid, inputs, 82e9, table, scale, offsets, work,
-                 tuple(out))  # fmt: skip
+    arguments = (n, chosen, inputs, creep_scratch(n, chosen))
     repeated(1, *arguments)
     best = np.inf
     for _ in range(rounds):
@@ -74,21 +70,21 @@ def step_microseconds(rounds=200):
     vehicle, track, speed, place = CURVE
     never = 1 << 40
     cases, chosen = {}, {}
-    for law in LAW_NUMBERS:
+    for law in LAWS:
         settings = load_settings(overrides=[f'creep_law="{law}"'])
         prepared = prepare(load_vehicle(vehicle), load_track(track), settings, speed)
         system, state = prepared.model.system, prepared.state.copy()
         step, _ = prepared.pace.at(speed)
         arrays = (work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
                   empty_recorder(prepared.model, 1))  # fmt: skip
-        time_loop(system, *arrays, FAST, step, 1, int(place / speed / step), never)
+        time_loop(system, *arrays, FAST, step, Chunk(1, int(place / speed / step), never))
         cases[law], chosen[law] = (system, arrays, state.copy(), step), step
     best = dict.fromkeys(cases, np.inf)
     for _ in range(rounds):
         for law, (system, arrays, state, step) in cases.items():
             arrays[1][:] = state
             begin = time.perf_counter()
-            time_loop(system, *arrays, FAST, step, 1, STEPS, never)
+            time_loop(system, *arrays, FAST, step, Chunk(1, STEPS, never))
             best[law] = min(best[law], (time.perf_counter() - begin) / STEPS)
     return {law: 1e6 * value for law, value in best.items()}, chosen
 

@@ -23,7 +23,7 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.status import RUNNING
-from railsim.model.assembly import work_arrays
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 
 GRAVITY = 9.81

@@ -11,11 +11,12 @@ from math import asin, atan2, cos, sin
 import numba
 import numpy as np
 
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import kinematics, locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
-from railsim.kernels.wheel_rail import W_Q, W_Y, wheel_rail
+from railsim.kernels.wheel_rail import wheel_rail
 
 HOLD_STIFFNESS, HOLD_DAMPING = 1e7, 1e6  # N/m, N s/m: keeps the car body at V t
 OUTPUT = 0.005  # s

@@ -24,7 +24,7 @@ from railsim.bench.parts import CALLS, least_time
 from railsim.definitions.loading import load_track, load_vehicle, load_vehicle_text
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
-from railsim.model.assembly import work_arrays
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 
 COACHES = (1, 2, 4)

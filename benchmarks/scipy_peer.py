@@ -16,9 +16,9 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.time_loop import RK4, time_loop
-from railsim.model.assembly import work_arrays
+from railsim.kernels.time_loop import RK4, Chunk, time_loop
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 from railsim.simulation.advance import Preparation
 from railsim.simulation.outputs import quantities
@@ -104,7 +104,15 @@ class Peer:
         for values in states:
             state[self.kept] = values
             time_loop(
-                model.system, work, state, derivative, stages, recorder, RK4, 1.0, 0, 0, 1, 0, 1
+                model.system,
+                work,
+                state,
+                derivative,
+                stages,
+                recorder,
+                RK4,
+                1.0,
+                Chunk(0, 0, 1, closing=1),
             )
             found = quantities(model, recorder, 1, self.prepared.balance.Q0)
             rows.append({name: np.array(value) for name, value in found.items()})

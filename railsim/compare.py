@@ -28,7 +28,7 @@ class Comparison:
     quantity : Quantity
         What is compared.
     where : str
-        ``peak``, ``largest`` or ``smallest`` over the whole run, or ``middle of curve 1``.
+        ``peak``, ``largest`` or ``smallest`` of the run, or ``full curve 1, median``.
     peaks : mapping of str to Peak
         The value of every result that has it, by the result's label.
     """
@@ -63,7 +63,7 @@ class Comparison:
 
 
 def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
-    """Compare the peaks and the mid-curve values of results.
+    """Compare the peaks and the full-curve values of results.
 
     Parameters
     ----------
@@ -73,15 +73,15 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
     Returns
     -------
     tuple of Comparison
-        Peaks first, then the values at the middle of every curve that the first result passed.
+        Peaks first, then the medians over every full curve that the first result passed.
     """
     rows: dict[tuple[str, str], dict[str, Peak]] = {}
     for label, result in results.items():
         for peak in peaks(result):
             rows.setdefault((WORDS[peak.kind], peak.quantity.name), {})[label] = peak
         for number, curve in enumerate(mid_curves(result), start=1):
-            where = f"middle of curve {number}"
-            for peak in curve.peaks:
+            where = f"full curve {number}, median"
+            for peak in curve.median_peaks:
                 rows.setdefault((where, peak.quantity.name), {})[label] = peak
     first = next(iter(results))
     empty = [label for label, result in results.items() if not len(result["time"])]

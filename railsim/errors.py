@@ -6,6 +6,7 @@ range of validity.
 """
 
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -18,24 +19,93 @@ class Fault:
     Attributes
     ----------
     file : str
-        File (or command line option) that holds the fault.
+        File or parameter of a function that holds the fault.
     key : str
         Dotted path of the key within the file, or ``line 12``; empty for the file as a whole.
     found : str
         What was found.
     allowed : str
         What is allowed instead, or how to mend it.
+    option : str
+        The command line's option for a parameter; empty for a file.
     """
 
     file: str
     key: str
     found: str
     allowed: str
+    option: str = ""
 
     def __str__(self) -> str:
         place = f"{self.file}: {self.key}" if self.key else self.file
         remedy = f"; {self.allowed}" if self.allowed else ""
         return f"{place}: {self.found}{remedy}"
+
+    def on_command_line(self) -> "Fault":
+        """Return the fault as the command line names it: by options, also those in backquotes."""
+        if not self.option:
+            return self
+        found, allowed = (_PARAMETER.sub(_option, text) for text in (self.found, self.allowed))
+        return replace(self, file=self.option, found=found, allowed=allowed)
+
+
+_PARAMETER = re.compile(r"`(\w+)`")
+
+
+def _option(parameter: re.Match[str]) -> str:
+    return "--" + parameter[1].replace("_", "-")
+
+
+def argument_fault(
+    parameter: str, key: str, found: str, allowed: str, option: str | None = None
+) -> Fault:
+    """Return what is wrong with an argument of a function.
+
+    Parameters
+    ----------
+    parameter : str
+        Its name in Python.
+    key, found, allowed : str
+        As in `Fault`.
+    option : str, optional
+        The command line's option, where it is not called as the parameter.
+
+    Examples
+    --------
+    >>> fault = argument_fault("cant_deficiency", "", "found 2 m", "0.3 m at most")
+    >>> print(fault)
+    cant_deficiency: found 2 m; 0.3 m at most
+    >>> print(fault.on_command_line())
+    --cant-deficiency: found 2 m; 0.3 m at most
+    >>> print(argument_fault("duration", "", "given with `until`", "").on_command_line())
+    --duration: given with --until
+    """
+    return Fault(parameter, key, found, allowed, option or "--" + parameter.replace("_", "-"))
+
+
+EQUAL = 5
+"""More faults than these that differ in their keys alone are one line with a count."""
+
+
+def fault_lines(faults: Iterable[Fault]) -> list[str]:
+    """Return a line for each fault; many that differ in their keys alone as one with a count.
+
+    Examples
+    --------
+    >>> fault_lines(Fault("a.toml", f"bodies.b{k}.mass", "found 0", "> 0") for k in range(20))
+    ['a.toml: bodies.b0.mass: found 0; > 0 (and 19 more: bodies.b1.mass ... bodies.b19.mass)']
+    """
+    alike: dict[tuple[str, str, str], list[Fault]] = {}
+    for fault in faults:
+        alike.setdefault((fault.file, fault.found, fault.allowed), []).append(fault)
+    lines = []
+    for group in alike.values():
+        keys = [fault.key for fault in group]
+        if len(group) <= EQUAL or not all(keys):
+            lines += [str(fault) for fault in group]
+        else:
+            lines.append(f"{group[0]} (and {len(group) - 1} more: {keys[1]} ... {keys[-1]})")
+    return lines
 
 
 def words_of(error: OSError | MemoryError) -> str:

@@ -24,7 +24,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 
 RESULTS = (".h5", ".hdf5")
 PICTURES = (".png", ".svg", ".pdf", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
@@ -75,7 +75,7 @@ def check_file(
         found, allowed = f"{path} exists", "give --overwrite or another name"
     else:
         return
-    raise InputError([Fault(option, "", found, allowed)])
+    raise InputError([argument_fault("path", "", found, allowed, option)])
 
 
 def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = False) -> None:
@@ -95,7 +95,7 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
     InputError : it is a file or called like one, cannot be written to, or holds one of `names`.
     """
     if problem := _impossible(folder):
-        raise InputError([Fault("--out", "", problem, "choose another name")])
+        raise InputError([argument_fault("path", "", problem, "choose another name", "--out")])
     there = [name for name in names if (folder / name).exists()]
     if folder.exists() and not folder.is_dir():
         found, allowed = f"{folder} is a file", "give the name of a folder"
@@ -107,7 +107,7 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
         found, allowed = f"{folder} holds {', '.join(there)}", "give --overwrite or another folder"
     else:
         return
-    raise InputError([Fault("--out", "", found, allowed)])
+    raise InputError([argument_fault("path", "", found, allowed, "--out")])
 
 
 def _unwritable(folder: Path) -> str:
@@ -133,7 +133,9 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         found = f"cannot make {folder} ({error.strerror})"
-        raise InputError([Fault("--out", "", found, "choose another folder")]) from None
+        raise InputError(
+            [argument_fault("path", "", found, "choose another folder", "--out")]
+        ) from None
 
 
 def _impossible(path: Path) -> str:
@@ -237,7 +239,9 @@ class PartialFile:
             writers = _swept(target.parent, target.name)
             if alone and writers:
                 found = f"{target} is being written by another process"
-                fault = Fault(option, "", found, "wait for it, or choose another name")
+                fault = argument_fault(
+                    "path", "", found, "wait for it, or choose another name", option
+                )
                 raise InputError([fault])
             self._handle, name = tempfile.mkstemp(
                 prefix=_prefix(target.name), suffix=".partial", dir=target.parent

@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from railsim.animation.scene import Drawn, Scene
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, argument_fault
 from railsim.files import check_file, whole_file
 from railsim.result.data import Array
 
@@ -54,7 +54,9 @@ def write_movie(
     if path.suffix.lower() == ".mp4":
         if shutil.which("ffmpeg") is None:
             allowed = "install ffmpeg, or write a .gif or .html"
-            raise InputError([Fault("--out", path.name, "MP4 needs ffmpeg", allowed)])
+            raise InputError(
+                [argument_fault("path", path.name, "MP4 needs ffmpeg", allowed, "--out")]
+            )
         writer = FFMpegWriter(fps=frames_per_second)
     else:
         writer = PillowWriter(fps=frames_per_second)

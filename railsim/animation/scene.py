@@ -13,7 +13,7 @@ import numpy as np
 from railsim.contact.curves import rail_curve, tape_circle_place
 from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.track.alignment import Alignment
@@ -116,7 +116,7 @@ def result_scene(
     if last - first < 2:
         found = f"nothing between {low:g} and {high:g} m"
         allowed = f"the run goes from {distance[0]:.6g} to {distance[-1]:.6g} m"
-        raise InputError([Fault("--between", "", found, allowed)])
+        raise InputError([argument_fault("between", "", found, allowed)])
     rows = np.unique(np.linspace(first, last - 1, min(frames, last - first)).astype(int))
     vehicle = result.vehicle()
     flat = flatten(vehicle)

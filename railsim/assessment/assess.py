@@ -25,7 +25,7 @@ from railsim.assessment.wear_report import WheelWear, wear_report
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits, load_running_limits
 from railsim.definitions.vehicle import Service, Vehicle
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.result import Result
 
 RUNNING = ("en14363", "uic518")
@@ -180,7 +180,9 @@ def assess(
     if isinstance(results, Result):
         results = {str(results.attributes.get("run", "run")): results}
     if standard not in STANDARDS:
-        raise InputError([Fault("--standard", "", standard, "one of " + ", ".join(STANDARDS))])
+        raise InputError(
+            [argument_fault("standard", "", standard, "one of " + ", ".join(STANDARDS))]
+        )
     groups: dict[str, dict[str, Result]] = {}
     for name, result in results.items():
         text = str(result.attributes["vehicle_toml"])

@@ -5,49 +5,33 @@ microseconds and Python's part in it does not count.  Everything is in the cache
 predicted: the sum of the parts is a lower bound of what they take in the time loop.
 """
 
-from railsim.kernels import jit
+from railsim.kernels import compiled
 from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up, stretched_roll
+from railsim.kernels.creepages import creepages
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
+from railsim.kernels.patches import side_by_side
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
 from railsim.kernels.support import AS_GIVEN
-from railsim.kernels.wheel_rail import (
-    BEYOND,
-    C11,
-    C22,
-    C23,
-    C33,
-    M_Z,
-    MU_N,
-    PHI,
-    T_X,
-    T_Y,
-    XI_X,
-    XI_Y,
-    A,
-    B,
-    add_creep_forces,
-    creepages,
-    normal_contact,
-    wheel_rail,
-)
+from railsim.kernels.wheel_contact import normal_contact
+from railsim.kernels.wheel_rail import add_creep_forces, wheel_rail
 
 
-@jit
+@compiled
 def many_right_hand_sides(system, work, state, derivative, n):
     """Everything, as RK4 calls it."""
     for _ in range(n):
         rates_of_state(system, work, state, derivative)
 
 
-@jit
+@compiled
 def many_mechanics(system, work, state, derivative, n):
     """Everything, as the fast scheme calls it."""
     for _ in range(n):
         mechanics(system, work, state, derivative, AS_GIVEN)
 
 
-@jit
+@compiled
 def many_frames(system, work, state, derivative, n):
     """Track frames of all bodies."""
     origin = system.bodies.frame[system.bodies.references[0]]
@@ -63,7 +47,7 @@ def many_frames(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_kinematics(system, work, state, derivative, n):
     """Positions, attitudes and velocities of all bodies."""
     for _ in range(n):
@@ -78,7 +62,7 @@ def many_kinematics(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_links(system, work, state, derivative, n):
     """Point-to-point elements."""
     first = 12 * system.bodies.kind.shape[0]
@@ -87,7 +71,7 @@ def many_links(system, work, state, derivative, n):
         link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
 
 
-@jit
+@compiled
 def many_mounts(system, work, state, derivative, n):
     """Elements with three axes."""
     first = 12 * system.bodies.kind.shape[0]
@@ -98,14 +82,14 @@ def many_mounts(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_wheel_rail(system, work, state, derivative, n):
     """All of the wheel-rail contact."""
     for _ in range(n):
         wheel_rail(system, work, state[-1], state)
 
 
-@jit
+@compiled
 def many_normal_contacts(system, work, state, derivative, n):
     """Table look-up and normal forces of all wheels; the number of patches."""
     patches = 0
@@ -114,59 +98,31 @@ def many_normal_contacts(system, work, state, derivative, n):
     return patches
 
 
-@jit
+@compiled
 def many_creepages(system, work, state, patches, n):
     """Creepages and Kalker's coefficients of all patches."""
     patch = work.patch
     for _ in range(n):
         creepages(system, work, patches, state[-1], state)
-        kalker_lookup(
-            patches,
-            patch[A],
-            patch[B],
-            system.contact.creep,
-            patch[C11],
-            patch[C22],
-            patch[C23],
-            patch[C33],
-            patch[BEYOND],
-        )
+        kalker_lookup(patches, side_by_side(patch), system.contact.kalker)
 
 
-@jit
+@compiled
 def many_fastsims(system, work, state, patches, n):
     """FASTSIM of all patches."""
-    patch = work.patch
+    law, arrays = system.contact.law, side_by_side(work.patch)
     for _ in range(n):
-        fastsim(
-            patches,
-            system.contact.n_x,
-            system.contact.n_y,
-            patch[A],
-            patch[B],
-            patch[MU_N],
-            patch[C11],
-            patch[C22],
-            patch[C23],
-            system.contact.shear_modulus,
-            patch[XI_X],
-            patch[XI_Y],
-            patch[PHI],
-            work.fastsim,
-            patch[T_X],
-            patch[T_Y],
-            patch[M_Z],
-        )
+        fastsim(patches, law.n_x, law.n_y, arrays, law.G, work.creep.strips)
 
 
-@jit
+@compiled
 def many_creep_forces(system, work, state, patches, n):
     """Creep forces put on the wheelsets, outputs of the wheels gathered."""
     for _ in range(n):
         add_creep_forces(system, work, patches, state[-1])
 
 
-@jit
+@compiled
 def many_dynamics(system, work, state, derivative, n):
     """Accelerations of all bodies."""
     for _ in range(n):
@@ -184,7 +140,7 @@ def many_dynamics(system, work, state, derivative, n):
         )
 
 
-@jit
+@compiled
 def many_look_ups(system, work, state, derivative, n):
     """Look-ups of the tread of the leading right wheel; the number of them."""
     contact = system.contact
@@ -204,26 +160,8 @@ def many_look_ups(system, work, state, derivative, n):
     return done
 
 
-@jit
-def many_fastsim_patches(patches, n_x, n_y, inputs, shear_modulus, work, out, n):
-    """FASTSIM of `patches` equal patches; rows of inputs: a, b, mu_N, c11, c22, c23, xi, phi."""
+@compiled
+def many_fastsim_patches(patches, n_x, n_y, arrays, shear_modulus, work, n):
+    """FASTSIM of the first `patches` of some arrays of patches."""
     for _ in range(n):
-        fastsim(
-            patches,
-            n_x,
-            n_y,
-            inputs[0],
-            inputs[1],
-            inputs[2],
-            inputs[3],
-            inputs[4],
-            inputs[5],
-            shear_modulus,
-            inputs[6],
-            inputs[7],
-            inputs[8],
-            work,
-            out[0],
-            out[1],
-            out[2],
-        )
+        fastsim(patches, n_x, n_y, arrays, shear_modulus, work)

@@ -11,9 +11,10 @@ from railsim.bench import loops
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.kernels.fastsim import fastsim_workspace
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.model.assembly import work_arrays
+from railsim.kernels.patches import Patches
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 from railsim.simulation.advance import Preparation
 
@@ -67,11 +68,7 @@ def state_at(vehicle: str, track: str, speed: float, place: float) -> tuple[Prep
         empty_recorder(prepared.model, 1),
         FAST,
         step,
-        1,
-        steps,
-        1 << 40,
-        1,
-        0,
+        Chunk(1, steps, 1 << 40, fresh=1),
     )
     return prepared, state
 
@@ -136,7 +133,7 @@ def _step_time(prepared: Preparation, state: Floats, repetitions: int) -> float:
     def some_steps() -> None:
         trial[:] = state
         time_loop(
-            system, work, trial, derivative, stages, recorder, FAST, step, 1, CALLS, 1 << 40, 0, 0
+            system, work, trial, derivative, stages, recorder, FAST, step, Chunk(1, CALLS, 1 << 40)
         )
 
     return least_time(some_steps, repetitions, CALLS)
@@ -147,7 +144,6 @@ def fastsim_grids(
 ) -> list[dict[str, float]]:
     """Measure FASTSIM over its grid, time per patch of `patches` together and of one alone [s]."""
     inputs = patch_inputs(patches)
-    out = np.zeros((3, patches))
     rows = []
     for cells in grids:
         work = fastsim_workspace(patches, cells, cells)
@@ -155,7 +151,7 @@ def fastsim_grids(
 
         def per_patch(n: int, cells: int = cells, work: Floats = work, calls: int = calls) -> float:
             return least_time(
-                lambda: loops.many_fastsim_patches(n, cells, cells, inputs, 82e9, work, out, calls),
+                lambda: loops.many_fastsim_patches(n, cells, cells, inputs, 82e9, work, calls),
                 repetitions,
                 calls * n,
             )
@@ -164,20 +160,23 @@ def fastsim_grids(
     return rows
 
 
-def patch_inputs(patches: int) -> Floats:
-    """Return patches of a curving coach, some of which slide; rows as `many_fastsim_patches`."""
+def patch_inputs(patches: int) -> Patches:
+    """Return patches of a curving coach, some of which slide."""
     share = np.linspace(0.1, 1.0, patches)
     one = np.ones(patches)
-    return np.array(
-        [
-            6e-3 * one,
-            4e-3 * one,
-            0.4 * 60e3 * share,
-            4.5 * one,
-            4.0 * one,
-            1.8 * one,
-            1e-3 * share,
-            -4e-3 * share,
-            0.5 * share,
-        ]
+    return Patches(
+        a=6e-3 * one,
+        b=4e-3 * one,
+        mu_N=0.4 * 60e3 * share,
+        c11=4.5 * one,
+        c22=4.0 * one,
+        c23=1.8 * one,
+        c33=one,
+        xi_x=1e-3 * share,
+        xi_y=-4e-3 * share,
+        phi=0.5 * share,
+        T_x=np.zeros(patches),
+        T_y=np.zeros(patches),
+        M_z=np.zeros(patches),
+        outside=np.zeros(patches),
     )

@@ -17,7 +17,7 @@ import click
 from railsim.cli.common import echo
 from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
 from railsim.cli.streams import silence, usable_streams
-from railsim.errors import InputError, ModelError, RailsimError, words_of
+from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
 from railsim.threads import use_one_thread
 from railsim.version import __version__
 
@@ -138,8 +138,8 @@ def _status(arguments: list[str]) -> int:
         try:
             return _called(arguments)
         except InputError as error:
-            for fault in error.faults:
-                echo(fault, err=True)
+            for line in fault_lines([fault.on_command_line() for fault in error.faults]):
+                echo(line, err=True)
             return WRONG_INPUT
         except ModelError as error:
             echo(f"railsim: {error}", err=True)

@@ -2,11 +2,15 @@
 
 import json
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from railsim.text import printable
+
+if TYPE_CHECKING:
+    from railsim.definitions.base import FileDefinition, Remark
+    from railsim.definitions.loading import Format
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -31,6 +35,25 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print a line, on stderr with `err`; what would steer the terminal is shown as its code."""
     click.echo(printable(str(text)), err=err)
+
+
+def remarks_on(definition: "FileDefinition", known: "Format") -> list["Remark"]:
+    """Return what is allowed but unusual in a definition; a vehicle's statics are looked at too."""
+    from railsim.definitions.track import Track
+    from railsim.definitions.vehicle import Vehicle
+
+    found = known.remarks(definition)
+    if isinstance(definition, Vehicle):
+        from railsim.model.experience import vehicle_remarks
+
+        found = [*found, *vehicle_remarks(definition)]
+    if isinstance(definition, Track):
+        from railsim.definitions.base import Remark
+        from railsim.track.irregularity import measured_remarks
+
+        texts = measured_remarks(definition)
+        found = [*found, *(Remark("irregularities", text) for text in texts)]
+    return found
 
 
 def json_option(function: F) -> F:

@@ -16,11 +16,7 @@ if TYPE_CHECKING:
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Assembly, Vehicle
     from railsim.result import Result
-
-GRAVITY = 9.81
-CANT_BASE = 1.5
-# Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
-USUAL_CANT_DEFICIENCY = 0.150
+    from railsim.track.curves import Curve
 
 
 def _point(point: Sequence[float]) -> str:
@@ -59,14 +55,13 @@ def vehicle_data(vehicle: "Vehicle") -> dict[str, Any]:
         }
         for element in flat.elements
     ]
-    mass = sum(body.mass for body in flat.bodies)
     return {
         "kind": "vehicle",
         "name": vehicle.name,
         "source": vehicle.source,
         "reference": flat.reference,
-        "mass": mass,
-        "mean_wheel_load": mass * GRAVITY / (2 * len(flat.of_kind("wheelset"))),
+        "mass": flat.mass,
+        "mean_wheel_load": flat.mean_wheel_load,
         "bodies": bodies,
         "elements": elements,
     }
@@ -192,7 +187,7 @@ def static_lines(static: dict[str, Any]) -> list[str]:
 
 def mechanism_lines(mechanism: "Mechanism") -> list[str]:
     """Return a mechanism file in a screenful: parts, driver, parameters with their provenance."""
-    from railsim.definitions.mechanism_faults import parameter_values
+    from railsim.definitions.mechanism_values import parameter_values
 
     values = parameter_values(mechanism)
     driver = mechanism.driver
@@ -271,8 +266,10 @@ def spring_lines(suspension: "TrailingArmSuspension") -> list[str]:
 def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
     """Return a track's elements with the speeds that suit its curves, as plain data [SI]."""
     from railsim.definitions.layout import cant_sections, curvature_sections, gradient_sections
+    from railsim.track.curves import curves
 
     plan, cant = curvature_sections(track), cant_sections(track)
+    bends = {curve.section: curve for curve in curves(track)}
     return {
         "kind": "track",
         "name": track.name,
@@ -288,7 +285,7 @@ def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
         "friction_falling": track.friction_falling and track.friction_falling.model_dump(),
         "third_body": track.third_body,
         "rounding": track.rounding,
-        "plan": [_plan_row(section, cant, speeds) for section in plan],
+        "plan": [_plan_row(section, cant, bends.get(section), speeds) for section in plan],
         "cant": [_row(section) for section in cant],
         "vertical": [_row(section) for section in gradient_sections(track)],
         "speed": track.speed,
@@ -328,33 +325,18 @@ def _row(section: "Section") -> dict[str, Any]:
 
 
 def _plan_row(
-    section: "Section", cant: Sequence["Section"], speeds: Sequence[float]
+    section: "Section", cant: Sequence["Section"], curve: "Curve | None", speeds: Sequence[float]
 ) -> dict[str, Any]:
+    from railsim.track.curves import cant_at
+
     row = _row(section)
-    kappa = max(section.start_value, section.end_value, key=abs)
-    height = _cant_at(cant, 0.5 * (section.begin + section.end))
     row["radii"] = tuple(1.0 / k if k else math.inf for k in row.pop("values"))
-    row["cant"] = tuple(_cant_at(cant, s) for s in (section.begin, section.end))
-    if section.type == "CIR" and kappa:
-        outwards = height if kappa > 0.0 else -height
-        row["balanced_speed"] = _speed(outwards, kappa)
-        row["usual_speed"] = _speed(outwards + USUAL_CANT_DEFICIENCY, kappa)
-        row["cant_deficiency"] = {
-            speed: CANT_BASE * speed**2 * abs(kappa) / GRAVITY - outwards for speed in speeds
-        }
+    row["cant"] = tuple(cant_at(cant, s) for s in (section.begin, section.end))
+    if curve is not None:
+        row["balanced_speed"] = curve.balanced_speed
+        row["usual_speed"] = curve.usual_speed
+        row["cant_deficiency"] = {speed: curve.cant_deficiency(speed) for speed in speeds}
     return row
-
-
-def _speed(cant: float, kappa: float) -> float:
-    """Speed at which a cant balances the curve's acceleration on the cant base [m/s]."""
-    return math.sqrt(max(cant, 0.0) * GRAVITY / (CANT_BASE * abs(kappa)))
-
-
-def _cant_at(cant: Sequence["Section"], s: float) -> float:
-    for section in cant:
-        if s < section.end:
-            return section.value(s)
-    return cant[-1].end_value if cant else 0.0
 
 
 def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:

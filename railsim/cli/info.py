@@ -11,6 +11,7 @@ from railsim.cli.common import (
     load_option,
     overwrite_option,
     print_json,
+    remarks_on,
     set_option,
     with_load,
 )
@@ -61,7 +62,6 @@ def command(
         _show_result(file, as_json)
         return
     from railsim.definitions.loading import load_any
-    from railsim.definitions.track import Track
 
     definition, known = load_any(file, with_load(assignments, load))
     if draw is not None:
@@ -71,12 +71,7 @@ def command(
         print_json(data)
         return
     echo("\n".join(lines))
-    remarks = [str(remark) for remark in known.remarks(definition)]
-    if isinstance(definition, Track):
-        from railsim.track.irregularity import measured_remarks
-
-        remarks += measured_remarks(definition)
-    for remark in remarks:
+    for remark in remarks_on(definition, known):
         echo(f"remark: {remark}")
 
 

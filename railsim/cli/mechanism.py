@@ -23,7 +23,7 @@ from railsim.files import check_folder, make_folder, whole_file
 if TYPE_CHECKING:
     from railsim.definitions.mechanism import Mechanism
     from railsim.mechanisms.analysis import Analysis
-    from railsim.mechanisms.optimisation import Optimum
+    from railsim.mechanisms.optimum import Optimum
 
 REPORT, OPTIMISED = "report.html", "optimised.toml"
 

@@ -1,5 +1,7 @@
 """``railsim run``: one vehicle on one track at one speed."""
 
+import logging
+from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,12 +23,14 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from railsim.compare import Comparison
     from railsim.definitions.settings import Settings
     from railsim.definitions.track import Track
+    from railsim.notation import Quantity
     from railsim.result import MidCurve, Peak, Result
+    from railsim.result.data import Array
     from railsim.studies.case import Case
 
 
@@ -100,7 +104,7 @@ def command(
             echo(f"{track}: {remark}", err=True)
     if not (quiet or as_json):
         echo("\n".join(_assumption_lines(case)))
-    with progress_bar(case.name, quiet=quiet) as progress:
+    with progress_bar(case.name, quiet=quiet) as progress, _start_remarks(case, quiet=quiet):
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **result_record(result)}
     lines = _report_lines(result, path)
@@ -122,6 +126,31 @@ def command(
     else:
         echo("\n".join(lines))
     return DONE if result.status == "complete" else ENDED_EARLY
+
+
+@contextmanager
+def _start_remarks(case: "Case", *, quiet: bool) -> "Iterator[None]":
+    """Show what is remarked when the run begins, not only at its end."""
+    handler = _Shown(case.name)
+    start = logging.getLogger("railsim.start")
+    if not quiet:
+        start.addHandler(handler)
+    try:
+        yield
+    finally:
+        start.removeHandler(handler)
+
+
+class _Shown(logging.Handler):
+    """Prints log records on stderr as remarks."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name = name
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record."""
+        echo(f"{self._name}: {record.getMessage()}", err=True)
 
 
 def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
@@ -229,15 +258,7 @@ def _support(track: "Track") -> str:
 
 def _irregularity_lines(track: "Track") -> list[str]:
     """Say what displaces the rails, in one line; nothing where they are smooth."""
-    words = []
-    for part in track.irregularities:
-        if part.type == "random":
-            low, high = part.wavelengths
-            words.append(f"{part.spectrum}, seed {part.seed}, {low:g} to {high:g} m")
-        elif part.type == "measured":
-            words.append(f"measured, {len(part.rows or ())} places")
-        else:
-            words.append(f"{part.type} at {part.s:g} m")
+    words = [part.summary() for part in track.irregularities]
     if len(words) > 3:
         words[2:] = [f"{len(words) - 2} more"]
     return [f"  rails     {'; '.join(words)}"] if words else []
@@ -257,11 +278,11 @@ def _friction(track: "Track") -> str:
 
 
 def _creep_law(settings: "Settings") -> str:
-    names = {"fastsim": "FASTSIM", "fastrip": "FaStrip"}
-    if settings.creep_law not in names:
-        return f"creep law {settings.creep_law}"
+    from railsim.definitions.creep_law import CREEP_LAWS
+
+    law = CREEP_LAWS[settings.creep_law]
     nx, ny = settings.fastsim_grid
-    return f"{names[settings.creep_law]} {nx} x {ny}"
+    return f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
 
 
 def _listed(names: "Any") -> str:
@@ -305,11 +326,12 @@ def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
                 number,
                 peak.labels.get("side", ""),
                 peak.quantity.text(peak.value),
+                "" if isnan(peak.smooth) else peak.quantity.text(peak.smooth),
                 f"{peak.time:.2f}",
                 f"{peak.distance:.1f}",
             ]
         )
-    header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "t (s)", "s (m)"]
+    header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "20 Hz", "t (s)", "s (m)"]
     return table(header, rows, numbers=4)
 
 
@@ -335,17 +357,28 @@ def _step_lines(result: "Result", differences: "Sequence[Comparison]") -> list[s
     return table(header, rows, numbers=2)
 
 
+def _with_scatter(quantity: "Quantity", values: "Array", scatter: "Array") -> list[str]:
+    """Return values with their scatter, where there is any to the digits that are shown."""
+    cells = []
+    for value, spread in zip(values, scatter, strict=True):
+        around = quantity.text(spread)
+        zero = float(around) == 0.0 if around != "nan" else True
+        cells.append(quantity.text(value) + ("" if zero else f" ± {around}"))
+    return cells
+
+
 def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:
     rows = []
-    for name, values in curve.values.items():
-        quantity = result.quantities[name]
+    for name, values in curve.medians.items():
+        quantity, spread = result.quantities[name], curve.scatter[name]
         if quantity.dims[1:] == ("wheelset", "side"):
             for side, label in enumerate(result.coordinates["side"]):
-                cells = [quantity.text(value) for value in values[:, side]]
+                cells = _with_scatter(quantity, values[:, side], spread[:, side])
                 rows.append([name, quantity.words, label, *cells])
         elif quantity.dims[1:] == ("wheelset",):
-            rows.append([name, quantity.words, "", *(quantity.text(value) for value in values)])
+            rows.append([name, quantity.words, "", *_with_scatter(quantity, values, spread)])
     numbers = [str(index + 1) for index in range(len(result.wheelsets))]
-    title = f"Mid-curve R {curve.radius:.6g} m, t = {curve.time:.2f} s, s = {curve.distance:.1f} m"
+    begin, end = curve.full_curve
+    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: median and scatter"
     header = ["", "wheelset", "side", *numbers]
     return [title, *table(header, rows, numbers=3)]

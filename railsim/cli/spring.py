@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
     from railsim.springs.tolerance import RideHeight
     from railsim.springs.verification import Fatigue, Verification
+    from railsim.springs.verification_checks import Case
 
 REPORT = "report.html"
 
@@ -245,7 +246,7 @@ def vehicle(
     elif not out:
         echo(text.rstrip("\n"))
     if not quiet:
-        for remark in part.remarks:
+        for remark in (*part.remarks, *_load_remarks(suspension, part.case, extends)):
             echo(remark, err=True)
         if out and not as_json:
             echo(out)
@@ -297,6 +298,31 @@ def _write_pages(
         with whole_file(folder / name) as partial:
             partial.write_bytes(content)
     return [folder / name for name in files]
+
+
+def _load_remarks(
+    suspension: "TrailingArmSuspension", case: "Case", extends: str | None
+) -> list[str]:
+    """Remark on springs that are taken at a load unlike that which the vehicle puts on them."""
+    from railsim.definitions.flatten import flatten
+    from railsim.definitions.loading import load_vehicle
+    from railsim.errors import RailsimError
+    from railsim.springs.vehicle_table import LIKELY, axlebox_load
+
+    name = extends or (suspension.vehicle.extends if suspension.vehicle else None)
+    if name is None:
+        return []
+    try:
+        load = axlebox_load(flatten(load_vehicle(name)))
+    except RailsimError as error:
+        return [f"the load of the axleboxes is not known: {error}"]
+    low, high = LIKELY
+    if low <= load / case.load <= high:
+        return []
+    return [
+        f"'{name}' puts {load / 1e3:.1f} kN on an axlebox at rest, the springs are taken at "
+        f"{case.load / 1e3:.1f} kN ({case.name}): do springs and vehicle belong together?"
+    ]
 
 
 def _base(

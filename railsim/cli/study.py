@@ -350,7 +350,7 @@ def _print_record(record: "Record") -> None:
 
     shown = {peak["quantity"]: peak for peak in record.get("peaks", ()) if peak["kind"] != "min"}
     values = []
-    for name, words in (("dQ_over_Q0", "dQ/Q0"), ("Y_over_Q", "Y/Q"), ("sum_abs_Y", "sum|Y|")):
+    for name, words in (("dQ_over_Q0", "dQ/Q0"), ("Y_over_Q", "Y/Q"), ("sum_Y", "sum Y")):
         if name in shown:
             quantity = QUANTITIES[name]
             unit = "" if quantity.shown_unit == "-" else f" {quantity.shown_unit}"

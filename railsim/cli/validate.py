@@ -2,12 +2,15 @@
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, print_json, quiet_option
+from railsim.cli.common import echo, json_option, print_json, quiet_option, remarks_on
 from railsim.files import RESULTS, is_file
+
+if TYPE_CHECKING:
+    from railsim.errors import Fault
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
@@ -43,14 +46,23 @@ def _report(file: str) -> dict[str, Any]:
     try:
         kind, remarks = checked(file)
     except InputError as error:
-        faults = [dict(vars(fault), text=str(fault)) for fault in error.faults]
+        faults = [_record(fault) for fault in error.faults]
         return {"file": file, "kind": None, "faults": faults, "remarks": []}
     return {"file": file, "kind": kind, "faults": [], "remarks": remarks}
 
 
+def _record(fault: "Fault") -> dict[str, str]:
+    keys = ("file", "key", "found", "allowed")
+    return {key: getattr(fault, key) for key in keys} | {"text": str(fault)}
+
+
 def _print(report: dict[str, Any], quiet: bool) -> None:
-    for fault in report["faults"]:
-        echo(fault["text"], err=True)
+    from railsim.errors import Fault, fault_lines
+
+    faults = [Fault(*(fault[key] for key in ("file", "key", "found", "allowed")))
+              for fault in report["faults"]]  # fmt: skip
+    for line in fault_lines(faults):
+        echo(line, err=True)
     if quiet or report["faults"]:
         return
     echo(f"{report['file']}: {report['kind']}, no faults")
@@ -86,21 +98,13 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
         return f"study of {len(index.runs)} runs, {index.status}", []
 
     from railsim.definitions.loading import load_any
-    from railsim.definitions.track import Track
     from railsim.errors import InputError
     from railsim.profiles.used import profile_faults
 
     definition, known = load_any(file)
     if faults := profile_faults(definition, file):
         raise InputError(faults)
-    remarks = [dict(vars(remark)) for remark in known.remarks(definition)]
-    if isinstance(definition, Track):
-        from railsim.track.irregularity import measured_remarks
-
-        remarks += [
-            {"key": "irregularities", "text": text} for text in measured_remarks(definition)
-        ]
-    return known.kind, remarks
+    return known.kind, [dict(vars(remark)) for remark in remarks_on(definition, known)]
 
 
 def _is_profile(name: str) -> bool:

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
     from railsim.contact.geometry import ContactGeometry, contact_geometry
     from railsim.contact.hertzian import HertzContact, hertz
-    from railsim.contact.table import ContactTable, build_contact_table, cached_contact_table
+    from railsim.contact.stored_table import cached_contact_table
+    from railsim.contact.table import ContactTable, build_contact_table
 
 _HOMES = {
     "ContactGeometry": "geometry",

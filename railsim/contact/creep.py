@@ -5,15 +5,7 @@ the two surfaces over the speed of travel), the contact ellipse and friction.  S
 are wheel minus rail in the contact frame (x forward, t to the right, n into the rail), the force
 is that on the *rail* and has the sign of the creepage.
 
-========= =====================================================================
-law       what it is
-========= =====================================================================
-`fastsim` Kalker's simplified theory (1982), the usual compromise
-`table`   Kalker's full half-space theory, tabulated: the best, at FASTSIM's cost
-`fastrip` strip theory joined to FASTSIM (after Sichani and others, 2016)
-`polach`  closed formula, with falling friction the choice for traction
-`linear`  Kalker's linear theory, saturated after Shen, Hedrick and Elkins
-========= =====================================================================
+The laws and what is known of each stand in `railsim.definitions.creep_law.CREEP_LAWS`.
 
 `creep_force` is for scripts, plots and tests; the time loop calls the kernel
 :func:`railsim.kernels.creep.creep_forces` on its own arrays.  docs/theory/creep.md describes the
@@ -28,15 +20,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from railsim.contact.creep_table import NO_TABLE, creep_table
 from railsim.contact.kalker import kalker_coefficients
+from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.errors import Fault, InputError, ModelError, nearest
-from railsim.kernels.creep import LAW_NUMBERS, creep_forces, falling_friction
-from railsim.kernels.creep_table import RATIO_MAX
+from railsim.kernels.aligned import aligned_zeros
+from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.fastsim import fastsim_workspace
+from railsim.kernels.patches import CreepLaw, CreepScratch, Patches
 
 Array = NDArray[np.float64]
 
-LAWS = tuple(LAW_NUMBERS)
-"""Names of the creep laws."""
+LAWS = tuple(name for name, law in CREEP_LAWS.items() if not law.measured)
+"""Names of the creep laws that need no curve of the user's own."""
 
 
 class CreepForce(NamedTuple):
@@ -74,6 +68,7 @@ def creep_force(
     friction_rest: float = 1.0,
     friction_decay: float = 0.0,
     speed: float = 0.0,
+    adhesion_curve: ArrayLike | None = None,
 ) -> CreepForce:
     """Creep force of elliptic contact patches by one of the laws.
 
@@ -132,8 +127,9 @@ def creep_force(
     >>> bool(0.0 < T.T_x < 0.3 * 80e3) and bool(T.T_y == 0.0)
     True
     """
-    if law not in LAWS:
-        raise InputError([Fault("creep_force", "law", f"'{law}'", nearest(law, LAWS))])
+    if law not in CREEP_LAWS:
+        raise InputError([Fault("creep_force", "law", f"'{law}'", nearest(law, CREEP_LAWS))])
+    name: CreepLawName = law
     k_slip = reduction if slip_reduction is None else slip_reduction
     ranges = {
         "nx, ny": (nx >= 1 and ny >= 1, f"{nx}, {ny}", "at least 1 cell"),
@@ -141,6 +137,11 @@ def creep_force(
         "slip_reduction": (0.0 < k_slip <= reduction, f"{k_slip}", "above 0, at most reduction"),
         "friction_rest": (0.0 <= friction_rest <= 1.0, f"{friction_rest}", "0 to 1"),
         "friction_decay": (friction_decay >= 0.0, f"{friction_decay}", "at least 0"),
+        "adhesion_curve": (
+            (adhesion_curve is not None) == CREEP_LAWS[name].measured,
+            "none" if adhesion_curve is None else f"together with the law '{law}'",
+            "rows [creepage, T/(mu N)] with the law 'adhesion_curve' and only with it",
+        ),
     }
     faults = [
         Fault("creep_force", key, found, allowed)
@@ -163,22 +164,59 @@ def creep_force(
     semi_a[~loaded] = 1.0
     semi_b[~loaded] = 1.0
     n = semi_a.size
-    bound = friction * normal
+    patches = Patches(
+        semi_a,
+        semi_b,
+        friction * normal,
+        *kalker_coefficients(semi_a / semi_b, nu),
+        *creepages,
+        *np.zeros((4, n)),
+    )
     if friction_rest < 1.0:
-        speeds = np.full(n, speed)
-        falling_friction(n, bound, *creepages[:2], speeds, friction_rest, friction_decay)
-    table = creep_table(nu) if law == "table" else NO_TABLE
-    T_x, T_y, M_z, beyond = np.zeros((4, n))
-    creep_forces(
-        LAW_NUMBERS[law], n, nx, ny, semi_a, semi_b, bound,
-        *kalker_coefficients(semi_a / semi_b, nu), G, reduction, k_slip, *creepages,
-        *table, np.zeros(16, dtype=np.int64), fastsim_workspace(n, ny, nx), T_x, T_y, M_z, beyond,
-    )  # fmt: skip
-    outside = int(beyond.sum())
+        falling_friction(n, patches, np.full(n, speed), friction_rest, friction_decay)
+    chosen = creep_law(name, (nx, ny), G, nu, (reduction, k_slip), adhesion_curve)
+    creep_forces(n, chosen, patches, creep_scratch(n, chosen))
+    outside = int(patches.outside.sum())
     if outside:
+        ratio = CREEP_LAWS[name].ratio
         warnings.warn(
-            f"creep law 'table': {outside} of {n} patches have a/b outside 1/{RATIO_MAX:g} to "
-            f"{RATIO_MAX:g} and got the force of the nearest ratio",
+            f"creep law '{law}': {outside} of {n} patches have a/b outside 1/{ratio:g} to "
+            f"{ratio:g} and got the force of the nearest ratio",
             stacklevel=2,
         )
-    return CreepForce(T_x.reshape(shape), T_y.reshape(shape), M_z.reshape(shape))
+    return CreepForce(*(force.reshape(shape) for force in (patches.T_x, patches.T_y, patches.M_z)))
+
+
+def creep_law(
+    name: CreepLawName,
+    grid: tuple[int, int],
+    G: float,
+    nu: float,
+    third_body: tuple[float, float] = (1.0, 1.0),
+    adhesion_curve: ArrayLike | None = None,
+) -> CreepLaw:
+    """Creep law as the kernels take it, with its table or curve.
+
+    Parameters
+    ----------
+    name : str
+        One of `railsim.definitions.creep_law.CREEP_LAWS`.
+    grid : (int, int)
+        Cells of a patch along and across.
+    G, nu : float
+        Shear modulus [Pa], Poisson's ratio [1].
+    third_body : (float, float)
+        Reduction of Kalker's coefficients, and Polach's further factor for the area of slip [1].
+    adhesion_curve : array_like, shape (k, 2), optional
+        Creepage and T/(mu N) [1].
+    """
+    table = creep_table(nu) if name == "table" else NO_TABLE
+    curve = np.zeros((0, 2)) if adhesion_curve is None else np.array(adhesion_curve, dtype=float)
+    return CreepLaw(
+        CREEP_LAWS[name].number, *grid, G, *third_body, table.coefficients, table.scale, curve
+    )
+
+
+def creep_scratch(n: int, law: CreepLaw) -> CreepScratch:
+    """Work arrays of a creep law for up to n patches."""
+    return CreepScratch(fastsim_workspace(n, law.n_y, law.n_x), aligned_zeros(16, np.int64))

@@ -153,21 +153,18 @@ def contact_geometry(
     if faults:
         raise InputError(faults)
     mean_radius = 0.5 * (radii[0] + radii[1])
-    candidates = [np.ascontiguousarray((w.u, w.r, w.t)) for w in wheels]
+    pairs = [
+        kernel.RigidPair(np.ascontiguousarray((w.u, w.r, w.t)), r.Y0, r.z, r.slope)
+        for w, r in zip(wheels, rails, strict=True)
+    ]
 
     def sweep(at: Array) -> tuple[Array, Array]:
         roll = np.empty(at.size)
         contacts = np.empty((at.size, 2, 6))
         kernel.rigid_sweep(
             np.ascontiguousarray(at),
-            candidates[1],
-            rails[1].Y0,
-            rails[1].z,
-            rails[1].slope,
-            candidates[0],
-            rails[0].Y0,
-            rails[0].z,
-            rails[0].slope,
+            pairs[1],
+            pairs[0],
             rails[0].dY,
             mean_radius,
             LARGEST_ROLL,

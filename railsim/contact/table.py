@@ -55,13 +55,9 @@ right differ in profile or radius a second table is built for the left, as a rig
 """
 
 import functools
-import hashlib
-import json
 import os
-import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -77,8 +73,6 @@ from railsim.contact.curves import (
     wheel_curve,
 )
 from railsim.errors import InputError
-from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
-from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
 from railsim.kernels.contact_table import A1, B1, D_B1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
 from railsim.kernels.hertz import unit_load_ellipse
@@ -311,7 +305,7 @@ def build_contact_table(
     InputError
         If the wheelset does not fit into the track, or a profile cannot be used.
     """
-    grid = _chosen_grid(grid, normal)
+    grid = chosen_grid(grid, normal)
     height = radius if centre_height is None else centre_height
     wheel_points = wheel_curve(
         wheel, radius, tape_circle_place(back_to_back), min(grid.spacing, grid.ds)
@@ -391,7 +385,8 @@ def build_contact_table(
     )
 
 
-def _chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
+def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
+    """Return the grid of a table, with another normal contact where one is asked for."""
     grid = grid or TableGrid()
     return replace(grid, normal=normal) if normal else grid
 
@@ -471,99 +466,3 @@ def spline_coefficients(values: Array, stretched: Array) -> Array:
     for stiffness in (K, K2):
         result[low, stiffness] = values[low, stiffness]
     return result
-
-
-def cache_folder() -> Path | None:
-    """Folder of the stored tables; None where none may be used, see `railsim.kernels.cache`."""
-    base = cache.cache_base()
-    return cache.safe_folder(base and base / "tables")
-
-
-def generator_hash() -> str:
-    """Hash of the sources that decide what a table holds."""
-    digest = hashlib.sha256()
-    here = Path(__file__).parent
-    modules = (kernel, contact_geometry, elastic_patch, non_elliptic, hertz_kernel)
-    sources = [Path(str(module.__file__)) for module in modules]
-    for path in (here / "table.py", here / "curves.py", *sources):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def cached_contact_table(
-    wheel: Profile,
-    rail: Profile,
-    radius: float = 0.46,
-    gauge: float = 1.435,
-    inclination: float = 0.025,
-    back_to_back: float = 1.360,
-    tape_circle_distance: float = 1.5,
-    G: float = 82e9,
-    nu: float = 0.28,
-    *,
-    centre_height: float | None = None,
-    normal: Normal | None = None,
-    grid: TableGrid | None = None,
-) -> ContactTable:
-    """As `build_contact_table`, from the disk where the same table has been built before.
-
-    The name of the stored table is a hash of everything that enters: both profiles, all numbers,
-    the grid and the generator's sources.  Tables are written under a temporary name and renamed,
-    so that parallel runs never see half a table; they are memory-mapped, so that parallel runs
-    share one copy.  A table that is not, byte for byte, what was stored is built anew.
-    """
-    grid = _chosen_grid(grid, normal)
-    numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu, centre_height)
-    digest = hashlib.sha256(generator_hash().encode())
-    digest.update(repr((numbers, grid)).encode())
-    digest.update(wheel.key())
-    digest.update(rail.key())
-    folder = cache_folder()
-    path = folder and folder / f"{digest.hexdigest()[:32]}.npy"
-    if path and (stored := _stored_table(path)):
-        return stored
-    table = build_contact_table(
-        wheel,
-        rail,
-        radius,
-        gauge,
-        inclination,
-        back_to_back,
-        tape_circle_distance,
-        G,
-        nu,
-        centre_height=centre_height,
-        grid=grid,
-    )
-    if path:
-        _store_table(table, path)
-    return table
-
-
-def _stored_table(path: Path) -> ContactTable | None:
-    text = cache.stored(path.with_suffix(".json"))
-    if text is None or not path.exists():
-        return None
-    try:
-        facts = json.loads(text)
-        crc = facts.pop("crc32")
-        table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
-    except (OSError, ValueError, TypeError, KeyError, EOFError):
-        cache.discard(path)
-        return None
-    if zlib.crc32(table.values.data) != crc:
-        cache.discard(path)
-        return None
-    return table
-
-
-def _store_table(table: ContactTable, path: Path) -> None:
-    facts = {name: getattr(table, name) for name in ContactTable.__dataclass_fields__}
-    facts["crc32"] = zlib.crc32(facts.pop("values").data)
-
-    def write(handle: int) -> None:
-        with os.fdopen(os.dup(handle), "wb") as file:
-            np.save(file, table.values)
-
-    if cache.store_file(path, write):
-        cache.store(path.with_suffix(".json"), json.dumps(facts).encode())

@@ -23,5 +23,11 @@ overrides      ``--set key.path=value``
 loading        files to definitions with every fault at once
 faults         wrong values in the words of a user
 schema         JSON Schemas and the manual's key tables
+creep_law      the creep laws: names, numbers, labels
+offered        what a definition offers but modules built on the definitions do
 =============  ==================================================================================
 """
+
+from railsim.definitions import loading
+
+__all__ = ["loading"]

@@ -24,6 +24,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
+from railsim.definitions.offered import offered
 from railsim.text import html_table, printable
 
 LONGEST_VALUE = 60  # characters of a value in the table of a notebook
@@ -81,6 +82,16 @@ class Definition(BaseModel):
 
     # built when first used: a part of a vehicle is built as part of it, not once more by itself
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    def __copy__(self) -> Self:
+        """Return a copy without what was worked out from the values: those of the copy may differ.
+
+        `model_copy` changes values of such a copy.
+        """
+        copied = super().__copy__()
+        for name in set(copied.__dict__) - set(type(self).model_fields):
+            del copied.__dict__[name]
+        return copied
 
 
 @cache
@@ -141,10 +152,8 @@ class FileDefinition(Definition):
         >>> coach.with_values({"bodies.carbody.mass": 40e3}).bodies["carbody"].mass
         40000.0
         """
-        # what is checked is known to the reader of files, which is built on this module
-        from railsim.definitions.loading import changed_definition
-
-        return changed_definition(self, values)
+        changed: Self = offered("changed_definition")(self, values)
+        return changed
 
     def __repr__(self) -> str:
         kind = type(self).__name__

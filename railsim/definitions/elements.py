@@ -6,7 +6,7 @@ the other side or in a mirrored assembly.  Tables hold rows [displacement or vel
 """
 
 from itertools import pairwise
-from math import dist
+from math import cos, dist, pi, sin, sqrt, tan
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -89,6 +89,10 @@ class Element(Definition):
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored place; `signs` holds -1 for each reversed axis."""
         return self
+
+    def parts(self) -> list[tuple[str, Vector, "Element"]]:
+        """Elements of which this one consists: suffix of the name, place from its point [m]."""
+        return []
 
     def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
         """Return the element with the preload that follows from its free length, if it has one.
@@ -321,8 +325,10 @@ class BumpStop(PointElement):
 class Friction(VerticalSpring, PointElement):
     """Dry friction along the axes of body 1, with a spring in parallel: leaf spring, friction pad.
 
-    Along each axis the sliding force is at most friction_force + friction_coefficient |N|, with N
-    the vertical spring force of this element; below it the pad sticks elastically.
+    The largest friction force along an axis is friction_force + friction_coefficient N, with N the
+    vertical spring force of this element in the direction of its preload, 0 where it is gone.  The
+    friction forces along all axes are one vector within the ellipse of these limits, or each has a
+    limit of its own; below it the pad sticks elastically.
     """
 
     kind: Literal["friction"]
@@ -332,6 +338,9 @@ class Friction(VerticalSpring, PointElement):
     """Part that grows with the vertical spring force, along x, y, z [1]"""
     stick_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
     """Stiffness of the sticking pad along x, y, z, needed where there is friction [N/m]"""
+    friction_limit: Literal["circle", "axes"] = "circle"
+    """`circle`: one contact slides in any direction, its force within a circle (an ellipse where
+    the limits differ); `axes`: contacts of their own along each axis"""
     stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
     """Stiffness of the parallel spring along x, y, z [N/m]"""
     damping: NonNegativeVector = (0.0, 0.0, 0.0)
@@ -352,6 +361,173 @@ class Friction(VerticalSpring, PointElement):
 
     def mirrored(self, signs: Signs) -> Self:
         """Return the element in a mirrored place: the preload turns with the axes."""
+        return self.model_copy(update=_mirrored_preload(self.preload, signs))
+
+
+class SideBearer(PointElement):
+    """A sliding pad on which body 2 rests on body 1: pressure without tension, friction in x and y.
+
+    The friction force has any direction in the plane and at most mu N; where the pad lifts there is
+    none.
+    """
+
+    kind: Literal["side_bearer"]
+    stiffness: Positive
+    """Vertical stiffness [N/m]"""
+    damping: NonNegative = 0.0
+    """Vertical damping while it carries [N s/m]"""
+    preload: Annotated[Literal["auto"] | NonNegative, Field(union_mode="left_to_right")] = 0.0
+    """Compression in the nominal position [N], or `auto`: from the equilibrium"""
+    clearance: NonNegative = 0.0
+    """Vertical clearance in the nominal position [m]"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction [1]"""
+    stick_stiffness: Positive
+    """Horizontal stiffness of the sticking pad [N/m]"""
+    stop_travel: Positive | None = None
+    """Further compression after which a solid stop carries [m]"""
+    stop_stiffness: Positive | None = None
+    """Stiffness of the solid stop beside that of the pad [N/m]"""
+
+    @model_validator(mode="after")
+    def _one_nominal_state(self) -> Self:
+        if self.clearance > 0.0 and self.preload != 0.0:
+            raise ValueError("either 'preload' or 'clearance', not both")
+        if (self.stop_travel is None) != (self.stop_stiffness is None):
+            raise ValueError("'stop_travel' and 'stop_stiffness' belong together")
+        return self
+
+    @property
+    def stop_table(self) -> Rows | None:
+        """Force of the solid stop over the travel of body 2, zero above it."""
+        if self.stop_travel is None or self.stop_stiffness is None:
+            return None
+        first = self.stop_travel + self.clearance
+        return ((-1.0, 0.0), (first, 0.0), (first + 1.0, self.stop_stiffness))
+
+
+class CentrePlate(PairElement):
+    """Flat plate (ring) of body 2 that turns and slides on a bowl of body 1.
+
+    The pressure is that of an elastic layer without tension; it follows a tilted body 2 to the
+    edge.  Eight pads at the nodes of Gauss's rule carry it: under even pressure the yaw moment of
+    friction is exactly 2/3 mu N (R^3 - r^3)/(R^2 - r^2), the tilting stiffness k (R^2 + r^2)/4.
+    """
+
+    kind: Literal["centre_plate"]
+    point: Vector
+    """Centre of the contact surface [m]"""
+    radius: Positive
+    """Outer radius R of the contact surface [m]"""
+    inner_radius: NonNegative = 0.0
+    """Inner radius r of the contact surface, 0 for a disc [m]"""
+    stiffness: Positive
+    """Vertical stiffness of the whole plate [N/m]"""
+    damping: NonNegative = 0.0
+    """Vertical damping of the whole plate while it carries [N s/m]"""
+    preload: Annotated[Literal["auto"] | NonNegative, Field(union_mode="left_to_right")] = "auto"
+    """Compression in the nominal position [N], or `auto`: from the equilibrium"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction [1]"""
+    stick_stiffness: Positive
+    """Horizontal stiffness of the whole sticking plate [N/m]"""
+
+    @model_validator(mode="after")
+    def _a_ring(self) -> Self:
+        if self.inner_radius >= self.radius:
+            raise ValueError("'inner_radius' must be smaller than 'radius'")
+        return self
+
+    def end_points(self) -> tuple[Vector, Vector]:
+        """Centre of the contact surface on both bodies [m]."""
+        return self.point, self.point
+
+    def parts(self) -> list[tuple[str, Vector, Element]]:
+        """Pads that carry the plate: suffix of the name, place from the centre [m], pad."""
+        found: list[tuple[str, Vector, Element]] = []
+        rule = _gauss_on_ring(self.inner_radius, self.radius)
+        for ring, (radius, share) in enumerate(rule):
+            for quarter in range(4):
+                angle = 0.5 * pi * quarter + 0.25 * pi * ring
+                pad = SideBearer(
+                    kind="side_bearer",
+                    bodies=self.bodies,
+                    point=(0.0, 0.0, 0.0),
+                    stiffness=0.25 * share * self.stiffness,
+                    damping=0.25 * share * self.damping,
+                    preload="auto" if self.preload == "auto" else 0.25 * share * self.preload,
+                    friction_coefficient=self.friction_coefficient,
+                    stick_stiffness=0.25 * share * self.stick_stiffness,
+                )
+                place = (radius * cos(angle), radius * sin(angle), 0.0)
+                found.append((f"pad_{4 * ring + quarter + 1}", place, pad))
+        return found
+
+
+def _gauss_on_ring(inner: float, outer: float) -> list[tuple[float, float]]:
+    """Two radii and shares of the area that integrate r^0 to r^3 over a ring exactly.
+
+    The radii are the zeros of r^2 - a r + b, orthogonal to 1 and r with the weight r dr.
+
+    Examples
+    --------
+    >>> [(round(r, 4), round(share, 4)) for r, share in _gauss_on_ring(0.0, 1.0)]
+    [(0.3551, 0.3639), (0.8449, 0.6361)]
+    """
+    m0, m1, m2, m3 = (
+        2.0 / (k + 2) * (outer ** (k + 2) - inner ** (k + 2)) / (outer**2 - inner**2)
+        for k in range(4)
+    )
+    # int (r^2 - a r + b) r^j r dr = 0 for j = 0, 1
+    a = (m3 * m0 - m1 * m2) / (m2 * m0 - m1 * m1)
+    b = (a * m1 - m2) / m0
+    half = sqrt(0.25 * a * a - b)
+    near, far = 0.5 * a - half, 0.5 * a + half
+    share = (m1 - near) / (far - near)
+    return [(near, 1.0 - share), (far, share)]
+
+
+class Wedge(VerticalSpring, PointElement):
+    """Friction wedges of one side of a three-piece bogie, on their springs.
+
+    Body 1 is the side frame, body 2 the bolster, whose inclined faces rest on the wedges; the wedge
+    springs stand on the side frame (variable friction).  Without mass and with a smooth inclined
+    face the force on the column is N = (F + T_z)/tan(angle), with F the spring force and T_z the
+    friction that holds the wedge up: mu N is larger on the way down than on the way up.
+    """
+
+    kind: Literal["wedge"]
+    stiffness: NonNegativeVector
+    """Stiffness of the wedge springs of one side along x, y, z [N/m]"""
+    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Damping along x, y, z [N s/m]"""
+    preload: AutoOrVector = "auto"
+    """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+    angle: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, lt=1.5)]
+    """Angle between the inclined face and the column's face [rad]"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction on the column [1]"""
+    stick_stiffness: tuple[Positive, Positive]
+    """Stiffness of the sticking wedges along y and z [N/m]"""
+
+    @model_validator(mode="after")
+    def _wedge_slides(self) -> Self:
+        if self.friction_coefficient >= tan(self.angle):
+            raise ValueError(
+                "the wedge locks itself: 'friction_coefficient' must be smaller than tan(angle) = "
+                f"{tan(self.angle):.3g}"
+            )
+        if self.stiffness[2] == 0.0:
+            raise ValueError("the wedges need springs: 'stiffness' along z")
+        return self
+
+    @property
+    def share(self) -> float:
+        """Friction over spring force while the wedge slides level: mu/tan(angle)."""
+        return self.friction_coefficient / tan(self.angle)
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the wedges in a mirrored place: the preload turns with the axes."""
         return self.model_copy(update=_mirrored_preload(self.preload, signs))
 
 
@@ -442,7 +618,73 @@ class AppliedForce(Element):
         return self.model_copy(update=update)
 
 
+class AxleTorque(PairElement):
+    """A torque between a wheelset and the body that takes its reaction."""
+
+    demand_table: (
+        Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), AfterValidator(_in_time)]
+        | None
+    ) = None
+    """Rows [time s or distance m, factor of the torque], linear in between, constant beyond"""
+    over: Literal["time", "distance"] = "time"
+    """First column of `demand_table`: time, or the place of the wheelset's nominal position"""
+    slip_control: tuple[NonNegative, Positive] | None = None
+    """Slip (omega r - V)/V at which the torque begins to fall, and slip at which it is gone [1]"""
+
+    @model_validator(mode="after")
+    def _slip_rises(self) -> Self:
+        if self.slip_control is not None and self.slip_control[0] >= self.slip_control[1]:
+            raise ValueError("'slip_control' needs two rising slips, such as [0.01, 0.02]")
+        return self
+
+
+def _over_speed(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    if not rising(rows):
+        raise ValueError("the speed must increase from row to row")
+    return rows
+
+
+class Traction(AxleTorque):
+    """Driving torque on a wheelset over the vehicle's speed; body 1 takes the reaction.
+
+    It drives forwards wherever the element stands, in mirrored placements too.
+    """
+
+    kind: Literal["traction"]
+    torque_table: Annotated[
+        tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), AfterValidator(_over_speed)
+    ]
+    """Rows [speed m/s, torque on the wheelset N m], forwards positive, linear, constant beyond"""
+
+
+class Brake(AxleTorque):
+    """Braking torque on a wheelset over the vehicle's speed; body 1 takes the reaction.
+
+    It acts against the wheelset's rotation and vanishes with it.
+    """
+
+    kind: Literal["brake"]
+    torque_table: Annotated[
+        tuple[tuple[NonNegative, NonNegative], ...],
+        Field(min_length=1),
+        AfterValidator(_over_speed),
+    ]
+    """Rows [speed m/s, torque on the wheelset N m], linear in between, constant beyond"""
+
+
 AnyElement = Annotated[
-    SpringDamper | Bushing | ShearSpring | RollBar | BumpStop | Friction | Airspring | AppliedForce,
+    SpringDamper
+    | Bushing
+    | ShearSpring
+    | RollBar
+    | BumpStop
+    | Friction
+    | SideBearer
+    | CentrePlate
+    | Wedge
+    | Airspring
+    | AppliedForce
+    | Traction
+    | Brake,
     Field(discriminator="kind"),
 ]

@@ -5,15 +5,16 @@ for the left copy of a part with `sides = "both"`.  Both move points; parameters
 (preloads, forces) turn with them, stiffness and damping do not.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
 from railsim.definitions.base import Vector
-from railsim.definitions.elements import Element
+from railsim.definitions.elements import AxleTorque, Element
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
+from railsim.definitions.offered import offers
 from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
 from railsim.errors import Fault, InputError
 
@@ -81,6 +82,10 @@ class FlatElement:
     definition: Element
 
 
+KEPT = "_flattened"
+GRAVITY = 9.81  # m/s2
+
+
 @dataclass(frozen=True)
 class FlatVehicle:
     """A vehicle without assemblies.
@@ -110,6 +115,16 @@ class FlatVehicle:
     def of_kind(self, kind: str) -> tuple[FlatBody, ...]:
         """Return the bodies of one kind, in their order."""
         return tuple(body for body in self.bodies if body.kind == kind)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all bodies [kg]."""
+        return sum(body.mass for body in self.bodies)
+
+    @property
+    def mean_wheel_load(self) -> float:
+        """Weight over the number of wheels [N]."""
+        return self.mass * GRAVITY / (2 * len(self.of_kind("wheelset")))
 
 
 @dataclass(frozen=True)
@@ -156,19 +171,23 @@ def _places(
             yield from _places(assembly, place.inner(name, placement))
 
 
+@offers
 def flatten(vehicle: Vehicle) -> FlatVehicle:
-    """Return the vehicle as plain lists of bodies and elements.
+    """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
     Raises
     ------
     InputError : names that mean nothing or are used twice, parts that do not fit together.
     """
-    faults = vehicle_faults(vehicle)
-    if faults:
-        raise InputError(
-            Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
-        )
-    return _flat(vehicle)
+    kept: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
+    if KEPT not in kept:
+        faults = vehicle_faults(vehicle)
+        if faults:
+            raise InputError(
+                Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
+            )
+        kept[KEPT] = _flat(vehicle)
+    return kept[KEPT]
 
 
 def vehicle_faults(vehicle: Vehicle) -> list[Fault]:
@@ -236,7 +255,17 @@ def _elements(
                 at = (place.point(points[0], side), place.point(points[1], side))
             definition = element.mirrored(place.signs(side)).with_known_preload(*at)
             body2 = ends[1] if len(ends) == 2 else ""
-            yield FlatElement(place.full(sided), ends[0], body2, at[0], at[1], definition)
+            full, signs = place.full(sided), place.signs(side)
+            parts = definition.parts()
+            for suffix, offset, part in parts:
+                there = _sum(at[0], tuple(s * d for s, d in zip(signs, offset, strict=True)))
+                yield FlatElement(f"{full}.{suffix}", ends[0], body2, there, there, part)
+            if not parts:
+                yield FlatElement(full, ends[0], body2, at[0], at[1], definition)
+
+
+def _sum(one: Sequence[float], two: Sequence[float]) -> Vector:
+    return (one[0] + two[0], one[1] + two[1], one[2] + two[2])
 
 
 def position_faults(vehicle: Vehicle) -> list[Fault]:
@@ -254,6 +283,7 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
             faults.append(Fault("", key, found, "wheelsets one behind the other"))
     for group, place in _places(vehicle, _Place()):
         faults += _side_faults(group, place)
+        faults += _torque_faults(group, place, {body.name: body.kind for body in flat.bodies})
     # a definition that stands several times is told of once
     return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
@@ -302,6 +332,20 @@ def _side_faults(group: Vehicle | Assembly, place: _Place) -> list[Fault]:
             continue
         if max(points[0][1], points[1][1]) <= 0.0:
             faults.append(_not_on_the_right(place.key("elements", name)))
+    return faults
+
+
+def _torque_faults(group: Vehicle | Assembly, place: _Place, kinds: dict[str, str]) -> list[Fault]:
+    faults = []
+    for name, element in group.elements.items():
+        if not isinstance(element, AxleTorque):
+            continue
+        ends = [resolve(body, place.scope, None, kinds) or "" for body in element.bodies]
+        found = [kinds[end] for end in ends]
+        if found != ["body", "wheelset"]:
+            key = place.key("elements", name, "bodies")
+            allowed = "first the body that takes the reaction, then the wheelset"
+            faults.append(Fault("", key, " and ".join(f"'{kind}'" for kind in found), allowed))
     return faults
 
 

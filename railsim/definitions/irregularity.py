@@ -5,7 +5,9 @@ from the place that plan, cant and vertical profile give it; several irregularit
 disturbance that does not end at zero by itself is faded in and out over `fade`.
 """
 
-from typing import Annotated, Literal, Self
+from abc import abstractmethod
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -17,6 +19,8 @@ COLUMNS = ("y_left", "z_left", "y_right", "z_right")
 CHANNELS = ("lateral", "vertical", "cross_level", "gauge")
 # Keys that say how the file of a measured irregularity is read; its rows are what came of it.
 READING = ("columns", "units", "reverse", "falling_mileage", "chord", "band")
+# Sign of each in the mirror image of the track.
+MIRROR = {"lateral": -1.0, "vertical": 1.0, "cross_level": -1.0, "gauge": 1.0}
 Amplitude = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
 Rails = Literal["left", "right", "both"]
 Row = tuple[Finite, Amplitude, Amplitude, Amplitude, Amplitude]
@@ -43,7 +47,59 @@ Wavelengths = Annotated[
 ]
 
 
-class Measured(Definition):
+Channel = Literal["lateral", "vertical", "cross_level", "gauge"]
+Channels = Annotated[tuple[Channel, ...], Field(min_length=1)]
+OTHER_RAIL: dict[str, Rails] = {"left": "right", "right": "left", "both": "both"}
+
+
+Wavelength = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.2, le=1000.0)]
+
+
+class Irregular(Definition):
+    """What every irregularity answers; none can be defined without."""
+
+    if TYPE_CHECKING:
+        type: str
+
+    @abstractmethod
+    def mirrored(self) -> Self:
+        """Return the mirror image: left and right exchanged."""
+
+    @abstractmethod
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends on a track whose plan has some length [m]."""
+
+    @abstractmethod
+    def resolution(self) -> float:
+        """Return the length that tables must resolve, a sixteenth of its shortest wave [m]."""
+
+    @abstractmethod
+    def summary(self) -> str:
+        """Return what it is in a few words."""
+
+
+class Single(Irregular):
+    """A disturbance at one place, `length` long about `s`."""
+
+    if TYPE_CHECKING:
+        s: float
+        length: float
+        shape: str
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.s - 0.5 * self.length, self.s + 0.5 * self.length
+
+    def resolution(self) -> float:
+        """Return a part of its length; a triangle has rounded kinks [m]."""
+        return self.length / (40.0 if self.shape == "triangle" else 16.0)
+
+    def summary(self) -> str:
+        """Return its kind and place."""
+        return f"{self.type} at {self.s:g} m"
+
+
+class Measured(Irregular):
     """Displacements measured or computed elsewhere.
 
     Between the rows a cubic spline where they resolve the waves, shape-preserving elsewhere.
@@ -90,8 +146,27 @@ class Measured(Definition):
                 raise ValueError(f"'{given[0]}' belongs to 'file' and does not go with 'rows'")
         return self
 
+    def mirrored(self) -> Self:
+        """Return the rows with the rails exchanged, displacements to the right turned round."""
+        rows = tuple((s, -yr, zr, -yl, zl) for s, yl, zl, yr, zr in self.rows or ())
+        return self.model_copy(update={"rows": rows})
 
-class Dip(Definition):
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where the rows begin and end [m]."""
+        rows = self.rows or ((0.0,), (length,))
+        return rows[0][0] + self.shift, rows[-1][0] + self.shift
+
+    def resolution(self) -> float:
+        """Return half the least distance of the rows, 0.05 m at least [m]."""
+        places = [row[0] for row in self.rows or ()]
+        return max(0.05, 0.5 * min(b - a for a, b in pairwise(places)))
+
+    def summary(self) -> str:
+        """Return that it is measured, and its number of rows."""
+        return f"measured, {len(self.rows or ())} places"
+
+
+class Dip(Single):
     """A single vertical disturbance: a dipped joint, a hump."""
 
     type: Literal["dip"]
@@ -106,8 +181,12 @@ class Dip(Definition):
     shape: Literal["cosine", "triangle"] = "cosine"
     """`cosine`: one wave of 1 - cos; `triangle`: two straights, kinks rounded over length / 10"""
 
+    def mirrored(self) -> Self:
+        """Return the same on the other rail."""
+        return self.model_copy(update={"rail": OTHER_RAIL[self.rail]})
 
-class Kink(Definition):
+
+class Kink(Single):
     """A single lateral disturbance: a kink of the alignment."""
 
     type: Literal["kink"]
@@ -122,8 +201,12 @@ class Kink(Definition):
     shape: Literal["cosine", "triangle"] = "triangle"
     """As for a dip"""
 
+    def mirrored(self) -> Self:
+        """Return the opposite on the other rail."""
+        return self.model_copy(update={"rail": OTHER_RAIL[self.rail], "offset": -self.offset})
 
-class Twist(Definition):
+
+class Twist(Single):
     """A single disturbance of the cross level: one rail rises, the other sinks by half of it."""
 
     type: Literal["twist"]
@@ -135,6 +218,10 @@ class Twist(Definition):
     """Change of cross level in the middle, positive = left rail higher [m]"""
     shape: Literal["cosine", "triangle"] = "triangle"
     """As for a dip"""
+
+    def mirrored(self) -> Self:
+        """Return the opposite change."""
+        return self.model_copy(update={"height": -self.height})
 
 
 class Coefficients(Definition):
@@ -179,7 +266,7 @@ SpectrumName = Literal[
 ]
 
 
-class Random(Definition):
+class Random(Irregular):
     """Stationary random irregularities from power spectral densities."""
 
     type: Literal["random"]
@@ -222,5 +309,71 @@ class Random(Definition):
             raise ValueError("the spectra 'china_trunk' do not describe the gauge")
         return self
 
+    def mirrored(self) -> Self:
+        """Return the mirror image of the same realisation."""
+        return self.model_copy(update={"mirror": not self.mirror})
 
-Irregularity = Annotated[Measured | Dip | Kink | Twist | Random, Field(discriminator="type")]
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.begin, length if self.end is None else self.end
+
+    def resolution(self) -> float:
+        """Return a sixteenth of the shortest wavelength [m]."""
+        return self.wavelengths[0] / 16.0
+
+    def summary(self) -> str:
+        """Return spectrum, seed and band."""
+        low, high = self.wavelengths
+        return f"{self.spectrum}, seed {self.seed}, {low:g} to {high:g} m"
+
+
+class Sweep(Irregular):
+    """Waves of one amplitude whose wavelength goes from one value to another.
+
+    Each octave of wavelengths takes the same length of track.
+    """
+
+    type: Literal["sweep"]
+    channel: Channel = "vertical"
+    """Which of the four irregularities: both rails to the right or down, the left rail higher, or
+    the rails apart"""
+    amplitude: Amplitude
+    """Amplitude of the waves; of `cross_level` the difference of heights, of `gauge` that of the
+    gauge [m]"""
+    wavelengths: tuple[Wavelength, Wavelength]
+    """Wavelength at the beginning and at the end, rising or falling [m]"""
+    begin: Finite
+    """Arc length where it begins, at a zero of the wave [m]"""
+    end: Finite
+    """Arc length where it ends [m]"""
+    fade: NonNegative = 10.0
+    """Length over which it fades in and out within its ends [m]"""
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if self.end <= self.begin:
+            raise ValueError("'end' must lie behind 'begin'")
+        return self
+
+    def mirrored(self) -> Self:
+        """Return the mirror image: what goes to the right or rises on the left is turned round."""
+        sign = MIRROR[self.channel]
+        return self.model_copy(update={"amplitude": sign * self.amplitude})
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.begin, self.end
+
+    def resolution(self) -> float:
+        """Return a sixteenth of the shorter wavelength [m]."""
+        return min(self.wavelengths) / 16.0
+
+    def summary(self) -> str:
+        """Return channel, amplitude and wavelengths."""
+        first, last = self.wavelengths
+        return f"{self.channel} sweep, {1e3 * self.amplitude:g} mm, {first:g} to {last:g} m"
+
+
+Irregularity = Annotated[
+    Measured | Dip | Kink | Twist | Random | Sweep, Field(discriminator="type")
+]

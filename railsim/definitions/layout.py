@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from railsim.definitions.alignment_rules import alignment_remarks
 from railsim.definitions.base import Remark
-from railsim.definitions.irregularity import Measured, Random
+from railsim.definitions.offered import offers
 from railsim.definitions.track import (
     CantElement,
     Circle,
@@ -82,6 +82,7 @@ class _Draft:
     ramp: bool
 
 
+@offers
 def curvature_sections(track: Track) -> list[Section]:
     """Return the plan as curvature over arc length [1/m]."""
     return _sections("plan", [_plan_draft(element) for element in track.plan])[0]
@@ -256,13 +257,7 @@ def _beyond_the_track(track: Track) -> list[Remark]:
     """Remark on irregularities of which the track sees nothing."""
     remarks = []
     for index, part in enumerate(track.irregularities):
-        if isinstance(part, Random):
-            begin, end = part.begin, track.length if part.end is None else part.end
-        elif isinstance(part, Measured):
-            rows = part.rows or ((0.0,), (track.length,))
-            begin, end = rows[0][0] + part.shift, rows[-1][0] + part.shift
-        else:
-            begin, end = part.s - 0.5 * part.length, part.s + 0.5 * part.length
+        begin, end = part.extent(track.length)
         if end <= 0.0 or begin >= track.length:
             text = f"from {begin:g} to {end:g} m, beyond the track's {track.length:g} m"
             remarks.append(Remark(f"irregularities.{index}", text))

@@ -28,6 +28,7 @@ from railsim.definitions.limits import (
 from railsim.definitions.measured import embed_measured
 from railsim.definitions.mechanism import MECHANISM_FORMAT, Mechanism
 from railsim.definitions.mechanism_faults import mechanism_faults, mechanism_remarks
+from railsim.definitions.offered import offers
 from railsim.definitions.overrides import apply_overrides, with_values
 from railsim.definitions.published import PUBLISHED_FORMAT, Published
 from railsim.definitions.scenario import SCENARIO_FORMAT, Scenario
@@ -259,6 +260,7 @@ def load_settings_json(text: str, file: str = "settings_json") -> Settings:
     return _loaded(Settings, Source(file, {"format": SETTINGS_FORMAT, **data}), ())
 
 
+@offers
 def changed_definition(definition: D, values: Mapping[str, Any]) -> D:
     """Return a definition with other values at some keys, checked as a file would be.
 

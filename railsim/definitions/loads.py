@@ -6,15 +6,14 @@ static equilibrium finds ride height, roll and pitch.
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Self
+from typing import Any, Self, TypeVar
 
 from pydantic import Field, model_validator
 
 from railsim.definitions.base import Definition, Name, Positive, PositiveVector, Text, Vector
 from railsim.errors import Fault, nearest
 
-if TYPE_CHECKING:
-    from railsim.definitions.vehicle import Assembly, Vehicle
+V = TypeVar("V", bound=Definition)  # a vehicle, which is built on this module
 
 
 class BodyLoad(Definition):
@@ -50,14 +49,15 @@ class LoadCase(LoadGroup):
     """What it stands for"""
 
 
-def loaded(vehicle: "Vehicle") -> "Vehicle":
+def loaded(vehicle: V) -> V:
     """Return the vehicle with the bodies of the load case in force."""
-    if vehicle.load is None:
+    given: Any = vehicle
+    if given.load is None:
         return vehicle
-    return vehicle.model_copy(update=_changes(vehicle, vehicle.loads[vehicle.load]))
+    return vehicle.model_copy(update=_changes(given, given.loads[given.load]))
 
 
-def _changes(group: "Vehicle | Assembly", load: LoadGroup) -> dict[str, object]:
+def _changes(group: Any, load: LoadGroup) -> dict[str, object]:
     bodies = {
         name: body.model_copy(update=load.bodies[name].model_dump(exclude_none=True))
         if name in load.bodies
@@ -73,7 +73,7 @@ def _changes(group: "Vehicle | Assembly", load: LoadGroup) -> dict[str, object]:
     return {"bodies": bodies, "assemblies": assemblies}
 
 
-def load_faults(vehicle: "Vehicle") -> list[Fault]:
+def load_faults(vehicle: Any) -> list[Fault]:
     """Return what load cases name that is not there; the faults' file is left empty."""
     faults = [
         fault
@@ -86,7 +86,7 @@ def load_faults(vehicle: "Vehicle") -> list[Fault]:
     return faults
 
 
-def _unknown(group: "Vehicle | Assembly", load: LoadGroup, key: str) -> Iterator[Fault]:
+def _unknown(group: Any, load: LoadGroup, key: str) -> Iterator[Fault]:
     for table, word in (("bodies", "body"), ("assemblies", "assembly")):
         known = list(getattr(group, table))
         for name in getattr(load, table):

@@ -7,208 +7,44 @@ Axes x, y; angles from x, anticlockwise; gravity along -y unless said otherwise.
 What one key says is checked here, what several say together in `mechanism_faults`.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from railsim.definitions.base import Count, Definition, FileDefinition, Flag, Name, Text
-from railsim.definitions.expressions import Expression
+from railsim.definitions.base import Count, Definition, FileDefinition, Name, Text
+from railsim.definitions.mechanism_parts import (
+    AUTO,
+    AirSpring,
+    Angle,
+    Body,
+    Cam,
+    Cylinder,
+    Damper,
+    Driver,
+    Force,
+    GasSpring,
+    Ground,
+    HandForce,
+    HandTorque,
+    JointFriction,
+    Link,
+    Piston,
+    PointMass,
+    PointName,
+    Prismatic,
+    Quantity,
+    QuantityOrAuto,
+    Revolute,
+    Slot,
+    Spring,
+    Start,
+    Stop,
+    Torque,
+    by_key,
+)
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
-AUTO = "auto"
-
-
-def _quantity(value: Any) -> float | str:
-    if isinstance(value, Expression):
-        return value
-    if isinstance(value, str):
-        return Expression(value)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError("a number, or an expression of parameters in quotes")
-    if not math.isfinite(value):
-        raise ValueError("must be finite")
-    return float(value)
-
-
-def _quantity_or_auto(value: Any) -> float | str:
-    return AUTO if value == AUTO else _quantity(value)
-
-
-Quantity = Annotated[
-    float | str,
-    PlainValidator(_quantity),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
-]
-QuantityOrAuto = Annotated[
-    float | str,
-    PlainValidator(_quantity_or_auto),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
-]
-PointName = Annotated[
-    str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*\.[A-Za-z_][A-Za-z0-9_-]*$")
-]
-Pair = tuple[PointName, PointName]
-
-
-class Polar(Definition):
-    """A place in polar coordinates."""
-
-    radius: Quantity
-    """Distance from the body's origin [m]"""
-    angle: Quantity
-    """Direction from the body's x axis [rad]"""
-
-
-def _place_tag(value: Any) -> str:
-    return "polar" if isinstance(value, dict | Polar) else "cartesian"
-
-
-Place = Annotated[
-    Annotated[tuple[Quantity, Quantity], Tag("cartesian")] | Annotated[Polar, Tag("polar")],
-    Discriminator(_place_tag),
-]
-
-
-class Ground(Definition):
-    """What does not move."""
-
-    points: dict[Name, Place] = Field(default_factory=dict)
-    """Places by name [m]"""
-    gravity: Quantity = 9.81
-    """Gravitational acceleration along -y [m/s2]"""
-
-
-class Body(Definition):
-    """A rigid body; its axes are where its points say."""
-
-    points: dict[Name, Place] = Field(default_factory=dict)
-    """Places by name in the body's axes [m]"""
-    mass: Quantity = 0.0
-    """Mass [kg]"""
-    centre: Place = (0.0, 0.0)
-    """Centre of gravity in the body's axes [m]"""
-    inertia: Quantity = 0.0
-    """Moment of inertia about the centre of gravity [kg m2]"""
-    outline: tuple[Name, ...] = ()
-    """Points joined by lines in drawings; by default all in their order"""
-
-
-class Start(Definition):
-    """Pose of a body from which the assembly at the driver's start is found."""
-
-    x: QuantityOrAuto = AUTO
-    """Place of the body's origin [m]; by default from a revolute joint or 0"""
-    y: QuantityOrAuto = AUTO
-    """The same along y [m]"""
-    angle: Quantity = 0.0
-    """Angle of the body [rad]"""
-
-
-class Revolute(Definition):
-    """Two points that stay together."""
-
-    revolute: Pair
-    """The points"""
-
-
-class Link(Definition):
-    """A rod without mass between two points, hinged at both."""
-
-    link: Pair
-    """The points"""
-    length: Quantity
-    """Distance between them [m]"""
-
-
-class Slot(Definition):
-    """A pin in a straight slot."""
-
-    slot: Pair
-    """Pin; point on another body from which the slot is measured"""
-    angle: Quantity = 0.0
-    """Direction of the slot in the axes of that body [rad]"""
-    offset: Quantity = 0.0
-    """Distance of the slot from that point, to the left of its direction [m]"""
-
-
-class Prismatic(Definition):
-    """A body that slides along a line of another one without turning against it."""
-
-    prismatic: Pair
-    """Point of the sliding body; point on the other one from which the line is measured"""
-    angle: Quantity = 0.0
-    """Direction of the line in the axes of the other body [rad]"""
-    offset: Quantity = 0.0
-    """Distance of the line from that point, to the left of its direction [m]"""
-    turned: Quantity = 0.0
-    """Angle of the sliding body less that of the other one [rad]"""
-
-
-class Arc(Definition):
-    """An arc of the path of the roller's centre on a cam."""
-
-    radius: Quantity
-    """Radius [m]"""
-    turns: Literal["left", "right"]
-    """Side to which the path turns on its way"""
-    length: Quantity | None = None
-    """Length along the path [m], of a path of tangent arcs"""
-    centre: Place | None = None
-    """Centre in the cam's axes [m], instead of tangency"""
-    begin: Quantity | None = None
-    """Direction from the given centre to the arc's begin [rad]; by default where its rates equal
-    those of the arc before, on the line through both centres"""
-    end: Quantity | None = None
-    """The same for its end [rad]"""
-
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
-        if (self.length is None) == (self.centre is None):
-            raise ValueError("either 'length' (tangent arcs) or 'centre'")
-        return self
-
-
-class Cam(Definition):
-    """A roller on a cam, kept in contact in both directions."""
-
-    cam: PointName
-    """Centre of the roller"""
-    path: PointName | None = None
-    """Point of the cam where the path of the roller's centre begins, for tangent arcs"""
-    body: Name | None = None
-    """Body that carries the cam, where arcs have centres"""
-    tangent: Quantity = 0.0
-    """Direction of the path at its begin, in the axes of the cam's body [rad]"""
-    arcs: tuple[Arc, ...] = Field(min_length=1)
-    """Arcs from the begin of the motion on"""
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        tangent = [arc.length is not None for arc in self.arcs]
-        if any(tangent) != all(tangent):
-            raise ValueError("all arcs with 'length', or all with 'centre'")
-        if tangent[0] == (self.path is None) or tangent[0] != (self.body is None):
-            raise ValueError("'path' goes with arcs of a 'length', 'body' with arcs of a 'centre'")
-        return self
-
-
-def _by_key(*keys: str) -> Any:
-    """A discriminator: the first of these keys that a table has."""
-
-    def tag(value: Any) -> str | None:
-        for key in keys:
-            if (key in value) if isinstance(value, Mapping) else hasattr(value, key):
-                return f"a {key}"
-        return None
-
-    listed = ", ".join(keys)
-    return Discriminator(
-        tag,
-        custom_error_type="one_of",
-        custom_error_message=f"one of the keys {listed} must say what it is",
-    )
 
 
 Joint = Annotated[
@@ -217,82 +53,8 @@ Joint = Annotated[
     | Annotated[Slot, Tag("a slot")]
     | Annotated[Prismatic, Tag("a prismatic")]
     | Annotated[Cam, Tag("a cam")],
-    _by_key("revolute", "link", "slot", "prismatic", "cam"),
+    by_key("revolute", "link", "slot", "prismatic", "cam"),
 ]
-
-
-class Cylinder(Definition):
-    """A pneumatic or hydraulic cylinder; its force is an unknown, or follows from a pressure."""
-
-    cylinder: Pair
-    """Its ends"""
-    bore: Quantity
-    """Bore of one cylinder [m]"""
-    rod: Quantity = 0.0
-    """Diameter of the rod [m]; counts when the cylinder pulls"""
-    count: Quantity = 1.0
-    """Cylinders side by side"""
-    supply_pressure: Quantity
-    """Available pressure [Pa]"""
-    acts: Literal["push", "pull"] = "push"
-    """Chamber under pressure"""
-    pin_to_pin: Quantity | None = None
-    """Shortest length of the cylinder between its pins less its stroke [m]"""
-    bores: tuple[Quantity, ...] = (0.032, 0.04, 0.05, 0.063, 0.08, 0.1, 0.125, 0.16, 0.2)
-    """Bores that are made [m]"""
-    strokes: tuple[Quantity, ...] = (
-        0.025, 0.05, 0.08, 0.1, 0.125, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5,
-    )  # fmt: skip
-    """Strokes that are made [m]"""
-
-
-class AirSpring(Definition):
-    """An air spring by its table: force over height and pressure, linear in between."""
-
-    air_spring: Pair
-    """Its ends"""
-    heights: tuple[Quantity, ...] = Field(min_length=2)
-    """Heights of the rows, rising [m]"""
-    pressures: tuple[Quantity, ...] = Field(min_length=2)
-    """Pressures of the columns, rising [Pa]"""
-    forces: tuple[tuple[Quantity, ...], ...] = Field(min_length=2)
-    """Forces, a row for each height [N]"""
-    supply_pressure: Quantity | None = None
-    """Available pressure [Pa]"""
-
-    @model_validator(mode="after")
-    def _rectangular(self) -> Self:
-        if len(self.forces) != len(self.heights):
-            raise ValueError(f"{len(self.forces)} rows of 'forces', {len(self.heights)} 'heights'")
-        for row in self.forces:
-            if len(row) != len(self.pressures):
-                raise ValueError(f"a row of {len(row)} 'forces', {len(self.pressures)} 'pressures'")
-        return self
-
-
-class Piston(Definition):
-    """An actuator along a line; its force is an unknown."""
-
-    piston: Pair
-    """Its ends"""
-
-
-class HandForce(Definition):
-    """A force at a point, of unknown size."""
-
-    push: PointName
-    """Where it acts"""
-    angle: Quantity
-    """Direction in which it is positive [rad]"""
-    turns: Flag = True
-    """Whether the direction turns with the body of the point"""
-
-
-class HandTorque(Definition):
-    """A torque on a body, of unknown size."""
-
-    turn: Name
-    """The body"""
 
 
 Actuator = Annotated[
@@ -301,116 +63,8 @@ Actuator = Annotated[
     | Annotated[Piston, Tag("a piston")]
     | Annotated[HandForce, Tag("a push")]
     | Annotated[HandTorque, Tag("a turn")],
-    _by_key("cylinder", "air_spring", "piston", "push", "turn"),
+    by_key("cylinder", "air_spring", "piston", "push", "turn"),
 ]
-
-
-class PointMass(Definition):
-    """A mass at a point."""
-
-    point_mass: PointName
-    """Where it is"""
-    mass: Quantity
-    """Mass [kg]"""
-
-
-class Force(Definition):
-    """A given force at a point."""
-
-    force: PointName
-    """Where it acts"""
-    size: Quantity
-    """Its size [N]"""
-    angle: Quantity
-    """Its direction [rad]"""
-    turns: Flag = False
-    """Whether the direction turns with the body of the point"""
-
-
-class Torque(Definition):
-    """A given torque on a body."""
-
-    torque: Name
-    """The body"""
-    size: Quantity
-    """Its size, anticlockwise [N m]"""
-
-
-class Spring(Definition):
-    """A linear spring between two points."""
-
-    spring: Pair
-    """Its ends"""
-    stiffness: Quantity
-    """Stiffness [N/m]"""
-    free_length: Quantity
-    """Length without force [m]"""
-
-
-class JointFriction(Definition):
-    """Dry friction of joints against a body's turning."""
-
-    joint_friction: Name
-    """Body that turns against the ground"""
-    moment: Quantity
-    """Torque against its motion [N m]"""
-
-
-class Damper(Definition):
-    """A linear damper between two points."""
-
-    damper: Pair
-    """Its ends"""
-    damping: Quantity
-    """Damping [N s/m]"""
-
-
-class Stop(Definition):
-    """A one-sided end stop between two points."""
-
-    stop: Pair
-    """Its ends"""
-    length: Quantity
-    """Distance at which it is met [m]"""
-    side: Literal["shortest", "longest"] = "shortest"
-    """Whether the distance may not become shorter, or not longer"""
-    stiffness: Quantity
-    """Stiffness [N/m]"""
-    damping: Quantity = 0.0
-    """Damping while it is met [N s/m]"""
-
-
-class GasSpring(Definition):
-    """A gas spring between two points."""
-
-    gas_spring: Pair
-    """Its ends"""
-    F1: Quantity
-    """Force at 20 C without friction: fully extended, or fully compressed if it pulls [N]"""
-    progression: Quantity
-    """Ratio of the force at the other end of the stroke to `F1`"""
-    stroke: Quantity
-    """Stroke [m]"""
-    extended: Quantity
-    """Length fully extended [m]"""
-    law: Literal["linear", "isothermal"] = "linear"
-    """Force over the stroke"""
-    acts: Literal["compression", "traction"] = "compression"
-    """Whether it pushes or pulls"""
-    friction: Quantity = 0.0
-    """Friction against the motion [N]"""
-    damping: Quantity = 0.0
-    """Damping [N s/m]"""
-    end_damping: Quantity | None = None
-    """Damping over the last part of the extension (oil) [N s/m]"""
-    end_length: Quantity = 0.0
-    """Length of that part [m]"""
-    temperature: Quantity = 20.0
-    """Temperature of the gas [C]"""
-    rod: Quantity | None = None
-    """Diameter of the rod [m], for the pressure of the gas"""
-    service: tuple[Quantity, Quantity] = (-30.0, 80.0)
-    """Lowest and highest temperature in service [C]"""
 
 
 Element = Annotated[
@@ -422,35 +76,10 @@ Element = Annotated[
     | Annotated[Damper, Tag("a damper")]
     | Annotated[Stop, Tag("a stop")]
     | Annotated[GasSpring, Tag("a gas_spring")],
-    _by_key(
+    by_key(
         "point_mass", "force", "torque", "spring", "joint_friction", "damper", "stop", "gas_spring"
     ),
 ]
-
-
-class Driver(Definition):
-    """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
-
-    angle: Name | None = None
-    """Body whose angle it is"""
-    length: Pair | None = None
-    """Points whose distance it is"""
-    coordinate: PointName | None = None
-    """Point whose coordinate it is"""
-    axis: Literal["x", "y"] = "y"
-    """Which coordinate"""
-    zero: Quantity = 0.0
-    """What the angle, length or coordinate is where the driver is 0 [rad or m]"""
-    start: Quantity = 0.0
-    """Value of the driver at the start of the motion [rad or m]"""
-    end: Quantity
-    """Value of the driver at its end [rad or m]"""
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        if sum(x is not None for x in (self.angle, self.length, self.coordinate)) != 1:
-            raise ValueError("one of 'angle', 'length' and 'coordinate'")
-        return self
 
 
 class Sampling(Definition):
@@ -460,17 +89,6 @@ class Sampling(Definition):
     """Number of positions, both ends included"""
     by: Literal["travel", "length", "time"] = "travel"
     """Quantity in equal steps: the driver, the actuator's length, or time at its motion law"""
-
-
-class Angle(Definition):
-    """An angle between two lines, folded to 0 to 90 degrees."""
-
-    between: tuple[Pair, Pair]
-    """The lines, each from one point to another"""
-    offset: Quantity = 0.0
-    """Added to the angle of the first line less that of the second [rad]"""
-    limited: Flag = True
-    """Whether it is a transmission angle that the least one of `[optimise]` holds for"""
 
 
 class Output(Definition):

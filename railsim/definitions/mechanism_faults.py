@@ -4,22 +4,19 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
 from railsim.definitions.base import Remark
-from railsim.definitions.expressions import Expression, evaluate
-from railsim.definitions.mechanism import (
-    RESULTS,
-    AirSpring,
-    Cam,
-    Cylinder,
-    GasSpring,
-    Link,
-    Mechanism,
-    Piston,
-    Polar,
-    Prismatic,
-    Slot,
+from railsim.definitions.expressions import Expression
+from railsim.definitions.mechanism import RESULTS, Mechanism
+from railsim.definitions.mechanism_parts import AirSpring, Cam, Cylinder, GasSpring, Link, Piston
+from railsim.definitions.mechanism_values import (
+    ends,
+    expressions,
+    number,
+    parameter_values,
+    part_sizes,
+    point_names,
+    sizes,
 )
 from railsim.errors import Fault, InputError, nearest
 
@@ -27,8 +24,6 @@ LARGEST = 50.0  # m; no mechanism of a vehicle is larger
 OUT_OF_PROPORTION = 100.0
 MOST_TURNED = 12.5  # rad; two turns
 ABSOLUTE_ZERO = -273.15  # C
-PARTS = ("length", "free_length", "stroke", "extended", "bore", "rod", "pin_to_pin", "end_length")
-"""Lengths of actuators and elements."""
 ROWS = {"revolute": 2, "link": 1, "slot": 1, "prismatic": 2, "cam": 1}
 
 
@@ -52,85 +47,6 @@ def mechanism_remarks(mechanism: Mechanism) -> list[Remark]:
     if silent := [name for name in mechanism.parameters if name not in stated]:
         remarks.append(Remark("provenance", f"not stated for {', '.join(silent)}"))
     return remarks
-
-
-def expressions(node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Expression]]:
-    """Yield every expression in a definition with its dotted key."""
-    if isinstance(node, Expression):
-        yield ".".join(path), node
-    elif isinstance(node, BaseModel):
-        for name in type(node).model_fields:
-            yield from expressions(getattr(node, name), (*path, name))
-    elif isinstance(node, Mapping):
-        for key, value in node.items():
-            yield from expressions(value, (*path, str(key)))
-    elif isinstance(node, list | tuple):
-        for index, value in enumerate(node):
-            yield from expressions(value, (*path, str(index)))
-
-
-def parameter_values(
-    mechanism: Mechanism, changed: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """Values of all parameters and intermediate results.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        Whose parameters.
-    changed : mapping of str to float or complex ndarray, optional
-        Values instead of the file's, also for parameters that are expressions there.
-
-    Raises
-    ------
-    InputError : an expression without a value, or parameters that go round in a circle.
-    """
-    values: dict[str, Any] = dict(changed or {})
-    home = {n: f"derived.{n}" for n in mechanism.derived}
-    home |= {n: f"parameters.{n}" for n in mechanism.parameters}
-    written = {**mechanism.derived, **mechanism.parameters}
-    waiting = {n: v for n, v in written.items() if n not in values}
-    for name in mechanism.automatic & waiting.keys():
-        del waiting[name]
-        values[name] = np.nan
-    while waiting:
-        ready = [
-            name
-            for name, value in waiting.items()
-            if not (isinstance(value, Expression) and value.names & waiting.keys())
-        ]
-        if not ready:
-            names = ", ".join(sorted(waiting))
-            raise InputError([Fault("", "parameters", f"{names} refer to each other", "")])
-        for name in ready:
-            values[name] = number(waiting.pop(name), values, home[name])
-    return values
-
-
-def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> Any:
-    """Value of a number or an expression.
-
-    Raises
-    ------
-    InputError : it has none.
-    """
-    if not isinstance(quantity, Expression):
-        return quantity
-    try:
-        return evaluate(quantity, values)
-    except ValueError as error:
-        hint = ""
-        if "acos" in str(error) or "asin" in str(error) or "root" in str(error):
-            hint = "the links cannot be assembled at the start with these parameters"
-        raise InputError([Fault("", key, str(error), hint)]) from None
-
-
-def place(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:
-    """Coordinates of a place in its body's axes."""
-    if isinstance(where, Polar):
-        radius, angle = number(where.radius, values, key), number(where.angle, values, key)
-        return radius * np.cos(angle), radius * np.sin(angle)
-    return number(where[0], values, key), number(where[1], values, key)
 
 
 def _parameter_faults(mechanism: Mechanism) -> list[Fault]:
@@ -246,21 +162,6 @@ def _part_references(key: str, part: Any) -> Iterator[tuple[str, str, str]]:
     for field in ("turn", "torque", "body", "joint_friction"):
         if (body := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", body, "body"
-
-
-def point_names(mechanism: Mechanism) -> list[str]:
-    """Names of all points, those of the ground first."""
-    names = [f"ground.{name}" for name in mechanism.ground.points]
-    return [*names, *(f"{b}.{p}" for b, part in mechanism.bodies.items() for p in part.points)]
-
-
-def ends(part: Any) -> tuple[str, str] | None:
-    """The two points of a joint, actuator or element between points."""
-    for field in ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston",
-                  "spring", "damper", "stop", "gas_spring"):  # fmt: skip
-        if (pair := getattr(part, field, None)) is not None:
-            return pair  # type: ignore[no-any-return]
-    return None
 
 
 def _end_faults(mechanism: Mechanism) -> list[Fault]:
@@ -470,39 +371,6 @@ def _freedom_faults(mechanism: Mechanism) -> list[Fault]:
     remedy = "a joint too many" if freedoms < 1 else "a joint too few"
     found = f"{freedoms} degrees of freedom: {bodies} bodies with 3 each, {rows} held by joints"
     return [Fault("", "joints", found, f"1 is needed: {remedy}")]
-
-
-def sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
-    """Lengths of the mechanism by the key that says them [m]; arcs of cams are left out."""
-    found = {}
-    parts: list[tuple[str, Any]] = [("ground", mechanism.ground)]
-    parts += [(f"bodies.{name}", body) for name, body in mechanism.bodies.items()]
-    for key, part in parts:
-        for name, where in part.points.items():
-            x, y = place(where, values)
-            found[f"{key}.points.{name}"] = float(np.hypot(x, y))
-    for name, joint in mechanism.joints.items():
-        if isinstance(joint, Link):
-            found[f"joints.{name}.length"] = float(number(joint.length, values))
-        if isinstance(joint, Slot | Prismatic):
-            found[f"joints.{name}.offset"] = abs(float(number(joint.offset, values)))
-    return {key: size for key, size in found.items() if size > 1e-9}
-
-
-def part_sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
-    """Lengths of actuators, elements and the zone by the key that says them [m]."""
-    found = {}
-    for table in ("actuators", "elements"):
-        for name, part in getattr(mechanism, table).items():
-            for field in PARTS:
-                if (quantity := getattr(part, field, None)) is not None:
-                    found[f"{table}.{name}.{field}"] = abs(float(number(quantity, values)))
-            for i, height in enumerate(getattr(part, "heights", ())):
-                found[f"{table}.{name}.heights.{i}"] = abs(float(number(height, values)))
-    if mechanism.zone is not None:
-        for field in ("low", "work", "high"):
-            found[f"zone.{field}"] = abs(float(number(getattr(mechanism.zone, field), values)))
-    return found
 
 
 def _size_faults(mechanism: Mechanism) -> list[Fault]:

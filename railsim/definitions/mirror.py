@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from railsim.definitions.base import Vector
 from railsim.definitions.elements import Element
-from railsim.definitions.irregularity import Dip, Irregularity, Kink, Measured, Random
 from railsim.definitions.track import (
     CantElement,
     Circle,
@@ -20,7 +19,6 @@ from railsim.definitions.track import (
 from railsim.definitions.vehicle import Assembly, Axlebox, Body, Placement, Vehicle, Wheelset
 
 SIGNS = (1.0, -1.0, 1.0)
-RAIL = {"left": "right", "right": "left", "both": "both"}
 
 Group = TypeVar("Group", Vehicle, Assembly)
 Part = TypeVar("Part", Body, Wheelset, Axlebox, Placement)
@@ -44,7 +42,7 @@ def mirrored_track(track: Track) -> Track:
             "friction": track.friction[::-1],
             "friction_table": _sides_exchanged(track.friction_table),
             "gauge_widening": _sides_exchanged(track.gauge_widening),
-            "irregularities": tuple(_mirrored_part(part) for part in track.irregularities),
+            "irregularities": tuple(part.mirrored() for part in track.irregularities),
         }
     )
 
@@ -68,19 +66,6 @@ def _mirrored_cant(element: CantElement) -> CantElement:
 
 def _sides_exchanged(rows: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
     return None if rows is None else tuple((s, right, left) for s, left, right in rows)
-
-
-def _mirrored_part(part: Irregularity) -> Irregularity:
-    if isinstance(part, Random):
-        return part.model_copy(update={"mirror": not part.mirror})
-    if isinstance(part, Measured):
-        rows = tuple((s, -yr, zr, -yl, zl) for s, yl, zl, yr, zr in part.rows or ())
-        return part.model_copy(update={"rows": rows})
-    if isinstance(part, Dip):
-        return part.model_copy(update={"rail": RAIL[part.rail]})
-    if isinstance(part, Kink):
-        return part.model_copy(update={"rail": RAIL[part.rail], "offset": -part.offset})
-    return part.model_copy(update={"height": -part.height})
 
 
 def mirrored_vehicle(vehicle: Vehicle) -> Vehicle:

@@ -184,13 +184,15 @@ def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
 
 
 def _reference_faults(parts: Mapping[str, Any], known: Mapping[str, str]) -> list[Fault]:
-    """Faults of names outside assemblies: the reference body and the points of the service."""
+    """Faults of names outside assemblies: the reference body, sensors."""
     candidates = [full for full, kind in known.items() if kind != "axlebox"]
     named = {"reference": parts.get("reference")}
     service = parts.get("service")
     if isinstance(service, Mapping):
         for point, table in _members(service, "points").items():
             named[f"service.points.{point}.body"] = table.get("body")
+    for sensor, table in _members(parts, "sensors").items():
+        named[f"sensors.{sensor}.body"] = table.get("body")
     return [
         Fault("", key, f"no body '{name}'", nearest(name, candidates))
         for key, name in named.items()

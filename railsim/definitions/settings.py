@@ -14,6 +14,7 @@ from railsim.definitions.base import (
     Text,
     rising,
 )
+from railsim.definitions.creep_law import CreepLawName
 
 SETTINGS_FORMAT = "railsim-settings/1"
 
@@ -31,6 +32,18 @@ Step = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-6, le=0.1)
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-3, le=1e5)]
 Spacing = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-3, le=1e5)]
 Cells = Annotated[int, Field(strict=True, ge=1, le=500)]
+Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=1.0)]
+
+
+def _from_zero(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    if rows[0] != (0.0, 0.0):
+        raise ValueError("the first row must be [0.0, 0.0]: no creepage, no force")
+    return _forward(rows)
+
+
+AdhesionRows = Annotated[
+    tuple[tuple[NonNegative, Share], ...], Field(min_length=2), AfterValidator(_from_zero)
+]
 TractionRows = Annotated[
     tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), AfterValidator(_forward)
 ]
@@ -107,15 +120,21 @@ class Outputs(Definition):
 
     quantities: tuple[Text, ...] = ()
     """Which of the usual quantities to keep, `*` standing for any letters; by default all"""
+    evaluate_after: NonNegative | None = None
+    """Time after the start that tables of peaks leave out [s]; by default 1 s, and no more than a
+    tenth of the run; 0: none"""
     low_pass: LowPass | None = None
     """Low pass of all quantities before they are stored at `output_rate`"""
     sensors: Flag = False
-    """Readings of accelerometers on the floor, the bogie frames and the vehicle's own points"""
+    """Motion of points: floor, bogie frames, axleboxes and the vehicle's `sensors`; accelerations
+    also as accelerometers read them"""
 
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""
     contact_patches: Flag = False
     """Place, size, load, creep forces and pressure of every contact patch"""
+    frictional_power: Flag = False
+    """Power that each wheel's contact turns into heat"""
     track: Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
 
@@ -135,8 +154,11 @@ class Settings(FileDefinition):
     """Distance between output points [m] instead of `output_rate`"""
     fastsim_grid: tuple[Cells, Cells] = (10, 10)
     """Cells of a contact patch along and across"""
-    creep_law: Literal["fastsim", "table", "fastrip", "polach", "linear"] = "fastsim"
+    creep_law: CreepLawName = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""
+    adhesion_curve: AdhesionRows | None = None
+    """Measured curve of the law `adhesion_curve`: rows [creepage, T/(mu N)] from [0, 0] on, linear
+    in between, constant beyond [1]"""
     normal_contact: Literal["hertz", "kik-piotrowski"] = "hertz"
     """Normal contact: the Hertz ellipse of averaged curvatures, or non-elliptic patches"""
     contact_damping: NonNegative = 2e5
@@ -159,6 +181,10 @@ class Settings(FileDefinition):
     def _physical(self) -> Self:
         if self.poisson >= 0.5:
             raise ValueError("'poisson' must be below 0.5")
+        if (self.creep_law == "adhesion_curve") != (self.adhesion_curve is not None):
+            raise ValueError(
+                "'adhesion_curve' belongs to creep_law = \"adhesion_curve\" and only to it"
+            )
         asked = self.outputs.low_pass
         if asked is not None:
             least = LEAST_RATE[asked.phase] * asked.frequency

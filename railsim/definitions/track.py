@@ -24,6 +24,7 @@ from railsim.definitions.base import (
     rising,
 )
 from railsim.definitions.irregularity import Irregularity
+from railsim.definitions.offered import offered
 from railsim.definitions.support import Support
 from railsim.drawn import Drawn
 
@@ -257,11 +258,8 @@ class Track(FileDefinition, Drawn):
 
     def _table(self) -> tuple[list[str], list[list[object]]]:
         """Return the table of the plan's elements that a notebook shows."""
-        # sections are built on the classes of this module
-        from railsim.definitions.layout import curvature_sections
-
         rows: list[list[object]] = []
-        for section in curvature_sections(self):
+        for section in offered("curvature_sections")(self):
             ends = " to ".join(
                 f"{1.0 / value:.6g}" if value else "inf"
                 for value in dict.fromkeys((section.start_value, section.end_value))

@@ -6,7 +6,7 @@ vehicle's origin, y to the right, z down from the plane through the rail tops.  
 group that stands at each of its placements; its coordinates count from there.
 """
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -24,10 +24,8 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.elements import AnyElement
 from railsim.definitions.loads import LoadCase
+from railsim.definitions.offered import offered
 from railsim.drawn import Drawn
-
-if TYPE_CHECKING:
-    from railsim.definitions.flatten import FlatVehicle
 
 VEHICLE_FORMAT = "railsim-vehicle/1"
 
@@ -148,6 +146,9 @@ class Vehicle(FileDefinition, Drawn):
     else the first wheelset"""
     service: Service | None = None
     """What the vehicle is admitted for; assessments need it"""
+    sensors: dict[Name, Point] = Field(default_factory=dict)
+    """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
+    standard ones"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
     """Bodies by name"""
     wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
@@ -164,13 +165,10 @@ class Vehicle(FileDefinition, Drawn):
     @property
     def mass(self) -> float:
         """Mass of all bodies in the load case [kg]."""
-        return sum(body.mass for body in self._flat().bodies)
+        return float(self._flat().mass)
 
-    def _flat(self) -> "FlatVehicle":
-        # flatten is built on the classes of this module
-        from railsim.definitions.flatten import flatten
-
-        return flatten(self)
+    def _flat(self) -> Any:
+        return offered("flatten")(self)
 
     def _table(self) -> tuple[list[str], list[list[object]]]:
         """Return the table of bodies that a notebook shows."""

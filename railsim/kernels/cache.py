@@ -8,10 +8,8 @@ costs time, never the run; `notices` says so, once.
 A folder that can only be read is used as it is, when it belongs to this user or to root.
 """
 
-import hashlib
 import logging
 import os
-import pickle
 import re
 import stat
 import tempfile
@@ -19,9 +17,6 @@ import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-
-from numba.core.compiler import CompileResult
-from numba.core.serialize import dumps
 
 notices: dict[str, None] = {}
 """What the user should know of the cache, each sentence once."""
@@ -161,57 +156,3 @@ def store_file(path: Path, write: Callable[[int], None]) -> bool:
             with suppress(OSError):
                 Path(name).unlink(missing_ok=True)
     return True
-
-
-class KernelCache:
-    """Compiled code of one function on disk, as numba's dispatcher wants it.
-
-    One file for every signature and kind of processor; which sources they belong to is said by the
-    name of the folder.
-    """
-
-    def __init__(self, function: Callable[..., object], folder: Path) -> None:
-        self._folder = folder
-        module = function.__module__.rpartition(".")[2]
-        self._name = f"{module}.{function.__qualname__}"
-        closure = [cell.cell_contents for cell in function.__closure__ or ()]
-        self._code = hashlib.sha256(function.__code__.co_code + repr(closure).encode()).hexdigest()
-
-    @property
-    def cache_path(self) -> str:
-        """Folder of the files."""
-        return str(self._folder)
-
-    def _path(self, signature: object, codegen) -> Path:
-        key = repr((str(signature), codegen.magic_tuple(), self._code))
-        digest = hashlib.sha256(key.encode()).hexdigest()[:24]
-        return self._folder / f"{self._name}-{digest}.nbc"
-
-    def load_overload(self, signature, target_context):
-        """Return the compiled function of a signature, or None."""
-        target_context.refresh()
-        path = self._path(signature, target_context.codegen())
-        data = stored(path)
-        if data is None:
-            return None
-        try:
-            return CompileResult._rebuild(target_context, *pickle.loads(data))
-        except Exception:  # what another version of a library has written
-            discard(path)
-            return None
-
-    def save_overload(self, signature, result) -> None:
-        """Store the compiled function of a signature."""
-        if not result.lifted and not result.library.has_dynamic_globals:
-            store(self._path(signature, result.codegen), dumps(result._reduce()))
-
-    def enable(self) -> None:
-        """Nothing to do: it is on."""
-
-    def disable(self) -> None:
-        """Nothing to do."""
-
-    def flush(self) -> None:
-        """Forget all signatures."""
-        for path in self._folder.glob(f"{self._name}-*.nbc"):
-            path.unlink(missing_ok=True)

@@ -10,13 +10,14 @@ that line and the rail.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit_outside
+from railsim.kernels import compiled
 
 
-@jit_outside
+@compiled(in_loop=False)
 def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
     """Trace line of a wheel relative to the wheelset's centre, in track axes.
 
@@ -48,7 +49,7 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
         c_z[k] = u[k] * l_z + r[k] * (along * l_z + across * l_y) / m
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rail_height(Y, Y0, dY, z, slope):
     """Height of the rail's surface and its slope at the lateral place `Y`, cubic, straight beyond.
 
@@ -86,7 +87,7 @@ def rail_height(Y, Y0, dY, z, slope):
 R_GAP, R_U, R_RADIUS, R_PLACE, R_SLOPE, R_INDEX = range(6)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y, roll, out):
     """First contact of a rigid wheel that is lowered onto its rail, without yaw.
 
@@ -139,7 +140,7 @@ def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y,
     out[R_INDEX] = index
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _gap_slope(wheel, k, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine):
     """Derivative of the gap with respect to u at a candidate [1]."""
     u, r, t = wheel[0, k], wheel[1, k], wheel[2, k]
@@ -147,23 +148,24 @@ def _gap_slope(wheel, k, rail_Y0, rail_dY, rail_z, rail_slope, y, cosine, sine):
     return slope * (cosine - t * sine) - (sine + t * cosine)
 
 
-@jit_outside
-def rigid_sweep(
-    lateral,
-    wheel_right,
-    right_Y0,
-    right_z,
-    right_slope,
-    wheel_left,
-    left_Y0,
-    left_z,
-    left_slope,
-    rail_dY,
-    centre_height,
-    roll_max,
-    roll,
-    contacts,
-):
+class RigidPair(NamedTuple):
+    """A wheel and its rail, as `rigid_contact` takes them."""
+
+    wheel: np.ndarray
+    rail_Y0: float
+    rail_z: np.ndarray
+    rail_slope: np.ndarray
+
+
+@compiled(in_loop=False)
+def _pair_contact(pair, rail_dY, centre_height, y, roll, out):
+    rigid_contact(
+        pair.wheel, pair.rail_Y0, rail_dY, pair.rail_z, pair.rail_slope, centre_height, y, roll, out
+    )
+
+
+@compiled(in_loop=False)
+def rigid_sweep(lateral, right_pair, left_pair, rail_dY, centre_height, roll_max, roll, contacts):
     """Roll of a rigid wheelset on both rails, and its contacts, over the lateral displacement.
 
     The left side is given as a right one; it is looked up at -y and -roll.  The roll is the one
@@ -174,8 +176,10 @@ def rigid_sweep(
     ----------
     lateral : ndarray, shape (n,)
         Lateral displacements [m].
-    wheel_right, wheel_left, right_*, left_*, rail_dY
-        As for `rigid_contact`.
+    right_pair, left_pair : RigidPair
+        Wheel and rail of each side.
+    rail_dY : float
+        As for `rigid_contact` [m].
     centre_height, roll_max : float
         As for `rigid_contact`; largest roll that is tried [rad].
     roll : ndarray, shape (n,)
@@ -195,12 +199,8 @@ def rigid_sweep(
             # away from the previous roll, in growing steps to both sides
             away = 0.0 if trial < 0 else step
             x = previous + (away if trial % 2 == 0 else -away)
-            rigid_contact(
-                wheel_right, right_Y0, rail_dY, right_z, right_slope, centre_height, y, x, right
-            )
-            rigid_contact(
-                wheel_left, left_Y0, rail_dY, left_z, left_slope, centre_height, -y, -x, left
-            )
+            _pair_contact(right_pair, rail_dY, centre_height, y, x, right)
+            _pair_contact(left_pair, rail_dY, centre_height, -y, -x, left)
             f = right[R_GAP] - left[R_GAP]
             if trial < 0:
                 f_a = f_b = f
@@ -224,12 +224,8 @@ def rigid_sweep(
             if f_a == f_b:
                 break
             x = b - f_b * (b - a) / (f_b - f_a)
-            rigid_contact(
-                wheel_right, right_Y0, rail_dY, right_z, right_slope, centre_height, y, x, right
-            )
-            rigid_contact(
-                wheel_left, left_Y0, rail_dY, left_z, left_slope, centre_height, -y, -x, left
-            )
+            _pair_contact(right_pair, rail_dY, centre_height, y, x, right)
+            _pair_contact(left_pair, rail_dY, centre_height, -y, -x, left)
             f = right[R_GAP] - left[R_GAP]
             if f * f_b < 0.0:
                 a, f_a = b, f_b

@@ -25,7 +25,7 @@ from math import sqrt
 import numba
 import numpy as np
 
-from railsim.kernels import jit
+from railsim.kernels import compiled
 from railsim.kernels.contact_table_simd import sum_of_nodes
 
 TREAD, FLANGE_ROOT, FLANGE = range(3)
@@ -61,7 +61,7 @@ MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
 SETTLED = 1e-8
 
 
-@jit
+@compiled
 def stretched_roll(roll):
     """Coordinate of the roll on which the tables' nodes are evenly spaced, and its slope.
 
@@ -79,7 +79,7 @@ def stretched_roll(roll):
     return roll / root, (1.0 - 0.5 * x * x / square) / root
 
 
-@jit
+@compiled
 def locate(contact, table, y, roll, stretched, w):
     """Cell and local coordinate in the three directions; a code if outside (see above)."""
     ty = (y - contact.shear[table] * roll - contact.y0) / contact.dy
@@ -101,7 +101,7 @@ def locate(contact, table, y, roll, stretched, w):
     return INSIDE, iy, ir, iw, ty - iy, tr - ir, tw - iw
 
 
-@jit
+@compiled
 def is_far(contact, table, patch, iy, ir, iw, tr, z):
     """Whether a patch is so far from touching that its look-up can be skipped."""
     values = contact.values
@@ -109,7 +109,7 @@ def is_far(contact, table, patch, iy, ir, iw, tr, z):
     return z - node - tr * (following - node) < -FAR
 
 
-@jit
+@compiled
 def spline_weights(t, per_step, weights, first):
     """Four weights of the uniform cubic B-spline at t in [0, 1), four of its derivative.
 
@@ -127,7 +127,7 @@ def spline_weights(t, per_step, weights, first):
     weights[first + 7] = 0.5 * t2 * per_step
 
 
-@jit
+@compiled
 def cell_weights(contact, ty, tr, roll_slope, weights):
     """Weights of a cell's nodes, the same for all patches of a wheel, into ``weights[16]``.
 
@@ -161,7 +161,7 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, place):
 _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_nodes
 
 
-@jit
+@compiled
 def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     """Fields of one patch and their gradients into ``out[first:first + LOOK_UP_SIZE]``.
 
@@ -182,7 +182,7 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     out[first + K2_W] *= per_step
 
 
-@jit
+@compiled
 def under_load(t, first, vertical):
     """Place, direction and ellipse of a patch under a load, from a look-up at `t[first:]`.
 
@@ -207,7 +207,7 @@ def under_load(t, first, vertical):
     )
 
 
-@jit
+@compiled
 def coupled_approaches(coupling, table, stiffness, approach):
     """Take from the penetrations what the neighbours' loads bend the surfaces.
 

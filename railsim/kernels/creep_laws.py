@@ -1,13 +1,13 @@
-"""Creep laws beside FASTSIM: FaStrip, Polach, and Kalker's linear theory with saturation.
+"""Creep laws beside FASTSIM: FaStrip, Polach, linear with saturation, a measured adhesion curve.
 
-All take the arrays of all patches, as :func:`railsim.kernels.fastsim.fastsim` does; units, frame
-and signs are those of that function: force on the rail, of the sign of the creepage.  Patches
-without contact or friction give zero.  docs/theory/creep.md derives and compares them.
+All take the arrays of all patches, see :class:`railsim.kernels.patches.Patches`; units, frame and
+signs are those of that group: force on the rail, of the sign of the creepage.  Patches without
+contact or friction give zero.  docs/theory/creep.md derives and compares them.
 """
 
 import math
 
-from . import jit, jit_ordered
+from . import compiled
 
 # FaStrip: flexibilities go over to a single one around this much creepage ...
 _BLEND_CREEPAGE = 2.1
@@ -22,8 +22,8 @@ _NO_LOAD = 1e-200  # a bound below this is none: its inverse would overflow [N]
 _EXCESS_POINTS = 16
 
 
-@jit_ordered
-def linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, G, xi_x, xi_y, phi, T_x, T_y, M_z):
+@compiled(ordered=True)
+def linear_saturated(n, patches, G):
     """Kalker's linear theory, saturated after Shen, Hedrick and Elkins (1983), spin included.
 
     With u the size of the linear force over mu N: force over mu N is u - u^2/3 + u^3/27 up to
@@ -31,8 +31,8 @@ def linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, G, xi_x, xi_y, phi, T_x,
     saturates at mu N; here u has a third component, the slip by spin at 0.6 of the patch's size.
     All of force and moment is reduced by the same factor.  Without spin it is the original.
 
-    Parameters and results as in `railsim.kernels.fastsim.fastsim`; c33 is the spin moment's
-    coefficient [1].
+    Parameters as in `railsim.kernels.fastsim.fastsim`; c33, the spin moment's coefficient, is read
+    too.
 
     Notes
     -----
@@ -40,6 +40,10 @@ def linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, G, xi_x, xi_y, phi, T_x,
     Source: Shen, Z.Y., Hedrick, J.K., Elkins, J.A. (1983), A comparison of alternative creep force
     models for rail vehicle dynamic analysis, Vehicle System Dynamics 12, 79-83.
     """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    c11, c22, c23, c33 = patches.c11, patches.c22, patches.c23, patches.c33
+    xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
+    T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
     for i in range(n):
         area = a[i] * b[i]
         size = math.sqrt(area)
@@ -62,10 +66,8 @@ def linear_saturated(n, a, b, mu_N, c11, c22, c23, c33, G, xi_x, xi_y, phi, T_x,
         M_z[i] = factor * m
 
 
-@jit_ordered
-def polach(
-    n, a, b, mu_N, c11, c22, c23, G, k_adhesion, k_slip, xi_x, xi_y, phi, T_x, T_y, M_z
-):  # fmt: skip
+@compiled(ordered=True)
+def polach(n, patches, G, k_adhesion, k_slip):
     """Creep force after Polach, with reduction factors for the areas of adhesion and slip.
 
     Force from the creepage (lateral creepage enlarged by spin)::
@@ -81,7 +83,7 @@ def polach(
         Reduction of Kalker's stiffness in the areas of adhesion and slip, k_slip <= k_adhesion
         <= 1 [1]: dry 1 and 1; Polach fits 0.3 and 0.1 to wet rails.
 
-    Others and results as in `railsim.kernels.fastsim.fastsim`.
+    Others as in `railsim.kernels.fastsim.fastsim`.
 
     Notes
     -----
@@ -89,6 +91,10 @@ def polach(
     Dynamics Supplement 33, 728-739; Polach, O. (2005), Creep forces in simulations of traction
     vehicles running on adhesion limit, Wear 258, 992-1000 (reduction factors, falling friction).
     """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    c11, c22, c23 = patches.c11, patches.c22, patches.c23
+    xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
+    T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
     for i in range(n):
         bound = mu_N[i]
         M_z[i] = 0.0
@@ -127,8 +133,54 @@ def polach(
         T_y[i] = y
 
 
-@jit
-def _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work):
+@compiled(ordered=True)
+def adhesion_curve(n, patches, curve):
+    """Creep force by a measured adhesion curve, T/(mu N) over creepage.
+
+    The force has the direction of the creepage, the curve gives its size over that of the
+    creepage::
+
+        T = mu N f(s) (xi_x, xi_s)/s,  s^2 = xi_x^2 + xi_s^2,  xi_s = xi_y + c23/c22 sqrt(a b) phi
+
+    xi_s is the lateral creepage that has the lateral force of the spin in linear theory: spin is
+    taken as Shen, Hedrick and Elkins (1983) take it, with the measured curve in place of their
+    cubic.  There is no moment.
+
+    Parameters
+    ----------
+    curve : ndarray, shape (k, 2), k >= 2
+        Creepage, rising from 0, and T/(mu N) from 0 on, 0..1 [1]; linear between the rows,
+        constant beyond the last.
+
+    Others as in `railsim.kernels.fastsim.fastsim`.
+
+    Notes
+    -----
+    Measured curves are those of Logston, C.F., Itami, G.S. (1980), Locomotive friction-creep
+    studies, Journal of Engineering for Industry 102, 275-281, and their like: force over creepage
+    of a driven wheelset on dry, wet or oiled rails.
+    """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    last = curve.shape[0] - 1
+    for i in range(n):
+        size = math.sqrt(max(a[i] * b[i], 0.0))
+        x = patches.xi_x[i]
+        y = patches.xi_y[i] + patches.c23[i] / patches.c22[i] * size * patches.phi[i]
+        s = math.sqrt(x * x + y * y)
+        k = 1
+        while k < last and s > curve[k, 0]:
+            k += 1
+        place = (s - curve[k - 1, 0]) / (curve[k, 0] - curve[k - 1, 0])
+        share = curve[k - 1, 1] + min(place, 1.0) * (curve[k, 1] - curve[k - 1, 1])
+        bound = max(mu_N[i], 0.0) if a[i] > 0.0 and b[i] > 0.0 else 0.0
+        factor = bound * share / (s + _TINY)
+        patches.T_x[i] = factor * x
+        patches.T_y[i] = factor * y
+        patches.M_z[i] = 0.0
+
+
+@compiled
+def _fastrip_strips(n, nx, ny, patches, G, work):
     """Prepare the strips of all patches for `_fastrip_march`.
 
     Rows of work: 0 to 2 growth per cell of the direction's traction (x and y at the middle, y by
@@ -136,6 +188,9 @@ def _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, wo
     it is at its bound; 7 to 9 sums of p_x, p_y, x p_y, which begin with those of the stick zone;
     10 integral of the ellipse over the slipping part of the cell that the stick zone cuts.
     """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    c11, c22, c23 = patches.c11, patches.c22, patches.c23
+    xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
     for i in range(n):
         loaded = mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0
         bound = mu_N[i] if loaded else 1.0
@@ -198,14 +253,14 @@ def _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, wo
             work[10, c] = _ellipse_area(end) - _ellipse_area(max(rear, -1.0))
 
 
-@jit
+@compiled
 def _ellipse_area(x):
     """Integral of sqrt(1 - x^2) from 0 to x, |x| <= 1."""
     x = min(max(x, -1.0), 1.0)
     return 0.5 * (x * math.sqrt(1.0 - x * x) + math.asin(x))
 
 
-@jit
+@compiled
 def _stick_zone(kappa, lam_d, psi, d):
     """Integrals over the stick zone 2 d - 1 < x < 1 of a strip: p_x, p_y, x p_y.
 
@@ -239,7 +294,7 @@ def _stick_zone(kappa, lam_d, psi, d):
     return x_sum, y_sum, m_sum
 
 
-@jit
+@compiled
 def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
     """One cell of all m strips: FASTSIM's direction, and its share of the slip zone added up."""
     grow_x, grow_y, grow_s, slip_end = work[0], work[1], work[2], work[3]
@@ -271,8 +326,8 @@ def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
         sum_m[c] += factor * y * x_cell
 
 
-@jit
-def fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x, T_y, M_z):
+@compiled
+def fastrip(n, nx, ny, patches, G, work):
     """Tangential forces on the rail after the idea of FaStrip: strip theory joined to FASTSIM.
 
     In the stick zone of each strip, which begins at the leading edge, the traction is that of
@@ -285,7 +340,7 @@ def fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     smaller tractions.  Three numbers of the blend were fitted to CONTACT's results for
     a/b = 0.3, 1 and 3.
 
-    Parameters and results as in `railsim.kernels.fastsim.fastsim`.
+    Parameters as in `railsim.kernels.fastsim.fastsim`.
 
     Notes
     -----
@@ -294,7 +349,7 @@ def fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     solution of the wheel-rail contact, Vehicle System Dynamics 54, 748-764; single flexibility for
     large creepage: Vollebregt, E.A.H. (2022), as in CONTACT.
     """
-    _fastrip_strips(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work)
+    _fastrip_strips(n, nx, ny, patches, G, work)
     m = n * ny
     half = 1.0 / nx
     for k in range(nx):
@@ -306,6 +361,8 @@ def fastrip(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     for j in range(ny):
         place = (2 * j + 1 - ny) / ny
         across += 1.0 - place * place
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
     for i in range(n):
         tx = ty = mz = 0.0
         for j in range(ny):

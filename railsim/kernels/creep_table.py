@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from . import jit
+from . import compiled
 from .creep_table_simd import sum_of_rows
 
 RATIO_MAX = 20.0  # the table covers 1/20 <= a/b <= 20
@@ -43,7 +43,7 @@ _NO_LOAD = 1e-200  # a bound below this is none [N]
 _TINY = 1e-300
 
 
-@jit
+@compiled
 def _weights(place, intervals):
     """Interval of a uniform grid and the four weights of the cubic B-splines there."""
     place = place if place > 0.0 else 0.0  # also for NaN, which must not become an index
@@ -60,7 +60,7 @@ def _weights(place, intervals):
     )
 
 
-@jit
+@compiled
 def _angle(y, x):
     """atan2(y, x) for x, y >= 0, not both zero, by a polynomial (Hastings type, error 2e-8).
 
@@ -79,7 +79,7 @@ def _angle(y, x):
     return 0.5 * math.pi - angle if y > x else angle
 
 
-@jit
+@compiled
 def _along_ratio(scale, r, column, r0, r1, r2, r3):
     """Factor of a creepage in q at the place r in log(a/b)."""
     return (
@@ -103,36 +103,34 @@ def _sum_of_rows_plain(table, start, strides, weights, first, sums):
 _sum_of_rows = _sum_of_rows_plain if numba.config.DISABLE_JIT else sum_of_rows
 
 
-@jit
-def table_forces(
-    n, a, b, mu_N, G, xi_x, xi_y, phi, table, scale, offsets, work, T_x, T_y, M_z, outside
-):  # fmt: skip
+@compiled
+def table_forces(n, patches, G, table, scale, scratch):
     """Tangential forces on the rail of n elliptic contact patches by the tabulated full theory.
 
     Parameters
     ----------
     n : int
         Number of patches.
-    a, b, mu_N, G, xi_x, xi_y, phi
-        As in `railsim.kernels.fastsim.fastsim`.
+    patches : Patches
+        Read: semi-axes, mu N, creepages; written: T_x, T_y, M_z, outside: 1 for a loaded patch
+        whose ratio a/b is outside the table; it got the values of the table's end.
+    G : float
+        Shear modulus [Pa].
     table : ndarray of float32, one dimension
         `railsim.contact.creep_table.CreepTable.coefficients`, flattened.
     scale : ndarray, shape (N_RATIO + 3, 4)
         `railsim.contact.creep_table.CreepTable.scale`.
-    offsets : ndarray of int64, shape (16,)
-        Scratch.
-    work : ndarray, shape (>= 5, >= 128), C-contiguous
-        Scratch: that of `railsim.kernels.fastsim.fastsim_workspace` will do.
-    T_x, T_y, M_z : ndarray, shape (>= n,), written
-        Force on the rail and moment about the normal [N, N, N m].
-    outside : ndarray, shape (>= n,), written
-        1 for a loaded patch whose ratio a/b is outside the table, else 0; it got the values of the
-        table's end.
+    scratch : CreepScratch
+        Any, its strips of shape (>= 5, >= 128).
 
     Notes
     -----
     Source: Kalker's full theory by our own solver; docs/validation/creep.md has the errors.
     """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    xi_x, xi_y, phi, outside = patches.xi_x, patches.xi_y, patches.phi, patches.outside
+    T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
+    work, offsets = scratch.strips, scratch.offsets
     width = work.shape[1]
     for first in range(0, n, _BLOCK):
         count = min(_BLOCK, n - first)

@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from railsim.kernels import jit
+from railsim.kernels import compiled
 
 _OFFSET = 0x553EF0FF289DD796  # four thirds of the exponent's bias, less what evens out the error
 
@@ -37,7 +37,7 @@ def _number(typingctx, bits):
     return types.float64(types.int64), codegen
 
 
-@jit
+@compiled
 def _cube_root(x):
     """Cube root of `x` > 0, a normal number, to some units in the last place."""
     r = _number(_OFFSET - _bits(x) // 3)

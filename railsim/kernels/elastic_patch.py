@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from railsim.kernels import jit_outside
+from railsim.kernels import compiled
 
 MOST_ITERATIONS = 60
 SETTLED = 1e-9  # step of Newton's method after which the next is below round-off [m]
@@ -19,7 +19,7 @@ REFERENCE = 60e-6  # penetration at which the terms of the potential are compare
 LEAST_SHARE = -0.4  # of the second term
 
 
-@jit_outside
+@compiled(in_loop=False)
 def overlap(z, theta, h, lift, du):
     """Integral of the overlap over the candidates, and its derivative over z.
 
@@ -55,7 +55,7 @@ def overlap(z, theta, h, lift, du):
     return total, width
 
 
-@jit_outside
+@compiled(in_loop=False)
 def height_under_load(z, load, k, theta, h, lift, du):
     """Height at which the foundation carries a normal load [m].
 
@@ -86,7 +86,7 @@ def height_under_load(z, load, k, theta, h, lift, du):
     return z
 
 
-@jit_outside
+@compiled(in_loop=False)
 def patch_sums(z, theta, h, lift, du, window, to_start, weight):
     """Integrals over the patch, and the weights of the candidates in its means.
 
@@ -150,7 +150,7 @@ def patch_sums(z, theta, h, lift, du, window, to_start, weight):
     return along, across, energy, carried, deepest
 
 
-@jit_outside
+@compiled(in_loop=False)
 def weighted(weight, values):
     """Sum of weight times value."""
     total = 0.0
@@ -159,7 +159,7 @@ def weighted(weight, values):
     return total
 
 
-@jit_outside
+@compiled(in_loop=False)
 def interpolated(x, x0, dx, values):
     """Linear interpolation on a uniform grid, constant beyond its ends."""
     s = (x - x0) / dx
@@ -171,7 +171,7 @@ def interpolated(x, x0, dx, values):
     return values[i] + (s - i) * (values[i + 1] - values[i])
 
 
-@jit_outside
+@compiled(in_loop=False)
 def unit_ellipse(A, B, hertz):
     """Semi-axes [m/N^(1/3)] and approach [m/N^(2/3)] at unit load, from tabulated logarithms.
 
@@ -186,13 +186,13 @@ def unit_ellipse(A, B, hertz):
     return a1, b1, d1
 
 
-@jit_outside
+@compiled(in_loop=False)
 def kept_above(B, least):
     """Smooth maximum of B and a floor: B + floor^2/B far above, the floor at B = 0 [1/m]."""
     return 0.5 * (B + math.sqrt(B * B + 4.0 * least * least))
 
 
-@jit_outside
+@compiled(in_loop=False)
 def averaged_curvature(A, curvature, half_widths, hertz, load, floor_ratio):
     """Half relative curvature across, averaged over the width of the ellipse that it makes.
 
@@ -233,7 +233,7 @@ def averaged_curvature(A, curvature, half_widths, hertz, load, floor_ratio):
     return B
 
 
-@jit_outside
+@compiled(in_loop=False)
 def energies_of(share, z, U, energy):
     """Potential with a given share of its second term that has the first and the last energy.
 
@@ -269,7 +269,7 @@ def energies_of(share, z, U, energy):
     energy[0], energy[1], energy[2] = z[0] - e, k, k * s1**5 * (a + b * s1)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def fit_energy(z, U):
     """Gap and stiffnesses of U = e^(5/2) (2/5 K + K2/3 sqrt(e)), e = z - g, from three energies.
 

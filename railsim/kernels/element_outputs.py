@@ -5,7 +5,7 @@ The laws are those of `elements`, evaluated again at the recorded state.
 
 from math import sqrt
 
-from railsim.kernels import jit, jit_internal
+from railsim.kernels import compiled
 from railsim.kernels.elements import axis_law, pad_load
 from railsim.kernels.internal import curve_value
 from railsim.kernels.system import (
@@ -32,7 +32,7 @@ DEFLECTION, ANGLE, FORCE, MOMENT, POWER = 0, 3, 6, 9, 12
 ELEMENT_COLUMNS = 13
 
 
-@jit_internal
+@compiled(python=False)
 def element_outputs(system, work, inner, chosen, out):
     """Outputs of the elements ``chosen[e] = (group, index)`` into ``out[e, ELEMENT_COLUMNS]``."""
     for e in range(chosen.shape[0]):
@@ -44,7 +44,7 @@ def element_outputs(system, work, inner, chosen, out):
             mount_output(system, work, inner, chosen[e, 1], e, out)
 
 
-@jit
+@compiled
 def end_point(pose, b, row, e, point):
     """Position and velocity of a point of body `b`, given in row `e` from `point` on; global."""
     x, y, z = row[e, point], row[e, point + 1], row[e, point + 2]
@@ -62,7 +62,7 @@ def end_point(pose, b, row, e, point):
     )
 
 
-@jit_internal
+@compiled(python=False)
 def link_output(system, work, inner, index, e, out):
     """Elongation, force (tension positive) and power of a link."""
     links, curves, row = system.links, system.curves, system.links.row
@@ -84,7 +84,7 @@ def link_output(system, work, inner, index, e, out):
     out[e, POWER] = force * rate
 
 
-@jit_internal
+@compiled(python=False)
 def mount_output(system, work, inner, index, e, out):
     """Deflections, angles, forces, moments (on body 1, its axes) and power of a mount."""
     mounts, curves, internal = system.mounts, system.curves, system.internal
@@ -98,7 +98,8 @@ def mount_output(system, work, inner, index, e, out):
     vy = v2 - v1 - a3 * gx + a1 * gz
     vz = w2 - w1 - a1 * gy + a2 * gx
     if mounts.flags[index, TRANSLATES]:
-        normal = pad_load(mounts, index, pose[i, 2] * gx + pose[i, 5] * gy + pose[i, 8] * gz)
+        z = pose[i, 2] * gx + pose[i, 5] * gy + pose[i, 8] * gz
+        normal = pad_load(mounts, curves, index, z)
         for k in range(3):
             d = pose[i, k] * gx + pose[i, 3 + k] * gy + pose[i, 6 + k] * gz
             rate = pose[i, k] * vx + pose[i, 3 + k] * vy + pose[i, 6 + k] * vz
@@ -114,7 +115,7 @@ def mount_output(system, work, inner, index, e, out):
     rotation_output(row, index, i, j, pose, e, out)
 
 
-@jit_internal
+@compiled(python=False)
 def rotation_output(row, index, i, j, pose, e, out):
     """Angles (antisymmetric part of R_1^T R_2), moments and their power."""
     wx = pose[j, ANGULAR] - pose[i, ANGULAR]

@@ -16,7 +16,9 @@ force times rate.  Dampers with a series stiffness, friction pads and air spring
 states (see `internal`).
 """
 
-from railsim.kernels import jit_inline, jit_internal, jit_merged
+from math import sqrt
+
+from railsim.kernels import compiled
 from railsim.kernels.internal import AIR, PAD, curve_value
 from railsim.kernels.lanes import (
     LANES,
@@ -32,10 +34,12 @@ from railsim.kernels.lanes import (
 from railsim.kernels.rotation import cross, turned, turned_back
 from railsim.kernels.system import (
     BOTH_ENDS,
+    DAMPING_Z,
     FORCE,
     FRICTION,
     LINK_SIZE,
     MOUNT_SIZE,
+    ONE_SIDED,
     POSE_SIZE,
     PRELOAD_Z,
     PUSH,
@@ -44,7 +48,7 @@ from railsim.kernels.system import (
 )
 
 
-@jit_inline
+@compiled(inline=True)
 def end_of(body, end, which):
     """Where the rows in `Work.pose` of one end's bodies start, for eight elements."""
     return (
@@ -59,7 +63,7 @@ def end_of(body, end, which):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def motion_of(pose, rows):
     """Attitude, position, velocity and angular velocity of eight bodies."""
     r0, r1, r2, r3, r4, r5, r6, r7 = load_rows(pose, rows, 0, 8)
@@ -68,7 +72,7 @@ def motion_of(pose, rows):
     return (r0, r1, r2, r3, r4, r5, r6, r7, r8), (x, y, z), (vx, vy, vz), (w1, w2, w3)
 
 
-@jit_inline
+@compiled(inline=True)
 def gap(pose, one, two, x1, y1, z1, x2, y2, z2):
     """Attitudes and angular velocities of both bodies, arms, distance of the points and its rate.
 
@@ -86,7 +90,7 @@ def gap(pose, one, two, x1, y1, z1, x2, y2, z2):
     return R1, R2, W1, W2, (ax, ay, az), (bx, by, bz), g, w
 
 
-@jit_inline
+@compiled(inline=True)
 def link_laws(links, curves, first, n, inner, drive, laws):
     """Forces of internal states and tables of `n` links; `laws`: elongations, rates, forces."""
     for k in range(n):
@@ -104,7 +108,7 @@ def link_laws(links, curves, first, n, inner, drive, laws):
         laws[2 * LANES + k] = force
 
 
-@jit_merged
+@compiled(merge=True)
 def link_forces(links, curves, inner, drive, laws, pose):
     """Add the forces of all point-to-point elements to the bodies' rows in `pose`."""
     count = links.body.shape[0]
@@ -139,7 +143,34 @@ def link_forces(links, curves, inner, drive, laws, pose):
         )
 
 
-@jit_inline
+@compiled(inline=True)
+def limit_of(mounts, e, k, normal):
+    """Largest friction force of mount `e` along axis `k` under the load `normal`."""
+    return mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal
+
+
+@compiled(python=False)
+def grip(mounts, internal, e, normal, inner):
+    """Factor that brings the friction forces of a pad that slides in any direction to its limit.
+
+    With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
+    wedge without mass, on a spring force F and under a smooth face at `angle` to the column,
+    presses on the column with N = (F + T_z)/tan(angle), T_z being the friction force on the side
+    frame, downwards positive: |T| <= mu N.
+    """
+    square, z, skew = 0.0, 0.0, 0.0
+    for k in range(3):
+        m = mounts.internal[e, k]
+        if m >= 0:
+            limit = limit_of(mounts, e, k, normal)
+            z = inner[m] / limit if limit > 0.0 else 0.0
+            square += z * z
+            skew = internal.parameter[m, 2]
+    size = sqrt(square) - skew * z
+    return 1.0 / size if size > 1.0 else 1.0
+
+
+@compiled(inline=True)
 def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
     """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
     force = 0.0
@@ -148,47 +179,74 @@ def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * abs(normal)
+            limit = limit_of(mounts, e, k, normal)
             drive[m, 0], drive[m, 1] = rate, limit
-            force += min(limit, max(-limit, inner[m]))
+            if internal.parameter[m, 1] == 0.0:
+                force += min(limit, max(-limit, inner[m]))
+            elif limit > 0.0:
+                force += inner[m] * grip(mounts, internal, e, normal, inner)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
         else:
             drive[m, 0] = rate
             force += inner[m]
+    if k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED:
+        force += lifted_part(mounts, e, d, rate, normal)
     return force
 
 
-@jit_inline
-def pad_load(mounts, e, z):
-    """Vertical spring force that loads the friction pads of mount `e` at its deflection `z`."""
-    if mounts.flags[e, FRICTION]:
-        return mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
-    return 0.0
+@compiled(inline=True)
+def pad_load(mounts, curves, e, z):
+    """Vertical spring force that loads the friction pads of mount `e` at its deflection `z`.
+
+    It counts in the direction of the preload; of a pad without tension, which body 1 carries, as
+    compression.
+    """
+    if mounts.flags[e, FRICTION] == 0:
+        return 0.0
+    preload = mounts.row[e, PRELOAD_Z]
+    force = preload + mounts.row[e, STIFFNESS_Z] * z
+    if mounts.flags[e, FRICTION] == ONE_SIDED:
+        if mounts.curve[e, 2] >= 0:
+            force += curve_value(curves, mounts.curve[e, 2], z)
+        return max(0.0, force)
+    if preload == 0.0:
+        return abs(force)
+    return max(0.0, force if preload > 0.0 else -force)
 
 
-@jit_inline
+@compiled(inline=True)
+def lifted_part(mounts, e, z, rate, normal):
+    """What takes the tension out of the spring and damper of a pad that only presses."""
+    spring = mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
+    damper = mounts.row[e, DAMPING_Z] * rate
+    if normal <= 0.0:
+        return -spring - damper
+    return max(0.0, normal + damper) - normal - damper
+
+
+@compiled(inline=True)
 def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
     """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
     for i in range(law, end):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
         lane = e - first
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
-        normal = pad_load(mounts, e, laws[2 * LANES + lane])
+        normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
         laws[(6 + k) * LANES + lane] = axis_law(
             mounts, internal, curves, e, k, d, rate, normal, inner, drive
         )
 
 
-@jit_inline
+@compiled(inline=True)
 def in_axes_of(R, W, g, w):
     """Deflection R^T g in a body's axes, and its rate R^T (w - omega x g)."""
     x, y, z = cross(W[0], W[1], W[2], g[0], g[1], g[2])
     return turned_back(R, g[0], g[1], g[2]), turned_back(R, w[0] - x, w[1] - y, w[2] - z)
 
 
-@jit_inline
+@compiled(inline=True)
 def rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3):
     """Moment on body 1 of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
     # off-diagonal terms of R_1^T R_2
@@ -207,7 +265,7 @@ def rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3):
     )
 
 
-@jit_merged
+@compiled(merge=True)
 def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
     """Add the forces of all three-axis elements to the bodies' rows in `pose`.
 
@@ -279,7 +337,7 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         )
 
 
-@jit_internal
+@compiled(python=False)
 def load_component(table, first, last, at, k):
     """Component `k` of a load at `at`: linear between its rows, constant beyond them."""
     if at <= table[first, 0]:
@@ -293,7 +351,7 @@ def load_component(table, first, last, at, k):
     return table[i, k] + share * (table[i + 1, k] - table[i, k])
 
 
-@jit_merged
+@compiled(merge=True)
 def load_forces(loads, time, s, frame_offset, bodies, frames, pose):
     """Add the given forces and torques at `time` and `s` to the bodies' rows in `pose`."""
     for e in range(loads.body.shape[0]):

@@ -7,9 +7,9 @@ smallest one; columns the quantities of each wheelset.
 
 import numpy as np
 
-from railsim.kernels import jit_inline
+from railsim.kernels import compiled
+from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.support import HALF_BASE, SUPPORT_SIZE, support_begin
-from railsim.kernels.wheel_rail import W_Q, W_T_GAMMA, W_Y
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
 (
@@ -32,7 +32,7 @@ EXTREMES = 16
 MAX, MIN = 0, 3
 
 
-@jit_inline
+@compiled(inline=True)
 def note_unloaded(wheel, h, unloaded):
     """Add a step of length `h` to the time of every wheel that carries nothing."""
     for w in range(wheel.shape[0]):
@@ -41,7 +41,7 @@ def note_unloaded(wheel, h, unloaded):
                 unloaded[w, side] += h
 
 
-@jit_inline
+@compiled(inline=True)
 def note_extremes(system, wheel, state, present, extremes):
     """Take the values of this instant into the extremes; `present` is scratch of their size."""
     time, s = state[-3], state[-2]

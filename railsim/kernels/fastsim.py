@@ -23,7 +23,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from . import fastsim_simd, jit, jit_ordered
+from . import compiled, fastsim_simd
 from .aligned import aligned_zeros
 from .fastsim_simd import BOUNDS, PER_L, RESULTS, W_ACROSS, W_ALONG, W_SUM, Y_PER_L
 
@@ -64,24 +64,23 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
     return work
 
 
-@jit_ordered
-def kalker_lookup(n, a, b, table, c11, c22, c23, c33, outside):
+@compiled(ordered=True)
+def kalker_lookup(n, patches, table):
     """Kalker's coefficients of n patches from the table of `railsim.contact.kalker.creep_tables`.
 
     Parameters
     ----------
     n : int
         Number of patches.
-    a, b : ndarray, shape (>= n,)
-        Semi-axes along and across the rolling direction, > 0 [m].
+    patches : Patches
+        Read: semi-axes; written: c11, c22, c23, c33, linear between the nodes, outside the table
+        its end values, for a = b = 0 (no contact) those of the circle; outside: 1 for a patch
+        outside the table, else 0.
     table : ndarray, shape (n_node, 4)
         Coefficients over u = (a - b)/(a + b), uniform over -KALKER_U_MAX..KALKER_U_MAX [1].
-    c11, c22, c23, c33 : ndarray, shape (>= n,), written
-        Coefficients, linear between the nodes; outside the table its end values [1].
-        For a = b = 0 (no contact) those of the circle.
-    outside : ndarray, shape (>= n,), written
-        1 for a patch outside the table, else 0.
     """
+    a, b, outside = patches.a, patches.b, patches.outside
+    c11, c22, c23, c33 = patches.c11, patches.c22, patches.c23, patches.c33
     last = table.shape[0] - 1
     scale = 0.5 * last / KALKER_U_MAX
     for i in range(n):
@@ -97,13 +96,18 @@ def kalker_lookup(n, a, b, table, c11, c22, c23, c33, outside):
         c33[i] = table[node, 3] + w * (table[node + 1, 3] - table[node, 3])
 
 
-@jit_ordered
-def _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, spin_a, spin_b):
+@compiled(ordered=True)
+def _patch_slopes(n, nx, patches, G, work):
     """Growth per cell of the scaled traction of every patch, at the middle strip.
 
-    With p0 = 2 mu N/(pi a b), dx = 2 a/nx and the flexibilities: sx = dx xi_x/(L1 p0) and so on,
-    spin_a = dx phi a/(L3 p0), spin_b = dx phi b/(L3 p0).  Zero without contact or friction.
+    With p0 = 2 mu N/(pi a b), dx = 2 a/nx and the flexibilities, into rows 3 to 6 of work:
+    dx xi_x/(L1 p0), dx xi_y/(L2 p0), dx phi a/(L3 p0), dx phi b/(L3 p0).  Zero without contact or
+    friction.
     """
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    c11, c22, c23 = patches.c11, patches.c22, patches.c23
+    xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
+    sx, sy, spin_a, spin_b = work[3], work[4], work[5], work[6]
     for i in range(n):
         loaded = mu_N[i] > _NO_LOAD and a[i] > 0.0 and b[i] > 0.0
         unit = math.pi * G * a[i] * b[i] / ((mu_N[i] if loaded else 1.0) * nx)
@@ -123,7 +127,7 @@ def _patch_slopes(n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, sx, sy, 
         spin_b[i] = scale * across
 
 
-@jit
+@compiled
 def _march_plain(work, m, nx, bounds):
     """Go along m strips from the leading edge: grow, cut back to the bound, add up.
 
@@ -155,7 +159,7 @@ def _march_plain(work, m, nx, bounds):
             sum_m[c] += sum_y[c]
 
 
-@jit
+@compiled
 def _march_simd(work, m, nx, bounds):
     """Do what `_march_plain` does in blocks of 3 to 5 vectors of 8 strips; m >= 24."""
     vectors = m // 8
@@ -201,8 +205,8 @@ _spread, _gather = (
 )
 
 
-@jit_ordered
-def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x, T_y, M_z):
+@compiled(ordered=True)
+def fastsim(n, nx, ny, patches, G, work):
     """Tangential forces on the rail of n elliptic contact patches by FASTSIM.
 
     Parameters
@@ -211,22 +215,12 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
         Number of patches; may be 0.
     nx, ny : int
         Cells along a strip, strips, both >= 1.
-    a, b : ndarray, shape (>= n,)
-        Semi-axes along and across the rolling direction [m].
-    mu_N : ndarray, shape (>= n,)
-        Friction coefficient times normal force [N]; where it or a semi-axis is not positive the
-        force is zero.
-    c11, c22, c23 : ndarray, shape (>= n,)
-        Kalker's coefficients [1].
+    patches : Patches
+        Read: semi-axes, mu N, c11, c22, c23, creepages; written: T_x, T_y, M_z.
     G : float
         Shear modulus [Pa].
-    xi_x, xi_y, phi : ndarray, shape (>= n,)
-        Creepages, wheel minus rail (contact frame: x forward, t to the right, n into the rail)
-        [1, 1, 1/m].
     work : ndarray, shape (WORK_ROWS, >= n ny and >= nx)
         From `fastsim_workspace`, for the same nx and ny.
-    T_x, T_y, M_z : ndarray, shape (>= n,), written
-        Force on the rail and moment about n at the patch centre [N, N, N m].
 
     Notes
     -----
@@ -236,15 +230,15 @@ def fastsim(n, nx, ny, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work, T_x,
     """
     columns = n * ny
     padded = max((columns + 7) // 8 * 8, _COLUMNS_MIN)
-    _patch_slopes(
-        n, nx, a, b, mu_N, c11, c22, c23, G, xi_x, xi_y, phi, work[3], work[4], work[5], work[6]
-    )
+    _patch_slopes(n, nx, patches, G, work)
     _spread(work, n, ny)
     for c in range(columns, padded):
         work[0, c] = work[1, c] = work[2, c] = 0.0
     _march(work, padded, nx, work[BOUNDS])
     _gather(work, n, ny)
     sum_x, sum_y, running, along, across = RESULTS
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
     for i in range(n):
         # p0 times the area of a cell at the middle: 2 mu N/(pi a b) (2 a/nx) (2 b/ny).  The
         # x-weighted sum of y traction follows from the sum of its running sum:

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from . import jit_outside
+from . import compiled
 
 CONVERGED = 0
 NOT_CONVERGED = 1
@@ -26,7 +26,7 @@ _MAX_TURN = 0.7  # largest turn of a traction's direction in one iteration [rad]
 _SETTLED, _FEW, _MAX_RETURNS = 15, 0.05, 2
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _log_sum(u, v):
     """log(u + sqrt(u^2 + v^2)) without cancellation for u < 0; 0 where the sum vanishes."""
     r = math.sqrt(u * u + v * v)
@@ -35,7 +35,7 @@ def _log_sum(u, v):
     return math.log(v * v / (r - u)) if v != 0.0 else 0.0
 
 
-@jit_outside
+@compiled(in_loop=False)
 def cell_influence(x, y, half_x, half_y, nu):
     """Displacement differences at (x, y) by unit tractions on a cell about the origin.
 
@@ -73,7 +73,7 @@ def cell_influence(x, y, half_x, half_y, nu):
     return (even + nu * xx) / math.pi, nu * xy / math.pi, (even + nu * yy) / math.pi
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rolling_matrices(x, y, half_x, half_y, edge, nu, middle, centre, x_middle):
     """Matrices that give the elastic part of the slip from the cells' tractions.
 
@@ -133,7 +133,7 @@ def rolling_matrices(x, y, half_x, half_y, edge, nu, middle, centre, x_middle):
                     centre[q, row, column] = value
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _slips(matrix, p, rigid, slip):
     """Slip of every cell: rigid part plus elastic part of the traction."""
     n = p.shape[1]
@@ -147,7 +147,7 @@ def _slips(matrix, p, rigid, slip):
         slip[1, i] = sy
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _newton_system(middle, centre, stick, slide, p, bound, slip_middle, slip_centre, A, r):
     """Linear system of one Newton step; see `rolling_traction`.
 
@@ -194,7 +194,7 @@ def _newton_system(middle, centre, stick, slide, p, bound, slip_middle, slip_cen
             A[ns + i, ns + i] -= cos_i * slip_centre[0, cell] + sin_i * slip_centre[1, cell]
 
 
-@jit_outside
+@compiled(in_loop=False)
 def rolling_traction(
     middle, centre, rigid_middle, rigid_centre, bound, p, sticks, slip, tolerance, iterations
 ):
@@ -286,7 +286,7 @@ def rolling_traction(
     return NOT_CONVERGED, iterations
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _cut_back(p, bound):
     """Shorten tractions that exceed the bound."""
     for i in range(bound.size):

@@ -8,17 +8,20 @@ MAXWELL        force of a damper c with a series stiffness k_s, F' = k_s (v - F/
 MAXWELL_CURVE  the same with a force-velocity table F_d(u): F' = k_s (v - u), F = F_d(u); exact over
                a step at constant v, branch of the table by branch
 PAD            force of a friction pad that sticks elastically and slides at a limit,
-               F' = k_t v, |F| <= F_max (Masing 1926): no creep at rest, loss = work of sliding
+               F' = k_t v, |F| <= F_max (Masing 1926): no creep at rest, loss = work of sliding.
+               States of a pad that slides in any direction follow each other; their forces over
+               their limits, q, stay within |q| - e q_z = 1: a circle, of a wedge (e > 0) a conic
+               with its focus at no force, see `elements`
 AIR            deflection w of the reservoir, c w' = k_1 (z - w) - k_2 w (Nishimura 1984); exact
                over a step at constant z
 """
 
-from math import exp, log
+from math import exp, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
+from railsim.kernels import compiled
 
 MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
 
@@ -29,7 +32,9 @@ class Internal(NamedTuple):
     Attributes
     ----------
     kind : int64[m]
-    parameter : float64[m, 3]  MAXWELL: c, k_s; MAXWELL_CURVE: -, k_s; PAD: k_t; AIR: k_1, k_2, c
+    parameter : float64[m, 3]  MAXWELL: c, k_s; MAXWELL_CURVE: -, k_s; AIR: k_1, k_2, c;
+                               PAD: k_t, 0 for a state alone, of several that slide together their
+                               number in the last and 1 in the others, e in the last
     curve : int64[m]           force-velocity table of MAXWELL_CURVE, else -1
     """
 
@@ -38,7 +43,7 @@ class Internal(NamedTuple):
     curve: np.ndarray
 
 
-@jit
+@compiled
 def curve_value(curves, index, x):
     """Piecewise linear table, continued linearly beyond its ends."""
     first = curves.start[index]
@@ -50,7 +55,7 @@ def curve_value(curves, index, x):
     return curves.f[i] + slope * (x - curves.x[i])
 
 
-@jit
+@compiled
 def curve_speed(curves, index, f, v):
     """Speed at which a rising table has the value `f`; on a flat part the one nearest to `v`."""
     first = curves.start[index]
@@ -67,7 +72,7 @@ def curve_speed(curves, index, f, v):
     return min(max(v, slow), fast)
 
 
-@jit
+@compiled
 def speed_on_branch(curves, i, f, flat):
     """Speed at which branch `i`, continued, has the value `f`; `flat` where it has no slope."""
     rise = curves.f[i + 1] - curves.f[i]
@@ -76,7 +81,7 @@ def speed_on_branch(curves, i, f, flat):
     return curves.x[i] + (f - curves.f[i]) * (curves.x[i + 1] - curves.x[i]) / rise
 
 
-@jit_internal
+@compiled(python=False)
 def curve_advanced(curves, index, k_s, f, v, h):
     """Force of a damper with the table `index` behind a spring `k_s` after a step at constant `v`.
 
@@ -114,7 +119,7 @@ def curve_advanced(curves, index, k_s, f, v, h):
     return f
 
 
-@jit
+@compiled
 def within_table(curves, index, f):
     """`f`, but not beyond the end of a table that is flat there."""
     first = curves.start[index]
@@ -126,7 +131,7 @@ def within_table(curves, index, f):
     return f
 
 
-@jit
+@compiled
 def relaxation_time(internal, i):
     """Time constant of state `i`, a linear one [s]."""
     p = internal.parameter
@@ -135,7 +140,7 @@ def relaxation_time(internal, i):
     return p[i, 2] / (p[i, 0] + p[i, 1])
 
 
-@jit
+@compiled
 def steady_value(internal, i, drive):
     """Value to which state `i`, a linear one, relaxes at a constant drive."""
     p = internal.parameter
@@ -144,11 +149,13 @@ def steady_value(internal, i, drive):
     return p[i, 0] * drive / (p[i, 0] + p[i, 1])
 
 
-@jit_merged
+@compiled(merge=True)
 def internal_rate(internal, curves, i, x, drive, limit):
     """Time derivative of state `i`."""
     if internal.kind[i] == PAD:
         rate = internal.parameter[i, 0] * drive
+        if internal.parameter[i, 1] > 0.0:  # `hold_within` brings it back
+            return rate
         sliding = (x >= limit and rate > 0.0) or (x <= -limit and rate < 0.0)
         return 0.0 if sliding else rate
     if internal.kind[i] == MAXWELL_CURVE:
@@ -160,7 +167,34 @@ def internal_rate(internal, curves, i, x, drive, limit):
     return (p[i, 0] * (drive - x) - p[i, 1] * x) / p[i, 2]
 
 
-@jit
+@compiled(inline=True)
+def slides_together(internal, i):
+    """Whether state `i` is the last of a pad that slides in any direction."""
+    return internal.kind[i] == PAD and internal.parameter[i, 1] > 1.0
+
+
+@compiled(python=False)
+def hold_within(internal, last, first, drive, state):
+    """Bring the forces of a pad that slides in any direction back to their limit.
+
+    They stand in `state` from `first` on; the limits in `drive`; `last` is the pad's last state.
+    """
+    square, z = 0.0, 0.0
+    begin = last + 1 - int(internal.parameter[last, 1])
+    for i in range(begin, last + 1):
+        z = 0.0
+        if drive[i, 1] > 0.0:
+            z = state[first + i] / drive[i, 1]
+        else:
+            state[first + i] = 0.0
+        square += z * z
+    size = sqrt(square) - internal.parameter[last, 2] * z
+    if size > 1.0:
+        for i in range(begin, last + 1):
+            state[first + i] /= size
+
+
+@compiled
 def constant_decays(internal, h, decay):
     """e^(-h/tau) of the linear states, 0 for the others."""
     for i in range(internal.kind.shape[0]):
@@ -170,11 +204,12 @@ def constant_decays(internal, h, decay):
             decay[i] = 0.0
 
 
-@jit_inline
+@compiled(inline=True)
 def advanced(internal, curves, i, x, drive, limit, h, decay):
     """State `i` after a step `h` at constant drive."""
     if internal.kind[i] == PAD:
-        return min(limit, max(-limit, x + h * internal.parameter[i, 0] * drive))
+        x += h * internal.parameter[i, 0] * drive
+        return x if internal.parameter[i, 1] > 0.0 else min(limit, max(-limit, x))
     if internal.kind[i] == MAXWELL_CURVE:
         return curve_advanced(curves, internal.curve[i], internal.parameter[i, 1], x, drive, h)
     end = steady_value(internal, i, drive)

@@ -20,11 +20,11 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
-from railsim.kernels import jit_inline
+from railsim.kernels import compiled
 from railsim.kernels import lanes_plain as plain
+from railsim.kernels.compiler import define_operator
 
 LANES = 8
 _DOUBLE = ir.DoubleType()
@@ -65,12 +65,9 @@ def _as_lanes(context, builder, kind, value):
 def _define(operation, instruction):
     """Let an operator take Lanes, and a number beside Lanes."""
 
-    @infer_global(operation)
-    class _Template(AbstractTemplate):  # type: ignore[misc]
-        def generic(self, args, kws):
-            if lanes in args and all(a == lanes or isinstance(a, types.Number) for a in args):
-                return signature(lanes, *args)
-            return None
+    def result_of(args):
+        fits = lanes in args and all(a == lanes or isinstance(a, types.Number) for a in args)
+        return lanes if fits else None
 
     def lower(context, builder, sig, args):
         values = [_as_lanes(context, builder, *pair) for pair in zip(sig.args, args, strict=True)]
@@ -78,9 +75,10 @@ def _define(operation, instruction):
 
     if instruction == "fneg":
         lower_builtin(operation, LanesType)(lower)
-        return
-    for kinds in ((LanesType, LanesType), (LanesType, types.Number), (types.Number, LanesType)):
-        lower_builtin(operation, *kinds)(lower)
+    else:
+        for kinds in ((LanesType, LanesType), (LanesType, types.Number), (types.Number, LanesType)):
+            lower_builtin(operation, *kinds)(lower)
+    define_operator(operation, result_of, lower)
 
 
 _define(operator.add, "fadd")
@@ -312,7 +310,7 @@ def store_lanes(typingctx, array, place, x):
     return types.void(array, types.intp, lanes), codegen
 
 
-@jit_inline
+@compiled(inline=True)
 def eight(index, first):
     """Eight entries of `index` from `first` on; beyond its end the last one again."""
     last = index.shape[0] - 1
@@ -328,7 +326,7 @@ def eight(index, first):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def eight_from(first, count):
     """The numbers from `first` on; beyond `count` the last one again."""
     last = count - 1
@@ -344,7 +342,7 @@ def eight_from(first, count):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def eight_of(index, numbers):
     """Entries of `index` at eight places."""
     return (
@@ -359,7 +357,7 @@ def eight_of(index, numbers):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def starts(numbers, size):
     """Where eight rows of a table with rows of `size` start."""
     return (

@@ -2,13 +2,13 @@
 
 import math
 
-from railsim.kernels import jit_outside
+from railsim.kernels import compiled
 from railsim.kernels.elastic_patch import interpolated
 
 VIRTUAL_SHARE = 0.55  # of the approach, Kik and Piotrowski (1996)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
     """Non-elliptic patch at a given approach.
 
@@ -93,7 +93,7 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
     return N, a, a / ratio
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _patch_end(zone, z, delta, middle, step):
     """Last candidate of the patch in one direction.
 
@@ -111,13 +111,13 @@ def _patch_end(zone, z, delta, middle, step):
     return k
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _virtual_overlap(zone, z, delta, k):
     """Overlap of a candidate along the normal at the virtual approach [m]."""
     return (z - zone.h[k]) / zone.lift[k] - (1.0 - VIRTUAL_SHARE) * delta
 
 
-@jit_outside
+@compiled(in_loop=False)
 def corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips):
     """Force and axes of `kik_piotrowski`, made exact for elliptic patches.
 
@@ -143,7 +143,7 @@ def corrected_by_hertz(patch, A, B, ellipse, delta, E_star, strips):
     )
 
 
-@jit_outside
+@compiled(in_loop=False)
 def non_elliptic_axes(zone, first, last, centre, A, B, ellipse, load, E_star, strips):
     """Semi-axes at unit load of the non-elliptic patch under a load, 0 if there is none.
 

@@ -12,12 +12,12 @@ import math
 
 import numpy as np
 
-from railsim.kernels import jit_outside
+from railsim.kernels import compiled
 
 CONVERGED, NOT_CONVERGED = range(2)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _corner(x, y):
     """Integral of 1/r over a rectangle, at one corner."""
     r = math.sqrt(x * x + y * y)
@@ -29,7 +29,7 @@ def _corner(x, y):
     return total
 
 
-@jit_outside
+@compiled(in_loop=False)
 def influence(n_x, n_s, dx, ds, E_star):
     """Displacement at the distance (i, j) of an element under unit pressure [m/Pa].
 
@@ -58,13 +58,13 @@ def influence(n_x, n_s, dx, ds, E_star):
     return table
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _signed(x, y):
     """Integral of 1/r from 0 to x and 0 to y, odd in both."""
     return math.copysign(1.0, x) * math.copysign(1.0, y) * _corner(abs(x), abs(y))
 
 
-@jit_outside
+@compiled(in_loop=False)
 def pressure(gap, column, row, table, tolerance, p):
     """Pressure that lifts the overlap of two half-spaces.
 
@@ -126,7 +126,7 @@ def pressure(gap, column, row, table, tolerance, p):
     return NOT_CONVERGED
 
 
-@jit_outside
+@compiled(in_loop=False)
 def _displace(p, column, row, table, u):
     """Displacements under pressures, mirror images included."""
     n = p.size

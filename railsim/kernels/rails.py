@@ -20,7 +20,7 @@ the wheel slips.  On rigid rails all four are zero.
 
 from math import asin, sqrt
 
-from railsim.kernels import jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.track_frame import (
     MU_LEFT,
     Y_LEFT,
@@ -52,7 +52,7 @@ COMING_Y, COMING_Z, COMING_ROLL = range(3)
 COMING = 4
 
 
-@jit_inline
+@compiled(inline=True)
 def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
     """Rails under all wheelsets into `plane` and `rail`.
 
@@ -79,7 +79,7 @@ def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
             locate_displaced(c, i, u, w, plane, rail)
 
 
-@jit_merged
+@compiled(merge=True)
 def locate_displaced(c, i, u, w, plane, rail):
     """Plane and rails of wheelset `w` from the displacements in cell `i` of the tables `c`."""
     y_l, y_l1, y_l2 = polynomial(
@@ -112,7 +112,7 @@ def locate_displaced(c, i, u, w, plane, rail):
     rail[w, 1, RAIL_SLOPE], rail[w, 1, RAIL_BEND] = y_r1, y_r2
 
 
-@jit_merged
+@compiled(merge=True)
 def foresee(track, s, speed, w, plane, rail, state, own, h, coming):
     """How the rates of wheelset `w` beside its rails will have changed after `h`, into `coming`.
 

@@ -21,7 +21,16 @@ Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Rai
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
+from railsim.kernels.driving import (
+    add_axle_torques,
+    add_traction,
+    apply_speed_change,
+    hold_fixed,
+    hold_reference,
+    speed_change,
+    turn_fixed,
+)
 from railsim.kernels.elements import link_forces, load_forces, mount_forces
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.lanes import (
@@ -34,7 +43,7 @@ from railsim.kernels.lanes import (
     starts,
     store_rows,
 )
-from railsim.kernels.rotation import product, sine_cosine, sine_cosine_lanes, turned, turned_back
+from railsim.kernels.rotation import product, sine_cosine_lanes, turned, turned_back
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
@@ -47,7 +56,6 @@ from railsim.kernels.support import (
     support_rates,
 )
 from railsim.kernels.system import (
-    AXLEBOX,
     BODY_SIZE,
     COS_ROLL,
     FORCE,
@@ -59,17 +67,16 @@ from railsim.kernels.system import (
     RATES_SIZE,
     RELATIVE_SIZE,
     SIN_ROLL,
-    TABLE,
     Y_0,
     Z_0,
 )
-from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, OMEGA_S, cell_of, track_frames
+from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, cell_of, track_frames
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@jit_inline
+@compiled(inline=True)
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -85,7 +92,7 @@ def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     return RUNNING
 
 
-@jit_inline
+@compiled(inline=True)
 def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     """Rates of roll, pitch, yaw from the angular velocity relative to the frame, body axes.
 
@@ -96,7 +103,7 @@ def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
     return about_x, w2 - yaw_rate * sin_roll, yaw_rate
 
 
-@jit_merged
+@compiled(merge=True)
 def kinematics(bodies, frames, speed, state, relative, pose, rates):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
@@ -151,7 +158,7 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
     axlebox_kinematics(bodies, state, pose, rates)
 
 
-@jit_inline
+@compiled(inline=True)
 def axlebox_kinematics(bodies, state, pose, rates):
     """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
     n = bodies.kind.shape[0]
@@ -187,7 +194,7 @@ def axlebox_kinematics(bodies, state, pose, rates):
         )
 
 
-@jit_merged
+@compiled(merge=True)
 def hold_axleboxes(bodies, axles, frames, C, state, pose):
     """Take from the moments of elements on a wheelset what would turn it about its axle.
 
@@ -217,7 +224,7 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
             pose[b, FORCE + k] += along * frames[f, ATTITUDE + 3 * k]
 
 
-@jit_inline
+@compiled(inline=True)
 def axlebox_dynamics(bodies, pose, rates, derivative):
     """Pitch accelerations of the axleboxes; everything else they hand to their wheelsets."""
     n = bodies.kind.shape[0]
@@ -244,7 +251,7 @@ def axlebox_dynamics(bodies, pose, rates, derivative):
         store_rows(rates, starts(own, RATES_SIZE), 0, (zero, zero, zero, zero, acceleration, zero))
 
 
-@jit_merged
+@compiled(merge=True)
 def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, rates, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
@@ -298,124 +305,6 @@ def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, 
         store_rows(derivative, starts(own, 6), 6 * n, (ax, ay, az, d1, d2, d3))
 
 
-@jit
-def table_value_slope(table, x):
-    """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
-    last = table.shape[0] - 1
-    if x < table[0, 0] or last == 0:
-        return table[0, 1], 0.0
-    if x >= table[last, 0]:
-        return table[last, 1], 0.0
-    i = 0
-    while x >= table[i + 1, 0]:
-        i += 1
-    slope = (table[i + 1, 1] - table[i, 1]) / (table[i + 1, 0] - table[i, 0])
-    return table[i, 1] + slope * (x - table[i, 0]), slope
-
-
-@jit_merged
-def add_traction(drive, bodies, frames, speed, pose):
-    """Traction less running resistance of a free-running vehicle, on the reference body."""
-    force, _ = table_value_slope(drive.table, speed)
-    force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
-    b = bodies.references[0]
-    f = bodies.frame[b]
-    for k in range(3):
-        pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
-
-
-@jit_merged
-def speed_change(drive, bodies, frames, state, derivative):
-    """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
-    if drive.mode == TABLE:
-        # V(s) gives V' = V dV/ds
-        _, slope = table_value_slope(drive.table, state[-2])
-        return state[-1] * slope
-    if drive.mode == FREE:
-        b = bodies.references[0]
-        f = bodies.frame[b]
-        y = state[6 * b + 1] + bodies.row[b, Y_0]
-        z = state[6 * b + 2] + bodies.row[b, Z_0]
-        return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
-            1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y
-        )
-    return 0.0
-
-
-@jit_merged
-def apply_speed_change(bodies, frames, state, rate, derivative):
-    """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
-    n = bodies.kind.shape[0]
-    for b in range(n):
-        if bodies.kind[b] == AXLEBOX:
-            continue
-        f = bodies.frame[b]
-        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
-        x = state[6 * b]
-        y = state[6 * b + 1] + bodies.row[b, Y_0]
-        z = state[6 * b + 2] + bodies.row[b, Z_0]
-        v = 6 * n + 6 * b
-        derivative[v] -= rate * (1.0 + w2 * z - w3 * y)
-        derivative[v + 1] -= rate * (w3 * x - w1 * z)
-        derivative[v + 2] -= rate * (w1 * y - w2 * x)
-
-
-@jit_merged
-def hold_reference(bodies, relative, acceleration, derivative):
-    """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
-    n = bodies.kind.shape[0]
-    for k in range(bodies.references.shape[0]):
-        b = bodies.references[k]
-        held = 6 * n + 6 * b
-        for i in range(3):
-            acceleration[b, i] -= derivative[held] * relative[b, i]
-        derivative[6 * b] = 0.0
-        derivative[held] = 0.0
-
-
-@jit_inline
-def turn_fixed(bodies, frames, speed, state):
-    """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
-    n = bodies.kind.shape[0]
-    for k in range(bodies.fixed.shape[0]):
-        b = bodies.fixed[k]
-        f = bodies.frame[b]
-        sr, cr = sine_cosine(state[6 * b + 3])
-        sp, cp = sine_cosine(state[6 * b + 4])
-        sy, cy = sine_cosine(state[6 * b + 5])
-        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
-        # C^T = Ry(-pitch) Rx(-roll) Rz(-yaw)
-        w1, w2 = cy * w1 + sy * w2, cy * w2 - sy * w1
-        w2, w3 = cr * w2 + sr * w3, cr * w3 - sr * w2
-        w1, w3 = cp * w1 - sp * w3, cp * w3 + sp * w1
-        v = 6 * n + 6 * b
-        state[v], state[v + 1], state[v + 2] = 0.0, 0.0, 0.0
-        state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
-
-
-@jit_inline
-def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
-    """Keep fixed bodies where they are; what holds them is part of their accelerations.
-
-    u' = C^T (V^2 omega_s + V' omega), `rate` being V'.
-    """
-    n = bodies.kind.shape[0]
-    for k in range(bodies.fixed.shape[0]):
-        b = bodies.fixed[k]
-        f, v = bodies.frame[b], 6 * n + 6 * b
-        for i in range(3):
-            turn = 0.0
-            for j in range(3):
-                acceleration[b, i] -= derivative[v + j] * C[b, 3 * j + i]
-                turn += C[b, 3 * j + i] * (
-                    speed * speed * frames[f, OMEGA_S + j] + rate * frames[f, OMEGA + j]
-                )
-            acceleration[b, 3 + i] = turn
-        for i in range(6):
-            derivative[6 * b + i] = 0.0
-            derivative[v + i] = 0.0
-
-
 def right_hand_side(system, work, state, derivative):
     """Derivative of the whole state.
 
@@ -424,7 +313,7 @@ def right_hand_side(system, work, state, derivative):
     return right_hand_sides(system, work, state[None], derivative[None])
 
 
-@jit
+@compiled
 def right_hand_sides(system, work, states, derivatives):
     """Derivatives of several states, one a row, as for difference quotients.
 
@@ -440,7 +329,7 @@ def right_hand_sides(system, work, states, derivatives):
     return status, where, n_patches
 
 
-@jit_merged
+@compiled(merge=True)
 def rates_of_state(system, work, state, derivative):
     """As `right_hand_side`, within compiled code."""
     status, where, n_patches = mechanics(system, work, state, derivative, AS_GIVEN)
@@ -449,7 +338,7 @@ def rates_of_state(system, work, state, derivative):
     return status, where, n_patches
 
 
-@jit_merged
+@compiled(merge=True)
 def internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
     first = 12 * system.bodies.kind.shape[0]
@@ -459,7 +348,7 @@ def internal_rates(system, work, state, derivative):
         )
 
 
-@jit_inline
+@compiled(inline=True)
 def keep_counts(events, first, to):
     """Copy the counts of patches: of repeated evaluations only the last one counts."""
     for w in range(events.shape[0]):
@@ -467,7 +356,7 @@ def keep_counts(events, first, to):
         events[w, to + 1] = events[w, first + 1]
 
 
-@jit_merged
+@compiled(merge=True)
 def mechanics(system, work, state, derivative, rails):
     """Derivative of coordinates, velocities, place and speed; drives of the internal states.
 
@@ -513,6 +402,10 @@ def mechanics(system, work, state, derivative, rails):
     hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:
         load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
+    if system.drives.body.shape[0] > 0:
+        add_axle_torques(
+            system.drives, time, s, system.frame_offset, bodies, speed, state, work.pose
+        )
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     left = evaluations(system, state, rails)

@@ -5,13 +5,13 @@ Matrices are tuples of nine, row by row.
 
 from math import cos, sin
 
-from railsim.kernels import jit, jit_inline
+from railsim.kernels import compiled
 from railsim.kernels.lanes import any_beyond, cosine, sine, where_beyond
 
 SMALL = 0.125  # rad; up to here the series below are exact to round-off
 
 
-@jit_inline
+@compiled(inline=True)
 def _series(x):
     """Taylor's series of sine and cosine to x^11: the neglected terms are below x^13/13! = 3e-22.
 
@@ -44,7 +44,7 @@ def _series(x):
     return s, c
 
 
-@jit
+@compiled
 def sine_cosine(x):
     """Sine and cosine of `x` [rad], by a series where |x| <= 0.125."""
     if not abs(x) <= SMALL:
@@ -52,7 +52,7 @@ def sine_cosine(x):
     return _series(x)
 
 
-@jit_inline
+@compiled(inline=True)
 def sine_cosine_lanes(x):
     """As `sine_cosine`, of eight angles."""
     s, c = _series(x)
@@ -61,7 +61,7 @@ def sine_cosine_lanes(x):
     return s, c
 
 
-@jit_inline
+@compiled(inline=True)
 def turned(R, x, y, z):
     """R times the vector (x, y, z)."""
     return (
@@ -71,7 +71,7 @@ def turned(R, x, y, z):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def turned_back(R, x, y, z):
     """R transposed times the vector (x, y, z)."""
     return (
@@ -81,13 +81,13 @@ def turned_back(R, x, y, z):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def cross(ax, ay, az, bx, by, bz):
     """Vector product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@jit_inline
+@compiled(inline=True)
 def product(A, C):
     """Matrix product A C."""
     return (

@@ -28,7 +28,7 @@ Source of the model: moving track models as of Iwnicki (2006), Handbook of Railw
 chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 """
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.rails import (
     ASIDE,
     MIDDLE_Y,
@@ -95,7 +95,7 @@ SUPPORT_STEP = 32
 REFERENCE_MASS = 100.0
 
 
-@jit
+@compiled
 def factors(variation, s, out):
     """Factors of pads and ballast at arc length `s` into ``out[PADS]``, ``out[BALLAST]``."""
     last = variation.shape[0] - 1
@@ -113,7 +113,7 @@ def factors(variation, s, out):
     out[BALLAST] = variation[i, 2] + u * (variation[i + 1, 2] - variation[i, 2])
 
 
-@jit_inline
+@compiled(inline=True)
 def locate_support(system, work, s):
     """Factors of stiffness and damping under each wheelset, the reference body being at `s`."""
     for w in range(work.support_step.shape[0]):
@@ -124,7 +124,7 @@ def locate_support(system, work, s):
             factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
 
 
-@jit_inline
+@compiled(inline=True)
 def track_forces(support, track, u, first, k, c, out, sign):
     """Add `sign` times the forces of pads and ballast, k K x + c C x with x at ``u[first:]``.
 
@@ -160,7 +160,7 @@ def track_forces(support, track, u, first, k, c, out, sign):
         out[6] += much * (k * row[K_BALLAST_ROLL] + c * row[C_BALLAST_ROLL]) * u[first + 6] - roll
 
 
-@jit_inline
+@compiled(inline=True)
 def solve_track(support, track, side, m, c, k):
     """Solve (m M + c (C + D) + k (K + K_c)) x = b for one wheelset's track.
 
@@ -242,7 +242,7 @@ def solve_track(support, track, side, m, c, k):
         track[2 * i + 1] += inverse * (p * f_z - r * f_y)
 
 
-@jit_inline
+@compiled(inline=True)
 def mass_of(row, k):
     """Mass or moment of inertia of degree of freedom `k`."""
     if k < RAIL_DOF:
@@ -250,7 +250,7 @@ def mass_of(row, k):
     return row[M_SLEEPER] if k < DOF - 1 else row[I_SLEEPER]
 
 
-@jit_inline
+@compiled(inline=True)
 def imbalance(system, work, state, w):
     """F - C u' - K u of the track under wheelset `w` into ``work.support_step[w, :7]``."""
     first = support_begin(system) + SUPPORT_SIZE * w
@@ -264,13 +264,13 @@ def imbalance(system, work, state, w):
     track_forces(system.support, track, state, first + RATE, 0.0, 1.0, track, -1.0)
 
 
-@jit_inline
+@compiled(inline=True)
 def support_begin(system):
     """Place of the first wheelset's track in the state."""
     return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
 
 
-@jit_merged
+@compiled(merge=True)
 def support_rates(system, work, state, derivative):
     """Rates of the track's displacements and of their rates.
 
@@ -291,7 +291,7 @@ def support_rates(system, work, state, derivative):
             derivative[first + RATE + k] = work.support_step[w, k] / mass if moves else 0.0
 
 
-@jit_merged
+@compiled(merge=True)
 def settle_rates(system, work, state):
     """One Newton step for the rates of a massless track, with the forces just evaluated.
 
@@ -319,7 +319,7 @@ def settle_rates(system, work, state):
     return changed
 
 
-@jit_inline
+@compiled(inline=True)
 def step_compliance(support, h, out):
     """Velocity of a rail per force over a step `h`, lateral and vertical, the sleeper held."""
     row = support.row
@@ -328,7 +328,7 @@ def step_compliance(support, h, out):
     out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
 
 
-@jit_merged
+@compiled(merge=True)
 def remember_track(system, work, state):
     """Let the memory of `step_support` begin at `state`."""
     for w in range(work.support.shape[0]):
@@ -339,14 +339,14 @@ def remember_track(system, work, state):
             state[first + ACCELERATION + k] = 0.0
 
 
-@jit_merged
+@compiled(merge=True)
 def note_wheelsets(system, work, state):
     """Keep where the wheelsets are in the planes of their rails before a step."""
     for w in range(work.support.shape[0]):
         note_wheelset(system, work, state, w)
 
 
-@jit_merged
+@compiled(merge=True)
 def note_wheelset(system, work, state, w):
     """Motion of a wheelset in the plane of its rails into its row of `work.support_step`.
 
@@ -372,7 +372,7 @@ def note_wheelset(system, work, state, w):
     track[MOTION + 9] = speed * (work.rail[w, 1, RAIL_SLOPE] - state[q + 5])
 
 
-@jit_inline
+@compiled(inline=True)
 def rail_motions(system, work, state):
     """Displacements and velocities of the rails for `rails`."""
     for w in range(work.support.shape[0]):
@@ -385,7 +385,7 @@ def rail_motions(system, work, state):
             work.rail_motion[w, side, MOTION_Z_RATE] = state[i + RATE + 1]
 
 
-@jit_merged
+@compiled(merge=True)
 def step_support(system, work, state, h):
     """Advance the track under all wheelsets by `h`; bodies, place and speed are those after it."""
     support = system.support
@@ -453,7 +453,7 @@ def step_support(system, work, state, h):
             state[first + MEAN_RATE + k] = track[k]
 
 
-@jit_inline
+@compiled(inline=True)
 def stretch_correction(track, i, stretch, first_time):
     """Multiply the imbalance of one rail so that the next correction does what the last missed.
 
@@ -473,7 +473,7 @@ def stretch_correction(track, i, stretch, first_time):
     track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
 
 
-@jit_merged
+@compiled(merge=True)
 def correct_support(system, work, state, first_time):
     """One Newton step for the rails after a step of the fast scheme.
 
@@ -513,7 +513,7 @@ def correct_support(system, work, state, first_time):
     return moved
 
 
-@jit_inline
+@compiled(inline=True)
 def evaluations(system, state, rails):
     """How often the contact forces may be evaluated again for the rails: `rails` as `AS_GIVEN`."""
     if rails == AFTER_STEP and system.support.elastic and state[-4] > 0.0:

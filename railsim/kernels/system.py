@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels.internal import Internal
+from railsim.kernels.patches import CreepLaw, CreepScratch
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
@@ -51,10 +52,14 @@ SHARE_1, SHARE_2, STIFFNESS_X, DAMPING_X, PRELOAD_X, ROTATION_X, ROTATION_DAMPIN
     17,
     20,
 )
-STIFFNESS_Z, PRELOAD_Z = STIFFNESS_X + 2, PRELOAD_X + 2
+STIFFNESS_Z, DAMPING_Z, PRELOAD_Z = STIFFNESS_X + 2, DAMPING_X + 2, PRELOAD_X + 2
 MOUNT_SIZE = 24
 # columns of Mounts.flags
 TRANSLATES, BOTH_ENDS, ROTATES, FRICTION = range(4)
+ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and never pull
+
+# columns of Drives.row
+BRAKES, OVER_DISTANCE, SLIP_BEGIN, SLIP_END = range(4)
 
 # columns of Work.pose: attitude R (0 to 8), position, velocity, angular velocity, force, moment
 POSITION, VELOCITY, ANGULAR, FORCE, MOMENT = 9, 12, 15, 18, 21
@@ -126,13 +131,10 @@ class Contact(NamedTuple):
     shear : float64[t]           lever of roll in the tables' lateral coordinate [m]
     coupling : float64[t, 2]     compliance between neighbouring patches [m/N]
     y0, dy, roll0, droll, dw : float   grid of the tables [m, rad, rad2]
-    creep : float64[k, 4]        Kalker's c11 c22 c23 c33 over log(a/b)
-    shear_modulus, damping : float   [Pa], [N s/m]
-    n_x, n_y : int               cells of FASTSIM along and across
-    law : int                    creep law, see `creep.LAW_NUMBERS`
-    reduction, slip_reduction : float   third-body factors of Kalker's coefficients
+    damping : float              normal to the patch [N s/m]
+    kalker : float64[k, 4]       c11 c22 c23 c33 over (a - b)/(a + b)
+    law : CreepLaw               creep law with its material, its grid and its data
     friction_rest, friction_decay : float   friction falling with slip [1], [s/m]
-    law_table : float32[], law_scale : float64[k, 4]   table of the full theory; else empty
     """
 
     body: np.ndarray
@@ -146,18 +148,11 @@ class Contact(NamedTuple):
     roll0: float
     droll: float
     dw: float
-    creep: np.ndarray
-    shear_modulus: float
     damping: float
-    n_x: int
-    n_y: int
-    law: int
-    reduction: float
-    slip_reduction: float
+    kalker: np.ndarray
+    law: CreepLaw
     friction_rest: float
     friction_decay: float
-    law_table: np.ndarray
-    law_scale: np.ndarray
 
 
 class Links(NamedTuple):
@@ -209,9 +204,8 @@ class Mounts(NamedTuple):
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
     flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
-                                 part, friction pads
-    law : int64[l]               3 times the mount plus the axis, rising, of all tables and internal
-                                 states
+                                 part, friction pads (`ONE_SIDED` where they may lift)
+    law : int64[l]               see `mount_laws`
     """
 
     body: np.ndarray
@@ -253,6 +247,13 @@ class Mounts(NamedTuple):
         return self.row[:, ROTATION_DAMPING_X : ROTATION_DAMPING_X + 3]
 
 
+def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """3 times the mount plus the axis, rising, of all that is more than spring and damper."""
+    has_law = (internal >= 0) | (curve >= 0)
+    has_law[:, 2] |= flags[:, FRICTION] == ONE_SIDED
+    return np.flatnonzero(has_law)
+
+
 class Curves(NamedTuple):
     """Piecewise linear tables, one after the other; beyond its ends a table continues linearly.
 
@@ -283,6 +284,24 @@ class Loads(NamedTuple):
     body: np.ndarray
     point: np.ndarray
     flags: np.ndarray
+    start: np.ndarray
+    table: np.ndarray
+
+
+class Drives(NamedTuple):
+    """Torques between wheelsets and the bodies that take their reactions.
+
+    Attributes
+    ----------
+    body : int64[d, 2]       body that takes the reaction, wheelset
+    row : float64[d, 4]      1 for a brake, 1 for a demand over distance, slips between which the
+                             torque is taken back (0 for none)
+    start : int64[2 d + 1]   first row of the table of the torque and of that of the demand of each
+    table : float64[..., 2]  speed [m/s] and torque [N m]; time [s] or distance [m] and factor
+    """
+
+    body: np.ndarray
+    row: np.ndarray
     start: np.ndarray
     table: np.ndarray
 
@@ -338,6 +357,7 @@ class System(NamedTuple):
     curves: Curves
     internal: Internal
     loads: Loads
+    drives: Drives
     drive: Drive
     gravity: float
 
@@ -365,7 +385,7 @@ class Work(NamedTuple):
     look_up, weights, stiffness, approach : of the wheel at hand, see `contact_table`
     patch_index : int64[p, 3]   wheelset, side and patch of each active contact patch
     patch : float64[PATCH_ROWS, p]  see `wheel_rail`
-    fastsim : float64[WORK_ROWS, ...];  offsets : int64[16]   scratch of the creep laws
+    creep : CreepScratch        of the creep laws
     wheel : float64[w, 2, WHEEL_COLUMNS]  see `wheel_rail`
     support : float64[w, 2, SUPPORT_COLUMNS];  support_step : float64[w, SUPPORT_STEP]
                                 of each wheelset's track, see `support`; w = 0 on rigid rails
@@ -408,8 +428,7 @@ class Work(NamedTuple):
     approach: np.ndarray
     patch_index: np.ndarray
     patch: np.ndarray
-    fastsim: np.ndarray
-    offsets: np.ndarray
+    creep: CreepScratch
     support: np.ndarray
     support_step: np.ndarray
     compliance: np.ndarray

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit_outside
+from railsim.kernels import compiled
 from railsim.kernels.contact_geometry import rail_height, trace_line
 from railsim.kernels.contact_table import A1, B1, C_Y, C_Z, HALF_LOAD, K2, LOADS, G, K
 from railsim.kernels.elastic_patch import (
@@ -114,7 +114,7 @@ class Zone(NamedTuple):
     node: np.ndarray
 
 
-@jit_outside
+@compiled(in_loop=False)
 def fill_table_slice(
     values, y_nodes, roll, yaw, centre_height, wheel, rail, elastic, hertz, strips
 ):
@@ -192,7 +192,7 @@ def fill_table_slice(
             fill_zone(values[p, i], zone, start, end, elastic, hertz, strips)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def near_candidates(y, p, least, c_y, c_z, stretch, centre_height, wheel, rail):
     """Range of a zone's candidates around those that can touch, `end` exclusive."""
     first, last = wheel.first[p], wheel.last[p]
@@ -210,7 +210,7 @@ def near_candidates(y, p, least, c_y, c_z, stretch, centre_height, wheel, rail):
     return start, end
 
 
-@jit_outside
+@compiled(in_loop=False)
 def fill_zone(out, zone, start, end, elastic, hertz, strips):
     """Fields of one zone at one place into `out`, shape (N_FIELD,)."""
     least = zone.h[start:end].min()
@@ -263,7 +263,7 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
     over_load(out, place)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def within(limit, h, start, end):
     """Range of the candidates from the first to the last whose gap is below a limit, and one more.
 
@@ -277,7 +277,7 @@ def within(limit, h, start, end):
     return start + max(first - 1, 0), start + min(last + 1, h.size)
 
 
-@jit_outside
+@compiled(in_loop=False)
 def averaged_over_widths(zone, start, weight):
     """Weighted sums of the relative curvature, for each width over which it is averaged."""
     sums = np.zeros(zone.wheel_curvature.shape[0])
@@ -291,7 +291,7 @@ def averaged_over_widths(zone, start, weight):
     return sums
 
 
-@jit_outside
+@compiled(in_loop=False)
 def over_load(out, place):
     """Fields of the form v + dv N/(N + HALF_LOAD), as near as possible to the three loads'."""
     loads = np.array(LOADS)

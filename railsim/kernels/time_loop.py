@@ -12,11 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_internal, jit_merged
+from railsim.kernels import compiled
+from railsim.kernels.contact_columns import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
+from railsim.kernels.driving import table_value_slope
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.extremes import note_extremes, note_unloaded
-from railsim.kernels.internal import MAXWELL_CURVE, PAD, advanced, constant_decays, within_table
-from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
+from railsim.kernels.internal import (
+    MAXWELL_CURVE,
+    PAD,
+    advanced,
+    constant_decays,
+    hold_within,
+    slides_together,
+    within_table,
+)
+from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import (
     AFTER_STEP,
@@ -42,7 +52,6 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import OMEGA_S
 from railsim.kernels.vibration import high_pass, watch
-from railsim.kernels.wheel_rail import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
 
 FAST, RK4 = range(2)
 # Weight of the last acceleration in the smoothed one, by which speeds are extrapolated: high enough
@@ -74,7 +83,26 @@ class Recorder(NamedTuple):
     element: np.ndarray
 
 
-@jit_internal
+class Chunk(NamedTuple):
+    """Which steps one call of the time loop takes.
+
+    Attributes
+    ----------
+    first : int     number of steps already taken
+    steps : int     how many to take
+    every : int     states are recorded where the count is a multiple of it, before the step
+    fresh : int     1 where nothing was before the state: the scheme's memory begins here
+    closing : int   1 to evaluate and record the state after the last step as well
+    """
+
+    first: int
+    steps: int
+    every: int
+    fresh: int = 0
+    closing: int = 0
+
+
+@compiled(python=False)
 def record(recorder, row, system, state, derivative, work, n_patches):
     """Copy the state and the by-products of its evaluation into row `row`."""
     for k in range(recorder.state.shape[1]):
@@ -101,7 +129,7 @@ def record(recorder, row, system, state, derivative, work, n_patches):
         )
 
 
-@jit_internal
+@compiled(python=False)
 def record_patches(out, row, work, n_patches):
     """Copy the active contact patches to their places; the others are zero."""
     for w in range(out.shape[1]):
@@ -115,7 +143,7 @@ def record_patches(out, row, work, n_patches):
             out[row, w, side, k, c] = work.patch[c, i]
 
 
-@jit_inline
+@compiled(inline=True)
 def implicitness(z):
     """Share of the new value at h times the damping rate: the trapezoid's 1/2, for large z 1 - 1/z.
 
@@ -124,7 +152,7 @@ def implicitness(z):
     return 0.5 if z < 2.0 else 1.0 - 1.0 / z
 
 
-@jit_inline
+@compiled(inline=True)
 def soften(rate, before, i, damping, inverse, h):
     """Take a damper of one coordinate linearly implicit; `inverse`: 1/mass."""
     z = h * damping * inverse
@@ -132,7 +160,7 @@ def soften(rate, before, i, damping, inverse, h):
     rate[i] = (rate[i] + theta_z * before[i]) / (1.0 + theta_z)
 
 
-@jit_inline
+@compiled(inline=True)
 def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
     """Take a damper of the speed of coordinate i + lever times that of j linearly implicit."""
     z = h * damping * (inverse_i + lever * lever * inverse_j)
@@ -143,7 +171,7 @@ def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
     rate[j] -= force * lever * inverse_j
 
 
-@jit_inline
+@compiled(inline=True)
 def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     """Take what the contact takes from the speeds in y, z and roll linearly implicit.
 
@@ -179,7 +207,7 @@ def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     )
 
 
-@jit_inline
+@compiled(inline=True)
 def soften_contact(bodies, jacobian, b, rate, before, h):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
@@ -208,7 +236,7 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
 
 
-@jit_inline
+@compiled(inline=True)
 def remember(system, work, state, derivative, h):
     """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
@@ -228,7 +256,7 @@ def remember(system, work, state, derivative, h):
     state[-4] = -h
 
 
-@jit_inline
+@compiled(inline=True)
 def step_fast(system, work, state, derivative, decay, h):
     """Advance `state` by `h` with the derivative already evaluated there.
 
@@ -286,13 +314,15 @@ def step_fast(system, work, state, derivative, decay, h):
         state[k] = advanced(
             system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h, decay[i]
         )
+        if slides_together(system.internal, i):
+            hold_within(system.internal, i, 12 * n, work.drive, state)
     state[-4] = h
     advance_place(system.drive, state, derivative, h)
     if system.support.elastic:
         step_support(system, work, state, h)
 
 
-@jit_inline
+@compiled(inline=True)
 def advance_place(drive, state, derivative, h):
     """Time, place and speed after a step; a speed table is met exactly."""
     state[-2] += h * (state[-1] + 0.5 * h * derivative[-1])
@@ -302,18 +332,20 @@ def advance_place(drive, state, derivative, h):
         state[-1], _ = table_value_slope(drive.table, state[-2])
 
 
-@jit_inline
+@compiled(inline=True)
 def settle_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
         k = first + i
-        if internal.kind[i] == PAD:
+        if slides_together(internal, i):
+            hold_within(internal, i, first, drive, state)
+        elif internal.kind[i] == PAD and internal.parameter[i, 1] == 0.0:
             state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
         elif internal.kind[i] == MAXWELL_CURVE:
             state[k] = within_table(curves, internal.curve[i], state[k])
 
 
-@jit_inline
+@compiled(inline=True)
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
@@ -340,7 +372,7 @@ def step_rk4(system, work, state, derivative, stages, h):
     return RUNNING, 0
 
 
-@jit_inline
+@compiled(inline=True)
 def striking(contact, swing, h, share):
     """First wheelset with a contact force about to change by more than a share of the wheel load.
 
@@ -352,7 +384,7 @@ def striking(contact, swing, h, share):
     return -1
 
 
-@jit_merged
+@compiled(merge=True)
 def all_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
     for k in range(state.shape[0]):
@@ -361,23 +393,9 @@ def all_finite(state):
     return -1
 
 
-@jit
-def time_loop(
-    system,
-    work,
-    state,
-    derivative,
-    stages,
-    recorder,
-    scheme,
-    h,
-    first_step,
-    n_steps,
-    every,
-    fresh,
-    closing,
-):
-    """Advance by `n_steps` steps of length `h` [s], recording every `every`-th state.
+@compiled
+def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chunk):
+    """Advance by some steps of length `h` [s], recording states on the way.
 
     Parameters
     ----------
@@ -385,13 +403,10 @@ def time_loop(
         Changed in place.
     derivative : float64[n_state];  stages : float64[3, n_state]
         Work arrays.
-    first_step : int
-        Number of steps already taken; states are recorded where the count is a multiple of
-        `every`, before the step.
-    fresh : int
-        1 where nothing was before `state`: the memory of the fast scheme begins here.
-    closing : int
-        1 to evaluate and record the state after the last step as well.
+    scheme : int
+        FAST or RK4.
+    chunk : Chunk
+        Which steps, and what is recorded.
 
     Returns
     -------
@@ -407,11 +422,12 @@ def time_loop(
         step_compliance(system.support, h, work.compliance)
     b0, a1, a2, fading = high_pass(h)
     rows = np.int64(0)
-    step, end = first_step, first_step + n_steps
+    first_step, every = chunk.first, chunk.every
+    step, end = first_step, first_step + chunk.steps
     left = np.int64(0)  # parts of a divided step that are still to be taken
     decay, length = work.decay, h
     rails = BALANCED if scheme == RK4 else AFTER_STEP
-    while step < end + closing:
+    while step < end + chunk.closing:
         status, where, patches = mechanics(system, work, state, derivative, rails)
         if status == RUNNING:
             note_extremes(system, work.wheel, state, work.present, work.extremes)
@@ -423,9 +439,9 @@ def time_loop(
                     record(recorder, rows, system, state, derivative, work, patches)
                     rows += 1
                 if step == end:
-                    return RUNNING, 0, n_steps, rows
+                    return RUNNING, 0, chunk.steps, rows
                 watch(work.wheel, work.vibration, b0, a1, a2, fading, h, state[-2])
-                if scheme == FAST and fresh and step == first_step:
+                if scheme == FAST and chunk.fresh and step == first_step:
                     remember(system, work, state, derivative, h)
                 decay, length = work.decay, h
                 w = striking(system.contact, work.swing, h, work.watch[1]) if parts > 0 else -1
@@ -454,4 +470,4 @@ def time_loop(
             return status, where, step - first_step, rows
         if left == 0:
             step += 1
-    return RUNNING, 0, n_steps, rows
+    return RUNNING, 0, chunk.steps, rows

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from railsim.kernels import jit, jit_inline, jit_merged
+from railsim.kernels import compiled
 from railsim.kernels.lanes import LANES, eight_from, eight_of, load_rows, starts, store_rows
 from railsim.kernels.rotation import sine_cosine_lanes
 
@@ -54,7 +54,7 @@ class TrackTables(NamedTuple):
     has_irregularity: int
 
 
-@jit
+@compiled
 def cell_of(track, s):
     """Cell index of arc length `s`, -1 outside the table, and the distance into the cell [m]."""
     position = (s - track.s_start) / track.ds
@@ -64,7 +64,7 @@ def cell_of(track, s):
     return i, s - track.s_start - i * track.ds
 
 
-@jit_inline
+@compiled(inline=True)
 def polynomial(c0, c1, c2, c3, u):
     """Cubic polynomial and its first two derivatives."""
     return (
@@ -74,7 +74,7 @@ def polynomial(c0, c1, c2, c3, u):
     )
 
 
-@jit_merged
+@compiled(merge=True)
 def track_frames(track, cell, cell_u, origin, frames):
     """Evaluate track frames into ``frames[:, FRAME_SIZE]``.
 

@@ -8,7 +8,7 @@ vibration of the angular frequency w they are A^2/2 and A^2 (1 - cos w h).
 
 from math import acos, exp, pi, sqrt, tan
 
-from railsim.kernels import jit, jit_merged
+from railsim.kernels import compiled
 
 CUT_OFF = 40.0  # Hz
 MEMORY = 0.1  # s
@@ -20,7 +20,7 @@ BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, PLACE, FREQUENCY = range(9)
 VIBRATION = 9
 
 
-@jit
+@compiled
 def high_pass(h):
     """Coefficients of the filter at the step `h` [s]: b0 = -b1/2 = b2, a1, a2; fading in a step."""
     k = tan(pi * min(CUT_OFF * h, 0.4))
@@ -33,7 +33,7 @@ def high_pass(h):
     )
 
 
-@jit_merged
+@compiled(merge=True)
 def watch(wheel, vibration, b0, a1, a2, fading, h, s):
     """Take up the wheel loads of a step of length `h` that begins at arc length `s`."""
     for w in range(wheel.shape[0]):

@@ -19,7 +19,8 @@ from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import FREE, N_SCALARS, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.system import Linearisation, jacobian_of_rows
-from railsim.model.assembly import Model, components_of, work_arrays
+from railsim.model.assembly import Model
+from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]

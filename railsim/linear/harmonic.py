@@ -18,7 +18,7 @@ so that a motion along the path has just these forces, and the tangent is the li
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError, argument_fault
 from railsim.linear.coordinates import FreeVehicle
 
 Floats = NDArray[np.float64]
@@ -82,8 +82,8 @@ class ContactPath:
                 except ModelError as error:
                     raise InputError(
                         [
-                            Fault(
-                                "--amplitude",
+                            argument_fault(
+                                "amplitude",
                                 "",
                                 f"found {1e3 * self.amplitude:g} mm, but {error}",
                                 "a smaller amplitude",

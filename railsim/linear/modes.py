@@ -13,7 +13,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, argument_fault
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle
@@ -396,7 +396,7 @@ def check_speeds(speeds: Sequence[float]) -> None:
     bad = [v for v in speeds if not (math.isfinite(v) and low <= v <= high)]
     if bad or not len(speeds):
         found = f"found {bad[0]:g} m/s" if bad else "no speed"
-        raise InputError([Fault("--speed", "", found, f"{low:g} to {high:g} m/s")])
+        raise InputError([argument_fault("speed", "", found, f"{low:g} to {high:g} m/s")])
 
 
 def _named(

@@ -26,7 +26,8 @@ from railsim.kernels.support import RATE, REFERENCE_MASS
 from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.coordinates import track_places
-from railsim.model.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
+from railsim.model.assembly import Model
+from railsim.model.work import CONSTANT_SPEED, components_of, without_loads, work_arrays
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]
@@ -75,9 +76,7 @@ class SteadyRolling:
 
     def __init__(self, model: Model, system: System, *, held: bool = False) -> None:
         self.model = model
-        self.system = system._replace(
-            drive=CONSTANT_SPEED, loads=system.loads._replace(body=system.loads.body[:0])
-        )
+        self.system = without_loads(system)._replace(drive=CONSTANT_SPEED)
         self.work = work_arrays(system)
         self.patches = 0  # loaded ones, of the last evaluation
         self._unknowns, self._equations, self._inertias = _conditions(model, system, held)

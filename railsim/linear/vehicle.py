@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import Fault, InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
 from railsim.linear.circle import PLACE, circle
@@ -21,6 +21,7 @@ from railsim.linear.steady import SteadyRolling, SteadyState, led
 from railsim.linear.system import Linearisation
 from railsim.model.assembly import Model, SharedTables, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
+from railsim.model.work import without_loads
 from railsim.profiles import Profile
 from railsim.profiles.builtin import cone
 from railsim.track.tables import track_tables
@@ -56,8 +57,8 @@ class Contact:
         found = []
         if self.linearisation not in LINEARISATIONS:
             found.append(
-                Fault(
-                    "--linearisation",
+                argument_fault(
+                    "linearisation",
                     "",
                     f"found '{self.linearisation}'",
                     " or ".join(LINEARISATIONS),
@@ -65,12 +66,14 @@ class Contact:
             )
         if not (math.isfinite(self.amplitude) and self.amplitude > 0.0):
             found.append(
-                Fault("--amplitude", "", f"found {self.amplitude:g} m", "a positive number of m")
+                argument_fault(
+                    "amplitude", "", f"found {self.amplitude:g} m", "a positive number of m"
+                )
             )
         low, high = CONICITIES
         if self.conicity is not None and not low <= self.conicity <= high:
             found.append(
-                Fault("--conicity", "", f"found {self.conicity:g}", f"{low:g} to {high:g}")
+                argument_fault("conicity", "", f"found {self.conicity:g}", f"{low:g} to {high:g}")
             )
         return found
 
@@ -118,9 +121,9 @@ class LinearVehicle:
         self.contact = contact or Contact()
         faults = self.contact.faults()
         if not abs(radius) >= 5.0:
-            faults.append(Fault("--radius", "", f"found {radius:g} m", "5 m at least"))
+            faults.append(argument_fault("radius", "", f"found {radius:g} m", "5 m at least"))
         if not abs(cant) <= 0.5:
-            faults.append(Fault("--cant", "", f"found {cant:g} m", "0.5 m at most"))
+            faults.append(argument_fault("cant", "", f"found {cant:g} m", "0.5 m at most"))
         if faults:
             raise InputError(faults)
         self.held = held
@@ -146,7 +149,7 @@ class LinearVehicle:
         self._rest[-2] = PLACE
         there = circle(track, curvature=self.curvature, cant=cant)
         check_fixed(assembled.flat, there)
-        self.system = self.model.system._replace(track=track_tables(there))
+        self.system = without_loads(self.model.system)._replace(track=track_tables(there))
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -218,8 +221,8 @@ def _check_hold(model: Model, hold: Sequence[str]) -> None:
     if wrong:
         raise InputError(
             [
-                Fault(
-                    "--hold", wrong[0], "no such body; --held holds the wheelsets", ", ".join(rigid)
+                argument_fault(
+                    "hold", wrong[0], "no such body; --held holds the wheelsets", ", ".join(rigid)
                 )
             ]
         )

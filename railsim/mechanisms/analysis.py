@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.expressions import Expression
-from railsim.definitions.mechanism import AUTO, AirSpring, Cylinder, GasSpring, Mechanism
-from railsim.definitions.mechanism_faults import ends
-from railsim.errors import Fault, InputError, nearest
+from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism_parts import AUTO, AirSpring, Cylinder, GasSpring
+from railsim.definitions.mechanism_values import ends
+from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.mechanisms.cams import Transition, cam_rows, transitions
 from railsim.mechanisms.dynamics import FreeMotion, TimedMotion, driven_motion, free_motion
 from railsim.mechanisms.forces import (
@@ -142,14 +143,16 @@ class Analysis:
         """
         if quantity not in self.output:
             found = f"no result '{quantity}'"
-            raise InputError([Fault("--at", quantity, found, nearest(quantity, self.output))])
+            raise InputError(
+                [argument_fault("at", quantity, found, nearest(quantity, self.output))]
+            )
         known = self.output[quantity]
         gap = known - value
         crossed = np.flatnonzero(gap[:-1] * gap[1:] <= 0.0)
         if not len(crossed):
             low, high = np.nanmin(known), np.nanmax(known)
             found, allowed = f"{value:g} is never reached", f"{low:.6g} to {high:.6g}"
-            raise InputError([Fault("--at", quantity, found, allowed)])
+            raise InputError([argument_fault("at", quantity, found, allowed)])
         k = crossed[0]
         s = zeros(
             solve(self.model, self.motion.s[k : k + 2]),
@@ -216,7 +219,7 @@ def no_case(definition: Mechanism, case: str) -> Fault:
     """The fault of a case that a mechanism does not have."""
     cases = definition.cases
     allowed = nearest(case, cases) if cases else "the file has no cases"
-    return Fault("--case", "", f"no case '{case}'", allowed)
+    return argument_fault("case", "", f"no case '{case}'", allowed)
 
 
 def actuator_of(definition: Mechanism) -> str | None:

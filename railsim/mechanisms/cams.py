@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import Cam
+from railsim.definitions.mechanism_parts import Cam
 from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
+from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.kinematics import Motion, solve
 
 HALVINGS = 48
@@ -83,7 +84,7 @@ def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
     n = 3 * model.linkage.n_bodies
     residual, jacobian = np.zeros((2, n)), np.zeros((2, n, n))
     twice = np.repeat(at.q, 2, axis=0)
-    kernel.jacobians(model.linkage, np.array([low, low]), twice, arcs, residual, jacobian)
+    motion_kernel.jacobians(model.linkage, np.array([low, low]), twice, arcs, residual, jacobian)
     unit = np.zeros((2, n, 1))
     unit[:, -1] = 1.0
     rates = np.linalg.solve(jacobian, unit)[:, 3 * (roller_body(dense, joint) - 1) + 2, 0]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.definitions.mechanism_faults import ends
+from railsim.definitions.mechanism_values import ends
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis, actuator_of
 from railsim.mechanisms.inversion import driver_at

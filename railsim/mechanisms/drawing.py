@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import GasSpring, Link, Prismatic, Revolute, Slot, Spring
-from railsim.definitions.mechanism_faults import ends
+from railsim.definitions.mechanism_parts import GasSpring, Link, Prismatic, Revolute, Slot, Spring
+from railsim.definitions.mechanism_values import ends
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.kinematics import Motion
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions import mechanism as written
-from railsim.definitions.mechanism_faults import ends
+from railsim.definitions.mechanism_values import ends
 from railsim.errors import Fault, InputError
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia
 from railsim.mechanisms.inversion import driver_at

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import (
-    Actuator,
+from railsim.definitions.mechanism import Actuator
+from railsim.definitions.mechanism_parts import (
     AirSpring,
     Cylinder,
     Damper,
@@ -30,9 +30,9 @@ from railsim.definitions.mechanism import (
     Stop,
     Torque,
 )
-from railsim.definitions.mechanism_faults import ends
+from railsim.definitions.mechanism_values import ends
 from railsim.errors import Fault, InputError
-from railsim.kernels import linkage as kernel
+from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.components import AirSpringTable, cylinder_area, gas_spring_force
 from railsim.mechanisms.kinematics import Motion, driver_words
 from railsim.mechanisms.model import Model
@@ -428,7 +428,7 @@ def reactions(
     rows = 3 * model.linkage.n_bodies
     residual = np.zeros((len(motion.s), rows))
     jacobian = np.zeros((len(motion.s), rows, rows))
-    kernel.jacobians(model.linkage, motion.s, motion.q, motion.arcs, residual, jacobian)
+    motion_kernel.jacobians(model.linkage, motion.s, motion.q, motion.arcs, residual, jacobian)
     right = -applied(motion, forces, rates)
     found = np.linalg.solve(jacobian.transpose(0, 2, 1), right[..., None])[..., 0]
     joints = {name: found[:, a:b] for name, (a, b) in model.joint_rows.items()}

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.mechanism import Mechanism, Optimise
-from railsim.definitions.mechanism_faults import ends, number, parameter_values
+from railsim.definitions.mechanism_values import ends, number, parameter_values
 from railsim.errors import Fault, InputError
 from railsim.mechanisms.analysis import actuator_of
 from railsim.mechanisms.forces import generalised_force, unit_work

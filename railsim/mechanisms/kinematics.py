@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from railsim.definitions.expressions import atan2
-from railsim.definitions.mechanism import Angle
+from railsim.definitions.mechanism_parts import Angle
 from railsim.errors import Fault, InputError
 from railsim.kernels import linkage as kernel
+from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.model import STEP, Model
 
 Floats = NDArray[np.float64]
@@ -149,7 +150,7 @@ def solve(model: Model, s: ArrayLike, near: Motion | None = None) -> Motion:
     q, q1, q2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     arcs = np.zeros((len(values), len(linkage.joint)), dtype=np.int64)
     failure = np.zeros(2)
-    status, _ = kernel.track(linkage, values, pose, arc_start, q, q1, q2, arcs, failure)
+    status, _ = motion_kernel.track(linkage, values, pose, arc_start, q, q1, q2, arcs, failure)
     if status != kernel.OK:
         raise InputError([_fault(model, status, *failure)])
     return Motion(model, wanted, q[1:], q1[1:], q2[1:], arcs[1:])
@@ -199,7 +200,7 @@ def check_freedom(model: Model) -> None:
         lost = error
     rows = 3 * model.linkage.n_bodies
     residual, jacobian = np.zeros((1, rows)), np.zeros((1, rows, rows))
-    kernel.jacobians(model.linkage, s, pose, arcs, residual, jacobian)
+    motion_kernel.jacobians(model.linkage, s, pose, arcs, residual, jacobian)
     joints = jacobian[0, :-1]
     left, singular, _ = np.linalg.svd(joints)
     rank = int(np.sum(singular > 1e-9 * singular[0]))
@@ -232,7 +233,7 @@ def tangents(motion: Motion, moved: Model, *, second: bool = True) -> Motion:
         np.repeat(array[None].astype(complex), count, axis=0)
         for array in (motion.s, motion.q, motion.q1, motion.q2)
     )
-    kernel.tangents(motion.model.linkage, moved.linkage, s, q, q1, q2, motion.arcs, second)
+    motion_kernel.tangents(motion.model.linkage, moved.linkage, s, q, q1, q2, motion.arcs, second)
     return Motion(moved, s, q, q1, q2, motion.arcs)
 
 

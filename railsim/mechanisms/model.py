@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import AUTO, Cam, Link, Mechanism, Prismatic, Revolute, Slot
-from railsim.definitions.mechanism_faults import number, parameter_values, place, point_names
+from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism_parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
+from railsim.definitions.mechanism_values import number, parameter_values, place, point_names
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 

@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, minimize, nnls
+from scipy.optimize import Bounds, minimize
 
 from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_faults import number
+from railsim.definitions.mechanism_values import number
 from railsim.errors import Fault, InputError
-from railsim.mechanisms.analysis import Analysis, analyse
 from railsim.mechanisms.judgement import Judge, Judgement
-from railsim.mechanisms.kinematics import check_freedom, solve
+from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
+from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of, own_choice
 
 Floats = NDArray[np.float64]
 
@@ -42,102 +42,10 @@ EVERY = 5
 """Share of the positions that every start is first judged at."""
 FINALISTS = 3
 """Starts that are followed to the end, at all positions."""
-FEASIBLE = 1e-7
-"""Breach of a constraint, in its scale, that counts as none."""
-ACTIVE = 1e-5
-"""Margin, in its scale, below which a constraint is active."""
 DRAWS = 60
 """Draws for each start until the links can be assembled."""
 REFUSED = 1e6
 """Objective, against that at the start, of parameters that cannot be assembled."""
-
-
-@dataclass(frozen=True)
-class Active:
-    """A limit that holds the optimum in place.
-
-    Attributes
-    ----------
-    name : str
-        Constraint, or parameter with `side` 'lower' or 'upper'.
-    side : str
-    slack : float
-        What is left to the limit, SI.
-    multiplier : float
-        Decrease of the objective for each unit (SI) that the limit gives way.
-    """
-
-    name: str
-    side: str
-    slack: float
-    multiplier: float
-
-
-@dataclass(frozen=True)
-class Start:
-    """One start of the search.
-
-    Attributes
-    ----------
-    number : int
-        0 is the file's own.
-    begin, end : dict of str to float
-        Parameters.
-    objective, violation : float
-        At the end; NaN where it never could be assembled.
-    evaluations : int
-    """
-
-    number: int
-    begin: dict[str, float]
-    end: dict[str, float]
-    objective: float
-    violation: float
-    evaluations: int
-
-    @property
-    def feasible(self) -> bool:
-        """Whether all constraints are kept."""
-        return bool(self.violation <= FEASIBLE)
-
-
-@dataclass(frozen=True)
-class Optimum:
-    """Result of a search.
-
-    Attributes
-    ----------
-    definition : Mechanism
-        The mechanism with the best parameters.
-    before, after : Analysis
-        Results with the file's own parameters and with the best.
-    objective, objective_before : float
-        NaN for parameters of the file that cannot be assembled.
-    feasible : bool
-        Whether all constraints are kept; else it is the compromise with the smallest breach.
-    breaches : dict of str to float
-        Broken constraints and by how much, SI.
-    active : tuple of Active
-    starts : tuple of Start
-    seed : int
-    """
-
-    definition: Mechanism
-    before: Analysis | None
-    after: Analysis
-    objective: float
-    objective_before: float
-    feasible: bool
-    breaches: dict[str, float]
-    active: tuple[Active, ...]
-    starts: tuple[Start, ...]
-    seed: int
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The best parameters among those that may change."""
-        best = best_of(self.starts)
-        return best.end
 
 
 def optimise(
@@ -175,16 +83,7 @@ def optimise(
         fault = Fault(definition.name, "optimise.bounds", "exclude every assembly", bounds)
         raise InputError([fault])
     best = best_of(found)
-    return _optimum(definition, judge, best, tuple(found), chosen_seed)
-
-
-def best_of(starts: Sequence[Start]) -> Start:
-    """The feasible start with the smallest objective, else that with the smallest breach."""
-    usable = [start for start in starts if np.isfinite(start.objective)]
-    feasible = [start for start in usable if start.feasible]
-    if feasible:
-        return min(feasible, key=lambda start: start.objective)
-    return min(usable, key=lambda start: start.violation)
+    return optimum_of(definition, judge, best, tuple(found), chosen_seed)
 
 
 def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict[str, float]]]:
@@ -196,7 +95,7 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
     generator = np.random.default_rng(seed)
     choices = _choices(judge)
     own = np.array([float(judge.values[name]) for name in judge.names])
-    found = [(np.clip(own, judge.lower, judge.upper), _own_choice(judge))]
+    found = [(np.clip(own, judge.lower, judge.upper), own_choice(judge))]
     for i in range(1, count):
         choice = choices[i % len(choices)]
         for _ in range(DRAWS):
@@ -216,10 +115,6 @@ def _choices(judge: Judge) -> list[dict[str, float]]:
             for value in values
         ]
     return choices
-
-
-def _own_choice(judge: Judge) -> dict[str, float]:
-    return {name: float(judge.values[name]) for name in judge.wanted.assemblies}
 
 
 def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
@@ -446,72 +341,3 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
     if after is None or after.violation >= here.violation:
         return u0, here
     return u, after
-
-
-def _optimum(
-    definition: Mechanism, judge: Judge, best: Start, starts: tuple[Start, ...], seed: int
-) -> Optimum:
-    x = np.array([best.end[name] for name in judge.names])
-    choice = {name: best.end[name] for name in judge.wanted.assemblies}
-    judged = judge(x, choice)
-    listed = {
-        name: tuple(names) for name, names in definition.provenance.items() if name != "optimised"
-    }
-    listed["optimised"] = tuple(best.end)
-    better = definition.with_parameters(best.end).model_copy(update={"provenance": listed})
-    check_freedom(build(better))
-    after = analyse(better)
-    try:
-        before: Analysis | None = analyse(definition)
-        own = np.array([float(judge.values[name]) for name in judge.names])
-        objective_before = judge(own, _own_choice(judge)).objective
-        judge(x, choice)
-    except InputError:
-        before, objective_before = None, float("nan")
-    breaches: dict[str, float] = {}
-    for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
-        if margin < -FEASIBLE:
-            breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
-    return Optimum(
-        better,
-        before,
-        after,
-        judged.objective,
-        objective_before,
-        best.feasible,
-        breaches,
-        _active(judge, judged, x),
-        starts,
-        seed,
-    )
-
-
-def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
-    """Limits that hold the optimum: their slack, and multipliers by least squares."""
-    rows: list[tuple[str, str, float, Floats]] = []
-    span = judge.upper - judge.lower
-    seen: dict[str, int] = {}
-    for i, (name, _) in enumerate(judge.labels):
-        if judged.margins[i] < ACTIVE and (
-            name not in seen or judged.margins[i] < judged.margins[seen[name]]
-        ):
-            seen[name] = i
-    for name, i in seen.items():
-        scale = judge.labels[i][1]
-        rows.append((name, "", float(judged.margins[i]) * scale, judged.slopes[i] * scale))
-    for k, name in enumerate(judge.names):
-        unit = np.eye(len(x))[k]
-        if x[k] - judge.lower[k] < ACTIVE * span[k]:
-            rows.append((name, "lower", float(x[k] - judge.lower[k]), unit))
-        if judge.upper[k] - x[k] < ACTIVE * span[k]:
-            rows.append((name, "upper", float(judge.upper[k] - x[k]), -unit))
-    if not rows:
-        return ()
-    matrix = np.array([row[3] for row in rows]).T * span[:, None]
-    norms = np.linalg.norm(matrix, axis=0)
-    norms[norms == 0.0] = 1.0
-    weights, _ = nnls(matrix / norms, judged.gradient * span)
-    return tuple(
-        Active(name, side, slack, float(weight))
-        for (name, side, slack, _), weight in zip(rows, weights / norms, strict=True)
-    )

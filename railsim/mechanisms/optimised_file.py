@@ -8,7 +8,7 @@ import tomli_w
 
 from railsim.definitions.mechanism import MECHANISM_FORMAT
 from railsim.definitions.paths import key_path
-from railsim.mechanisms.optimisation import Optimum
+from railsim.mechanisms.optimum import Optimum
 
 
 def optimised_text(

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.definitions.mechanism import CatalogueRow, Cylinder, GasSpring
+from railsim.definitions.mechanism import CatalogueRow
+from railsim.definitions.mechanism_parts import Cylinder, GasSpring
 from railsim.mechanisms.analysis import Analysis, actuator_of
 from railsim.mechanisms.components import cylinder_area, lid_force, next_size
 

@@ -14,7 +14,7 @@ from railsim.mechanisms.selection import checks, selection
 from railsim.mechanisms.tolerance import scatter
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimisation import Optimum
+    from railsim.mechanisms.optimum import Optimum
 
 Data = dict[str, Any]
 

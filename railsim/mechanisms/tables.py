@@ -14,7 +14,7 @@ from railsim.mechanisms.summary import parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimisation import Optimum
+    from railsim.mechanisms.optimum import Optimum
 
 Texts = tuple[list[str], list[list[str]]]
 

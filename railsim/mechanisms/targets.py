@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_faults import ends, parameter_values
+from railsim.definitions.mechanism_values import ends, parameter_values
 from railsim.errors import Fault, InputError
 from railsim.mechanisms.analysis import actuator_of, height_drivers, zone_drivers
 from railsim.mechanisms.inversion import driver_at
@@ -106,7 +106,7 @@ def positions(definition: Mechanism) -> Positions:
 
 
 def _number(definition: Mechanism, key: str, values: Any) -> float:
-    from railsim.definitions.mechanism_faults import number
+    from railsim.definitions.mechanism_values import number
 
     return float(number(getattr(definition.zone, key), values))
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.mechanism_faults import ends, number, parameter_values
+from railsim.definitions.mechanism_values import ends, number, parameter_values
 from railsim.mechanisms.analysis import actuator_of
 from railsim.mechanisms.forces import generalised_force, unit_work
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents

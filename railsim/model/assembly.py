@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.contact.coupling import coupling
-from railsim.contact.creep_table import NO_TABLE, creep_table
+from railsim.contact.creep import creep_law
 from railsim.contact.kalker import creep_tables
-from railsim.contact.table import ContactTable, cached_contact_table
+from railsim.contact.stored_table import cached_contact_table
+from railsim.contact.table import ContactTable
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.layout import is_straight_and_level
 from railsim.definitions.settings import Drive as DriveDefinition
@@ -23,23 +24,14 @@ from railsim.definitions.support import Support as SupportDefinition
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, ModelError
-from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
-from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
-from railsim.kernels.creep import LAW_NUMBERS
-from railsim.kernels.extremes import EXTREMES, MAX, MIN
-from railsim.kernels.fastsim import fastsim_workspace
-from railsim.kernels.lanes import LANES
-from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
-from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_ROW, SUPPORT_SIZE, SUPPORT_STEP
+from railsim.kernels.aligned import CACHE_LINE, aligned
+from railsim.kernels.patches import CreepLaw
+from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE
 from railsim.kernels.system import (
     AXLEBOX,
-    CONSTANT,
     FIXED,
     FREE,
     N_SCALARS,
-    POSE_SIZE,
-    RATES_SIZE,
-    RELATIVE_SIZE,
     RIGID,
     TABLE,
     WHEELSET,
@@ -48,20 +40,16 @@ from railsim.kernels.system import (
     Drive,
     Support,
     System,
-    Work,
 )
-from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
-from railsim.kernels.vibration import VIBRATION
-from railsim.kernels.wheel_rail import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
+from railsim.kernels.track_frame import TrackTables
 from railsim.model.element_arrays import ElementArrays
+from railsim.model.work import CONSTANT_SPEED, GRAVITY
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
-GRAVITY = 9.81  # m/s2, as in the reference study
-CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
 _KINDS = {"body": RIGID, "wheelset": WHEELSET, "axlebox": AXLEBOX}
 
 
@@ -164,23 +152,48 @@ def assemble(
     if shared.track is None:
         shared.track = track_tables(track)
     contact, tables = _contact(flat, track, settings, book, shared.contact)
+    system, index = _suspension(flat)
+    system = system._replace(
+        track=shared.track,
+        support=support_arrays(track.support),
+        contact=contact,
+        drive=drive_arrays(settings.drive),
+    )
+    design = None
+    if vehicle.load is not None:
+        unloaded = vehicle.model_copy(update={"load": None})
+        design = assemble(unloaded, track, settings, profiles, shared)
+    return Model(system, index, flat, tables, book.used, design)
+
+
+def without_rails(vehicle: Vehicle) -> Model:
+    """Return the model of a vehicle without wheels' contacts and track, for statics alone."""
+    flat = flatten(vehicle)
+    system, index = _suspension(flat)
+    return Model(system, index, flat, (), {})
+
+
+def _suspension(flat: FlatVehicle) -> tuple[System, Index]:
+    """Bodies and elements as arrays, and their names; no track and no contacts."""
     elements = ElementArrays({body.name: body for body in flat.bodies})
     for element in flat.elements:
         elements.add(element)
     elements.sort()
     bodies, offsets = _bodies(flat)
+    nothing: Any = None
     system = System(
         bodies=bodies,
         frame_offset=offsets,
-        track=shared.track,
-        support=support_arrays(track.support),
-        contact=contact,
+        track=nothing,
+        support=nothing,
+        contact=nothing,
         links=elements.links(),
         mounts=elements.mounts(),
         curves=elements.curves(),
         internal=elements.internal(),
         loads=elements.loads(),
-        drive=drive_arrays(settings.drive),
+        drives=elements.drives(),
+        drive=CONSTANT_SPEED,
         gravity=GRAVITY,
     )
     index = Index(
@@ -189,11 +202,7 @@ def assemble(
         links=tuple(row["name"] for row in elements.link_rows),
         mounts=tuple(row["name"] for row in elements.mount_rows),
     )
-    design = None
-    if vehicle.load is not None:
-        unloaded = vehicle.model_copy(update={"load": None})
-        design = assemble(unloaded, track, settings, profiles, shared)
-    return Model(system, index, flat, tables, book.used, design)
+    return system, index
 
 
 def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> None:
@@ -224,101 +233,6 @@ def check_fixed(flat: FlatVehicle, track: Track, drive: str = "constant") -> Non
         ]
     if faults:
         raise InputError(faults)
-
-
-def components_of(kind: int) -> tuple[int, ...]:
-    """Components in which a body of this kind moves."""
-    return {AXLEBOX: (4,), FIXED: ()}.get(kind, (0, 1, 2, 3, 4, 5))
-
-
-def work_arrays(system: System) -> Work:
-    """Scratch arrays for `system`."""
-    n = len(system.bodies.kind)
-    n_wheelsets = len(system.contact.body)
-    n_patches = 2 * N_PATCH * n_wheelsets
-    n_frames = len(system.frame_offset)
-    n_tracks = n_wheelsets * system.support.elastic
-    return Work(
-        frames=aligned_zeros((n_frames, FRAME_SIZE)),
-        cell=aligned_zeros(n_frames, np.int64),
-        cell_u=aligned_zeros(n_frames),
-        pose=aligned_zeros((n, POSE_SIZE)),
-        relative=aligned_zeros((n, RELATIVE_SIZE)),
-        rail_force=aligned_zeros((n, RATES_SIZE)),
-        acceleration=aligned_zeros((n, RATES_SIZE)),
-        drive=aligned_zeros((len(system.internal.kind), 2)),
-        laws=aligned_zeros(9 * LANES),
-        decay=aligned_zeros(len(system.internal.kind)),
-        contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
-        plane=_smooth_planes(n_wheelsets),
-        rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
-        rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
-        above=aligned_zeros(10),
-        look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
-        weights=aligned_zeros(N_WEIGHT),
-        stiffness=aligned_zeros(2 * N_PATCH),
-        approach=aligned_zeros(N_PATCH),
-        patch_index=aligned_zeros((n_patches, 3), np.int64),
-        patch=aligned_zeros((PATCH_ROWS, n_patches)),
-        fastsim=fastsim_workspace(n_patches, system.contact.n_y, system.contact.n_x),
-        offsets=aligned_zeros(16, np.int64),
-        support=aligned_zeros((n_tracks, 2, SUPPORT_COLUMNS)),
-        support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
-        compliance=aligned_zeros(2),
-        vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
-        events=aligned_zeros((n_wheelsets, 4), np.int64),
-        wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
-        swing=aligned_zeros(n_wheelsets),
-        watch=aligned_zeros(2),
-        coming=aligned_zeros((2, COMING)),
-        parts=aligned_zeros(3, np.int64),
-        extremes=no_extremes(n_wheelsets),
-        present=aligned_zeros(EXTREMES),
-        unloaded=aligned_zeros((n_wheelsets, 2)),
-        decay_part=aligned_zeros(len(system.internal.kind)),
-    )
-
-
-def _smooth_planes(n_wheelsets: int) -> Floats:
-    """Planes of rails that are not displaced: they turn nothing."""
-    plane = aligned_zeros((n_wheelsets, PLANE_SIZE))
-    plane[:, COSINE] = 1.0
-    return plane
-
-
-def no_extremes(n_wheelsets: int) -> Floats:
-    """`Work.extremes` before anything has been seen, shape (6, wheelset, EXTREMES)."""
-    extremes = aligned_zeros((6, n_wheelsets, EXTREMES))
-    extremes[MAX] = -np.inf
-    extremes[MIN] = np.inf
-    return extremes
-
-
-def level_track(system: System) -> System:
-    """Return the same system on straight, level, smooth, frictionless track, no given loads."""
-    cells = 4
-    length = float(np.ptp(system.frame_offset)) + 100.0
-    coefficients = np.zeros((cells, 6, 4))
-    ds = 2.0 * length / cells
-    coefficients[:, 0, 0] = -length + ds * np.arange(cells)
-    coefficients[:, 0, 1] = 1.0
-    start = float(np.min(system.frame_offset)) - length / 2.0
-    coefficients[:, 0, 0] += start + length
-    track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0)
-    nothing = system.loads._replace(
-        body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
-    )
-    even = system.support._replace(variation=system.support.variation[:0])
-    return system._replace(track=track, support=even, drive=CONSTANT_SPEED, loads=nothing)
-
-
-def level_track_with_friction(system: System) -> System:
-    """As `level_track`, with the largest friction that each rail of the real track has."""
-    level = level_track(system)
-    rail = level.track.rail.copy()
-    for row in (MU_LEFT, MU_RIGHT):
-        rail[:, row, 0] = np.max(system.track.rail[:, row, 0])
-    return level._replace(track=level.track._replace(rail=rail))
 
 
 def support_arrays(definition: SupportDefinition) -> Support:
@@ -504,7 +418,6 @@ def _contact(
     first = tables[0]
     y0, values = on_common_grid(tables)
     falling = track.friction_falling
-    law_table = creep_table(settings.poisson) if settings.creep_law == "table" else NO_TABLE
     names = _names(flat.bodies)
     weight = GRAVITY * sum(body.mass for body in flat.bodies)
     contact = Contact(
@@ -521,17 +434,33 @@ def _contact(
         roll0=first.roll0,
         droll=first.droll,
         dw=first.dw,
-        creep=creep_tables(settings.poisson),
-        shear_modulus=settings.shear_modulus,
         damping=settings.contact_damping,
-        n_x=settings.fastsim_grid[0],
-        n_y=settings.fastsim_grid[1],
-        law=LAW_NUMBERS[settings.creep_law],
-        reduction=track.third_body[0],
-        slip_reduction=track.third_body[1],
+        kalker=creep_tables(settings.poisson),
+        law=_creep_law(settings, track),
         friction_rest=falling.rest if falling else 1.0,
         friction_decay=falling.decay if falling else 0.0,
-        law_table=law_table.coefficients,
-        law_scale=law_table.scale,
     )
     return contact, tuple(tables)
+
+
+def _creep_law(settings: Settings, track: Track) -> CreepLaw:
+    """Creep law of the settings with the third body of the track."""
+    if settings.adhesion_curve is not None and track.third_body != (1.0, 1.0):
+        raise InputError(
+            [
+                Fault(
+                    "track",
+                    "third_body",
+                    f"found {list(track.third_body)} together with settings.adhesion_curve",
+                    "[1.0, 1.0]: a measured curve holds the third body",
+                )
+            ]
+        )
+    return creep_law(
+        settings.creep_law,
+        settings.fastsim_grid,
+        settings.shear_modulus,
+        settings.poisson,
+        track.third_body,
+        settings.adhesion_curve,
+    )

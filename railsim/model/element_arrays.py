@@ -15,20 +15,35 @@ from numpy.typing import NDArray
 from railsim.definitions.elements import (
     Airspring,
     AppliedForce,
+    AxleTorque,
+    Brake,
     BumpStop,
     Bushing,
     Element,
     Friction,
     RollBar,
     ShearSpring,
+    SideBearer,
     SpringDamper,
+    Traction,
+    Wedge,
     two_sided,
 )
 from railsim.definitions.flatten import FlatBody, FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
-from railsim.kernels.system import LINK_SIZE, MOUNT_SIZE, Curves, Links, Loads, Mounts
+from railsim.kernels.system import (
+    LINK_SIZE,
+    MOUNT_SIZE,
+    ONE_SIDED,
+    Curves,
+    Drives,
+    Links,
+    Loads,
+    Mounts,
+    mount_laws,
+)
 
 Floats = NDArray[np.float64]
 Rows = tuple[tuple[float, float], ...]
@@ -45,8 +60,10 @@ def vertical_support(law: Element) -> float:
             return law.stiffness
         rows = np.array(two_sided(law.spring_table))
         return float(np.max(np.diff(rows[:, 1]) / np.diff(rows[:, 0])))
-    if isinstance(law, Bushing | ShearSpring | Friction):
+    if isinstance(law, Bushing | ShearSpring | Friction | Wedge):
         return law.stiffness[2]
+    if isinstance(law, SideBearer):
+        return law.stiffness
     if isinstance(law, Airspring):
         both = law.bellows_stiffness + law.reservoir_stiffness
         return law.area_stiffness + law.bellows_stiffness * law.reservoir_stiffness / both
@@ -91,6 +108,7 @@ class ElementArrays:
     link_rows: list[dict[str, Any]] = field(default_factory=list)
     mount_rows: list[dict[str, Any]] = field(default_factory=list)
     load_rows: list[dict[str, Any]] = field(default_factory=list)
+    drive_rows: list[dict[str, Any]] = field(default_factory=list)
     internal_rows: list[tuple[int, Triple, int]] = field(default_factory=list)
     curve_rows: list[Floats] = field(default_factory=list)
 
@@ -101,6 +119,8 @@ class ElementArrays:
             self._add_link(element, law)
         elif isinstance(law, AppliedForce):
             self._add_loads(element, law)
+        elif isinstance(law, Traction | Brake):
+            self._add_drive(element, law)
         else:
             self._add_mount(element, law)
 
@@ -185,6 +205,10 @@ class ElementArrays:
             return {"curve": tuple(curve)}
         if isinstance(law, Friction):
             return self._friction(law)
+        if isinstance(law, SideBearer):
+            return self._side_bearer(law)
+        if isinstance(law, Wedge):
+            return self._wedge(law)
         if isinstance(law, Airspring):
             parameter = (law.bellows_stiffness, law.reservoir_stiffness, law.orifice_damping)
             return {
@@ -202,13 +226,65 @@ class ElementArrays:
             "stiffness": law.stiffness,
             "damping": law.damping,
             "friction": limits,
-            "internal": tuple(
-                self._state(PAD, (k_t, 0.0, 0.0)) if np.any(limit > 0.0) else -1
-                for k_t, limit in zip(law.stick_stiffness, limits, strict=True)
+            "internal": self._pads(
+                law.stick_stiffness, limits, together=law.friction_limit == "circle"
             ),
             "flags": (1, 0, 0, 1),
             "preload": _given(law.preload),
         }
+
+    def _side_bearer(self, law: SideBearer) -> dict[str, Any]:
+        limits = np.zeros((3, 2))
+        limits[:2, 1] = law.friction_coefficient
+        load = -law.stiffness * law.clearance if law.preload == 0.0 else law.preload
+        return {
+            "stiffness": (0.0, 0.0, law.stiffness),
+            "damping": (0.0, 0.0, law.damping),
+            "friction": limits,
+            "internal": self._pads((law.stick_stiffness, law.stick_stiffness, 0.0), limits),
+            "curve": (-1, -1, self._curve(law.stop_table)),
+            "flags": (1, 0, 0, ONE_SIDED),
+            "preload": _NOTHING if load == "auto" else (0.0, 0.0, load),
+        }
+
+    def _wedge(self, law: Wedge) -> dict[str, Any]:
+        limits = np.zeros((3, 2))
+        limits[1:, 1] = law.share
+        return {
+            "stiffness": law.stiffness,
+            "damping": law.damping,
+            "friction": limits,
+            "internal": self._pads((0.0, *law.stick_stiffness), limits, skew=law.share),
+            "flags": (1, 0, 0, ONE_SIDED),
+            "preload": _given(law.preload),
+        }
+
+    def _pads(
+        self, stiffness: Triple, limits: Floats, *, together: bool = True, skew: float = 0.0
+    ) -> Triple:
+        """Internal states of the friction forces along the axes that have a limit."""
+        axes = [k for k in range(3) if np.any(limits[k] > 0.0)]
+        together = together and len(axes) > 1
+        found = [-1, -1, -1]
+        for k in axes:
+            last = k == axes[-1]
+            number = float(len(axes) if last else 1) if together else 0.0
+            found[k] = self._state(PAD, (stiffness[k], number, skew if last else 0.0))
+        return found[0], found[1], found[2]
+
+    def _add_drive(self, element: FlatElement, law: AxleTorque) -> None:
+        assert isinstance(law, Traction | Brake)
+        begin, end = law.slip_control or (0.0, 0.0)
+        self.drive_rows.append(
+            {
+                "body": self._pair(element),
+                "row": (isinstance(law, Brake), law.over == "distance", begin, end),
+                "tables": (
+                    np.array(law.torque_table, dtype=float),
+                    np.array(law.demand_table or (), dtype=float).reshape(-1, 2),
+                ),
+            }
+        )
 
     def _add_loads(self, element: FlatElement, law: AppliedForce) -> None:
         point = np.array(element.point1) - self._centre(element.body1)
@@ -277,14 +353,15 @@ class ElementArrays:
         )
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
+        flags = _column(rows, "flags", (4,), np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
             row=_table(rows, floats, MOUNT_SIZE),
             friction=_column(rows, "friction", (3, 2)),
             internal=internal,
             curve=curve,
-            flags=_column(rows, "flags", (4,), np.int64),
-            law=np.flatnonzero((internal >= 0) | (curve >= 0)),
+            flags=flags,
+            law=mount_laws(internal, curve, flags),
         )
 
     def loads(self) -> Loads:
@@ -297,6 +374,17 @@ class ElementArrays:
             flags=_column(rows, "flags", (3,), np.int64),
             start=_starts(tables),
             table=np.concatenate(tables) if tables else np.zeros((0, 4)),
+        )
+
+    def drives(self) -> Drives:
+        """Arrays of all torques on wheelsets."""
+        rows = self.drive_rows
+        tables = [table for row in rows for table in row["tables"]]
+        return Drives(
+            body=_column(rows, "body", (2,), np.int64),
+            row=_column(rows, "row", (4,)),
+            start=_starts(tables),
+            table=np.concatenate(tables) if tables else np.zeros((0, 2)),
         )
 
     def curves(self) -> Curves:

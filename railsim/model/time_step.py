@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.errors import ModelError
+from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import N_SCALARS, System, Work
-from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
-from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
-from railsim.model.assembly import Model, work_arrays
+from railsim.kernels.time_loop import FAST, RK4, Chunk, Recorder, time_loop
+from railsim.model.assembly import Model
+from railsim.model.work import work_arrays
 
 Floats = NDArray[np.float64]
 Situation = tuple[System, Floats]
@@ -206,11 +207,7 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
             recorder,
             SCHEMES[scheme],
             h,
-            1,
-            1,
-            _NEVER,
-            0,
-            0,
+            Chunk(1, 1, _NEVER),
         )
         return after if status == RUNNING else np.full_like(after, np.nan)
 

@@ -16,17 +16,12 @@ from numpy.typing import NDArray
 from railsim.contact.creep import creep_force
 from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
 from railsim.contact.kalker import kalker_coefficients
+from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.plot.style import DISTINCT, Picture, styled
 
 Array = NDArray[np.float64]
 
-LAW_COLOURS = {
-    "fastsim": DISTINCT[0],
-    "table": DISTINCT[1],
-    "fastrip": DISTINCT[2],
-    "polach": DISTINCT[3],
-    "linear": DISTINCT[6],
-}
+LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
 CASES = {
     "longitudinal": (1.0, 0.0, 0.0),
     "lateral": (0.0, 1.0, 0.0),
@@ -70,7 +65,7 @@ class Patch(NamedTuple):
 
 
 def creep_curves_figure(
-    patch: Patch, laws: Sequence[str], nx: int = 10, ny: int = 10, exact_points: int = 7
+    patch: Patch, laws: Sequence[CreepLawName], nx: int = 10, ny: int = 10, exact_points: int = 7
 ) -> Figure:
     """Creep forces over normalised creepage, for six directions of creepage.
 
@@ -121,7 +116,7 @@ def _draw_curves(
     patch: Patch,
     direction: Sequence[float],
     scale: Array,
-    laws: Sequence[str],
+    laws: Sequence[CreepLawName],
     grid: tuple[int, int],
 ) -> None:
     unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
@@ -130,7 +125,7 @@ def _draw_curves(
         force = creep_force(
             patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu, law, *grid
         )
-        colour, label = LAW_COLOURS[law], law
+        colour, label = LAW_COLOURS[law], str(law)
         for values, shown, line in (
             (force.T_x, direction[0] != 0.0, "-"),
             (force.T_y, direction[1] != 0.0 or direction[2] != 0.0, "--"),

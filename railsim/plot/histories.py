@@ -4,7 +4,7 @@ The figures of the curving study: wheel load change, lateral force, derailment q
 lateral displacement and yaw, with the curve shaded and the limits of EN 14363 where they exist.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.definitions.layout import curvature_sections
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.notation import QUANTITIES, Quantity
-from railsim.plot.selection import LIMITS, STUDY, Line, Panel, panels
+from railsim.plot.selection import STUDY, Line, Panel, limit_of, panels
 from railsim.plot.style import (
     DISTINCT,
     LIMIT,
@@ -89,7 +89,7 @@ def _window(horizontal: Array, between: tuple[float, float]) -> slice:
     if stop - start < 2:
         found = f"nothing between {between[0]:g} and {between[1]:g}"
         allowed = f"the run goes from {horizontal[0]:.6g} to {horizontal[-1]:.6g}"
-        raise InputError([Fault("--between", "", found, allowed)])
+        raise InputError([argument_fault("between", "", found, allowed)])
     return slice(int(start), int(stop))
 
 
@@ -178,7 +178,7 @@ def _draw(
     axes.set_title(heading)
     axes.set_ylabel(unit_label(quantity))
     axes.margins(x=0.0)
-    draw_limit(axes, quantity)
+    draw_limit(axes, quantity, [result])
 
 
 def unit_label(quantity: Quantity) -> str:
@@ -190,11 +190,12 @@ def unit_label(quantity: Quantity) -> str:
     return f"{symbol}({unit})" if unit != "-" else symbol.strip()
 
 
-def draw_limit(axes: Axes, quantity: Quantity) -> None:
-    """Draw the limit of a quantity that has one."""
-    if quantity.name not in LIMITS:
+def draw_limit(axes: Axes, quantity: Quantity, results: Iterable[Result]) -> None:
+    """Draw the limit of a quantity that has one for these results."""
+    limit = limit_of(quantity.name, results)
+    if limit is None:
         return
-    value, words = LIMITS[quantity.name]
+    value, words = limit
     shown = value * quantity.scale
     axes.axhline(shown, color=LIMIT, lw=0.9, ls=(0, (6, 2)), zorder=1.5)
     axes.annotate(

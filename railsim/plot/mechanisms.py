@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism import AirSpring, Cam
+from railsim.definitions.mechanism_parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
 from railsim.mechanisms.drawing import Line, joint_points, lines, points, working_box
@@ -25,7 +25,7 @@ from railsim.plot.point_names import name_points
 from railsim.plot.style import DISTINCT, LIMIT, Picture
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimisation import Optimum
+    from railsim.mechanisms.optimum import Optimum
 
 Floats = NDArray[np.float64]
 DASHES: tuple[Any, ...] = (

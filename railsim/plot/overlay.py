@@ -1,6 +1,6 @@
 """The same quantities of several results in one picture, to be compared by eye."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 
 from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def overlay(
             for index, (result, panel) in enumerate(zip(results.values(), same, strict=True)):
                 if panel is not None:
                     _draw(axes, result[over], panel, DISTINCT[index % len(DISTINCT)])
-            _label(axes, next(panel for panel in same if panel is not None))
+            _label(axes, next(panel for panel in same if panel is not None), results.values())
             shade(axes, shown, named=same_radii and axes in cells[:columns])
         for axes in cells[max(0, count - columns) : count]:
             axes.set_xlabel(first.quantities[over].label)
@@ -78,7 +78,7 @@ def _draw(axes: Axes, horizontal: Array, panel: Panel, colour: str) -> None:
         axes.plot(horizontal, line.values * panel.quantity.scale, color=colour, ls=style)
 
 
-def _label(axes: Axes, panel: Panel) -> None:
+def _label(axes: Axes, panel: Panel, results: Iterable[Result]) -> None:
     quantity = panel.quantity
     places = {
         label for line in panel.lines for dim, label in line.labels.items() if dim != "side"
@@ -90,7 +90,7 @@ def _label(axes: Axes, panel: Panel) -> None:
     axes.set_ylabel(unit_label(quantity))
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     axes.margins(x=0.0)
-    draw_limit(axes, quantity)
+    draw_limit(axes, quantity, results)
 
 
 def _legend(labels: Sequence[str], drawn: Mapping[str, Sequence[Panel]]) -> list[Line2D]:

@@ -5,7 +5,7 @@ A selection is the name of a quantity, followed by the places that it is wanted 
 number from the leading end.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -16,11 +16,20 @@ from railsim.result.data import Array
 
 MOST_LINES = 24
 
-STUDY = ("dQ_over_Q0", "sum_abs_Y", "Y_over_Q", "wheelset_roll", "wheelset_lateral", "wheelset_yaw")
+STUDY = ("dQ_over_Q0", "sum_Y", "Y_over_Q", "wheelset_roll", "wheelset_lateral", "wheelset_yaw")
 """What is drawn unless told otherwise."""
 
 LIMITS = {"Y_over_Q": (0.8, "EN 14363: 0.8"), "dQ_over_Q0": (-0.6, "EN 14363: −60 %")}
 """EN 14363 (2016): derailment quotient, on-track tests; wheel unloading, twisted track [SI]."""
+TWIST_TEST_SPEED = 3.0
+"""Speed up to which the limit of wheel unloading holds, that of the test on twisted track [m/s]."""
+
+
+def limit_of(name: str, results: Iterable[Result]) -> tuple[float, str] | None:
+    """Return the limit of a quantity and its words, where it applies to all of some results."""
+    if name == "dQ_over_Q0" and any(result.speed > TWIST_TEST_SPEED for result in results):
+        return None
+    return LIMITS.get(name)
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,14 @@ seen from the rail, within its first half and round (the contour turns back behi
 of a rail: a crown from which the contour only falls, 14 mm or more on the gauge side.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_smoothing_spline
 
-from railsim.errors import Fault, InputError
 from railsim.profiles.profile import FLANGE_BACK, Kind, Profile
 from railsim.profiles.readers import RawProfile
+from railsim.profiles.smoothing import Points, smoothed_points, used_part
 
 Array = NDArray[np.float64]
 
@@ -37,36 +35,6 @@ GAUGE_SIDE_DEPTH = 0.0140
 STANDARD_INCLINATIONS = (1 / 20, 1 / 30, 1 / 40)
 UPRIGHT = 4e-3
 """Lean that measuring noise and wear may feign [1]."""
-
-CURVATURE_NOISE = 3.0
-"""Curvature that noise may leave after smoothing [1/m], some 4 % of a gauge corner's."""
-
-SMOOTHING_WAVES = (1.0e-3, 10.0e-3)
-"""Shortest and longest wave that smoothing halves [m]."""
-
-LARGEST_NOISE = 0.1e-3
-"""Noise beyond which nothing is left of the curvatures after smoothing [m]."""
-
-NOISE_FLOOR = 0.15e-6
-"""Noise below this is the rounding of printed numbers and is left alone [m]."""
-
-
-@dataclass
-class _Work:
-    """Points on their way to a profile."""
-
-    file: str
-    y: Array
-    z: Array
-    line: NDArray[np.int64]
-    notes: list[str]
-
-    def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:
-        key = "" if at is None else f"line {int(self.line[at])}"
-        return InputError([Fault(self.file, key, found, remedy)])
-
-    def keep(self, which: Array | NDArray[np.bool_] | NDArray[np.int64]) -> None:
-        self.y, self.z, self.line = self.y[which], self.z[which], self.line[which]
 
 
 def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> Profile:
@@ -94,7 +62,7 @@ def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> 
     kind = kind or raw.kind
     if kind is None:
         kind = "wheel" if _looks_like_wheel(raw) else "rail"
-    work = _Work(file, raw.y.copy(), raw.z.copy(), raw.line, list(raw.notes))
+    work = Points(file, raw.y.copy(), raw.z.copy(), raw.line, list(raw.notes))
     if raw.y.size < FEWEST_POINTS:
         raise work.fail(
             f"{raw.y.size} points", f"a profile needs {FEWEST_POINTS} or more, 0.5 mm apart"
@@ -113,7 +81,7 @@ def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> 
     else:
         inclination = _orient_rail(work)
     _check_steps(work, kind)
-    y, z = _smoothed(work)
+    y, z = smoothed_points(work)
     _check_overhang(work, kind, y, z)
     level = float(np.interp(0.0, *_function_part(y, z, 0.0)) if kind == "wheel" else z.min())
     smoothed = y is not work.y
@@ -136,7 +104,7 @@ def _looks_like_wheel(raw: RawProfile) -> bool:
     return bool(width * scale > 0.095)
 
 
-def _to_metres(work: _Work, unit: float | None, kind: Kind) -> None:
+def _to_metres(work: Points, unit: float | None, kind: Kind) -> None:
     """Convert to metres, from the file's unit or from the size."""
     width = float(np.ptp(work.y))
     sizes = (0.060, 0.220) if kind == "wheel" else (0.030, 0.250)
@@ -164,11 +132,11 @@ def _to_metres(work: _Work, unit: float | None, kind: Kind) -> None:
     work.y, work.z = work.y * unit, work.z * unit
 
 
-def _distances(work: _Work) -> Array:
+def _distances(work: Points) -> Array:
     return np.hypot(np.diff(work.y), np.diff(work.z))
 
 
-def _remove_double_points(work: _Work) -> None:
+def _remove_double_points(work: Points) -> None:
     double = np.concatenate(([False], _distances(work) < 1e-9))
     if double.any():
         work.notes.append(f"{int(double.sum())} double points left out")
@@ -177,7 +145,7 @@ def _remove_double_points(work: _Work) -> None:
         raise work.fail(f"{work.y.size} different points", f"{FEWEST_POINTS} or more are needed")
 
 
-def _bring_into_order(work: _Work) -> None:
+def _bring_into_order(work: Points) -> None:
     """Sort points by y if that, and not the file's order, makes a contour."""
     in_file = _distances(work)
     order = np.argsort(work.y, kind="stable")
@@ -193,7 +161,7 @@ def _bring_into_order(work: _Work) -> None:
         _remove_double_points(work)
 
 
-def _remove_outliers(work: _Work) -> None:
+def _remove_outliers(work: Points) -> None:
     """Leave out single points that stand off the line through their neighbours."""
     removed: list[int] = []
     for _ in range(max(work.y.size // 50, 1) + 1):
@@ -222,7 +190,7 @@ def _remove_outliers(work: _Work) -> None:
         work.notes.append(f"{len(removed)} outliers left out (line {lines})")
 
 
-def _check_holes(work: _Work) -> None:
+def _check_holes(work: Points) -> None:
     distance = _distances(work)
     at = int(np.argmax(distance))
     if distance[at] > LARGEST_HOLE:
@@ -235,7 +203,7 @@ def _check_holes(work: _Work) -> None:
         )
 
 
-def _orient_wheel(work: _Work) -> None:
+def _orient_wheel(work: Points) -> None:
     """Flange to negative y, z outwards from the axle; refuse what has no flange."""
     candidates = []
     for sign in (1.0, -1.0):
@@ -280,13 +248,13 @@ def _orient_wheel(work: _Work) -> None:
     _flange_side_first(work)
 
 
-def _flange_side_first(work: _Work) -> None:
+def _flange_side_first(work: Points) -> None:
     """Contour from the flange (gauge) side to the field side."""
     if work.y[0] > work.y[-1]:
         work.keep(np.arange(work.y.size)[::-1])
 
 
-def _rail_like(work: _Work) -> bool:
+def _rail_like(work: Points) -> bool:
     """Whether the contour falls on both sides, or on one side without turning back."""
     for z in (work.z, -work.z):
         top = int(np.argmin(z))
@@ -295,7 +263,7 @@ def _rail_like(work: _Work) -> bool:
     return False
 
 
-def _place_wheel(work: _Work) -> None:
+def _place_wheel(work: Points) -> None:
     """Origin at the tape circle; from the wheel back where the file has it there."""
     tip = int(np.argmax(work.z))
     before = work.y[: tip + 1]
@@ -338,7 +306,7 @@ def _function_part(y: Array, z: Array, place: float) -> tuple[Array, Array]:
     return y[first : last + 1], z[first : last + 1]
 
 
-def _orient_rail(work: _Work) -> float:
+def _orient_rail(work: Points) -> float:
     """Crown up (z down), gauge side at negative y; inclination that the points carry."""
     widths = []
     for sign in (1.0, -1.0):
@@ -396,7 +364,7 @@ def _orient_rail(work: _Work) -> float:
     return float(inclination)
 
 
-def _flank_inclination(work: _Work) -> float | None:
+def _flank_inclination(work: Points) -> float | None:
     """Lean of the head's middle line between both flanks, gauge side positive [1]."""
     top = int(np.argmin(work.z))
     lower = min(float(work.z[: top + 1].max()), float(work.z[top:].max()))
@@ -418,16 +386,16 @@ def _flank_inclination(work: _Work) -> float | None:
     return float(slope)
 
 
-def _crossing(work: _Work, i: int, j: int, depth: float) -> float:
+def _crossing(work: Points, i: int, j: int, depth: float) -> float:
     share = (depth - work.z[i]) / (work.z[j] - work.z[i])
     return float(work.y[i] + share * (work.y[j] - work.y[i]))
 
 
-def _check_steps(work: _Work, kind: Kind) -> None:
+def _check_steps(work: Points, kind: Kind) -> None:
     """Refuse vertical steps where wheel and rail touch."""
     dy, dz = np.diff(work.y), np.diff(work.z)
     angle = np.abs(np.degrees(np.arctan2(np.abs(dz), dy)))
-    used = _used(work.y, work.z, kind)
+    used = used_part(work.y, work.z, kind)
     for i in np.flatnonzero(used & (np.abs(dz) > STEP) & (angle > 60.0)):
         before = angle[max(i - 3, 0) : i]
         after = angle[i + 1 : i + 4]
@@ -440,19 +408,9 @@ def _check_steps(work: _Work, kind: Kind) -> None:
             )
 
 
-def _used(y: Array, z: Array, kind: Kind) -> NDArray[np.bool_]:
-    """Intervals between points on which wheel and rail may touch."""
-    middle_y, middle_z = 0.5 * (y[1:] + y[:-1]), 0.5 * (z[1:] + z[:-1])
-    if kind == "rail":
-        return np.asarray(middle_z < 0.012)
-    tip = int(np.argmax(z))
-    beside_tip = (np.arange(middle_y.size) > tip) & (middle_y > y[tip] + 3e-3)
-    return np.asarray(beside_tip & (middle_y < 0.040))
-
-
-def _check_overhang(work: _Work, kind: Kind, y: Array, z: Array) -> None:
+def _check_overhang(work: Points, kind: Kind, y: Array, z: Array) -> None:
     """Refuse a contour that runs back where wheel and rail touch."""
-    overhang = np.flatnonzero(_used(y, z, kind) & (np.diff(y) <= 0.0))
+    overhang = np.flatnonzero(used_part(y, z, kind) & (np.diff(y) <= 0.0))
     if overhang.size:
         at = int(overhang[0])
         raise work.fail(
@@ -460,54 +418,3 @@ def _check_overhang(work: _Work, kind: Kind, y: Array, z: Array) -> None:
             "a profile may not overhang where wheel and rail touch",
             at,
         )
-
-
-def _smoothed(work: _Work) -> tuple[Array, Array]:
-    """Points smoothed as much as their noise demands, no more.
-
-    The noise is estimated from how much each point departs from the cubic through its four
-    neighbours; the smoothing spline over the contour's length halves waves of the length L at
-    which the curvature's noise, noise (2 pi/L)^2 sqrt(spacing/L), falls to `CURVATURE_NOISE`.
-    """
-    y, z = work.y, work.z
-    s = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
-    noise = np.hypot(_noise(s, y), _noise(s, z))
-    if noise < NOISE_FLOOR:
-        return y, z
-    if noise > LARGEST_NOISE:
-        raise work.fail(
-            f"noise of {1e3 * noise:.2f} mm from point to point",
-            f"up to {1e3 * LARGEST_NOISE:.1f} mm can be smoothed; measure again",
-        )
-    spacing = float(s[-1] / (s.size - 1))
-    wave = float((noise * (2 * np.pi) ** 2 * np.sqrt(spacing) / CURVATURE_NOISE) ** 0.4)
-    wave = float(np.clip(wave, *SMOOTHING_WAVES))
-    if wave <= 2.5 * spacing:
-        return y, z
-    # a smoothing spline with penalty lam on the second derivative halves the wave 2 pi (lam ds)^1/4
-    lam = (wave / (2 * np.pi)) ** 4 / spacing
-    smooth_y = make_smoothing_spline(s, y, lam=lam)(s)
-    smooth_z = make_smoothing_spline(s, z, lam=lam)(s)
-    change = np.hypot(smooth_y - y, smooth_z - z)
-    work.notes.append(
-        f"noise of {1e6 * noise:.1f} um: smoothed over {1e3 * wave:.1f} mm, points moved by "
-        f"{1e6 * np.sqrt(np.mean(change**2)):.1f} um rms, {1e6 * change.max():.0f} um at most"
-    )
-    return smooth_y, smooth_z
-
-
-def _noise(s: Array, values: Array) -> float:
-    """Robust estimate of the noise of samples over s [unit of values]."""
-    n = values.size
-    if n < 8:
-        return 0.0
-    centre = np.arange(2, n - 2)
-    weights = np.ones((centre.size, 4))
-    places = s[centre[:, None] + np.array([-2, -1, 1, 2])]
-    for a in range(4):
-        for b in range(4):
-            if a != b:
-                weights[:, a] *= (s[centre] - places[:, b]) / (places[:, a] - places[:, b])
-    predicted = np.sum(weights * values[centre[:, None] + np.array([-2, -1, 1, 2])], axis=1)
-    spread = np.sqrt(1.0 + np.sum(weights**2, axis=1))
-    return float(np.median(np.abs(values[centre] - predicted) / spread) / 0.6745)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.layout import Section, curvature_sections
-from railsim.plot.selection import LIMITS, STUDY
+from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result
 from railsim.text import printable
 
@@ -126,7 +126,7 @@ def _quantity(
             values[row, :count] = thin.T.reshape(count, sides, -1)
     values *= quantity.scale
     low, high, codes = coded(values)
-    limit = LIMITS.get(name)
+    limit = limit_of(name, results.values())
     return {
         "name": name,
         "words": quantity.long_name[:1].upper() + quantity.long_name[1:],

@@ -18,7 +18,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from railsim.definitions.mechanism import AirSpring
+from railsim.definitions.mechanism_parts import AirSpring
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.comparison import Comparison
@@ -32,7 +32,7 @@ from railsim.plot.style import styled
 from railsim.version import __version__
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimisation import Optimum
+    from railsim.mechanisms.optimum import Optimum
 
 DPI = 130
 FRAMES = 121

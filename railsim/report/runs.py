@@ -189,8 +189,8 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
         ["", *(printable(str(record["name"])) for record in shown)],
         [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
     )
-    texts = ["Largest magnitudes over all steps of the runs, with their signs; wheelsets count "
-             "from the leading end."]  # fmt: skip
+    texts = ["Largest magnitudes over all steps of the runs after their starts, with their "
+             "signs; wheelsets count from the leading end."]  # fmt: skip
     if len(shown) < len(_done(records)):
         texts.append(f"{len(shown)} of {len(_done(records))} runs, those with the largest values; "
                      "all others are in the spread and in the study's summary.csv.")  # fmt: skip
@@ -219,7 +219,7 @@ def _spread(records: Sequence[Record], data: dict[str, Any]) -> Section | None:
         rows,
         f"Spread over {len(done)} runs",
         words=frozenset({0, 2, 5}),
-        note="Peaks and values at mid-curve by magnitude, over all wheels.",
+        note="Peaks and medians over full curves by magnitude, over all wheels.",
     )
     texts = [f"Varied: {', '.join(map(printable, varied))}."]
     return Section("spread", "Over the study", texts, plots=["spread"], details=[table])

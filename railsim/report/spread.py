@@ -68,10 +68,14 @@ def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
             words = f"{quantity.long_name}, {WORDS[peak['kind']]}"
             rows.append((f"{quantity.name}_{peak['kind']}", words, quantity, value))
     for number, curve in enumerate(record.get("mid_curves", ()), start=1):
-        for name, value in curve["largest"].items():
+        # records of earlier versions have the middle of the curve alone
+        steady, where = curve.get("largest_medians"), "full curve"
+        if steady is None:
+            steady, where = curve["largest"], "middle of curve"
+        for name, value in steady.items():
             if name in QUANTITIES and value is not None:
                 quantity = QUANTITIES[name]
-                words = f"{quantity.long_name}, middle of curve {number}"
+                words = f"{quantity.long_name}, {where} {number}"
                 rows.append((f"{name}_mid{number}", words, quantity, abs(value)))
     return rows
 

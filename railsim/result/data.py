@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 D = TypeVar("D")
 Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]
+Writer = Callable[["Result", str | Path, bool], Path]
+_WRITERS: dict[str, Writer] = {}  # of files; each enters itself when the package is imported
+
+
+def register_writer(kind: str, write: Writer) -> None:
+    """Let `Result` write files of a kind: the layout of a file is built on this module."""
+    _WRITERS[kind] = write
 
 
 class Result:
@@ -359,9 +366,7 @@ class Result:
         InputError
             The file exists and may not be overwritten, or cannot be written.
         """
-        from railsim.result.hdf5 import write
-
-        return write(self, path, overwrite=overwrite)
+        return _WRITERS["hdf5"](self, path, overwrite)
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the arrays as an `xarray.Dataset` with named coordinates and units.

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, argument_fault
 from railsim.files import check_file, whole_file
 from railsim.result.data import Array, Result
 
@@ -86,7 +86,7 @@ def _parquet(result: Result, path: Path) -> None:
     except ImportError as error:
         found = f"the package '{error.name}' is not installed"
         allowed = "install it with: pip install pandas pyarrow"
-        raise InputError([Fault("--out", "", found, allowed)]) from None
+        raise InputError([argument_fault("path", "", found, allowed, "--out")]) from None
     frame = pandas.DataFrame({name: values for name, _, values in columns(result)})
     frame.attrs = {"units": {name: unit for name, unit, _ in columns(result)}}
     with open(path, "wb") as file:

@@ -1,14 +1,17 @@
 """Largest values of a result with the place where they occur, and values at mid-curve."""
 
+import math
+import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from railsim.definitions.layout import curvature_sections
+from railsim.definitions.layout import Section, curvature_sections
 from railsim.notation import Quantity
 from railsim.result.data import Array, Result
+from railsim.result.filters import low_passed
 
 PEAK_QUANTITIES = (
     "Q",
@@ -23,6 +26,17 @@ PEAK_QUANTITIES = (
     "T_gamma",
 )
 """What peak tables list unless told otherwise."""
+
+LOW_PASS = 20.0
+"""Low pass of forces in EN 14363 [Hz]."""
+FORCES = ("Q", "dQ_over_Q0", "Y", "Y_over_Q", "sum_Y", "sum_abs_Y")
+"""Quantities whose peaks are also given after that low pass."""
+LEAST_RATE = 2.5
+"""Outputs per period of the low pass at least."""
+DEVIATION = (15.87, 84.13)
+"""Percentiles that are one standard deviation from the median of a normal distribution."""
+SETTLING = 1.0 / 3.0
+"""Share of a full curve in which the vehicle settles."""
 
 BY_SIGN = ("dQ_over_Q0",)
 """Quantities whose largest and smallest value are two different questions (overload, unloading)."""
@@ -46,6 +60,9 @@ class Peak:
         Distance of the reference body at that time [m].
     kind : {"abs", "max", "min"}
         Largest magnitude, largest or smallest value.
+    smooth : float
+        The same extreme value of the quantity after a low pass of `LOW_PASS`; NaN where it is not
+        known: outputs too seldom, or not at equal times [SI].
     """
 
     quantity: Quantity
@@ -54,6 +71,7 @@ class Peak:
     time: float
     distance: float
     kind: str = "abs"
+    smooth: float = math.nan
 
     @property
     def shown(self) -> float:
@@ -70,11 +88,12 @@ class Peak:
             **self.labels,
             "time": self.time,
             "distance": self.distance,
+            **({} if math.isnan(self.smooth) else {"low_pass_20_hz": self.smooth}),
         }
 
 
 def peak(result: Result, name: str, kind: str = "abs") -> Peak:
-    """Return the extreme value of a quantity.
+    """Return the extreme value of a quantity over the part of the run that is evaluated.
 
     Parameters
     ----------
@@ -87,32 +106,42 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
 
     Notes
     -----
-    Of the quantities in the group ``peaks`` over all steps of the run, of others over its outputs.
+    Of the quantities in the group ``peaks`` over all steps of the run, of others over its outputs;
+    from the attribute ``evaluation_start`` on, in files without it over the whole run.
     """
     if name in result.groups.get("peaks", {}):
         return _peak_of_steps(result, name, kind)
-    array = result[name]
-    keys: dict[str, Array] = {"abs": np.abs(array), "max": array, "min": -array}
-    key = keys[kind]
-    place = np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
-    quantity = result.quantities[name]
-    instant = place[0]
+    rows = evaluated(result)
+    array = result.part(name, rows)
+    place = _extreme(array, kind)
     return Peak(
-        quantity,
+        result.quantities[name],
         float(array[place]),
         _labels(result, name, place[1:]),
-        float(result["time"][instant]),
-        float(result["distance"][instant]),
+        float(result["time"][rows][place[0]]),
+        float(result["distance"][rows][place[0]]),
         kind,
     )
+
+
+def evaluated(result: Result) -> slice:
+    """Instants of a result that peaks are evaluated over; all where none is in that part."""
+    begin = float(result.attributes.get("evaluation_start", -math.inf))
+    first = int(np.searchsorted(result["time"], begin - 1e-9))
+    return slice(first if first < len(result["time"]) else 0, None)
+
+
+def _extreme(array: Array, kind: str) -> tuple[Any, ...]:
+    """Place of the extreme value of an array; values that are not a number are left out."""
+    key = {"abs": np.abs(array), "max": array, "min": -array}[kind]
+    return np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
 
 
 def _peak_of_steps(result: Result, name: str, kind: str) -> Peak:
     found = result.groups["peaks"]
     rows = {"abs": slice(0, 2), "max": slice(0, 1), "min": slice(1, 2)}[kind]
     values = found[name][rows]
-    key = {"abs": np.abs(values), "max": values, "min": -values}[kind]
-    place = np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
+    place = _extreme(values, kind)
     return Peak(
         result.quantities[name],
         float(values[place]),
@@ -121,6 +150,40 @@ def _peak_of_steps(result: Result, name: str, kind: str) -> Peak:
         float(found[f"{name}_distance"][rows][place]),
         kind,
     )
+
+
+def low_pass_of(result: Result, name: str) -> Array | None:
+    """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
+
+    Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
+    has lifted does not spoil the rest.  None where outputs are too seldom or not at equal times.
+    """
+    time = result["time"]
+    if len(time) < 3:
+        return None
+    steps = np.diff(time[: len(time) - 1])  # the last one may be shorter
+    step = float(np.mean(steps))
+    if np.ptp(steps) > 1e-6 * step or step * LOW_PASS * LEAST_RATE > 1.0:
+        return None
+    rate = 1.0 / step
+    if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
+        outwards = np.array([-1.0, 1.0])
+        Y, Q = (low_passed(result[part], rate, LOW_PASS) for part in ("Y", "Q"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            smooth = np.where(Q > 0.0, outwards * Y / Q, np.nan)
+    else:
+        array = result[name]
+        if np.isnan(array).any():
+            return None
+        smooth = low_passed(array, rate, LOW_PASS)
+    return np.asarray(smooth[evaluated(result)])
+
+
+def _with_low_pass(result: Result, found: Peak) -> Peak:
+    smooth = low_pass_of(result, found.quantity.name)
+    if smooth is None or not len(smooth) or np.isnan(smooth).all():
+        return found
+    return replace(found, smooth=float(smooth[_extreme(smooth, found.kind)]))
 
 
 def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...]:
@@ -146,12 +209,14 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     for name in names:
         kinds = ("max", "min") if name in BY_SIGN else ("abs",)
         found.extend(peak(result, name, kind) for kind in kinds)
-    return tuple(found)
+    return tuple(
+        _with_low_pass(result, each) if each.quantity.name in FORCES else each for each in found
+    )
 
 
 @dataclass(frozen=True)
 class MidCurve:
-    """Values while the reference body passes the middle of a circular element.
+    """Values in a circular element: at its middle, and over the full curve.
 
     Attributes
     ----------
@@ -165,6 +230,14 @@ class MidCurve:
         Quantity to its values, without the dimension time [SI].
     peaks : tuple of Peak
         Largest magnitude of every quantity over its places.
+    medians, scatter : mapping of str to ndarray
+        Median over the full curve, and half the distance between the percentiles 15.87 and 84.13,
+        which is one standard deviation of a normal distribution [SI].
+    median_peaks : tuple of Peak
+        Largest median of every quantity over its places.
+    full_curve : (float, float)
+        Where the reference body is while all wheelsets are in the full curve, without the
+        first third of it [m]; where it is shorter than that, its middle.
     """
 
     radius: float
@@ -172,6 +245,10 @@ class MidCurve:
     time: float
     values: Mapping[str, Array]
     peaks: tuple[Peak, ...]
+    medians: Mapping[str, Array]
+    scatter: Mapping[str, Array]
+    median_peaks: tuple[Peak, ...]
+    full_curve: tuple[float, float]
 
     def record(self) -> dict[str, Any]:
         """Return the values as plain numbers and strings, SI."""
@@ -181,13 +258,17 @@ class MidCurve:
             "time": self.time,
             "values": {name: values.tolist() for name, values in self.values.items()},
             "largest": {peak.quantity.name: peak.value for peak in self.peaks},
+            "largest_medians": {peak.quantity.name: peak.value for peak in self.median_peaks},
+            "full_curve": list(self.full_curve),
+            "medians": {name: values.tolist() for name, values in self.medians.items()},
+            "scatter": {name: values.tolist() for name, values in self.scatter.items()},
         }
 
 
 def mid_curves(result: Result, names: Iterable[str] | None = None) -> tuple[MidCurve, ...]:
     """Return the values at the middle of every circular element that was passed.
 
-    They are interpolated linearly between the two instants around the middle.
+    Those at the middle are interpolated linearly between the two instants around it.
 
     Parameters
     ----------
@@ -204,11 +285,24 @@ def mid_curves(result: Result, names: Iterable[str] | None = None) -> tuple[MidC
     for section in curvature_sections(result.track()):
         middle = 0.5 * (section.begin + section.end)
         if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:
-            found.append(_mid_curve(result, wanted, 1.0 / section.start_value, middle))
+            found.append(_mid_curve(result, wanted, section))
     return tuple(found)
 
 
-def _mid_curve(result: Result, names: list[str], radius: float, middle: float) -> MidCurve:
+def _full_curve(result: Result, section: Section) -> tuple[float, float]:
+    """Part of the way over which the whole vehicle is in the full curve, less its first third."""
+    middle = 0.5 * (section.begin + section.end)
+    ahead = behind = 0.0
+    if "wheelset_distance" in result:
+        offset = result["wheelset_distance"][0] - result["distance"][0]
+        ahead, behind = float(np.max(offset)), float(np.min(offset))
+    begin, end = section.begin - behind, section.end - ahead
+    begin += SETTLING * (end - begin)
+    return (begin, end) if begin < middle < end else (middle, middle)
+
+
+def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
+    radius, middle = 1.0 / section.start_value, 0.5 * (section.begin + section.end)
     distance = result["distance"]
     after = max(1, int(np.searchsorted(distance, middle)))
     share = (middle - distance[after - 1]) / (distance[after] - distance[after - 1])
@@ -219,13 +313,33 @@ def _mid_curve(result: Result, names: list[str], radius: float, middle: float) -
 
     values = {name: there(name) for name in names}
     time = float(there("time"))
-    largest = []
+    largest = [_largest(result, name, array, time, middle) for name, array in values.items()]
+    begin, end = _full_curve(result, section)
+    rows = slice(
+        int(np.searchsorted(distance, begin)), int(np.searchsorted(distance, end, "right"))
+    )
+    medians: dict[str, Array] = {}
+    scatter: dict[str, Array] = {}
     for name, array in values.items():
-        place = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
-        labels = _labels(result, name, place)
-        peak = Peak(result.quantities[name], float(array[place]), labels, time, middle)
-        largest.append(peak)
-    return MidCurve(radius, middle, time, values, tuple(largest))
+        over = result.part(name, rows)
+        if len(over) < 2:
+            medians[name], scatter[name] = array, np.zeros_like(array)
+            continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a wheel that never carries: NaN
+            bounds = np.nanpercentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
+        medians[name], scatter[name] = bounds[1], 0.5 * (bounds[2] - bounds[0])
+    steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
+    return MidCurve(
+        radius, middle, time, values, tuple(largest), medians, scatter, steady, (begin, end)
+    )  # fmt: skip
+
+
+def _largest(result: Result, name: str, array: Array, time: float, distance: float) -> Peak:
+    """Largest magnitude over the places of a quantity."""
+    place = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
+    labels = _labels(result, name, place)
+    return Peak(result.quantities[name], float(array[place]), labels, time, distance)
 
 
 def _labels(result: Result, name: str, place: tuple[Any, ...]) -> dict[str, str]:

@@ -35,7 +35,7 @@ from railsim.errors import Fault, InputError
 from railsim.files import PartialFile, check_file
 from railsim.notation import EXTREMES, QUANTITIES, Quantity
 from railsim.profiles.profile import Profile
-from railsim.result.data import Array, Attributes, Result, frozen
+from railsim.result.data import Array, Attributes, Result, frozen, register_writer
 from railsim.result.integrity import DIGEST, content_digest, seal
 from railsim.result.reading import open_result
 from railsim.result.sinks import (
@@ -284,6 +284,9 @@ def write(
         statics = {name: result[name] for name in chosen if "time" not in chosen[name].dims}
         sink.close(result.attributes, statics, result.profiles, _groups_of(result, chosen))
     return sink.path
+
+
+register_writer("hdf5", lambda result, path, overwrite: write(result, path, overwrite=overwrite))
 
 
 def _groups_of(result: Result, chosen: Mapping[str, Quantity]) -> dict[str, Mapping[str, Any]]:

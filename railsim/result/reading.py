@@ -30,8 +30,9 @@ ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
 ARRAYS = ("time", "distance")
 DIMENSIONS = ("wheelset", "side", "body")
 NUMBERS = (
-    "speed", "start", "duration", "asked_duration", "asked_until", "step", "wall_time", "cpu_time",
-    "real_time_factor", "runs_together", "patches_evaluated", "patches_out_of_range",
+    "speed", "start", "duration", "evaluation_start", "asked_duration", "asked_until", "step",
+    "wall_time", "cpu_time", "real_time_factor", "runs_together", "patches_evaluated",
+    "patches_out_of_range",
 )  # fmt: skip
 STATES = ("complete", "derailed", "stopped")
 

@@ -1,4 +1,4 @@
-"""Accelerometers on bodies: what they read at chosen points.
+"""Sensors on bodies: how their points move, and what accelerometers read there.
 
 An accelerometer reads the acceleration of its point minus gravity, in the axes of the body it is
 fixed to; the rest value of its z axis, -g, is taken out.  On canted track, or when the body rolls,
@@ -17,6 +17,8 @@ from railsim.track.alignment import Alignment
 
 Floats = NDArray[np.float64]
 GRAVITY = 9.81
+BOX = 1.0
+"""Distance of a sensor on an axlebox from the middle of the wheelset [m]."""
 NEAR = 3.0
 """A frame above a wheelset lies no further from it than this along the vehicle [m]."""
 
@@ -33,11 +35,14 @@ class Sensor:
         Arc length of the body's frame beyond that of the reference body [m].
     arm : tuple of float
         Point from the centre of gravity, body axes [m].
+    axlebox : bool
+        On a wheelset: the sensor does not spin with it.
     """
 
     body: str
     offset: float
     arm: tuple[float, float, float]
+    axlebox: bool = False
 
 
 def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
@@ -76,6 +81,62 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
         arm = (place[0] - cg[0], place[1] - cg[1], place[2] - cg[2])
         placed[name] = Sensor(body, cg[0] - origin, arm)
     return placed
+
+
+def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
+    """Sensors of `sensors`, on the axleboxes, and those of the vehicle's table ``sensors``.
+
+    ``axlebox_1_left``, ... on each wheelset at the height of its axle, where elements of the
+    primary suspension are joined to it or its axleboxes, or 1 m from the middle.
+    """
+    flat = flatten(vehicle)
+    bodies = {body.name: body for body in flat.bodies}
+    origin = bodies[flat.reference].position[0]
+    found = sensors(vehicle)
+    for number, wheelset in enumerate(flat.of_kind("wheelset"), start=1):
+        x, y, _ = wheelset.position
+        boxes = [box for box in flat.bodies if box.parent == wheelset.name]
+        across = max((abs(box.position[1] - y) for box in boxes), default=BOX)
+        for side, sign in (("left", -1.0), ("right", 1.0)):
+            arm = (0.0, sign * across, 0.0)
+            found[f"axlebox_{number}_{side}"] = Sensor(wheelset.name, x - origin, arm, axlebox=True)
+    for name, point in vehicle.sensors.items():
+        cg = bodies[point.body].position
+        arm = (point.position[0] - cg[0], point.position[1] - cg[1], point.position[2] - cg[2])
+        on_axle = bodies[point.body].kind == "wheelset"
+        found[name] = Sensor(point.body, cg[0] - origin, arm, on_axle)
+    return found
+
+
+def motions(
+    chosen: Mapping[str, Sensor], motion: Mapping[str, Floats], bodies: tuple[str, ...]
+) -> dict[str, Floats]:
+    """Displacements, velocities and absolute accelerations of sensors, float64[time, sensor, 3].
+
+    Displacements and velocities are those against the moving track frame of the body, in its axes;
+    accelerations in the axes of the body.
+    """
+    shape = (len(motion["distance"]), len(chosen), 3)
+    found = {
+        f"sensor_{name}": np.zeros(shape)
+        for name in ("displacement", "velocity", "absolute_acceleration")
+    }
+    for number, sensor in enumerate(chosen.values()):
+        b = bodies.index(sensor.body)
+        position, rates = motion["body_position"][:, b], motion["body_velocity"][:, b]
+        absolute, arm = motion["body_acceleration"][:, b], np.array(sensor.arm)
+        roll, pitch, yaw = _attitude(sensor, position)
+        turned = _out_of_body(np.broadcast_to(arm, (len(roll), 3)), roll, pitch, yaw)
+        found["sensor_displacement"][:, number] = position[:, :3] + turned - arm
+        spin = _turning(sensor, rates)
+        found["sensor_velocity"][:, number] = rates[:, :3] + _out_of_body(
+            np.cross(spin, arm), roll, pitch, yaw
+        )
+        angular = _turning(sensor, absolute)
+        found["sensor_absolute_acceleration"][:, number] = (
+            absolute[:, :3] + np.cross(angular, arm) + np.cross(spin, np.cross(spin, arm))
+        )
+    return found
 
 
 def readings(
@@ -148,11 +209,34 @@ def _of_body(
         ],
         axis=-1,
     )
-    roll, pitch, yaw = position[:, 3], position[:, 4], position[:, 5]
+    roll, pitch, yaw = _attitude(sensor, position)
     linear = absolute[:, :3] - GRAVITY * _into_body(down, roll, pitch, yaw)
     linear[:, 2] += GRAVITY
-    omega = rates[:, 3:] + _into_body(turning, roll, pitch, yaw)
-    return linear, omega, absolute[:, 3:]
+    omega = _turning(sensor, rates) + _into_body(turning, roll, pitch, yaw)
+    return linear, omega, _turning(sensor, absolute)
+
+
+def _attitude(sensor: Sensor, position: Floats) -> tuple[Floats, Floats, Floats]:
+    """Roll, pitch and yaw of the axes of a sensor; an axlebox does not spin with its wheelset."""
+    pitch = np.zeros(len(position)) if sensor.axlebox else position[:, 4]
+    return position[:, 3], pitch, position[:, 5]
+
+
+def _turning(sensor: Sensor, rates: Floats) -> Floats:
+    """Angular velocity or acceleration of the axes of a sensor."""
+    turning = np.array(rates[:, 3:])
+    if sensor.axlebox:
+        turning[:, 1] = 0.0
+    return turning
+
+
+def _out_of_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
+    """Components in track axes of a vector in body axes: C v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
+    x, y, z = vector.T
+    x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
+    y, z = np.cos(roll) * y - np.sin(roll) * z, np.cos(roll) * z + np.sin(roll) * y
+    x, y = np.cos(yaw) * x - np.sin(yaw) * y, np.cos(yaw) * y + np.sin(yaw) * x
+    return np.stack([x, y, z], axis=-1)
 
 
 def _into_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:

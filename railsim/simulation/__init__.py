@@ -1,9 +1,13 @@
 """Runs in the time domain; begin reading in `run`.
 
-- `run`: `simulate`, the course of a run on one page; `simulate_together`: of several in one call
+- `run`: `simulate`, the course of a run on one page
+- `conditions`, `preparation`, `ending`: its inputs checked, its model and state, its result
+- `together`: `simulate_together`, several runs in one call of the time loop
+- `told`: the finished fraction, as it is told on the way
 - `advance`: the time loop, chunk by chunk
 - `pace`: step and output interval at any speed; `flange`: the step judged in flange contact
 - `run_in`: the state in which a run starts, also in curves; `settling`: run-ins
+- `disturbance`: initial disturbances, wheelsets kept on their rails
 - `ensemble`: several vehicles as one system
 - `outputs`: from raw records to the quantities of a result
 - `right_samples`: low-pass filter before storage
@@ -11,6 +15,8 @@
 - `check_step`: a run compared with itself at half its step
 """
 
-from railsim.simulation.run import outcomes, prepare, simulate, simulate_together
+from railsim.simulation.preparation import prepare
+from railsim.simulation.run import simulate
+from railsim.simulation.together import outcomes, simulate_together
 
 __all__ = ["outcomes", "prepare", "simulate", "simulate_together"]

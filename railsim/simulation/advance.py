@@ -21,11 +21,12 @@ from railsim.definitions.settings import Settings
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import VIBRATION
-from railsim.model.assembly import Model, no_extremes, work_arrays
+from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
+from railsim.model.work import no_extremes, work_arrays
 from railsim.result import Sink
 from railsim.simulation.ensemble import Ensemble, contact_grid
 from railsim.simulation.outputs import OutputPlan
@@ -37,6 +38,7 @@ Progress = Callable[[float], None]
 # Longest chunk in outputs, and in steps of all its vehicles: some hundredths of a second of
 # computing by the fast scheme, and below a second by the other one
 ROWS, STEPS = 500, 64_000
+ROUND_OFF = 1e-9  # s
 
 # state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes,
 # times without load, vibrations
@@ -57,6 +59,8 @@ class Preparation:
         Where the run ends, whichever comes first [s], [m].
     pace : Pace
         Step and output interval at any speed.
+    evaluation : float
+        Time from which on peaks are evaluated [s].
     fresh : bool
         Whether nothing was before the initial state.
     remarks : tuple of str
@@ -69,6 +73,7 @@ class Preparation:
     end_time: float
     end_distance: float
     pace: Pace
+    evaluation: float = 0.0
     fresh: bool = True
     remarks: tuple[str, ...] = ()
 
@@ -96,8 +101,9 @@ class Run:
         How it ended, see `railsim.kernels.status`.
     events : int64[2]
         Loaded contact patches so far, and those out of the creep law's range.
-    extremes : float64[6, w, EXTREMES]
-        Largest and smallest values so far, see `railsim.kernels.extremes`.
+    extremes, evaluated : float64[6, w, EXTREMES]
+        Largest and smallest values so far, see `railsim.kernels.extremes`; of all, and since the
+        evaluation began.
     unloaded : float64[w, 2]
         Time during which each wheel has carried nothing [s].
     divided : int
@@ -137,6 +143,7 @@ class Run:
     def __post_init__(self) -> None:
         wheelsets = len(self.prepared.model.index.wheelsets)
         self.extremes: Floats = no_extremes(wheelsets)
+        self.evaluated: Floats = no_extremes(wheelsets)
         self.unloaded: Floats = np.zeros((wheelsets, 2))
 
 
@@ -203,6 +210,7 @@ class _Convoy:
         self._derivative = np.zeros_like(self._state)
         self._stages = np.zeros((3, len(self._state)))
         self._fresh, self._due = runs[0].fresh, runs[0].due
+        self._evaluates = self._state[-3] >= runs[0].prepared.evaluation - ROUND_OFF
         self._varies = runs[0].prepared.pace.varies
         # equal steps of distance while the speed changes: every interval is a chunk of its own
         self._spacing = settings.output_spacing if self._varies else None
@@ -234,6 +242,7 @@ class _Convoy:
                 run.status, run.where = status, where
                 run.wall_time += share * spent
             moved(self._runs, self._state)
+            self._begin_evaluation()
             if status != RUNNING:
                 break
             if self._errors():
@@ -267,6 +276,9 @@ class _Convoy:
         """Advance by one chunk: status, where, number of records."""
         at_most = max(1, STEPS // (every * len(self._runs)))
         intervals = 1 if self._varies else min(ROWS, at_most)
+        if not self._evaluates:  # whose begin is the end of a chunk
+            before = self._runs[0].prepared.evaluation - self._state[-3]
+            intervals = min(intervals, max(1, math.ceil(before / (step * every) - ROUND_OFF)))
         n_steps = min(intervals * every, math.ceil(self._left() / step * (1.0 - 1e-9)))
         last = int(self._spacing is not None and n_steps == every)
         goal = self._state[-2] + (self._spacing or 0.0)
@@ -278,6 +290,15 @@ class _Convoy:
             steps, rows = steps + more, rows + first
         self._due = status == RUNNING and steps % every == 0
         return status, where, rows
+
+    def _begin_evaluation(self) -> None:
+        """Begin with new extremes where the part of the run begins that is evaluated."""
+        if self._evaluates or self._state[-3] < self._runs[0].prepared.evaluation - ROUND_OFF:
+            return
+        for run, part in zip(self._runs, self._ensemble.parts, strict=True):
+            _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
+        self._work.extremes[:] = no_extremes(self._work.extremes.shape[1])
+        self._evaluates = True
 
     def _last_record(self) -> tuple[int, int, int]:
         """Record the state at the end: status, where, number of records."""
@@ -304,11 +325,7 @@ class _Convoy:
                 self._ensemble.recorder,
                 self._scheme,
                 step,
-                at,
-                min(most, end - at),
-                every,
-                int(self._fresh),
-                closing,
+                Chunk(at, min(most, end - at), every, fresh=int(self._fresh), closing=closing),
             )
             at, rows = at + steps, rows + new
             self._fresh = self._fresh and steps == 0
@@ -352,6 +369,8 @@ class _Convoy:
             run.fresh, run.due = self._fresh, self._due
             run.events += self._work.events[part.wheelsets, :2].sum(axis=0)
             _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
+            if self._evaluates:
+                _take_extremes(run.evaluated, self._work.extremes[:, part.wheelsets])
             run.unloaded += self._work.unloaded[part.wheelsets]
             run.divided += int(self._work.parts[1])
             run.unsettled += int(self._work.parts[2])

@@ -38,6 +38,7 @@ from railsim.kernels.system import (
     Curves,
     Mounts,
     System,
+    mount_laws,
 )
 from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model, side_by_side
@@ -181,6 +182,9 @@ def joined_system(models: Sequence[Model]) -> System:
         loads=_joined([system.loads for system in systems], body=bodies)._replace(
             start=_joined_starts([system.loads.start for system in systems])
         ),
+        drives=_joined([system.drives for system in systems], body=bodies)._replace(
+            start=_joined_starts([system.drives.start for system in systems])
+        ),
         drive=first.drive,
         gravity=first.gravity,
     )
@@ -211,7 +215,7 @@ def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
     joint = joint._replace(
         **{name: aligned(getattr(joint, name)[order]) for name in joint._fields if name != "law"}
     )
-    return joint._replace(law=np.flatnonzero((joint.internal >= 0) | (joint.curve >= 0)))
+    return joint._replace(law=mount_laws(joint.internal, joint.curve, joint.flags))
 
 
 def _order_of_mounts(systems: Sequence[System]) -> Ints:

@@ -14,7 +14,8 @@ from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.model.assembly import CONSTANT_SPEED, Model
+from railsim.model.assembly import Model
+from railsim.model.work import CONSTANT_SPEED, without_loads
 from railsim.simulation.settling import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
@@ -79,11 +80,10 @@ def in_flange_contact(
         (float(np.max(rail[:, 4, 0])), float(np.max(rail[:, 5, 0]))),
         TIMES,
     )
-    smooth = system._replace(
+    smooth = without_loads(system)._replace(
         track=track_tables(auxiliary),
         drive=CONSTANT_SPEED,
         support=system.support._replace(variation=system.support.variation[:0]),
-        loads=system.loads._replace(body=system.loads.body[:0]),
     )
     contact = smooth.contact
     damped = smooth._replace(contact=contact._replace(damping=MORE_DAMPING * contact.damping))

@@ -10,17 +10,25 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, nearest
+from railsim.kernels import contact_columns as patch
 from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
-from railsim.kernels import wheel_rail as patch
+from railsim.kernels.contact_columns import (
+    W_PHI,
+    W_Q,
+    W_T_GAMMA,
+    W_T_GAMMA_SPIN,
+    W_XI_X,
+    W_XI_Y,
+    W_Y,
+)
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Recorder
-from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_T_GAMMA_SPIN, W_XI_X, W_XI_Y, W_Y
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
-from railsim.result.sensors import readings, sensors
+from railsim.result.sensors import all_sensors, motions, readings
 from railsim.track.alignment import CANT_BASE, Alignment
 from railsim.track.irregularity import displacement
 
@@ -78,6 +86,19 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
     }
+
+
+def frictional_power(values: Mapping[str, Floats], speed: Floats) -> Floats:
+    """Power that the contact of each wheel turns into heat, P = V (T_gamma + T_gamma_spin).
+
+    Both wear numbers are work per metre of the vehicle's way; V is its speed.
+
+    Returns
+    -------
+    float64[time, wheelset, side]
+        [W]
+    """
+    return speed[:, None, None] * (values["T_gamma"] + values["T_gamma_spin"])
 
 
 def rail_deflection(model: Model, state: Floats) -> Floats:
@@ -155,7 +176,7 @@ class OutputPlan:
 
     def __init__(self, model: Model, settings: Settings, track: Track, vehicle: Vehicle) -> None:
         self._model = model
-        self._sensors = sensors(vehicle) if settings.outputs.sensors else {}
+        self._sensors = all_sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
         self._alignment = Alignment(track)
         self._track_file = track
@@ -202,7 +223,8 @@ class OutputPlan:
     def _known(self) -> tuple[Quantity, ...]:
         prefixes = ["element_"] * bool(self.elements)
         prefixes += ["patch_"] * self._asked.contact_patches
-        prefixes += ["track_", "rail_"] * self._asked.track
+        prefixes += ["frictional_power"] * self._asked.frictional_power
+        prefixes += ["track_", "rail_", "wheelset_"] * self._asked.track
         prefixes += ["sensor_"] * bool(self._sensors)
         more = [q for name, q in REQUESTED.items() if name.startswith(tuple(prefixes))]
         return (*QUANTITIES.values(), *(more if prefixes else ()))
@@ -241,14 +263,20 @@ class OutputPlan:
                 self._alignment,
                 recorder.state[:rows, -1],
             )
+            values |= motions(self._sensors, values, self._model.index.bodies)
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows])
+        if self._asked.frictional_power:
+            values["frictional_power"] = frictional_power(values, recorder.state[:rows, -1])
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
             deflection = rail_deflection(self._model, recorder.state[:rows])
             values |= {
                 "rail_deflection_lateral": deflection[..., 0],
                 "rail_deflection_vertical": deflection[..., 1],
+                "wheelset_lateral_on_rails": (
+                    values["wheelset_lateral"] - values["rail_lateral"].mean(axis=-1)
+                ),
             }
         return values
 

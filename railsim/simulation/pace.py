@@ -9,9 +9,10 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.kernels.rhs import STANDSTILL_SPEED
-from railsim.model.assembly import Model, level_track_with_friction
+from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability
+from railsim.model.work import level_track_with_friction
 from railsim.simulation.flange import in_flange_contact
 from railsim.simulation.settling import Progress
 

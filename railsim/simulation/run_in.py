@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.track import Track
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
     ASIDE,
@@ -41,8 +41,9 @@ from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.steady import NotConverged, led
-from railsim.model.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium, initial_state
+from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
 from railsim.simulation.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
@@ -138,10 +139,7 @@ def _arrived(
     state[-2] = place
     if steps:
         follow_rails(model, state)
-        system = model.system._replace(
-            drive=CONSTANT_SPEED,
-            loads=model.system.loads._replace(body=model.system.loads.body[:0]),
-        )
+        system = without_loads(model.system)._replace(drive=CONSTANT_SPEED)
         _run(model, system, state, step, steps, scheme, start, "on its way there", approaching)
     state[-3:] = 0.0, start, speed
     return state
@@ -256,8 +254,8 @@ def _run(
     if status != RUNNING:
         raise InputError(
             [
-                Fault(
-                    "--start",
+                argument_fault(
+                    "start",
                     "",
                     f"the vehicle does not stay on the track at s = {start:g} m, "
                     f"{where}, at {state[-1]:g} m/s",
@@ -346,10 +344,8 @@ def settled(
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )
-    system = model.system._replace(
-        track=track_tables(auxiliary),
-        drive=CONSTANT_SPEED,
-        loads=model.system.loads._replace(body=model.system.loads.body[:0]),
+    system = without_loads(model.system)._replace(
+        track=track_tables(auxiliary), drive=CONSTANT_SPEED
     )
     state = balance.state.copy()
     steps = math.ceil(auxiliary.length / speed / step)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
-from railsim.kernels.time_loop import time_loop
-from railsim.model.assembly import Model, work_arrays
+from railsim.kernels.time_loop import Chunk, time_loop
+from railsim.model.assembly import Model
 from railsim.model.time_step import divide_strikes, empty_recorder
+from railsim.model.work import work_arrays
 
 Floats = NDArray[np.float64]
 # called with the time that has been simulated, and all of it [s]; it may raise, as on Ctrl-C
@@ -100,11 +101,7 @@ def advance(
             recorder,
             scheme,
             step,
-            1 + done,
-            min(most, steps - done),
-            steps + 2,
-            int(done == 0),
-            0,
+            Chunk(1 + done, min(most, steps - done), steps + 2, fresh=int(done == 0)),
         )
         done += more
         if progress is not None:

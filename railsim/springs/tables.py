@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from railsim.springs.tolerance import RideHeight
-from railsim.springs.verification import Check, Fatigue, Verification
+from railsim.springs.verification import Fatigue, Verification
+from railsim.springs.verification_checks import Check
 
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult

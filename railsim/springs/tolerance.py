@@ -21,7 +21,8 @@ from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
-from railsim.springs.verification import built, load_cases
+from railsim.springs.verification import load_cases
+from railsim.springs.verification_checks import built
 
 Floats = NDArray[np.float64]
 

@@ -18,10 +18,15 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from railsim.definitions.flatten import FlatVehicle
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
 from railsim.errors import Fault, InputError
-from railsim.springs.verification import Case, load_cases
+from railsim.springs.verification import load_cases
+from railsim.springs.verification_checks import Case
 
+LIKELY = (0.75, 1.25)
+"""Load of an axlebox in the vehicle over the load at which the springs are taken."""
+GRAVITY = 9.81
 _DIGITS = 7
 _INNERMOST_ARRAY = re.compile(r"\[\n([^\[\]]+)\]")
 
@@ -47,6 +52,20 @@ class VehiclePart:
     elements: dict[str, Any]
     case: Case
     remarks: tuple[str, ...]
+
+
+def axlebox_load(vehicle: FlatVehicle) -> float:
+    """Return the static load of an axlebox, all bodies but the wheelsets shared by all of them [N].
+
+    Examples
+    --------
+    >>> from railsim.definitions.flatten import flatten
+    >>> from railsim.definitions.loading import load_vehicle
+    >>> round(axlebox_load(flatten(load_vehicle("coach_manchester"))))
+    59912
+    """
+    carried = sum(body.mass for body in vehicle.bodies if body.kind == "body")
+    return carried * GRAVITY / (2.0 * len(vehicle.of_kind("wheelset")))
 
 
 def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> VehiclePart:

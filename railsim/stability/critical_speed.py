@@ -13,7 +13,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError, argument_fault
 from railsim.linear.eigenmodes import LossOfStability, loss_of_stability
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
@@ -205,15 +205,25 @@ def _check(methods: Sequence[str], low: float, high: float, points: int) -> None
     faults = []
     unknown = [method for method in methods if method not in METHODS]
     if unknown:
-        faults.append(Fault("--method", "", f"found '{unknown[0]}'", " or ".join(METHODS)))
+        faults.append(
+            argument_fault("methods", "", f"found '{unknown[0]}'", " or ".join(METHODS), "--method")
+        )
     least, most = SPEED_RANGE
-    for option, value in (("--from", low), ("--to", high)):
+    for name, option, value in (("low", "--from", low), ("high", "--to", high)):
         if not (math.isfinite(value) and least <= value <= most):
-            faults.append(Fault(option, "", f"found {value:g} m/s", f"{least:g} to {most:g} m/s"))
+            faults.append(
+                argument_fault(
+                    name, "", f"found {value:g} m/s", f"{least:g} to {most:g} m/s", option
+                )
+            )
     if not faults and low >= high:
-        faults.append(Fault("--from", "", f"found {low:g} m/s", f"less than --to, {high:g} m/s"))
+        faults.append(
+            argument_fault(
+                "low", "", f"found {low:g} m/s", f"less than the highest, {high:g} m/s", "--from"
+            )
+        )
     if not 2 <= points <= 200:
-        faults.append(Fault("--points", "", f"found {points}", "2 to 200"))
+        faults.append(argument_fault("points", "", f"found {points}", "2 to 200"))
     if faults:
         raise InputError(faults)
 

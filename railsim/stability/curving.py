@@ -20,20 +20,21 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import InputError, ModelError, argument_fault
+from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.kernels.wheel_rail import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
-from railsim.model.assembly import GRAVITY, Model, assemble, check_fixed, work_arrays
+from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
+from railsim.model.work import GRAVITY, work_arrays
 from railsim.profiles import Profile
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
@@ -241,33 +242,33 @@ def _check(
     for value in radius:
         if not (math.isfinite(value) and abs(value) >= SMALLEST_RADIUS):
             faults.append(
-                Fault(
-                    "--radius",
+                argument_fault(
+                    "radius",
                     "",
                     f"found {value:g} m",
                     f"{SMALLEST_RADIUS:g} m at least, negative to the left",
                 )
             )
     if not 0.0 <= cant <= LARGEST_CANT:
-        faults.append(Fault("--cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
+        faults.append(argument_fault("cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
     for value in friction:
         if not 0.0 < value <= 2.0:
-            faults.append(Fault("--friction", "", f"found {value:g}", "above 0, at most 2"))
+            faults.append(argument_fault("friction", "", f"found {value:g}", "above 0, at most 2"))
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
         if not all(low <= v <= high for v in speeds) or not math.isfinite(value):
             faults.append(
-                Fault(
-                    "--cant-deficiency",
+                argument_fault(
+                    "cant_deficiency",
                     "",
                     f"found {value:g} m with a cant of {cant:g} m",
                     f"a sum that gives speeds of {low:g} to {high:g} m/s",
                 )
             )
-    for name, values in (("--radius", radius), ("--cant-deficiency", deficiency)):
+    for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
         if not len(values):
-            faults.append(Fault(name, "", "no value", "one at least"))
+            faults.append(argument_fault(name, "", "no value", "one at least"))
     if faults:
         raise InputError(faults)
 
@@ -377,11 +378,7 @@ class _Search:
                 recorder,
                 FAST,
                 step,
-                1,
-                round(1.0 / step),
-                1 << 40,
-                int(second == 0),
-                0,
+                Chunk(1, round(1.0 / step), 1 << 40, fresh=int(second == 0)),
             )
             if status != RUNNING:
                 return self._values(solver, state, FAILED)

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.errors import ModelError
+from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.system import TABLE, Drive
-from railsim.kernels.time_loop import time_loop
-from railsim.kernels.wheel_rail import W_Y
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import PLACE
 from railsim.linear.vehicle import LinearVehicle
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
+from railsim.model.work import work_arrays
 
 Floats = NDArray[np.float64]
 
@@ -164,11 +164,7 @@ class VehicleMotion:
             self._recorder,
             self.scheme,
             self.step,
-            0,
-            steps,
-            self.every,
-            fresh,
-            0,
+            Chunk(0, steps, self.every, fresh=fresh),
         )
         if status != RUNNING or not np.isfinite(state).all():
             sentence = STATUS[status][1] if status != RUNNING else "the state is not finite"

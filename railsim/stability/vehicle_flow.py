@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import PLACE
-from railsim.model.assembly import CONSTANT_SPEED, work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import CONSTANT_SPEED, work_arrays
 from railsim.stability.motion import VehicleMotion
 
 Floats = NDArray[np.float64]
@@ -116,11 +116,7 @@ class VehicleFlow:
                 self._recorder,
                 self._motion.scheme,
                 float(duration) / steps,
-                1,
-                steps,
-                1 << 40,
-                0,
-                0,
+                Chunk(1, steps, 1 << 40),
             )
             if status != RUNNING:
                 full[:-N_SCALARS] = np.nan
@@ -152,10 +148,6 @@ class VehicleFlow:
             self._recorder,
             self._motion.scheme,
             duration / steps,
-            0,
-            OBSERVED * every,
-            every,
-            0,
-            0,
+            Chunk(0, OBSERVED * every, every),
         )
         return np.asarray(self._recorder.state[:rows].copy())

@@ -18,7 +18,7 @@ from railsim.definitions.study import Sample, value_texts
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.profiles.used import profile_faults
-from railsim.simulation.run import check_range, initial_speed
+from railsim.simulation.conditions import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
 from railsim.studies.points import Fingerprints, Grid, Overrides, Point, check_number, point_key
 from railsim.studies.rows import PERMITTED, made_rows

@@ -28,7 +28,7 @@ M = TypeVar("M", bound=BaseModel)
 INDEX_BYTES = 500_000_000
 MOST_FAULTS = 20
 UNITS = {"speed": "m/s", "step": "s", "wall_time": "s", "cpu_time": "s"}
-_COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*)(?:_(time|distance))?")
+_COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*|median\d*)(?:_(time|distance|20hz))?")
 FORMAT = "railsim-study-result/1"
 
 
@@ -246,6 +246,8 @@ def summary_row(record: Record) -> dict[str, Any]:
     for peak in record.get("peaks", ()):
         column = f"{peak['quantity']}_{endings[peak['kind']]}"
         row[column] = peak["value"]
+        if "low_pass_20_hz" in peak:
+            row[f"{column}_20hz"] = peak["low_pass_20_hz"]
         for fact in ("wheelset", "side", "time", "distance"):
             if fact in peak:
                 row[f"{column}_{fact}"] = peak[fact]
@@ -253,4 +255,6 @@ def summary_row(record: Record) -> dict[str, Any]:
         ending = "mid" if number == 1 else f"mid{number}"
         for name, value in curve["largest"].items():
             row[f"{name}_{ending}"] = value
+        for name, value in curve.get("largest_medians", {}).items():
+            row[f"{name}_{ending.replace('mid', 'median')}"] = value
     return {**row, **record.get("quantities", {})}

@@ -13,6 +13,7 @@ seed.  The period is as long as the irregularity, and 20 of its longest waveleng
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 from itertools import pairwise
 
 import numpy as np
@@ -21,11 +22,13 @@ from numpy.typing import NDArray
 from railsim.definitions.irregularity import (
     CHANNELS,
     COLUMNS,
+    MIRROR,
     Dip,
     Irregularity,
     Kink,
     Measured,
     Random,
+    Sweep,
     Twist,
 )
 from railsim.definitions.layout import Section
@@ -44,8 +47,6 @@ SHARES = {
     "cross_level": (0.0, -1.0, 0.0, 1.0),
     "gauge": (-0.5, 0.0, 0.5, 0.0),
 }
-# the same of the mirror image of the track
-MIRROR = {"lateral": -1.0, "vertical": 1.0, "cross_level": -1.0, "gauge": 1.0}
 RAILS = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}
 # Points of the lattice in the shortest wavelength: interpolation error 4e-6 of the amplitude.
 POINTS_PER_WAVE = 32
@@ -74,38 +75,35 @@ def displacement(track: Track) -> Displacement | None:
 
 def shortest_length(track: Track) -> float:
     """Length that the tables must resolve: a sixteenth of the shortest wave, and so on [m]."""
-    lengths = [np.inf]
-    for part in track.irregularities:
-        if isinstance(part, Random):
-            lengths.append(part.wavelengths[0] / 16.0)
-        elif isinstance(part, Measured):
-            places = np.array([row[0] for row in part.rows or ()])
-            lengths.append(max(0.05, 0.5 * float(np.min(np.diff(places)))))
-        else:
-            lengths.append(part.length / (40.0 if part.shape == "triangle" else 16.0))
-    return float(min(lengths))
+    return min([np.inf, *(part.resolution() for part in track.irregularities)])
 
 
+@singledispatch
 def _displacement(part: Irregularity, track: Track) -> Displacement:
-    if isinstance(part, Random):
-        return _random(part, track)
-    if isinstance(part, Measured):
-        return _measured(part)
-    return _single(part)
+    raise NotImplementedError(f"no displacement of irregularities '{part.type}'")
 
 
 # single disturbances ------------------------------------------------------------------------------
 
 
-def _single(part: Dip | Kink | Twist) -> Displacement:
-    if isinstance(part, Dip):
-        left, right = RAILS[part.rail]
-        shares = part.depth * np.array([0.0, left, 0.0, right])
-    elif isinstance(part, Kink):
-        left, right = RAILS[part.rail]
-        shares = part.offset * np.array([left, 0.0, right, 0.0])
-    else:
-        shares = 0.5 * part.height * np.array([0.0, -1.0, 0.0, 1.0])
+@_displacement.register
+def _dip(part: Dip, track: Track) -> Displacement:
+    left, right = RAILS[part.rail]
+    return _single(part, part.depth * np.array([0.0, left, 0.0, right]))
+
+
+@_displacement.register
+def _kink(part: Kink, track: Track) -> Displacement:
+    left, right = RAILS[part.rail]
+    return _single(part, part.offset * np.array([left, 0.0, right, 0.0]))
+
+
+@_displacement.register
+def _twist(part: Twist, track: Track) -> Displacement:
+    return _single(part, 0.5 * part.height * np.array([0.0, -1.0, 0.0, 1.0]))
+
+
+def _single(part: Dip | Kink | Twist, shares: Array) -> Displacement:
     shape = _cosine if part.shape == "cosine" else _triangle
     value_and_rate = shape(part.s, part.length)
 
@@ -142,7 +140,8 @@ def _triangle(middle: float, length: float) -> Displacement:
 # measured and widening ----------------------------------------------------------------------------
 
 
-def _measured(part: Measured) -> Displacement:
+@_displacement.register
+def _measured(part: Measured, track: Track) -> Displacement:
     from scipy.interpolate import CubicHermiteSpline  # a quarter of a second; most need none
 
     places, values, slopes = _interpolation(part)
@@ -292,6 +291,7 @@ def _profile(points: Sequence[tuple[float, float]], rounding: float) -> RoundedP
 # random -------------------------------------------------------------------------------------------
 
 
+@_displacement.register
 def _random(part: Random, track: Track) -> Displacement:
     from scipy.fft import next_fast_len
 
@@ -357,6 +357,36 @@ def _periodic(lattice: Array, period: float, u: Array) -> tuple[Array, Array]:
     c2, c3 = 3.0 * step - 2.0 * rate0 - rate1, rate0 + rate1 - 2.0 * step
     value = value0 + t * (rate0 + t * (c2 + t * c3))
     return value, (rate0 + t * (2.0 * c2 + 3.0 * t * c3)) / h
+
+
+# sweep --------------------------------------------------------------------------------------------
+
+
+@_displacement.register
+def _sweep(part: Sweep, track: Track) -> Displacement:
+    """A sin(phase) with d phase/ds = 2 pi/wavelength, the wavelength changing exponentially.
+
+    With u = (s - begin)/length and r = first/last wavelength: wavelength = first r^-u and
+    phase = 2 pi length (r^u - 1)/(first ln r).
+    """
+    from scipy.special import exprel  # (e^x - 1)/x, also at one wavelength
+
+    first, last = part.wavelengths
+    length, octaves = part.end - part.begin, np.log(first / last)
+    shares = part.amplitude * np.array(SHARES[part.channel])
+    if part.channel == "cross_level":
+        shares *= 0.5  # each rail has half of the difference
+    window = _window(part.begin, part.end, part.fade)
+
+    def moved(s: Array) -> tuple[Array, Array]:
+        u = np.clip((s - part.begin) / length, 0.0, 1.0)
+        waves = length / first * u * exprel(octaves * u)
+        rate = 2.0 * np.pi / first * np.exp(octaves * u)
+        value = shares[:, None] * np.sin(2.0 * np.pi * waves)
+        slope = shares[:, None] * rate * np.cos(2.0 * np.pi * waves)
+        return _windowed(value, slope, *window(s))
+
+    return moved
 
 
 # fading -------------------------------------------------------------------------------------------

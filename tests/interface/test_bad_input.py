@@ -36,7 +36,11 @@ TRACKS = [
     ('vertical = [{type="CST", length=-5.0}]', "vertical.0.length", "-5.0; must be greater"),
 ]
 IRREGULARITIES = [
-    ('type="bump"', "", "unknown 'type' 'bump'; allowed: dip, kink, measured, random, twist"),
+    (
+        'type="bump"',
+        "",
+        "unknown 'type' 'bump'; allowed: dip, kink, measured, random, sweep, twist",
+    ),
     ("s=3.0", "", "no key 'type'; it tells what the table describes"),
     (DIP.replace("0.003", "3.0"), ".depth", "3.0; must be less than or equal to 0.5"),
     (DIP.replace("2.0", "0.0"), ".length", "0.0; must be greater than 0"),

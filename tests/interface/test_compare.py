@@ -40,7 +40,7 @@ def test_difference_from_nothing_is_not_a_number():
 
 def test_peaks_and_mid_curve_values_are_compared():
     rows = compare({"base": example_result(), "short": example_result(duration=19.0)})
-    assert [row.where for row in rows].count("middle of curve 1") == 10
+    assert [row.where for row in rows].count("full curve 1, median") == 10
     assert set(rows[-1].peaks) == {"base"}  # the short run ends before the middle
 
 
@@ -49,7 +49,7 @@ def test_command_prints_value_place_time_and_difference(files, capsys):
     printed = capsys.readouterr().out
     line = next(each for each in printed.splitlines() if "lower" in each and "-5.58" in each)
     assert "-10.00 %" in line
-    assert "middle of curve 1" in printed
+    assert "full curve 1, median" in printed
 
 
 def test_folder_holds_table_record_and_picture(files, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 import railsim.cli.interrupts
 import railsim.simulation.flange
-import railsim.simulation.run
+import railsim.simulation.preparation
 import railsim.simulation.run_in
 import railsim.simulation.settling
 from railsim.cli import main
@@ -60,13 +60,13 @@ def comes(monkeypatch):
     """Let a signal come, in one of the ways above, while a run is prepared."""
 
     def during_preparation(way, number):
-        prepare = railsim.simulation.run.prepare
+        prepare = railsim.simulation.preparation.prepare
 
         def interrupted(*arguments, **how):
             way(number)
             return prepare(*arguments, **how)
 
-        monkeypatch.setattr(railsim.simulation.run, "prepare", interrupted)
+        monkeypatch.setattr(railsim.simulation.preparation, "prepare", interrupted)
 
     return during_preparation
 

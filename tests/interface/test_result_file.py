@@ -194,7 +194,7 @@ def test_unfinished_overwriting_keeps_the_old_file(tmp_path, written):
 def test_output_that_cannot_be_written_is_refused_at_the_door(written, path, words):
     with pytest.raises(InputError, match=words) as caught:
         Hdf5Sink(written.parent / path)
-    assert caught.value.faults[0].file == "--out"
+    assert caught.value.faults[0].option == "--out"
     assert os.listdir(written.parent) == ["run.h5"]
 
 

@@ -8,12 +8,12 @@ from railsim.notation import QUANTITIES
 from railsim.result import Result, mid_curves, peak, peaks
 
 
-def small(values, distance=(0.0, 10.0, 20.0)):
+def small(values, distance=(0.0, 10.0, 20.0), **facts):
     return Result(
         {"time": [0.0, 1.0, 2.0], "distance": distance, "Q": values},
         {name: QUANTITIES[name] for name in ("time", "distance", "Q")},
         {"wheelset": ["lead"], "side": ["left", "right"]},
-        attributes(),
+        {**attributes(), **facts},
     )
 
 
@@ -25,6 +25,67 @@ def test_peak_names_value_place_and_time():
     assert largest.shown == pytest.approx(-0.007)
     assert peak(result, "Q", "max").value == 6.0
     assert peak(result, "Q", "min").value == -7.0
+
+
+def test_peak_leaves_out_the_start():
+    """From the attribute `evaluation_start` on; files without it count as a whole."""
+    values = [[[9.0, 2.0]], [[3.0, -7.0]], [[5.0, 6.0]]]
+    assert peak(small(values), "Q").value == 9.0
+    late = peak(small(values, evaluation_start=1.0), "Q")
+    assert (late.value, late.time, late.distance) == (-7.0, 1.0, 10.0)
+    assert peak(small(values, evaluation_start=9.0), "Q").value == 9.0  # nothing is in it
+
+
+def waves(rate=200.0, **facts):
+    """A wheel load of 100 kN with 10 kN at 2 Hz and 30 kN at 60 Hz for 20 s, 20 m/s."""
+    time = np.arange(0.0, 20.0, 1.0 / rate)
+    load = 1e5 + 1e4 * np.sin(4.0 * np.pi * time) + 3e4 * np.sin(120.0 * np.pi * time)
+    Q = np.stack([load, 0.5 * load], axis=-1)[:, None]
+    return Result(
+        {"time": time, "distance": 250.0 + 20.0 * time, "Q": Q, "Y": 0.1 * Q, "Y_over_Q": Q / Q},
+        {name: QUANTITIES[name] for name in ("time", "distance", "Q", "Y", "Y_over_Q")},
+        {"wheelset": ["lead"], "side": ["left", "right"]},
+        {**attributes(), **facts},
+    )
+
+
+def test_peaks_after_the_low_pass_of_20_hz():
+    """The wave of 60 Hz is gone to 1/sqrt(1 + 3^8), that of 2 Hz is whole; Y/Q after it."""
+    found = {each.quantity.name: each for each in peaks(waves(1000.0))}
+    rest = 1e5 + 1e4 + 3e4 / np.sqrt(1.0 + 3.0**8)
+    assert found["Q"].value == pytest.approx(1.4e5, rel=1e-3)
+    assert found["Q"].smooth == pytest.approx(rest, rel=2e-3)
+    assert found["Q"].record()["low_pass_20_hz"] == found["Q"].smooth
+    assert found["Y_over_Q"].smooth == pytest.approx(-0.1, rel=1e-6)  # left: outwards negative
+
+
+@pytest.mark.parametrize("result", [waves(40.0), small([[[1.0, 2.0]]] * 3)])
+def test_no_low_pass_of_outputs_that_are_too_seldom(result):
+    (found,) = (each for each in peaks(result, ["Q"]) if each.quantity.name == "Q")
+    assert np.isnan(found.smooth)
+    assert "low_pass_20_hz" not in found.record()
+
+
+def test_full_curve_values_are_medians_with_their_scatter():
+    """Of a sine the percentiles 15.87 and 84.13 lie at 0.8778 of its amplitude to either side.
+
+    R 250 m from 360 to 420 m; of the 60 m in the full curve the first third is left out.
+    """
+    (curve,) = mid_curves(waves(1000.0))
+    assert curve.full_curve == pytest.approx((380.0, 420.0))
+    assert curve.medians["Y"][0] == pytest.approx([1e4, 5e3], rel=2e-3)
+    only = waves(1000.0)
+    flat = Result(
+        {**{name: only[name] for name in ("time", "distance")}, "Q": np.sin(only["Q"] / 1e4)},
+        {name: QUANTITIES[name] for name in ("time", "distance", "Q")},
+        {"wheelset": ["lead"], "side": ["left", "right"]},
+        attributes(),
+    )
+    (curve,) = mid_curves(flat)
+    rows = (flat["distance"] >= 380.0) & (flat["distance"] <= 420.0)
+    low, high = np.percentile(flat["Q"][rows], [15.87, 84.13], axis=0)
+    np.testing.assert_allclose(curve.scatter["Q"], 0.5 * (high - low))
+    assert curve.record()["medians"]["Q"] == curve.medians["Q"].tolist()
 
 
 def test_peak_leaves_out_what_is_not_a_number():

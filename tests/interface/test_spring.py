@@ -301,6 +301,16 @@ def test_vehicle_file_refuses_unknown_names(capsys):
     assert "coach_manchester" in line
 
 
+def test_vehicle_warns_of_springs_for_another_load(capsys):
+    """Springs for 59.9 kN on an axlebox under a wagon with 97.2 kN; none where they belong."""
+    assert cli.main(["spring", "vehicle", "turasas_axlebox"]) == 0
+    assert "belong together" not in capsys.readouterr().err
+    assert cli.main(["spring", "vehicle", "turasas_axlebox", "--extends", "wagon_c62a"]) == 0
+    assert "puts 97.2 kN on an axlebox at rest, the springs are taken at 59.9 kN" in (
+        capsys.readouterr().err
+    )
+
+
 def test_vehicle_json_gives_the_tables(capsys):
     data = answer(capsys, "vehicle", "turasas_axlebox")
     assert data["elements"]["coil_nest"]["kind"] == "shear_spring"

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.mechanism import Cylinder, Mechanism
+from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism_parts import Cylinder
 from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.comparison import compare
 from railsim.mechanisms.forces import table_of

@@ -12,6 +12,7 @@ import pytest
 from railsim.contact.kalker import creep_tables, kalker_coefficients
 from railsim.errors import ModelError
 from railsim.kernels.fastsim import kalker_lookup
+from railsim.kernels.patches import Patches
 
 
 def rows(reference_dir, name):
@@ -41,12 +42,18 @@ def test_recomputed_values_agree_within_what_the_reference_states(reference_dir)
             assert value == pytest.approx(float(row[name]), rel=allowed + 0.005), (ratio, nu, name)
 
 
+def ellipses(a, b):
+    """Patches of these semi-axes, all else one; coefficients stand in fields 3 to 6."""
+    return Patches(a, b, *np.ones((12, a.size)))
+
+
 def test_lookup_of_the_time_loop_follows_the_coefficients():
     ratio = np.geomspace(1 / 23.9, 23.9, 997)
     b = 5e-3 / np.sqrt(ratio)
-    out, outside = np.zeros((4, ratio.size)), np.ones(ratio.size)
-    kalker_lookup(ratio.size, ratio * b, b, creep_tables(0.28), *out, outside)
-    assert not outside.any()
+    patches = ellipses(ratio * b, b)
+    kalker_lookup(ratio.size, patches, creep_tables(0.28))
+    assert not patches.outside.any()
+    out = np.array(patches[3:7])
     exact = np.array(kalker_coefficients(ratio, 0.28))
     # the look-up rounds the corners that linear interpolation in g leaves at a/b = 0.1, 0.2, 5, 10
     np.testing.assert_allclose(out, exact, rtol=9e-3)
@@ -56,10 +63,11 @@ def test_lookup_of_the_time_loop_follows_the_coefficients():
 def test_lookup_keeps_the_end_values_beyond_its_range_and_takes_empty_patches():
     a = np.array([1.0, 1.0, 0.0])
     b = np.array([1e-3, 1e3, 0.0])
-    out, outside = np.zeros((4, 3)), np.zeros(3)
+    patches = ellipses(a, b)
     table = creep_tables(0.28)
-    kalker_lookup(3, a, b, table, *out, outside)
-    np.testing.assert_array_equal(outside, (1.0, 1.0, 0.0))
+    kalker_lookup(3, patches, table)
+    out = np.array(patches[3:7])
+    np.testing.assert_array_equal(patches.outside, (1.0, 1.0, 0.0))
     np.testing.assert_allclose(out[:, 0], table[-1], rtol=1e-12)
     np.testing.assert_allclose(out[:, 1], table[0], rtol=1e-12)
     np.testing.assert_allclose(out[:, 2], kalker_coefficients(1.0, 0.28), rtol=1e-4)

@@ -22,6 +22,14 @@ RICH = {
         {"type": "kink", "s": 100.0, "length": 9.0, "offset": 0.01, "rail": "right"},
         {"type": "twist", "s": 200.0, "length": 9.0, "height": 0.01},
         {
+            "type": "sweep",
+            "channel": "lateral",
+            "amplitude": 2e-3,
+            "wavelengths": (20.0, 5.0),
+            "begin": 50.0,
+            "end": 150.0,
+        },
+        {
             "type": "measured",
             "rows": [[s, 0.001 * s, 0.002, 0.0, 0.0] for s in (0.0, 1.0, 2.0, 3.0, 4.0)],
         },
@@ -45,6 +53,16 @@ def test_track_mirrored_twice_is_the_original(name):
     track = load_track(name).replace(**RICH)
     assert mirrored_track(mirrored_track(track)) == track
     assert mirrored_track(track) != track
+
+
+def test_mirror_image_says_what_it_is_and_not_what_its_original_said():
+    track, vehicle = load_track("curve_r250"), load_vehicle("coach_manchester")
+    assert track.to_toml() != mirrored_track(track).to_toml()
+    assert "radius = -250.0" in mirrored_track(track).to_toml()
+    assert flatten(vehicle) is flatten(vehicle)
+    moved = vehicle.model_copy(update={"name": "another"})
+    assert flatten(moved).name == "another"
+    assert 'name = "another"' in moved.to_toml()
 
 
 def test_symmetric_vehicle_is_its_own_mirror_image():

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from railsim.kernels import jit, lanes_plain
+from railsim.kernels import compiled, lanes_plain
 from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
 from railsim.kernels.lanes import (
     LANES,
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="what is compil
 WIDTH = 11
 
 
-@jit
+@compiled
 def turn(table, out, n):
     """Store the columns of rows in another order, and a sum of two."""
     for first in range(0, n, LANES):
@@ -35,7 +35,7 @@ def turn(table, out, n):
         store_rows(out, rows, 2, (e, d, c, b, a, a + 2.0 * b))
 
 
-@jit
+@compiled
 def collect(table, one, two, total):
     """Add rows of `table` to the rows `one` of `total`, and what is left of 1 to the rows `two`."""
     n = one.shape[0]
@@ -55,7 +55,7 @@ def collect(table, one, two, total):
         )
 
 
-@jit
+@compiled
 def collect_three(table, where, total):
     """Add the first three columns of `table` to the rows `where` of `total`."""
     n = where.shape[0]
@@ -64,7 +64,7 @@ def collect_three(table, where, total):
         add_rows(total, starts(eight(where, first), 8), 5, values, min(n - first, LANES))
 
 
-@jit
+@compiled
 def elementary(x, out):
     """Functions of eight numbers."""
     rows = starts(eight_from(0, LANES), 1)

@@ -17,11 +17,12 @@ from railsim.kernels.contact_table import (
 from railsim.kernels.rhs import locate_frames, right_hand_side
 from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import AXLEBOX, N_SCALARS, WHEELSET
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.track_frame import FRAME_SIZE
-from railsim.model.assembly import assemble, work_arrays
+from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import SCHEMES, empty_recorder
+from railsim.model.work import work_arrays
 
 NEVER = 1 << 40
 
@@ -75,11 +76,7 @@ def advance(system, state, h, n_steps, scheme="rk4", model=None):
         empty_recorder(model, 1),
         SCHEMES[scheme],
         h,
-        1,
-        n_steps,
-        NEVER,
-        1,
-        0,
+        Chunk(1, n_steps, NEVER, fresh=1),
     )
     assert (status, steps) == (0, n_steps)
     return after

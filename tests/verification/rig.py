@@ -13,9 +13,10 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
-from railsim.kernels.time_loop import FAST, RK4, time_loop
-from railsim.model.assembly import assemble, level_track, work_arrays
+from railsim.kernels.time_loop import FAST, RK4, Chunk, settle_limits, time_loop
+from railsim.model.assembly import assemble
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import level_track, work_arrays
 
 DATA = Path(__file__).parent.parent / "data" / "vehicles"
 
@@ -56,6 +57,7 @@ class Rig:
         self.work, self.derivative = work_arrays(model.system), np.zeros(model.n_state)
         self.n = model.index.n_bodies
         self.body = self.probe // 6
+        self.frame = model.index.coordinate("frame", 0) // 6
 
     def force(self, axis, deflection, rate=0.0):
         """Force on the frame along `axis`, positive as the probe moves away; sets the drives."""
@@ -67,15 +69,29 @@ class Rig:
 
     def history(self, axis, time, deflection, rate):
         """Forces along a prescribed motion, internal states advanced as the fast scheme does."""
+        unit = np.eye(6)[axis]
+        moved = self.path(time, lambda t: unit * deflection(t), lambda t: unit * rate(t))
+        return moved[:, axis]
+
+    def forces(self, position, rate):
+        """Force and moment about its centre on the frame, six each; sets the drives."""
+        self.state[self.probe : self.probe + 6] = position
+        self.state[6 * self.n + self.probe : 6 * self.n + self.probe + 6] = rate
+        status, *_ = right_hand_side(self.system, self.work, self.state, self.derivative)
+        assert status == 0
+        return self.work.pose[self.frame, FORCE : FORCE + 6].copy()
+
+    def path(self, time, position, rate):
+        """As `history` for a motion in all six coordinates; forces and moments on the frame."""
         internal, curves = self.system.internal, self.system.curves
         h = time[1] - time[0]
         decay = np.zeros(len(internal.kind))
         constant_decays(internal, h, decay)
-        forces = np.zeros_like(time)
+        forces = np.zeros((len(time), 6))
         for k in range(len(time)):
             # a step's drive: a rate counts in its middle, an air spring's deflection too
-            forces[k] = self.force(axis, deflection(time[k]), rate(time[k]))
-            self.force(axis, deflection(time[k] + 0.5 * h), rate(time[k] + 0.5 * h))
+            forces[k] = self.forces(position(time[k]), rate(time[k]))
+            self.forces(position(time[k] + 0.5 * h), rate(time[k] + 0.5 * h))
             for i in range(len(internal.kind)):
                 at = 12 * self.n + i
                 self.state[at] = advanced(
@@ -88,6 +104,7 @@ class Rig:
                     h,
                     decay[i],
                 )
+            settle_limits(internal, curves, 12 * self.n, self.work.drive, self.state)
         return forces
 
 
@@ -214,11 +231,7 @@ def step_by_step(model, state, h, n_steps, scheme="rk4"):
             recorder,
             RK4 if scheme == "rk4" else FAST,
             h,
-            1,
-            1,
-            1 << 40,
-            int(step == 0),
-            0,
+            Chunk(1, 1, 1 << 40, fresh=int(step == 0)),
         )
         assert status == 0
         yield state

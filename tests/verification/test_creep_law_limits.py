@@ -1,11 +1,17 @@
 """Limits of the closed creep laws, falling friction and the third body."""
 
+import typing
+
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from railsim.contact.creep import LAWS, creep_force
 from railsim.contact.kalker import kalker_coefficients
+from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
+from railsim.definitions.settings import Settings
 from railsim.errors import InputError
+from railsim.kernels import creep as kernel
 
 A, B, N, MU, G = 5e-3, 3e-3, 70e3, 0.35, 82e9
 PATCH = {"a": A, "b": B, "N": N, "mu": MU}
@@ -46,6 +52,46 @@ def test_huge_pure_spin_turns_without_pushing(law, arm):
     # with cells the slip is that of half a cell upstream: the pole of the spin is off by 1/100
     allowed = 0.015 if law in ("fastsim", "fastrip") else 2e-3
     assert np.hypot(force.T_x, force.T_y) < allowed * MU * N
+
+
+CURVE = [[0.0, 0.0], [0.002, 0.6], [0.01, 1.0], [0.1, 0.7]]
+
+
+def test_adhesion_curve_is_met_in_every_direction():
+    size = np.array([0.0, 1e-3, 2e-3, 6e-3, 1e-2, 5.5e-2, 0.1, 3.0])
+    share = np.array([0.0, 0.3, 0.6, 0.8, 1.0, 0.85, 0.7, 0.7])
+    for angle in (0.0, 0.7, 2.0, 4.0):
+        x, y = np.cos(angle), np.sin(angle)
+        force = creep_force(**PATCH, xi_x=x * size, xi_y=y * size, phi=0.0,
+                            law="adhesion_curve", adhesion_curve=CURVE)  # fmt: skip
+        np.testing.assert_allclose(force.T_x, share * x * MU * N, rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(force.T_y, share * y * MU * N, rtol=1e-12, atol=1e-9)
+        assert not force.M_z.any()
+
+
+def test_spin_of_the_adhesion_curve_is_the_creepage_of_its_force_in_linear_theory():
+    _, c22, c23, _ = (float(c) for c in kalker_coefficients(A / B))
+    phi = 0.2
+    curve = {"law": "adhesion_curve", "adhesion_curve": CURVE}
+    spin = creep_force(**PATCH, xi_x=0.0, xi_y=0.0, phi=phi, **curve)
+    same = creep_force(**PATCH, xi_x=0.0, xi_y=c23 / c22 * np.sqrt(A * B) * phi, phi=0.0, **curve)
+    np.testing.assert_allclose([*spin], [*same], rtol=1e-12, atol=1e-9)
+    assert spin.T_y > 0.0
+
+
+def test_adhesion_curve_and_its_law_belong_together():
+    for more in ({"law": "adhesion_curve"}, {"law": "polach", "adhesion_curve": CURVE}):
+        with pytest.raises(InputError, match="adhesion_curve"):
+            creep_force(**PATCH, xi_x=0.0, xi_y=0.0, phi=0.0, **more)
+        with pytest.raises(ValidationError, match="adhesion_curve"):
+            Settings(creep_law=more["law"], adhesion_curve=more.get("adhesion_curve"))
+
+
+def test_numbers_of_the_creep_laws_are_those_of_the_kernels():
+    assert {law.number for law in CREEP_LAWS.values()} == set(range(len(CREEP_LAWS)))
+    for name, law in CREEP_LAWS.items():
+        assert getattr(kernel, name.upper()) == law.number
+    assert tuple(CREEP_LAWS) == typing.get_args(CreepLawName)
 
 
 @laws

@@ -25,8 +25,10 @@ from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels import creep_table as kernel
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, T_HALF
 from railsim.kernels.fastsim import fastsim_workspace
+from railsim.kernels.patches import CreepScratch, Patches
 
 SIZE, N, MU, G = 5e-3, 70e3, 0.35, 82e9
+SCRATCH = CreepScratch(fastsim_workspace(1, 1, 1), np.zeros(16, dtype=np.int64))
 
 
 def q_per_creepage(ratio):
@@ -76,13 +78,13 @@ def test_splines_reproduce_a_smooth_force():
     t = rng.uniform(0.0, 1.0, n)
     q = e * (T_HALF * t / (1.0 - t))[:, None]
     q[:, 2] /= spin_scale(ratio, np.ones(n), np.ones(n))
-    out, outside = np.zeros((3, n)), np.ones(n)
-    kernel.table_forces(
-        n, np.sqrt(ratio), 1.0 / np.sqrt(ratio), np.ones(n), 1.0,
-        *(np.ascontiguousarray(q[:, k]) for k in range(3)), *table, np.zeros(16, dtype=np.int64),
-        fastsim_workspace(1, 1, 1), *out, outside,
+    patches = Patches(
+        np.sqrt(ratio), 1.0 / np.sqrt(ratio), np.ones(n), *np.zeros((4, n)),
+        *(np.ascontiguousarray(q[:, k]) for k in range(3)), *np.ones((4, n)),
     )  # fmt: skip
-    assert not outside.any()
+    kernel.table_forces(n, patches, 1.0, *table, SCRATCH)
+    assert not patches.outside.any()
+    out = np.stack((patches.T_x, patches.T_y, patches.M_z))
     # fourth order of the nodes' distance, 9 degrees and 1/20
     np.testing.assert_allclose(out.T, smooth(log_ratio, e, t) * t[:, None], atol=2e-4)
 
@@ -95,9 +97,9 @@ def test_both_sums_of_rows_agree():
     sums = np.zeros((2, 16))
     kernel._sum_of_rows_plain(table, 37, strides, weights, 5, sums[0])
 
-    from railsim.kernels import jit
+    from railsim.kernels import compiled
 
-    @jit
+    @compiled
     def compiled(table, start, strides, weights, first, sums):
         kernel._sum_of_rows(table, start, strides, weights, first, sums)
 
@@ -203,16 +205,13 @@ def test_ratio_beyond_the_table_warns_and_takes_the_nearest():
 
 
 def test_nan_stays_visible():
-    out = np.zeros((4, 1))
     one = np.ones(1)
     for k in range(3):
         creepages = [np.zeros(1) for _ in range(3)]
         creepages[k][0] = np.nan
-        kernel.table_forces(
-            1, one, one, one, 1.0, *creepages, *creep_table(), np.zeros(16, dtype=np.int64),
-            fastsim_workspace(1, 1, 1), *out,
-        )  # fmt: skip
-        assert np.isnan(out[0, 0])
+        patches = Patches(one, one, one, *np.zeros((4, 1)), *creepages, *np.zeros((4, 1)))
+        kernel.table_forces(1, patches, 1.0, *creep_table(), SCRATCH)
+        assert np.isnan(patches.T_x[0])
 
 
 def test_other_poisson_numbers_have_their_linear_slopes():

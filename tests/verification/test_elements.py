@@ -95,6 +95,203 @@ def test_a_sticking_pad_is_a_spring_without_loss_and_does_not_creep():
     assert np.ptp(held) == 0.0
 
 
+# sliding in any direction -------------------------------------------------------------------------
+
+
+def pressed(load, friction=0.3, **other):
+    """A pad between both bodies of the rig; `load` presses it in the nominal position [N]."""
+    return {
+        "kind": "side_bearer",
+        "stiffness": 1e6,
+        "preload": load,
+        "friction_coefficient": friction,
+        "stick_stiffness": 2e7,
+        **other,
+    }
+
+
+def pulled(rig, direction, way=0.02, steps=400, held=(0.0,) * 6):
+    """Forces along a straight way into one direction, from the position `held`."""
+    time = np.linspace(0.0, 1.0, steps)
+    return rig.path(time, lambda t: held + way * t * direction, lambda t: way * direction)
+
+
+@pytest.mark.parametrize("angle", np.radians([0.0, 30.0, 45.0, 120.0, 250.0]))
+@pytest.mark.parametrize("kind", ["friction", "side_bearer", "centre_plate"])
+def test_static_capacity_is_mu_N_in_every_direction(kind, angle):
+    """A limit for each axis gives up to sqrt(2) mu N; Coulomb's law does not know the axes."""
+    mu, N = 0.3, 5e4
+    both = [mu, mu, 0.0]
+    law = {
+        "side_bearer": pressed(N, mu),
+        "friction": {
+            "kind": kind,
+            "friction_coefficient": both,
+            "stick_stiffness": [2e7, 2e7, 0.0],
+            "stiffness": [0.0, 0.0, 1e6],
+            "preload": [0.0, 0.0, N],
+        },
+        "centre_plate": {**pressed(N, mu), "kind": kind, "radius": 0.178},
+    }[kind]
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0, 0.0, 0.0, 0.0])
+    force = pulled(Rig(**law), direction)[-1, :2]
+    assert force == pytest.approx(mu * N * direction[:2], abs=1e-9 * N)
+
+
+def test_limits_for_each_axis_can_be_kept():
+    law = {
+        "kind": "friction",
+        "friction_force": [3e3, 4e3, 0.0],
+        "stick_stiffness": [2e7, 2e7, 0.0],
+    }
+    diagonal = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    apart = pulled(Rig(**law, friction_limit="axes"), diagonal)[-1, :2]
+    assert apart == pytest.approx([3e3, 4e3])
+    together = pulled(Rig(**law), diagonal)[-1, :2]
+    assert np.hypot(*(together / [3e3, 4e3])) == pytest.approx(1.0)
+
+
+def test_sliding_around_a_circle_turns_the_force_with_it():
+    """Once around at constant |v| the force follows the way; its work is mu N times the way.
+
+    It lags by the elastic way mu N/k_t over the radius; energy within 1 %.
+    """
+    mu, N, radius = 0.3, 5e4, 0.05
+    rig = Rig(**pressed(N, mu))
+    time = np.linspace(0.0, 2.0, 4001)
+    turn = 2.0 * np.pi
+
+    def place(t):
+        return radius * np.array([np.cos(turn * t) - 1.0, np.sin(turn * t), 0.0, 0.0, 0.0, 0.0])
+
+    def rate(t):
+        return radius * turn * np.array([-np.sin(turn * t), np.cos(turn * t), 0.0, 0.0, 0.0, 0.0])
+
+    force = rig.path(time, place, rate)[2000:-1, :2]
+    assert np.hypot(*force.T) == pytest.approx(mu * N, rel=1e-3)
+    v = np.array([rate(t)[:2] for t in time[2000:-1]])
+    work = np.sum(force * v) * (time[1] - time[0])
+    assert work == pytest.approx(mu * N * 2.0 * np.pi * radius, rel=0.01)
+
+
+def test_no_pressure_no_grip_and_no_tension():
+    """A pad that is lifted holds nothing in any direction, and grips again when it comes down."""
+    N, k = 5e4, 1e6
+    rig = Rig(**pressed(N, damping=2e4))
+    x = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert pulled(rig, x)[-1, 0] == pytest.approx(0.3 * N)
+    above = np.array([0.02, 0.0, -0.06, 0.0, 0.0, 0.0])  # N/k = 50 mm: lifted by 10 mm
+    lifted = pulled(rig, x, held=above)
+    assert np.all(lifted[1:, :3] == 0.0)
+    assert pulled(rig, x, held=np.array([0.04, 0.0, -0.03, 0.0, 0.0, 0.0]))[-1, 0] == (
+        pytest.approx(0.3 * (N - 0.03 * k))
+    )
+    # going up fast the damper does not hold it down
+    assert rig.forces(np.zeros(6), np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))[2] == 0.0
+
+
+@pytest.mark.parametrize("preload", [5e4, -5e4])
+def test_a_leaf_spring_grips_only_in_the_direction_of_its_preload(preload):
+    rig = Rig(
+        kind="friction",
+        friction_coefficient=[0.3, 0.3, 0.0],
+        stick_stiffness=[2e7, 2e7, 0.0],
+        stiffness=[0.0, 0.0, 1e6],
+        preload=[0.0, 0.0, preload],
+    )
+    gone = np.array([0.0, 0.0, -0.06 * np.sign(preload), 0.0, 0.0, 0.0])
+    assert np.all(pulled(rig, np.eye(6)[0], held=gone)[:, :2] == 0.0)
+
+
+def test_side_bearer_with_clearance_and_stop():
+    """Nothing in the clearance, then its spring, then the stop beside it."""
+    rig = Rig(**pressed(0.0, clearance=0.004, stop_travel=0.01, stop_stiffness=5e7))
+    for z, force in ((0.0, 0.0), (-0.1, 0.0), (0.004, 0.0), (0.009, 5e3), (0.015, 11e3 + 5e4)):
+        assert rig.force(Z, z) == pytest.approx(force, abs=1e-6)
+
+
+@pytest.mark.parametrize("inner", [0.0, 0.05, 0.15])
+def test_yaw_moment_of_a_centre_plate(inner):
+    """2/3 mu N (R^3 - r^3)/(R^2 - r^2) under even pressure, exactly; no side force."""
+    mu, N, R = 0.3, 4e5, 0.178
+    plate = {**pressed(N, mu, stick_stiffness=1e9), "kind": "centre_plate", "radius": R}
+    rig = Rig(**plate, inner_radius=inner)
+    yaw = pulled(rig, np.eye(6)[5], way=0.05)[-1]
+    assert yaw[5] == pytest.approx(2 / 3 * mu * N * (R**3 - inner**3) / (R**2 - inner**2))
+    assert yaw[:2] == pytest.approx(0.0, abs=1e-3 * mu * N)
+
+
+def test_tilting_stiffness_and_edge_of_a_centre_plate():
+    """k (R^2 + r^2)/4 while all of it carries; tilted far, only pads at the edge do."""
+    N, R, r, k = 4e5, 0.178, 0.05, 1e9
+    plate = {**pressed(N, stiffness=k), "kind": "centre_plate", "radius": R, "inner_radius": r}
+    rig = Rig(**plate)
+    for axis in (3, 4):
+        small = rig.forces(1e-5 * np.eye(6)[axis], np.zeros(6))
+        assert small[axis] == pytest.approx(1e-5 * k * (R**2 + r**2) / 4.0, rel=1e-3)
+    # at the angle where one outer pad alone carries N: edge of the plate, within the pads' place
+    far = rig.forces([0.0, 0.0, 0.0, 0.02, 0.0, 0.0], np.zeros(6))
+    assert 0.0 < far[3] / far[2] < R
+
+
+def test_turning_plate_loses_its_side_capacity():
+    """Each point's friction is against its own way: little is left across a plate that turns."""
+    plate = {**pressed(4e5, stick_stiffness=1e9), "kind": "centre_plate", "radius": 0.178}
+    rig = Rig(**plate)
+    turning = np.array([0.0, 0.01, 0.0, 0.0, 0.0, 1.0])
+    both = pulled(rig, turning, way=0.05)[-1]
+    assert 0.0 < both[1] < 0.2 * 0.3 * 4e5
+    assert both[5] == pytest.approx(2 / 3 * 0.3 * 4e5 * 0.178, rel=0.03)
+
+
+# wedges -------------------------------------------------------------------------------------------
+
+WEDGE = {
+    "kind": "wedge",
+    "stiffness": [0.0, 0.0, 4e5],
+    "preload": [0.0, 0.0, 3e4],
+    "angle": 0.634,
+    "friction_coefficient": 0.25,
+    "stick_stiffness": [2e7, 2e7],
+}
+
+
+def wedge_limits(force):
+    """Friction on the way down and up by the balance of a wedge without mass (see Wu, Robeda 2004).
+
+    Down: F = N tan(a) - mu N, up: F = N tan(a) + mu N; the friction is mu N.
+    """
+    a, mu = np.tan(WEDGE["angle"]), WEDGE["friction_coefficient"]
+    return mu * force / (a - mu), mu * force / (a + mu)
+
+
+def test_wedges_lose_the_work_of_both_ways():
+    """Energy of a cycle: a figure between the two limits over the spring force, elastic flanks."""
+    A, k_t, k, F = 0.03, WEDGE["stick_stiffness"][1], WEDGE["stiffness"][2], 3e4
+    d, f = last_period(Rig(**WEDGE), Z, triangle(A, 1.0), 1.0)
+
+    def down(z):
+        return wedge_limits(F + k * z)[0]
+
+    def up(z):
+        return -wedge_limits(F + k * z)[1]
+
+    top = brentq(lambda z: down(A) + k_t * (z - A) - up(z), -A, A)
+    bottom = brentq(lambda z: up(-A) + k_t * (z + A) - down(z), -A, A)
+    x = np.array([A, top, -A, bottom])
+    y = np.array([down(A), up(top), up(-A), down(bottom)])
+    area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    assert loop_area(d, f - F - k * d) == pytest.approx(area, rel=1e-3)
+
+
+def test_wedges_slide_sideways_at_their_level_limit():
+    """mu F/tan(a) where no part of the friction holds the wedge up or down."""
+    force = pulled(Rig(**WEDGE), np.eye(6)[1])[-1]
+    assert force[1] == pytest.approx(0.25 * 3e4 / np.tan(WEDGE["angle"]), rel=1e-3)
+    unloaded = pulled(Rig(**WEDGE), np.eye(6)[1], held=np.array([0, 0, -0.08, 0, 0, 0.0]))
+    assert np.all(unloaded[:, 1:3] == 0.0)
+
+
 # dampers ------------------------------------------------------------------------------------------
 
 BLOW_OFF = [[0.0, 0.0], [0.1, 10e3], [0.5, 12e3]]

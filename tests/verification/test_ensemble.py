@@ -205,7 +205,7 @@ def test_output_that_cannot_be_written_ends_its_own_run_only():
 
 
 def test_wrong_inputs_of_all_are_refused_at_once():
-    with pytest.raises(InputError, match="--speed"):
+    with pytest.raises(InputError, match="speed"):
         simulate_together([coach(), coach()], load_track("straight"), speed=-1.0)
 
 

@@ -9,7 +9,7 @@ from dynamics import load_track
 from held_wheelset import GRAVITY, RADIUS, HeldWheelset
 from scipy.optimize import brentq, root
 
-from railsim.kernels.wheel_rail import C11, C22, C23, C_Y, A, B
+from railsim.kernels.contact_columns import C11, C22, C23, C_Y, A, B
 from railsim.linear.circle import circle
 
 MASS, INERTIA = 1813.0, 1120.0

@@ -1,14 +1,22 @@
 """Irregularities of the track against their definitions: spectra, shapes, measured data."""
 
+import typing
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.signal import welch
 
+from railsim.definitions.irregularity import Irregularity
 from railsim.definitions.loading import load_track
 from railsim.definitions.track import Track
 from railsim.errors import InputError
-from railsim.track.irregularity import displacement, largest_between_rows, measured_remarks
+from railsim.track.irregularity import (
+    _displacement,
+    displacement,
+    largest_between_rows,
+    measured_remarks,
+)
 from railsim.track.spectra import ERRI_B176, SPECTRA
 from railsim.track.tables import track_tables
 
@@ -161,6 +169,7 @@ DIP = {"type": "dip", "s": 50.0, "length": 8.0, "depth": 0.01, "rail": "right"}
 KINK = {"type": "kink", "s": 50.0, "length": 10.0, "offset": 0.006, "rail": "left"}
 TWIST = {"type": "twist", "s": 50.0, "length": 12.0, "height": 0.02}
 ROWS = [[s, *(1e-3 * np.sin([s, 2 * s, 3 * s, s + 1.0]))] for s in np.arange(10.0, 90.0, 0.5)]
+SWEEP = {"type": "sweep", "amplitude": 3e-3, "wavelengths": (20.0, 6.0), "begin": 5.0, "end": 90.0}
 MEASURED = {"type": "measured", "rows": ROWS, "shift": 3.0, "scale": 2.0}
 
 
@@ -175,6 +184,8 @@ MEASURED = {"type": "measured", "rows": ROWS, "shift": 3.0, "scale": 2.0}
         TWIST,
         MEASURED,
         {**MEASURED, "fade": 0.0},
+        SWEEP,
+        {**SWEEP, "channel": "lateral", "wavelengths": (5.0, 12.0)},
     ],
 )
 def test_rate_is_the_derivative(part):
@@ -185,7 +196,7 @@ def test_rate_is_the_derivative(part):
     np.testing.assert_allclose(moved(s)[1], difference, atol=1e-7)
 
 
-@pytest.mark.parametrize("part", [random(fade=10.0, end=90.0), DIP, KINK, TWIST, MEASURED])
+@pytest.mark.parametrize("part", [random(fade=10.0, end=90.0), DIP, KINK, TWIST, MEASURED, SWEEP])
 def test_table_follows_the_displacement(part):
     bumpy = track(part, length=100.0)
     tables = track_tables(bumpy)
@@ -197,6 +208,44 @@ def test_table_follows_the_displacement(part):
     # cells are a sixteenth of the shortest wave: (2 pi / 16)^4 / 384 = 6e-5 of 10 mm; where the
     # second derivative jumps within a cell of 0.25 m, up to 1/27 ds^2 of its jump of 1.4e-3 / m
     np.testing.assert_allclose(found, displacement(bumpy)(s)[0].T, atol=3e-6)
+
+
+@pytest.mark.parametrize("wavelengths", [(20.0, 4.0), (4.0, 20.0), (8.0, 8.0)])
+def test_sweep_has_its_amplitude_and_wavelength_where_they_should_be(wavelengths):
+    """Zeros of sin(2 pi L (r^u - 1)/(first ln r)) at u = ln(1 + n first ln r/(2 L))/ln r."""
+    first, last = wavelengths
+    begin, length, height = 30.0, 400.0, 2e-3
+    part = {"type": "sweep", "amplitude": height, "wavelengths": wavelengths, "begin": begin,
+            "end": begin + length, "fade": 0.0}  # fmt: skip
+    moved = displacement(track(part))
+    n = np.arange(1, 40)
+    ratio = np.log(first / last)
+    u = np.log1p(n * first * ratio / (2.0 * length)) / ratio if ratio else n * first / 2.0 / length
+    u, n = u[u < 1.0], n[u < 1.0]
+    zeros = begin + length * u
+    values, rates = moved(zeros)
+    np.testing.assert_allclose(values[1], 0.0, atol=1e-15)
+    local = first * (last / first) ** u
+    np.testing.assert_allclose(rates[1], 2.0 * np.pi / local * height * (-1.0) ** n, rtol=1e-9)
+    wave = moved(np.linspace(zeros[0], zeros[-1], 20001))[0]
+    assert np.max(wave[1]) == pytest.approx(height, rel=1e-5)
+    np.testing.assert_array_equal(wave[1], wave[3])
+    assert not wave[[0, 2]].any()
+
+
+def test_cross_level_of_a_sweep_is_the_difference_of_heights():
+    part = {"type": "sweep", "amplitude": 4e-3, "wavelengths": (8.0, 8.0), "begin": 0.0,
+            "end": 80.0, "channel": "cross_level", "fade": 0.0}  # fmt: skip
+    _, left, _, right = displacement(track(part))(np.array([2.0]))[0]
+    np.testing.assert_allclose((left, right), ([-2e-3], [2e-3]), rtol=1e-12)
+
+
+def test_every_kind_of_irregularity_has_a_displacement_and_answers():
+    kinds = typing.get_args(typing.get_args(Irregularity)[0])
+    assert len(kinds) == 6
+    for kind in kinds:
+        assert _displacement.dispatch(kind) is not _displacement.dispatch(object)
+        assert not kind.__abstractmethods__
 
 
 def test_smooth_track_has_none():

@@ -10,13 +10,13 @@ from rig import test_vehicle
 from railsim.contact import table
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
-from railsim.kernels.time_loop import time_loop
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillations
 from railsim.linear.modes import modes, root_locus
 from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
-from railsim.model.assembly import CONSTANT_SPEED, level_track_with_friction, work_arrays
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
+from railsim.model.work import CONSTANT_SPEED, level_track_with_friction, work_arrays
 from railsim.profiles import Profile
 from railsim.profiles.builtin import arc_chain_rail
 
@@ -180,11 +180,7 @@ def run_from(prepared, mode, speed, scheme):
             empty_recorder(model, 1),
             SCHEMES[scheme],
             h,
-            min(k, 1),
-            steps,
-            1 << 40,
-            int(k == 0),
-            0,
+            Chunk(min(k, 1), steps, 1 << 40, fresh=int(k == 0)),
         )
         assert status == 0
         time.append((k + 1) * steps * h)
@@ -196,7 +192,7 @@ def run_from(prepared, mode, speed, scheme):
 
 
 def test_an_amplitude_beyond_the_contact_table_is_refused():
-    with pytest.raises(InputError, match="--amplitude"):
+    with pytest.raises(InputError, match="amplitude"):
         modes(load_vehicle("coach_manchester"), STRAIGHT, linearisation="harmonic", amplitude=0.1)
 
 

@@ -8,7 +8,7 @@ from rig import test_vehicle
 import railsim
 from railsim.errors import Fault, InputError
 from railsim.result import open_result
-from railsim.simulation import run, run_in, simulate
+from railsim.simulation import preparation, run_in, simulate
 
 RAMP = ((0.0, 10.0), (50.0, 10.0), (150.0, 30.0), (200.0, 30.0))
 
@@ -213,7 +213,7 @@ def test_continued_run_needs_no_run_in(straight, monkeypatch):
     def refused(*arguments):
         raise AssertionError("a run-in")
 
-    monkeypatch.setattr(run, "start_state", refused)
+    monkeypatch.setattr(preparation, "start_state", refused)
     assert simulate(coach, straight, resume=first, until=10.0).status == "complete"
 
 

@@ -7,11 +7,12 @@ from rig import test_vehicle
 
 import railsim
 from railsim.definitions.settings import Settings
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import right_hand_side
-from railsim.kernels.wheel_rail import W_Q, W_Y
 from railsim.linear.steady import NotConverged
-from railsim.model.assembly import assemble, work_arrays
+from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.model.work import work_arrays
 from railsim.simulation import run_in
 
 STEADY = Settings(start_state="steady")

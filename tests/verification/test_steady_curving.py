@@ -5,13 +5,13 @@ import pytest
 from dynamics import Settings, load_track, load_vehicle, steady
 from rig import test_vehicle
 
-from railsim.kernels.time_loop import FAST, time_loop
-from railsim.kernels.wheel_rail import W_Q, W_Y
+from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
 from railsim.linear.steady import NotConverged, led
-from railsim.model.assembly import work_arrays
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation.run_in import settled
 from railsim.track.tables import track_tables
 
@@ -68,11 +68,7 @@ def test_newton_finds_the_end_of_a_long_run(name, radius):
             empty_recorder(model, 1),
             FAST,
             1e-3,
-            1,
-            500,
-            1 << 40,
-            0,
-            0,
+            Chunk(1, 500, 1 << 40),
         )
         assert status == 0
     for column in (W_Q, W_Y):

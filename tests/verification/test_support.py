@@ -6,13 +6,13 @@ from dynamics import Settings, evaluate, load_track, load_vehicle, steady
 
 from railsim.definitions.support import PRESETS
 from railsim.definitions.vehicle import Vehicle
+from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.support import RATE, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
-from railsim.kernels.time_loop import time_loop
-from railsim.kernels.wheel_rail import W_Q
-from railsim.model.assembly import work_arrays
+from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.time_step import SCHEMES, empty_recorder
+from railsim.model.work import work_arrays
 from railsim.simulation import simulate
 from railsim.simulation.outputs import rail_deflection
 
@@ -117,8 +117,9 @@ def over_the_joint(speed, h, scheme="rk4", damping=0.0, stiffness=None, after=0.
     work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
     steps = int((9.0 / speed + after) / h)
     recorder = empty_recorder(model, steps)
+    chunk = Chunk(0, steps, 1, fresh=1)
     status, *_ = time_loop(
-        system, work, state, derivative, stages, recorder, SCHEMES[scheme], h, 0, steps, 1, 1, 0
+        system, work, state, derivative, stages, recorder, SCHEMES[scheme], h, chunk
     )
     assert status == 0
     end = recorder.state.shape[1] - N_SCALARS

@@ -7,7 +7,7 @@ from rig import test_vehicle
 
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.track import Track
-from railsim.kernels.wheel_rail import W_NORMAL
+from railsim.kernels.contact_columns import W_NORMAL
 from railsim.simulation import simulate
 
 G = 9.81
@@ -100,6 +100,19 @@ def test_traction_accelerates_the_mass_and_the_turning_wheels(coach):
     rate = 2.0 * np.polyfit(result.time[late], result.distance[late], 2)[0]
     mass, turning = masses(coach)
     assert rate == pytest.approx(30e3 / (mass + turning), rel=1e-3)
+
+
+def test_frictional_power_is_what_a_coasting_coach_loses_in_a_curve(coach):
+    """(m + sum(I/r0^2)) V V' = -P, once it has settled; the yawing bodies hold 0.05 % more."""
+    settings = Settings(drive={"mode": "free"}, outputs={"frictional_power": True})
+    result = simulate(coach, curve(), speed=20.0, settings=settings)
+    t, s = result.time, result.distance
+    late = t > t[-1] - 2.0
+    rate, speed = np.polyfit(t[late] - t[-1] + 1.0, s[late], 2)[:2] * (2.0, 1.0)
+    mass, turning = masses(coach)
+    power = result["frictional_power"][late].sum(axis=(1, 2)).mean()
+    assert power > 5e3
+    assert power == pytest.approx(-(mass + turning) * speed * rate, rel=0.01)
 
 
 def test_cant_about_the_inner_rail_is_cant_about_the_centre_when_steady(coach):

@@ -5,7 +5,7 @@ import pytest
 from dynamics import Settings, advance, changed, evaluate, load_track, load_vehicle, steady
 
 from railsim.definitions.track import Track
-from railsim.kernels.wheel_rail import W_Q, W_Y
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.simulation import simulate
 
 

@@ -7,8 +7,9 @@ from dynamics import Settings, changed, load_track, load_vehicle, undamped
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import modes
-from railsim.model.assembly import assemble, level_track
+from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.model.work import level_track
 
 
 def held_modes(vehicle, *, loaded):

@@ -15,7 +15,7 @@ from dynamics import (
 )
 
 from railsim.definitions.track import Track
-from railsim.kernels.wheel_rail import (
+from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
     C_X,

@@ -1,0 +1,63 @@
+"""The creep laws: what settings, plots, texts and the time loop know of each."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+CreepLawName = Literal["fastsim", "table", "fastrip", "polach", "linear", "adhesion_curve"]
+
+
+@dataclass(frozen=True)
+class CreepLaw:
+    """What is known of a creep law.
+
+    Attributes
+    ----------
+    number : int
+        Its number in `railsim.kernels.creep`.
+    label : str
+        How it is called in texts and pictures.
+    colour : int
+        Its colour in pictures, an index of `railsim.plot.style.DISTINCT`.
+    meaning : str
+        What it is, in one line.
+    grid : bool
+        Whether it divides the patch into cells, `settings.fastsim_grid`.
+    ratio : float
+        Range of the ratio of semi-axes: 1/ratio <= a/b <= ratio; beyond it the nearest is taken,
+        and the patch is counted.
+    measured : bool
+        Whether it needs a curve of the user's own, `settings.adhesion_curve`.
+    """
+
+    number: int
+    label: str
+    colour: int
+    meaning: str
+    grid: bool = False
+    ratio: float = 24.0
+    measured: bool = False
+
+
+CREEP_LAWS: dict[CreepLawName, CreepLaw] = {
+    "fastsim": CreepLaw(
+        0, "FASTSIM", 0, "Kalker's simplified theory (1982), the usual compromise", grid=True
+    ),
+    "table": CreepLaw(1, "table", 1, "Kalker's full half-space theory, tabulated", ratio=20.0),
+    "fastrip": CreepLaw(
+        2,
+        "FaStrip",
+        2,
+        "strip theory joined to FASTSIM, after Sichani and others (2016)",
+        grid=True,
+    ),
+    "polach": CreepLaw(
+        3, "Polach", 3, "Polach's closed formula, with falling friction the choice for traction"
+    ),
+    "linear": CreepLaw(
+        4, "linear", 6, "Kalker's linear theory, saturated after Shen, Hedrick and Elkins"
+    ),
+    "adhesion_curve": CreepLaw(
+        5, "adhesion curve", 4, "a measured curve T/(mu N) over creepage", measured=True
+    ),
+}
+"""Every creep law by its name in a settings file."""

@@ -1,0 +1,237 @@
+"""The compiler: all that railsim uses of numba's inside, and what it does without it.
+
+Numba's private parts are used here and nowhere else.  They make compilation a quarter shorter,
+keep compiled code by the hash of all sources, and give every run the same bits whatever else is
+compiled.
+Where they are missing, or where `RAILSIM_PLAIN_NUMBA=1` asks for it, functions are compiled by
+numba's public means: slower to compile, and the last bits of a run may depend on what was compiled
+before, but the same formulas.  A version of numba costs time at worst.
+
+Every compiled function holds its callees for itself.  By numba's own choice the callees of one
+name, compiled alone or within several callers, are merged when they are loaded: the first one
+wins.  They are optimised differently, sums are reordered, and the last bits of a run would depend
+on what the process compiled or called before.
+"""
+
+import hashlib
+import os
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+from numba.core import config as _config
+from numba.extending import intrinsic, overload
+
+from railsim.kernels.cache import discard, notice, store, stored
+
+try:
+    from llvmlite.binding import Linkage
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import Compiler, CompileResult, Flags
+    from numba.core.registry import CPUDispatcher
+    from numba.core.serialize import dumps
+    from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+
+    MISSING = ""
+except ImportError as error:
+    MISSING = str(error)
+
+PRIVATE = not MISSING and os.environ.get("RAILSIM_PLAIN_NUMBA", "") in ("", "0")
+"""Whether numba's private parts are used."""
+
+if MISSING:
+    notice(
+        f"numba {numba.__version__} is not known to this railsim ({MISSING}): kernels are compiled "
+        "by its public means, more slowly"
+    )
+
+if PRIVATE:
+
+    class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
+        """Compiled code whose callees are invisible to all other code."""
+
+        def _finalize_final_module(self):
+            self._finalized = True  # no more is added: what callers link is taken before
+            self._get_module_for_linking()
+            for function in self._final_module.functions:
+                if function.linkage == Linkage.linkonce_odr:
+                    function.linkage = Linkage.internal
+            super()._finalize_final_module()
+
+    class _Flags(Flags):  # type: ignore[misc]
+        """Compiler flags that are compared by those that are set.
+
+        Numba looks up each operator under a key with the flags; its own comparison goes through all
+        thirty of them in Python, some 400 000 times for the time loop: a quarter of its
+        compilation.
+        """
+
+        def __hash__(self):
+            return hash(frozenset(self._values))
+
+        def __eq__(self, other):
+            if isinstance(other, _Flags):
+                return self._values == other._values
+            return super().__eq__(other)
+
+    class _Compiler(Compiler):  # type: ignore[misc]
+        def compile_extra(self, func):
+            self.state.flags = _Flags(self.state.flags)
+            self.state.library = _SelfContained(self.state.targetctx.codegen(), func.__qualname__)
+            self.state.library.enable_object_caching()
+            return super().compile_extra(func)
+
+    class _Internal(CPUDispatcher):  # type: ignore[misc]
+        """Compiled function without an entry for Python, where a call of it would crash."""
+
+        def __call__(self, *args):
+            raise TypeError(f"{self.py_func.__name__} can be called from compiled code only")
+
+
+class KernelCache:
+    """Compiled code of one function on disk, as numba's dispatcher wants it.
+
+    One file for every signature and kind of processor; which sources they belong to is said by the
+    name of the folder.
+    """
+
+    def __init__(self, function: Callable[..., object], folder: Path) -> None:
+        self._folder = folder
+        module = function.__module__.rpartition(".")[2]
+        self._name = f"{module}.{function.__qualname__}"
+        closure = [cell.cell_contents for cell in function.__closure__ or ()]
+        self._code = hashlib.sha256(function.__code__.co_code + repr(closure).encode()).hexdigest()
+
+    @property
+    def cache_path(self) -> str:
+        """Folder of the files."""
+        return str(self._folder)
+
+    def _path(self, signature: object, codegen) -> Path:
+        key = repr((str(signature), codegen.magic_tuple(), self._code))
+        digest = hashlib.sha256(key.encode()).hexdigest()[:24]
+        return self._folder / f"{self._name}-{digest}.nbc"
+
+    def load_overload(self, signature, target_context):
+        """Return the compiled function of a signature, or None."""
+        target_context.refresh()
+        path = self._path(signature, target_context.codegen())
+        data = stored(path)
+        if data is None:
+            return None
+        try:
+            return CompileResult._rebuild(target_context, *pickle.loads(data))
+        except Exception:  # what another version of a library has written
+            discard(path)
+            return None
+
+    def save_overload(self, signature, result) -> None:
+        """Store the compiled function of a signature."""
+        if not result.lifted and not result.library.has_dynamic_globals:
+            store(self._path(signature, result.codegen), dumps(result._reduce()))
+
+    def enable(self) -> None:
+        """Nothing to do: it is on."""
+
+    def disable(self) -> None:
+        """Nothing to do."""
+
+    def flush(self) -> None:
+        """Forget all signatures."""
+        for path in self._folder.glob(f"{self._name}-*.nbc"):
+            path.unlink(missing_ok=True)
+
+
+def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **options):
+    """Compile a function, keeping the code in `folder`.
+
+    Parameters
+    ----------
+    function : callable
+    folder : Path or None
+        Where compiled code of these sources is kept; None keeps none.
+    fastmath : set of str
+        Which freedom the compiler has with sums and products.
+    python : bool
+        Whether Python calls it too; the entry for Python, which takes a `System` apart into its
+        arrays, costs more to compile than many a function itself.
+    allocates : bool
+        Whether it may allocate arrays.
+    **options
+        Public options of `numba.njit`.
+    """
+    if not PRIVATE:
+        return _plainly(function, folder, fastmath, options)
+    compiled = numba.njit(
+        error_model="numpy",
+        fastmath=fastmath,
+        pipeline_class=_Compiler,
+        no_cfunc_wrapper=True,
+        **({} if python else {"no_cpython_wrapper": True}),
+        **({} if allocates else {"_nrt": False}),
+        **options,
+    )(function)
+    if _config.DISABLE_JIT:
+        return compiled
+    if folder is not None:
+        compiled._cache = KernelCache(function, folder)
+    if not python:
+        compiled.__class__ = _Internal
+    return compiled
+
+
+def _plainly(function, folder: Path | None, fastmath, options):
+    """Compile by numba's public means; its own cache in the folder of these sources."""
+    before = _config.CACHE_DIR
+    try:
+        if folder is not None:
+            _config.CACHE_DIR = str(folder / "plain")
+        kept = folder is not None and Path(function.__code__.co_filename).is_file()
+        return numba.njit(error_model="numpy", fastmath=fastmath, cache=kept, **options)(function)
+    finally:
+        _config.CACHE_DIR = before
+
+
+def define_operator(operation, result_of, lower):
+    """Let an operator of Python take further types in compiled code.
+
+    Parameters
+    ----------
+    operation : callable
+        Such as `operator.add`.
+    result_of : callable
+        Type of the result of some types, None where they are not concerned.
+    lower : callable
+        Writes the instructions: context, builder, signature, values; registered with numba already
+        for all types that are concerned.
+    """
+    if PRIVATE:
+
+        @infer_global(operation)
+        class _Template(AbstractTemplate):  # type: ignore[misc]
+            def generic(self, args, kws):
+                result = result_of(args)
+                return None if result is None else signature(result, *args)
+
+        return
+
+    @intrinsic
+    def of_one(typingctx, a):
+        return result_of((a,))(a), lower
+
+    @intrinsic
+    def of_two(typingctx, a, b):
+        return result_of((a, b))(a, b), lower
+
+    if operation.__name__ == "neg":
+
+        @overload(operation, inline="always")
+        def one(a):
+            return (lambda a: of_one(a)) if result_of((a,)) is not None else None
+
+        return
+
+    @overload(operation, inline="always")
+    def two(a, b):
+        return (lambda a, b: of_two(a, b)) if result_of((a, b)) is not None else None

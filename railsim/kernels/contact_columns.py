@@ -1,0 +1,52 @@
+"""Rows and columns of what the wheel-rail contact writes: patches, wheels, damping of wheelsets."""
+
+# rows of Work.patch: one column per active patch.  Angle and foot are in the plane of the rails:
+# place of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal and C
+# in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
+(
+    A,
+    B,
+    NORMAL,
+    MU_N,
+    ANGLE_SIN,
+    ANGLE_COS,
+    C_X,
+    C_Y,
+    C_Z,
+    XI_X,
+    XI_Y,
+    PHI,
+    C11,
+    C22,
+    C23,
+    C33,
+    T_X,
+    T_Y,
+    M_Z,
+    PENETRATION,
+    BEYOND,
+    NORMAL_STIFFNESS,
+    NORMAL_DAMPING,
+    LEAD,
+    FOOT_X,
+    FOOT_Y,
+    FOOT_Z,
+    TURN_Y,
+    TURN_Z,
+    NORMAL_Y,
+    NORMAL_Z,
+    PATCH_SPEED,
+) = range(32)
+PATCH_ROWS = 32
+
+# columns of Work.wheel[w, side]
+W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL, W_T_GAMMA_SPIN = range(9)
+WHEEL_COLUMNS = 9
+
+# columns of Work.contact_jacobian[b], what the contact takes from the wheelset's speeds, for the
+# implicit part of the step: creep forces along the track [N s/m], the same times the lever c_z
+# [N s], in yaw [N m s]; then in y, z and roll [N s/m, N s, N m s] the upper half of the symmetric
+# matrix of the creep forces across, and row by row that of the normal forces with the friction that
+# follows them
+J_ALONG, J_ALONG_LEVER, J_YAW, J_SLIP, J_NORMAL = 0, 1, 2, 3, 9
+CONTACT_JACOBIAN = 18

@@ -1,0 +1,136 @@
+"""How contact forces change with speeds of wheelset and rail, for the implicit part of a step."""
+
+from math import sqrt
+
+from railsim.kernels import compiled
+from railsim.kernels.contact_columns import (
+    ANGLE_COS,
+    ANGLE_SIN,
+    C_Y,
+    C_Z,
+    FOOT_Y,
+    FOOT_Z,
+    J_NORMAL,
+    J_SLIP,
+    NORMAL,
+    NORMAL_DAMPING,
+    NORMAL_STIFFNESS,
+    NORMAL_Y,
+    NORMAL_Z,
+    T_Y,
+)
+from railsim.kernels.support import (
+    D_Y_ROLL,
+    D_Y_SLIP,
+    D_Y_Y,
+    D_Y_Z,
+    D_Z_ROLL,
+    D_Z_SLIP,
+    D_Z_Y,
+    D_Z_Z,
+    K_Y_ROLL,
+    K_Y_Y,
+    K_Y_Z,
+    K_Z_ROLL,
+    K_Z_Y,
+    K_Z_Z,
+    SUPPORT_COLUMNS,
+)
+
+
+@compiled(inline=True)
+def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
+    """Slopes of the creep force along and across over the creepage in that direction [N].
+
+    Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
+    (mu N) <= 3 (Vermeulen and Johnson 1964, spin as in the linear theory): an estimate that serves
+    the time step and does not enter the forces.
+    """
+    x = G * ab * c11 * xi_x / mu_N
+    y = G * ab * (c22 * xi_y + c23 * sqrt(ab) * phi) / mu_N
+    square = x * x + y * y
+    u = sqrt(square)
+    secant, tangent = 1.0, 1.0
+    if u >= 3.0:
+        secant, tangent = 1.0 / u, 0.0
+    elif u > 1e-9:
+        secant, tangent = 1.0 - u / 3.0 + square / 27.0, (1.0 - u / 3.0) ** 2
+    share = x * x / (square + 1e-300)
+    along = share * tangent + (1.0 - share) * secant
+    across = share * secant + (1.0 - share) * tangent
+    return G * ab * c11 * along, G * ab * c22 * across
+
+
+@compiled(inline=True)
+def begin_support(support):
+    """Nothing yet acts on the rails."""
+    for w in range(support.shape[0]):
+        for side in range(2):
+            for k in range(SUPPORT_COLUMNS):
+                support[w, side, k] = 0.0
+
+
+@compiled(inline=True)
+def add_slopes(support, w, side, patch, k, across):
+    """Add to the derivatives of the forces on a rail what patch `k` contributes.
+
+    By a motion d of the wheel at the patch, N changes by k_N n d and c_N n d', and the creep force
+    with it, being nearly proportional to N; T_y by the slope of the creep law, `across`, times
+    t d'.
+    """
+    s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
+    cy, cz = patch[FOOT_Y, k], patch[FOOT_Z, k]
+    share = patch[T_Y, k] / patch[NORMAL, k]
+    f_y, f_z = s + share * c, c - share * s
+    stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
+    lever = c * cy - s * cz  # of the normal about the wheelset's centre
+    support[w, side, K_Y_Y] += stiffness * f_y * s
+    support[w, side, K_Y_Z] += stiffness * f_y * c
+    support[w, side, K_Y_ROLL] += stiffness * f_y * lever
+    support[w, side, K_Z_Y] += stiffness * f_z * s
+    support[w, side, K_Z_Z] += stiffness * f_z * c
+    support[w, side, K_Z_ROLL] += stiffness * f_z * lever
+    arm = -c * cz - s * cy  # of the tangent
+    support[w, side, D_Y_Y] += damping * f_y * s + across * c * c
+    support[w, side, D_Y_Z] += damping * f_y * c - across * c * s
+    support[w, side, D_Y_ROLL] += damping * f_y * lever + across * c * arm
+    support[w, side, D_Z_Y] += damping * f_z * s - across * s * c
+    support[w, side, D_Z_Z] += damping * f_z * c + across * s * s
+    support[w, side, D_Z_ROLL] += damping * f_z * lever - across * s * arm
+    support[w, side, D_Y_SLIP] += across * c * c
+    support[w, side, D_Z_SLIP] -= across * s * c
+
+
+@compiled(inline=True)
+def add_damping(jacobian, b, patch, k, across):
+    """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
+
+    Across, -T_y t with the slope `across` of the creep law; along the normal, -(N n + T_y t) with
+    the contact damping, the creep force being nearly proportional to N.
+    """
+    s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
+    cy, cz = patch[C_Y, k], patch[C_Z, k]
+    arm = -c * cz - s * cy
+    lever = c * cy - s * cz
+    jacobian[b, J_SLIP] += across * c * c
+    jacobian[b, J_SLIP + 1] -= across * c * s
+    jacobian[b, J_SLIP + 2] += across * c * arm
+    jacobian[b, J_SLIP + 3] += across * s * s
+    jacobian[b, J_SLIP + 4] -= across * s * arm
+    jacobian[b, J_SLIP + 5] += across * arm * arm
+    damping = patch[NORMAL_DAMPING, k]
+    share = patch[T_Y, k] / patch[NORMAL, k]
+    f_y, f_z, f_roll = (
+        damping * (s + share * c),
+        damping * (c - share * s),
+        damping * (lever + share * arm),
+    )
+    jacobian[b, J_NORMAL] += f_y * s
+    jacobian[b, J_NORMAL + 1] += f_y * c
+    jacobian[b, J_NORMAL + 2] += f_y * lever
+    jacobian[b, J_NORMAL + 3] += f_z * s
+    jacobian[b, J_NORMAL + 4] += f_z * c
+    jacobian[b, J_NORMAL + 5] += f_z * lever
+    jacobian[b, J_NORMAL + 6] += f_roll * s
+    jacobian[b, J_NORMAL + 7] += f_roll * c
+    jacobian[b, J_NORMAL + 8] += f_roll * lever

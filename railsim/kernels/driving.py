@@ -1,0 +1,168 @@
+"""How the speed of travel acts on the bodies: traction, the held reference body, fixed bodies."""
+
+from railsim.kernels import compiled
+from railsim.kernels.rotation import sine_cosine
+from railsim.kernels.system import (
+    AXLEBOX,
+    BRAKES,
+    FORCE,
+    FREE,
+    MOMENT,
+    OVER_DISTANCE,
+    RADIUS,
+    SLIP_BEGIN,
+    SLIP_END,
+    TABLE,
+    Y_0,
+    Z_0,
+)
+from railsim.kernels.track_frame import OMEGA, OMEGA_S
+
+BRAKES_FULLY = (
+    0.1  # m/s; speed of the wheel's rim below which a brake's torque fades to that at rest
+)
+
+
+@compiled
+def table_value_slope(table, x):
+    """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
+    last = table.shape[0] - 1
+    if x < table[0, 0] or last == 0:
+        return table[0, 1], 0.0
+    if x >= table[last, 0]:
+        return table[last, 1], 0.0
+    i = 0
+    while x >= table[i + 1, 0]:
+        i += 1
+    slope = (table[i + 1, 1] - table[i, 1]) / (table[i + 1, 0] - table[i, 0])
+    return table[i, 1] + slope * (x - table[i, 0]), slope
+
+
+@compiled(merge=True)
+def add_traction(drive, bodies, frames, speed, pose):
+    """Traction less running resistance of a free-running vehicle, on the reference body."""
+    force, _ = table_value_slope(drive.table, speed)
+    force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
+    b = bodies.references[0]
+    f = bodies.frame[b]
+    for k in range(3):
+        pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
+
+
+@compiled(merge=True)
+def add_axle_torques(drives, time, s, frame_offset, bodies, speed, state, pose):
+    """Driving and braking torques on wheelsets, their reactions on the bodies that carry them."""
+    n = bodies.kind.shape[0]
+    for e in range(drives.body.shape[0]):
+        b, w = drives.body[e, 0], drives.body[e, 1]
+        first, demand, end = drives.start[2 * e], drives.start[2 * e + 1], drives.start[2 * e + 2]
+        torque, _ = table_value_slope(drives.table[first:demand], speed)
+        if end > demand:
+            over_distance = drives.row[e, OVER_DISTANCE] > 0.0
+            at = s + frame_offset[bodies.frame[w]] if over_distance else time
+            factor, _ = table_value_slope(drives.table[demand:end], at)
+            torque *= factor
+        # forwards it turns about the negative y axis
+        rolling = -state[6 * n + 6 * w + 4] * bodies.row[w, RADIUS]
+        if drives.row[e, BRAKES] > 0.0:
+            torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
+        if drives.row[e, SLIP_END] > 0.0:
+            begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
+            slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed
+            torque *= min(1.0, max(0.0, (gone - slip) / (gone - begin)))
+        for k in range(3):
+            moment = torque * pose[w, 3 * k + 1]
+            pose[w, MOMENT + k] -= moment
+            pose[b, MOMENT + k] += moment
+
+
+@compiled(merge=True)
+def speed_change(drive, bodies, frames, state, derivative):
+    """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
+    if drive.mode == TABLE:
+        # V(s) gives V' = V dV/ds
+        _, slope = table_value_slope(drive.table, state[-2])
+        return state[-1] * slope
+    if drive.mode == FREE:
+        b = bodies.references[0]
+        f = bodies.frame[b]
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
+        return derivative[6 * bodies.kind.shape[0] + 6 * b] / (
+            1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y
+        )
+    return 0.0
+
+
+@compiled(merge=True)
+def apply_speed_change(bodies, frames, state, rate, derivative):
+    """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
+    n = bodies.kind.shape[0]
+    for b in range(n):
+        if bodies.kind[b] == AXLEBOX:
+            continue
+        f = bodies.frame[b]
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        x = state[6 * b]
+        y = state[6 * b + 1] + bodies.row[b, Y_0]
+        z = state[6 * b + 2] + bodies.row[b, Z_0]
+        v = 6 * n + 6 * b
+        derivative[v] -= rate * (1.0 + w2 * z - w3 * y)
+        derivative[v + 1] -= rate * (w3 * x - w1 * z)
+        derivative[v + 2] -= rate * (w1 * y - w2 * x)
+
+
+@compiled(merge=True)
+def hold_reference(bodies, relative, acceleration, derivative):
+    """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
+    n = bodies.kind.shape[0]
+    for k in range(bodies.references.shape[0]):
+        b = bodies.references[k]
+        held = 6 * n + 6 * b
+        for i in range(3):
+            acceleration[b, i] -= derivative[held] * relative[b, i]
+        derivative[6 * b] = 0.0
+        derivative[held] = 0.0
+
+
+@compiled(inline=True)
+def turn_fixed(bodies, frames, speed, state):
+    """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
+    n = bodies.kind.shape[0]
+    for k in range(bodies.fixed.shape[0]):
+        b = bodies.fixed[k]
+        f = bodies.frame[b]
+        sr, cr = sine_cosine(state[6 * b + 3])
+        sp, cp = sine_cosine(state[6 * b + 4])
+        sy, cy = sine_cosine(state[6 * b + 5])
+        w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+        # C^T = Ry(-pitch) Rx(-roll) Rz(-yaw)
+        w1, w2 = cy * w1 + sy * w2, cy * w2 - sy * w1
+        w2, w3 = cr * w2 + sr * w3, cr * w3 - sr * w2
+        w1, w3 = cp * w1 - sp * w3, cp * w3 + sp * w1
+        v = 6 * n + 6 * b
+        state[v], state[v + 1], state[v + 2] = 0.0, 0.0, 0.0
+        state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
+
+
+@compiled(inline=True)
+def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
+    """Keep fixed bodies where they are; what holds them is part of their accelerations.
+
+    u' = C^T (V^2 omega_s + V' omega), `rate` being V'.
+    """
+    n = bodies.kind.shape[0]
+    for k in range(bodies.fixed.shape[0]):
+        b = bodies.fixed[k]
+        f, v = bodies.frame[b], 6 * n + 6 * b
+        for i in range(3):
+            turn = 0.0
+            for j in range(3):
+                acceleration[b, i] -= derivative[v + j] * C[b, 3 * j + i]
+                turn += C[b, 3 * j + i] * (
+                    speed * speed * frames[f, OMEGA_S + j] + rate * frames[f, OMEGA + j]
+                )
+            acceleration[b, 3 + i] = turn
+        for i in range(6):
+            derivative[6 * b + i] = 0.0
+            derivative[v + i] = 0.0

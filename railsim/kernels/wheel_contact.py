@@ -1,0 +1,400 @@
+"""Elastic normal contact of all wheels: see `wheel_rail` for the equations."""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from railsim.kernels import compiled
+from railsim.kernels.contact_columns import (
+    ANGLE_COS,
+    ANGLE_SIN,
+    CONTACT_JACOBIAN,
+    FOOT_X,
+    FOOT_Y,
+    FOOT_Z,
+    LEAD,
+    MU_N,
+    NORMAL,
+    NORMAL_DAMPING,
+    NORMAL_STIFFNESS,
+    PENETRATION,
+    W_LIFT,
+    W_NORMAL,
+    W_PHI,
+    W_Q,
+    W_T_GAMMA,
+    W_T_GAMMA_SPIN,
+    W_XI_X,
+    W_XI_Y,
+    W_Y,
+    A,
+    B,
+)
+from railsim.kernels.contact_table import (
+    ABOVE_Y,
+    BELOW_Y,
+    G_ROLL,
+    G_W,
+    G_Y,
+    INSIDE,
+    K2_ROLL,
+    K2_W,
+    K2_Y,
+    K_ROLL,
+    K_W,
+    K_Y,
+    LOOK_UP_SIZE,
+    N_PATCH,
+    OUTSIDE_ROLL,
+    cell_weights,
+    coupled_approaches,
+    is_far,
+    locate,
+    look_up,
+    stretched_roll,
+    under_load,
+)
+from railsim.kernels.rails import (
+    ASIDE,
+    ASIDE_SLOPE,
+    BEND_Z,
+    COMING_ROLL,
+    COMING_Y,
+    COMING_Z,
+    COSINE,
+    FRICTION,
+    MIDDLE_Y,
+    MIDDLE_Z,
+    MOTION_Y,
+    MOTION_Y_RATE,
+    MOTION_Z,
+    MOTION_Z_RATE,
+    RAIL_BEND,
+    RAIL_SLOPE,
+    ROLL,
+    ROLL_SLOPE,
+    SINE,
+    SLOPE_Y,
+    SLOPE_Z,
+    foresee,
+)
+from railsim.kernels.status import (
+    DERAILED,
+    INWARD_RANGE,
+    ROLL_RANGE,
+    RUNNING,
+    WHEEL_LIFT,
+    YAW_RANGE,
+)
+from railsim.kernels.system import COS_ROLL, Y_0, Z_0
+from railsim.kernels.track_frame import OMEGA
+
+# a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
+NEAR = 2e-3
+FADE = 30e-6  # penetration over which the contact damping is faded in (m)
+LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
+
+
+@compiled(inline=True)
+def normal_contact(system, work, speed, state):
+    """Look up all wheels, add elastic normal forces, list the active patches.
+
+    Returns
+    -------
+    status, wheelset, n : int
+        Status code, the wheelset it concerns, number of active patches.
+    """
+    contact = system.contact
+    force, plane, above = work.rail_force, work.plane, work.above
+    jacobian = work.contact_jacobian
+    n_bodies = system.bodies.kind.shape[0]
+    smoothed = 12 * n_bodies + system.internal.kind.shape[0]
+    ahead = work.watch[0]
+    n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
+    for w in range(contact.body.shape[0]):
+        b = contact.body[w]
+        for k in range(6):
+            force[b, k] = 0.0
+        for k in range(CONTACT_JACOBIAN):
+            jacobian[b, k] = 0.0
+        # the wheelset in the plane of the rails, and its rates there
+        sine, cosine = plane[w, SINE], plane[w, COSINE]
+        height = system.bodies.row[b, Z_0]
+        y = state[6 * b + 1] - plane[w, MIDDLE_Y]
+        z = state[6 * b + 2] - plane[w, MIDDLE_Z] + height
+        y_rate = state[6 * n_bodies + 6 * b + 1] - speed * plane[w, SLOPE_Y]
+        z_rate = state[6 * n_bodies + 6 * b + 2] - speed * plane[w, SLOPE_Z]
+        y, z = cosine * y + sine * z, cosine * z - sine * y
+        turn = speed * plane[w, ROLL_SLOPE]
+        y_rate, z_rate = (
+            cosine * y_rate + sine * z_rate + turn * z,
+            cosine * z_rate - sine * y_rate - turn * y,
+        )
+        # rates of the Euler angles were left here by the kinematics
+        yaw, yaw_rate = state[6 * b + 5], work.acceleration[b, 5]
+        # a yawed axle on sloping rails is rolled against their plane
+        slope, bend = plane[w, SLOPE_Z], plane[w, BEND_Z]
+        above[0], above[1] = y, z - height
+        above[2], above[3] = state[6 * b + 3] - plane[w, ROLL] + slope * yaw, yaw
+        above[4], above[5] = y_rate, z_rate
+        above[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
+        above[7] = yaw_rate
+        above[8], above[9] = stretched_roll(above[2])
+        work.swing[w] = 0.0
+        if ahead > 0.0 and system.track.has_irregularity:
+            own = smoothed + 6 * b
+            place = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
+            foresee(system.track, place, speed, w, plane, work.rail, state, own, ahead, work.coming)
+        for side in range(2):
+            status, n = wheel_contact(system, work, w, side, speed, n)
+            if status != RUNNING:
+                return status, w, n
+        # from the plane to the track's axes; -dU/ds in place of the force along the track
+        f_y, f_z = force[b, 1], force[b, 2]
+        along = plane[w, ROLL_SLOPE] * (f_y * z - f_z * y - force[b, 3])
+        f_y, f_z = cosine * f_y - sine * f_z, sine * f_y + cosine * f_z
+        force[b, 0] += along - f_y * plane[w, SLOPE_Y] - f_z * slope - force[b, 3] * bend * yaw
+        force[b, 1] = f_y
+        force[b, 2] = f_z
+        force[b, 5] += slope * force[b, 3]
+    return RUNNING, 0, n
+
+
+class Meeting(NamedTuple):
+    """A wheel on its rail, as if it were the right one: both seen in the plane of the rails.
+
+    Attributes
+    ----------
+    sign : float           -1 for the left wheel, 1 for the right one
+    y, z, roll, yaw : float   of the wheelset, less the rail's displacement [m, rad]
+    y_rate, z_rate, roll_rate, yaw_rate : float   their rates [m/s, rad/s]
+    """
+
+    sign: float
+    y: float
+    z: float
+    roll: float
+    yaw: float
+    y_rate: float
+    z_rate: float
+    roll_rate: float
+    yaw_rate: float
+
+
+@compiled(inline=True)
+def meeting(work, w, side, speed):
+    """How the wheel `side` of wheelset `w`, which `work.above` describes, stands on its rail."""
+    rail, above, motion = work.rail, work.above, work.rail_motion
+    sign = 2.0 * side - 1.0
+    aside, aside_slope = rail[w, side, ASIDE], rail[w, side, ASIDE_SLOPE]
+    return Meeting(
+        sign,
+        sign * (above[0] - aside - motion[w, side, MOTION_Y]),
+        above[1] - motion[w, side, MOTION_Z],
+        sign * above[2],
+        above[3] - rail[w, side, RAIL_SLOPE],
+        sign * (above[4] - speed * aside_slope - motion[w, side, MOTION_Y_RATE]),
+        above[5] - motion[w, side, MOTION_Z_RATE],
+        sign * above[6],
+        above[7] - speed * rail[w, side, RAIL_BEND],
+    )
+
+
+@compiled(inline=True)
+def wheel_contact(system, work, w, side, speed, n):
+    """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
+
+    `work.above` holds the wheelset in the plane of its rails, `n` counts the active patches so far.
+
+    Returns
+    -------
+    status, n : int
+    """
+    contact, above = system.contact, work.above
+    approach = work.approach
+    meet = meeting(work, w, side, speed)
+    table = contact.table[w, side]
+    where, iy, ir, iw, ty, tr, tw = locate(
+        contact, table, meet.y, meet.roll, meet.sign * above[8], meet.yaw * meet.yaw
+    )
+    if where != INSIDE:
+        return outside(where), n
+    cell_weights(contact, ty, tr, above[9], work.weights)
+    lift = 1.0
+    for patch in range(N_PATCH):
+        work.stiffness[patch] = 0.0
+        work.stiffness[N_PATCH + patch] = 0.0
+        approach[patch] = -1.0
+        if is_far(contact, table, patch, iy, ir, iw, tr, meet.z):
+            continue
+        first = patch * LOOK_UP_SIZE
+        look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
+        work.stiffness[patch] = work.look_up[first + 1]
+        work.stiffness[N_PATCH + patch] = work.look_up[first + 2]
+        approach[patch] = meet.z - work.look_up[first]
+        lift = min(lift, -approach[patch])
+    coupled_approaches(contact.coupling, table, work.stiffness, approach)
+    clear_wheel(work.wheel, w, side, lift)
+    for patch in range(N_PATCH):
+        if approach[patch] > -NEAR:
+            n = patch_contact(system, work, w, side, patch, meet, n)
+    if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, meet.z):
+        return WHEEL_LIFT, n
+    return RUNNING, n
+
+
+@compiled(inline=True)
+def clear_wheel(wheel, w, side, lift):
+    """Nothing yet acts on a wheel."""
+    wheel[w, side, W_Q] = 0.0
+    wheel[w, side, W_Y] = 0.0
+    wheel[w, side, W_NORMAL] = 0.0
+    wheel[w, side, W_XI_X] = 0.0
+    wheel[w, side, W_XI_Y] = 0.0
+    wheel[w, side, W_PHI] = 0.0
+    wheel[w, side, W_T_GAMMA] = 0.0
+    wheel[w, side, W_T_GAMMA_SPIN] = 0.0
+    wheel[w, side, W_LIFT] = lift
+
+
+@compiled(inline=True)
+def patch_contact(system, work, w, side, patch, meet, n):
+    """Normal force of one patch; where it carries, the patch becomes number `n` of the active ones.
+
+    Returns
+    -------
+    n : int
+        Number of active patches.
+    """
+    contact, t, coming = system.contact, work.look_up, work.coming
+    p, k = work.approach[patch], patch * LOOK_UP_SIZE
+    p_rate = (
+        meet.z_rate
+        - t[k + G_Y] * meet.y_rate
+        - t[k + G_ROLL] * meet.roll_rate
+        - t[k + G_W] * 2.0 * meet.yaw * meet.yaw_rate
+    )
+    p_change = coming[side, COMING_Z] - meet.sign * (
+        t[k + G_Y] * coming[side, COMING_Y] + t[k + G_ROLL] * coming[side, COMING_ROLL]
+    )
+    if p <= 0.0:
+        ahead = work.watch[0]
+        p += ahead * (p_rate + max(p_change, 0.0))
+        if p > 0.0:
+            root = sqrt(p)
+            soon = p * root * (t[k + 1] + root * t[k + 2]) / ahead
+            work.swing[w] = max(work.swing[w], soon)
+    else:
+        root = sqrt(p)
+        change = max(abs(p_rate), abs(p_rate + p_change))
+        soon = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change
+        work.swing[w] = max(work.swing[w], soon)
+        elastic = p * root * (t[k + 1] + root * t[k + 2])
+        c_y, c_z, a1, b1, tangent = under_load(t, k, elastic)
+        cos_2 = 1.0 / (1.0 + tangent * tangent)
+        fade = min(1.0, p / FADE)
+        vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
+        add_normal_force(work, contact.body[w], w, side, meet, p, k, vertical)
+        cos_g = sqrt(cos_2)
+        N = vertical / cos_g
+        if N > 0.0:
+            column = work.patch
+            column[A, n] = a1
+            column[B, n] = b1
+            column[NORMAL, n] = N
+            column[MU_N, n] = work.rail[w, side, FRICTION] * N
+            column[ANGLE_COS, n] = cos_g
+            column[ANGLE_SIN, n] = meet.sign * tangent * cos_g
+            # the normal meets the axle: c + lambda n lies on it, and n does not point along
+            lead = meet.sign * (c_z * tangent - c_y)
+            column[LEAD, n] = lead
+            column[FOOT_X, n] = meet.yaw * lead
+            column[FOOT_Y, n] = meet.sign * c_y
+            column[FOOT_Z, n] = c_z
+            column[PENETRATION, n] = p
+            column[NORMAL_STIFFNESS, n] = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) / cos_2
+            column[NORMAL_DAMPING, n] = contact.damping * fade
+            work.patch_index[n, 0] = w
+            work.patch_index[n, 1] = side
+            work.patch_index[n, 2] = patch
+            n += 1
+    return n
+
+
+@compiled(inline=True)
+def add_normal_force(work, b, w, side, meet, p, k, vertical):
+    """Add a patch's generalised normal forces to those of wheelset `w`, body `b`.
+
+    `p`: penetration; `k`: where the patch begins in `work.look_up`; `vertical`: its force there.
+    """
+    force, rail, t = work.rail_force, work.rail, work.look_up
+    per_K, per_K2 = 0.4 * p * p * sqrt(p), p * p * p / 3.0
+    q_y = meet.sign * (vertical * t[k + G_Y] - per_K * t[k + K_Y] - per_K2 * t[k + K2_Y])
+    q_yaw = (vertical * t[k + G_W] - per_K * t[k + K_W] - per_K2 * t[k + K2_W]) * 2.0 * meet.yaw
+    force[b, 0] -= q_y * rail[w, side, ASIDE_SLOPE] + q_yaw * rail[w, side, RAIL_BEND]
+    force[b, 1] += q_y
+    force[b, 2] -= vertical
+    force[b, 3] += meet.sign * (
+        vertical * t[k + G_ROLL] - per_K * t[k + K_ROLL] - per_K2 * t[k + K2_ROLL]
+    )
+    force[b, 5] += q_yaw
+    work.wheel[w, side, W_Q] += vertical
+    work.wheel[w, side, W_Y] -= q_y
+
+
+@compiled
+def all_far(contact, table, iy, ir, iw, tr, z):
+    """Whether every patch is more than LIFT_RANGE away from its rail."""
+    for patch in range(N_PATCH):
+        if z - contact.values[table, patch, iw, ir, iy, 0] > -LIFT_RANGE:
+            return False
+    return True
+
+
+@compiled
+def outside(where):
+    """Status code for a look-up outside the contact table."""
+    if where == ABOVE_Y:
+        return DERAILED
+    if where == BELOW_Y:
+        return INWARD_RANGE
+    if where == OUTSIDE_ROLL:
+        return ROLL_RANGE
+    return YAW_RANGE
+
+
+@compiled(merge=True)
+def complete_normal_force(b, bodies, frames, C, state, force):
+    """Moment vector from the generalised moments, and the force along the track.
+
+    The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
+    track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and the normal force does no
+    work on the spin, M_2 = 0.
+
+    The potential does not depend on the place along a smooth track.  Moving along it with all
+    relative coordinates held, v = e_x + omega x r and u = omega per metre, the contact does no
+    work; hence F_x (1 + (omega x r)_x) = -F_y (omega x r)_y - F_z (omega x r)_z - M omega: on a
+    twisted track the wheels climb the rails.  `force[b, 0]` brings the share of irregular rails.
+    """
+    m1 = force[b, 3]
+    m3 = force[b, 5] / C[b, COS_ROLL]
+    mx = C[b, 0] * m1 + C[b, 2] * m3
+    my = C[b, 3] * m1 + C[b, 5] * m3
+    mz = C[b, 6] * m1 + C[b, 8] * m3
+    f = bodies.frame[b]
+    w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
+    x = state[6 * b]
+    y = state[6 * b + 1] + bodies.row[b, Y_0]
+    z = state[6 * b + 2] + bodies.row[b, Z_0]
+    along = (
+        force[b, 1] * (w3 * x - w1 * z)
+        + force[b, 2] * (w1 * y - w2 * x)
+        + mx * w1
+        + my * w2
+        + mz * w3
+    )
+    force[b, 0] = (force[b, 0] - along) / (1.0 + w2 * z - w3 * y)
+    force[b, 3] = mx
+    force[b, 4] = my
+    force[b, 5] = mz

@@ -1,0 +1,195 @@
+"""What an optimisation found: starts, active constraints, the best point."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from railsim.definitions.mechanism import Mechanism
+from railsim.errors import InputError
+from railsim.mechanisms.analysis import Analysis, analyse
+from railsim.mechanisms.judgement import Judge, Judgement
+from railsim.mechanisms.kinematics import check_freedom
+from railsim.mechanisms.model import build
+
+Floats = NDArray[np.float64]
+
+
+FEASIBLE = 1e-7
+"""Breach of a constraint, in its scale, that counts as none."""
+ACTIVE = 1e-5
+"""Margin, in its scale, below which a constraint is active."""
+
+
+@dataclass(frozen=True)
+class Active:
+    """A limit that holds the optimum in place.
+
+    Attributes
+    ----------
+    name : str
+        Constraint, or parameter with `side` 'lower' or 'upper'.
+    side : str
+    slack : float
+        What is left to the limit, SI.
+    multiplier : float
+        Decrease of the objective for each unit (SI) that the limit gives way.
+    """
+
+    name: str
+    side: str
+    slack: float
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start of the search.
+
+    Attributes
+    ----------
+    number : int
+        0 is the file's own.
+    begin, end : dict of str to float
+        Parameters.
+    objective, violation : float
+        At the end; NaN where it never could be assembled.
+    evaluations : int
+    """
+
+    number: int
+    begin: dict[str, float]
+    end: dict[str, float]
+    objective: float
+    violation: float
+    evaluations: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all constraints are kept."""
+        return bool(self.violation <= FEASIBLE)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Result of a search.
+
+    Attributes
+    ----------
+    definition : Mechanism
+        The mechanism with the best parameters.
+    before, after : Analysis
+        Results with the file's own parameters and with the best.
+    objective, objective_before : float
+        NaN for parameters of the file that cannot be assembled.
+    feasible : bool
+        Whether all constraints are kept; else it is the compromise with the smallest breach.
+    breaches : dict of str to float
+        Broken constraints and by how much, SI.
+    active : tuple of Active
+    starts : tuple of Start
+    seed : int
+    """
+
+    definition: Mechanism
+    before: Analysis | None
+    after: Analysis
+    objective: float
+    objective_before: float
+    feasible: bool
+    breaches: dict[str, float]
+    active: tuple[Active, ...]
+    starts: tuple[Start, ...]
+    seed: int
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The best parameters among those that may change."""
+        best = best_of(self.starts)
+        return best.end
+
+
+def best_of(starts: Sequence[Start]) -> Start:
+    """The feasible start with the smallest objective, else that with the smallest breach."""
+    usable = [start for start in starts if np.isfinite(start.objective)]
+    feasible = [start for start in usable if start.feasible]
+    if feasible:
+        return min(feasible, key=lambda start: start.objective)
+    return min(usable, key=lambda start: start.violation)
+
+
+def own_choice(judge: Judge) -> dict[str, float]:
+    """Return the choices that the mechanism's own file makes."""
+    return {name: float(judge.values[name]) for name in judge.wanted.assemblies}
+
+
+def optimum_of(
+    definition: Mechanism, judge: Judge, best: Start, starts: tuple[Start, ...], seed: int
+) -> Optimum:
+    """Return the best of all starts with what is active there."""
+    x = np.array([best.end[name] for name in judge.names])
+    choice = {name: best.end[name] for name in judge.wanted.assemblies}
+    judged = judge(x, choice)
+    listed = {
+        name: tuple(names) for name, names in definition.provenance.items() if name != "optimised"
+    }
+    listed["optimised"] = tuple(best.end)
+    better = definition.with_parameters(best.end).model_copy(update={"provenance": listed})
+    check_freedom(build(better))
+    after = analyse(better)
+    try:
+        before: Analysis | None = analyse(definition)
+        own = np.array([float(judge.values[name]) for name in judge.names])
+        objective_before = judge(own, own_choice(judge)).objective
+        judge(x, choice)
+    except InputError:
+        before, objective_before = None, float("nan")
+    breaches: dict[str, float] = {}
+    for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
+        if margin < -FEASIBLE:
+            breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
+    return Optimum(
+        better,
+        before,
+        after,
+        judged.objective,
+        objective_before,
+        best.feasible,
+        breaches,
+        _active(judge, judged, x),
+        starts,
+        seed,
+    )
+
+
+def _active(judge: Judge, judged: Judgement, x: Floats) -> tuple[Active, ...]:
+    """Limits that hold the optimum: their slack, and multipliers by least squares."""
+    rows: list[tuple[str, str, float, Floats]] = []
+    span = judge.upper - judge.lower
+    seen: dict[str, int] = {}
+    for i, (name, _) in enumerate(judge.labels):
+        if judged.margins[i] < ACTIVE and (
+            name not in seen or judged.margins[i] < judged.margins[seen[name]]
+        ):
+            seen[name] = i
+    for name, i in seen.items():
+        scale = judge.labels[i][1]
+        rows.append((name, "", float(judged.margins[i]) * scale, judged.slopes[i] * scale))
+    for k, name in enumerate(judge.names):
+        unit = np.eye(len(x))[k]
+        if x[k] - judge.lower[k] < ACTIVE * span[k]:
+            rows.append((name, "lower", float(x[k] - judge.lower[k]), unit))
+        if judge.upper[k] - x[k] < ACTIVE * span[k]:
+            rows.append((name, "upper", float(judge.upper[k] - x[k]), -unit))
+    if not rows:
+        return ()
+    matrix = np.array([row[3] for row in rows]).T * span[:, None]
+    norms = np.linalg.norm(matrix, axis=0)
+    norms[norms == 0.0] = 1.0
+    weights, _ = nnls(matrix / norms, judged.gradient * span)
+    return tuple(
+        Active(name, side, slack, float(weight))
+        for (name, side, slack, _), weight in zip(rows, weights / norms, strict=True)
+    )

@@ -1,0 +1,260 @@
+"""Preloads of the suspension, with which a vehicle stands in its nominal position."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.flatten import FlatElement
+from railsim.errors import ModelError
+from railsim.kernels.aligned import aligned
+from railsim.kernels.system import AXLEBOX, RIGID, Links, Mounts, System
+from railsim.model.assembly import Model
+from railsim.model.element_arrays import vertical_support
+from railsim.notation import COMPONENTS
+
+Floats = NDArray[np.float64]
+
+
+UNBALANCED = 1e-6  # share of the weight that may stay unbalanced by preloads (round-off)
+
+
+def with_preloads(model: Model) -> Model:
+    """Return the model with every `auto` preload solved.
+
+    Unknowns are the vertical force of each mount and the force of each link so marked; conditions
+    the vertical force, roll and pitch moment of each rigid body and the pitch moment of each
+    axlebox, with the preloads given by the user and gravity as loads.
+
+    A load case takes the preloads of the design load: its bodies find their heights, rolls and
+    pitches themselves.  So does a vehicle with springs of known free length: their preloads are
+    given, and what they leave unbalanced moves the bodies.
+    """
+    if model.design is not None:
+        return _levelled(_with_preloads_of(model, with_preloads(model.design)))
+    conditions = _conditions(model.system)
+    # springs carry the weight of a fixed body where they can
+    weights = [(int(body), 2) for body in model.system.bodies.fixed]
+    free_lengths = any(getattr(e.definition, "has_free_length", False) for e in model.flat.elements)
+    for wanted in [[*conditions, *weights], conditions] if weights else [conditions]:
+        filled, rest = _with_solved_preloads(model, _auto_preloads(model), wanted)
+        unbalanced = [] if free_lengths else _unbalanced(model, wanted, rest)
+        if not unbalanced:
+            return filled
+    raise ModelError(
+        "no static equilibrium: the springs with preload cannot carry the vehicle in its "
+        "nominal position; unbalanced: " + "; ".join(unbalanced)
+    )
+
+
+def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
+    """Compression of all springs that carry weight at rest in the nominal position, by name [N].
+
+    As `with_preloads`, of a load case with its own weights, and of springs with known lengths as if
+    their preloads were to be found; a given preload counts as it is.  Positive where the spring
+    pushes its bodies apart.  With `solved` the model's preloads are taken as they are.
+
+    Raises
+    ------
+    ModelError
+        The springs cannot carry the vehicle.
+    """
+    support = _auto_preloads(model, known_lengths=True)
+    filled = model
+    if not solved:
+        conditions = _conditions(model.system)
+        filled, rest = _with_solved_preloads(model, support, conditions)
+        unbalanced = _unbalanced(model, conditions, rest)
+        if unbalanced and not len(model.system.bodies.fixed):
+            raise ModelError(
+                "the springs cannot carry the vehicle in its nominal position; unbalanced: "
+                + "; ".join(unbalanced)
+            )
+    flat = {element.name: element for element in model.flat.elements}
+    shares = {}
+    for group, i in support:
+        name = getattr(model.index, group)[i]
+        if group == "links":
+            shares[name] = -float(filled.system.links.spring[i, 2])
+            continue
+        # the body below is pushed down by what stands on it
+        below = 1.0 if _is_below(model, flat[name]) else -1.0
+        shares[name] = below * float(filled.system.mounts.preload[i, 2])
+    return shares
+
+
+def _is_below(model: Model, element: FlatElement) -> bool:
+    """Whether body 1 of an element carries body 2."""
+    if element.point1[2] != element.point2[2]:
+        return element.point1[2] > element.point2[2]
+    one, two = model.flat.body(element.body1), model.flat.body(element.body2)
+    # a frame may have its centre of gravity below the axles on which it stands
+    if (one.kind == "body") != (two.kind == "body"):
+        return two.kind == "body"
+    return one.position[2] >= two.position[2]
+
+
+def _levelled(model: Model) -> Model:
+    """Fill the air springs of a load case so that what stands on them alone keeps its height.
+
+    A levelling valve feeds or drains a bellows until it has its nominal height over the body below.
+    """
+    carried = _carried_by_levelled_springs(model)
+    if not carried:
+        return model
+    names = {e.name for e in model.flat.elements if getattr(e.definition, "levelling", False)}
+    support = {
+        (group, i): stiffness
+        for (group, i), stiffness in _auto_preloads(model).items()
+        if getattr(model.index, group)[i] in names
+    }
+    conditions = [pair for pair in _conditions(model.system) if pair[0] in carried]
+    levelled, _ = _with_solved_preloads(model, support, conditions)
+    return levelled
+
+
+def _carried_by_levelled_springs(model: Model) -> set[int]:
+    """Bodies that stand on springs with levelling valves and on nothing else."""
+    on: dict[str, list[bool]] = {}
+    for element in model.flat.elements:
+        law = element.definition
+        if vertical_support(law) > 0.0 and getattr(law, "preload", 0.0) != 0.0:
+            for body in (element.body1, element.body2):
+                on.setdefault(body, []).append(bool(getattr(law, "levelling", False)))
+    return {model.index.bodies.index(name) for name, kinds in on.items() if all(kinds)}
+
+
+def _with_solved_preloads(
+    model: Model, support: dict[tuple[str, int], float], conditions: list[tuple[int, int]]
+) -> tuple[Model, Floats]:
+    """Solve the preloads of `support` for `conditions`; the model with them, and what is left."""
+    system = model.system
+    unknowns = list(support)
+    loads = np.array([_load(system, body, component) for body, component in conditions])
+    links = system.links._replace(row=aligned(system.links.row))
+    mounts = system.mounts._replace(row=aligned(system.mounts.row))
+    for group, element in unknowns:
+        _set_preload(links, mounts, group, element, 0.0)
+    fixed = _preload_forces(system, links, mounts, conditions)
+    columns = []
+    for group, element in unknowns:
+        unit = _with_unit_preload(system, group, element)
+        columns.append(_preload_forces(system, *unit, conditions))
+    matrix = np.array(columns).T.reshape(len(conditions), len(unknowns))
+    # equal deflection where the conditions leave a choice: unknowns scaled by sqrt(stiffness)
+    scale = np.sqrt(np.array([support[unknown] for unknown in unknowns]))
+    right_side = -(loads + fixed)
+    scaled = least_squares(matrix * scale, right_side, 1e-10)
+    values = scaled * scale
+    for (group, element), value in zip(unknowns, values, strict=True):
+        _set_preload(links, mounts, group, element, value)
+    filled = replace(model, system=system._replace(links=links, mounts=mounts))
+    return filled, matrix @ values - right_side
+
+
+def _with_preloads_of(model: Model, design: Model) -> Model:
+    links = model.system.links._replace(row=aligned(model.system.links.row))
+    mounts = model.system.mounts._replace(row=aligned(model.system.mounts.row))
+    links.spring[:, 2] = design.system.links.spring[:, 2]
+    mounts.preload[:] = design.system.mounts.preload
+    return replace(model, system=model.system._replace(links=links, mounts=mounts))
+
+
+def least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:
+    """Return the least-squares solution of least size."""
+    if not (np.isfinite(matrix).all() and np.isfinite(right_side).all()):
+        raise ModelError(
+            "no static equilibrium: masses, forces or stiffnesses are out of all proportion"
+        )
+    solution, *_ = np.linalg.lstsq(matrix, right_side, rcond=rcond)
+    return np.asarray(solution, dtype=float)
+
+
+def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[tuple[str, int], float]:
+    """Elements whose preload is to be found, with the stiffness by which they share the weight.
+
+    With `known_lengths` also those whose preload follows from their lengths.
+    """
+    auto = {
+        element.name: vertical_support(element.definition)
+        for element in model.flat.elements
+        if getattr(element.definition, "preload", None) == "auto"
+        or (known_lengths and getattr(element.definition, "has_free_length", False))
+    }
+    groups = {"links": model.index.links, "mounts": model.index.mounts}
+    return {
+        (group, i): auto[name]
+        for group, names in groups.items()
+        for i, name in enumerate(names)
+        if auto.get(name, 0.0) > 0.0
+    }
+
+
+def _conditions(system: System) -> list[tuple[int, int]]:
+    """(body, component) of every equation: z, roll, pitch of rigid bodies, pitch of axleboxes."""
+    rows: list[tuple[int, int]] = []
+    for body, kind in enumerate(system.bodies.kind):
+        if kind == RIGID:
+            rows += [(body, 2), (body, 3), (body, 4)]
+        elif kind == AXLEBOX:
+            rows.append((body, 4))
+    return rows
+
+
+def _load(system: System, body: int, component: int) -> float:
+    weight = system.bodies.mass[body] * system.gravity
+    return float(weight) if component == 2 else 0.0
+
+
+def _with_unit_preload(system: System, group: str, element: int) -> tuple[Links, Mounts]:
+    links = system.links._replace(row=aligned(system.links.row))
+    mounts = system.mounts._replace(row=aligned(system.mounts.row))
+    links.spring[:, 2] = 0.0
+    mounts.preload[:] = 0.0
+    _set_preload(links, mounts, group, element, 1.0)
+    return links, mounts
+
+
+def _set_preload(links: Links, mounts: Mounts, group: str, element: int, value: float) -> None:
+    preload = links.spring if group == "links" else mounts.preload
+    preload[element, 2] = value
+
+
+def _preload_forces(
+    system: System, links: Links, mounts: Mounts, conditions: list[tuple[int, int]]
+) -> Floats:
+    """Forces and moments of all preloads in the nominal position, one per condition."""
+    totals = np.zeros((len(system.bodies.kind), 6))
+    for e, (i, j) in enumerate(links.body):
+        direction = _nominal(system, j, links.point[e, 1]) - _nominal(system, i, links.point[e, 0])
+        force = links.spring[e, 2] * direction / np.linalg.norm(direction)
+        _add(totals, i, links.point[e, 0], force)
+        _add(totals, j, links.point[e, 1], -force)
+    for e, (i, j) in enumerate(mounts.body):
+        _add(totals, i, mounts.point[e, 0], mounts.preload[e])
+        _add(totals, j, mounts.point[e, 1], -mounts.preload[e])
+    return np.array([totals[body, component] for body, component in conditions])
+
+
+def _nominal(system: System, body: int, lever: Floats) -> Floats:
+    frame = system.frame_offset[system.bodies.frame[body]]
+    centre = body if system.bodies.kind[body] != AXLEBOX else system.bodies.parent[body]
+    y, z = system.bodies.nominal[centre]
+    return np.array([frame, y, z]) + lever
+
+
+def _add(totals: Floats, body: int, lever: Floats, force: Floats) -> None:
+    (x, y, z), (fx, fy, fz) = lever.tolist(), force.tolist()
+    # written out: numpy's cross product of three numbers each takes 60 us
+    totals[body] += fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+
+
+def _unbalanced(model: Model, conditions: list[tuple[int, int]], rest: Floats) -> list[str]:
+    """What the preloads leave of forces and moments, in words."""
+    weight = float(np.sum(model.system.bodies.mass)) * model.system.gravity
+    lines = []
+    for (body, component), value in zip(conditions, rest, strict=True):
+        if abs(value) > UNBALANCED * weight:
+            unit = "N" if component < 3 else "N m"
+            lines.append(f"{model.index.bodies[body]}: {COMPONENTS[component]} {value:.6g} {unit}")
+    return lines

@@ -1,0 +1,133 @@
+"""Work arrays of a system, and the same system on straight level track."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact.creep import creep_scratch
+from railsim.kernels.aligned import aligned_zeros
+from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
+from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
+from railsim.kernels.extremes import EXTREMES, MAX, MIN
+from railsim.kernels.lanes import LANES
+from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
+from railsim.kernels.system import (
+    AXLEBOX,
+    CONSTANT,
+    FIXED,
+    POSE_SIZE,
+    RATES_SIZE,
+    RELATIVE_SIZE,
+    Drive,
+    System,
+    Work,
+)
+from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
+from railsim.kernels.vibration import VIBRATION
+
+Floats = NDArray[np.float64]
+
+
+GRAVITY = 9.81  # m/s2, as in the reference study
+CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
+
+
+def components_of(kind: int) -> tuple[int, ...]:
+    """Components in which a body of this kind moves."""
+    return {AXLEBOX: (4,), FIXED: ()}.get(kind, (0, 1, 2, 3, 4, 5))
+
+
+def work_arrays(system: System) -> Work:
+    """Scratch arrays for `system`."""
+    n = len(system.bodies.kind)
+    n_wheelsets = len(system.contact.body)
+    n_patches = 2 * N_PATCH * n_wheelsets
+    n_frames = len(system.frame_offset)
+    n_tracks = n_wheelsets * system.support.elastic
+    return Work(
+        frames=aligned_zeros((n_frames, FRAME_SIZE)),
+        cell=aligned_zeros(n_frames, np.int64),
+        cell_u=aligned_zeros(n_frames),
+        pose=aligned_zeros((n, POSE_SIZE)),
+        relative=aligned_zeros((n, RELATIVE_SIZE)),
+        rail_force=aligned_zeros((n, RATES_SIZE)),
+        acceleration=aligned_zeros((n, RATES_SIZE)),
+        drive=aligned_zeros((len(system.internal.kind), 2)),
+        laws=aligned_zeros(9 * LANES),
+        decay=aligned_zeros(len(system.internal.kind)),
+        contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
+        plane=_smooth_planes(n_wheelsets),
+        rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
+        rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
+        above=aligned_zeros(10),
+        look_up=aligned_zeros(N_PATCH * LOOK_UP_SIZE),
+        weights=aligned_zeros(N_WEIGHT),
+        stiffness=aligned_zeros(2 * N_PATCH),
+        approach=aligned_zeros(N_PATCH),
+        patch_index=aligned_zeros((n_patches, 3), np.int64),
+        patch=aligned_zeros((PATCH_ROWS, n_patches)),
+        creep=creep_scratch(n_patches, system.contact.law),
+        support=aligned_zeros((n_tracks, 2, SUPPORT_COLUMNS)),
+        support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
+        compliance=aligned_zeros(2),
+        vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
+        events=aligned_zeros((n_wheelsets, 4), np.int64),
+        wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
+        swing=aligned_zeros(n_wheelsets),
+        watch=aligned_zeros(2),
+        coming=aligned_zeros((2, COMING)),
+        parts=aligned_zeros(3, np.int64),
+        extremes=no_extremes(n_wheelsets),
+        present=aligned_zeros(EXTREMES),
+        unloaded=aligned_zeros((n_wheelsets, 2)),
+        decay_part=aligned_zeros(len(system.internal.kind)),
+    )
+
+
+def _smooth_planes(n_wheelsets: int) -> Floats:
+    """Planes of rails that are not displaced: they turn nothing."""
+    plane = aligned_zeros((n_wheelsets, PLANE_SIZE))
+    plane[:, COSINE] = 1.0
+    return plane
+
+
+def no_extremes(n_wheelsets: int) -> Floats:
+    """`Work.extremes` before anything has been seen, shape (6, wheelset, EXTREMES)."""
+    extremes = aligned_zeros((6, n_wheelsets, EXTREMES))
+    extremes[MAX] = -np.inf
+    extremes[MIN] = np.inf
+    return extremes
+
+
+def level_track(system: System) -> System:
+    """Return the same system on straight, level, smooth, frictionless track, no given loads."""
+    cells = 4
+    length = float(np.ptp(system.frame_offset)) + 100.0
+    coefficients = np.zeros((cells, 6, 4))
+    ds = 2.0 * length / cells
+    coefficients[:, 0, 0] = -length + ds * np.arange(cells)
+    coefficients[:, 0, 1] = 1.0
+    start = float(np.min(system.frame_offset)) - length / 2.0
+    coefficients[:, 0, 0] += start + length
+    track = TrackTables(start, ds, coefficients, np.zeros((cells, 6, 4)), 0)
+    even = system.support._replace(variation=system.support.variation[:0])
+    return without_loads(system)._replace(track=track, support=even, drive=CONSTANT_SPEED)
+
+
+def without_loads(system: System) -> System:
+    """Return the system without given forces and torques, which analyses without a clock omit."""
+    return system._replace(
+        loads=system.loads._replace(
+            body=system.loads.body[:0], point=system.loads.point[:0], flags=system.loads.flags[:0]
+        ),
+        drives=system.drives._replace(body=system.drives.body[:0], row=system.drives.row[:0]),
+    )
+
+
+def level_track_with_friction(system: System) -> System:
+    """As `level_track`, with the largest friction that each rail of the real track has."""
+    level = level_track(system)
+    rail = level.track.rail.copy()
+    for row in (MU_LEFT, MU_RIGHT):
+        rail[:, row, 0] = np.max(system.track.rail[:, row, 0])
+    return level._replace(track=level.track._replace(rail=rail))

@@ -1,0 +1,106 @@
+"""Smoothing of measured profiles against their own noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_smoothing_spline
+
+from railsim.errors import Fault, InputError
+from railsim.profiles.profile import Kind
+
+Array = NDArray[np.float64]
+
+
+CURVATURE_NOISE = 3.0
+"""Curvature that noise may leave after smoothing [1/m], some 4 % of a gauge corner's."""
+
+SMOOTHING_WAVES = (1.0e-3, 10.0e-3)
+"""Shortest and longest wave that smoothing halves [m]."""
+
+LARGEST_NOISE = 0.1e-3
+"""Noise beyond which nothing is left of the curvatures after smoothing [m]."""
+
+NOISE_FLOOR = 0.15e-6
+"""Noise below this is the rounding of printed numbers and is left alone [m]."""
+
+
+@dataclass
+class Points:
+    """Points on their way to a profile."""
+
+    file: str
+    y: Array
+    z: Array
+    line: NDArray[np.int64]
+    notes: list[str]
+
+    def fail(self, found: str, remedy: str, at: int | None = None) -> InputError:
+        """Return what to raise about a point."""
+        key = "" if at is None else f"line {int(self.line[at])}"
+        return InputError([Fault(self.file, key, found, remedy)])
+
+    def keep(self, which: Array | NDArray[np.bool_] | NDArray[np.int64]) -> None:
+        """Keep some of the points, or bring them into another order."""
+        self.y, self.z, self.line = self.y[which], self.z[which], self.line[which]
+
+
+def used_part(y: Array, z: Array, kind: Kind) -> NDArray[np.bool_]:
+    """Intervals between points on which wheel and rail may touch."""
+    middle_y, middle_z = 0.5 * (y[1:] + y[:-1]), 0.5 * (z[1:] + z[:-1])
+    if kind == "rail":
+        return np.asarray(middle_z < 0.012)
+    tip = int(np.argmax(z))
+    beside_tip = (np.arange(middle_y.size) > tip) & (middle_y > y[tip] + 3e-3)
+    return np.asarray(beside_tip & (middle_y < 0.040))
+
+
+def smoothed_points(work: Points) -> tuple[Array, Array]:
+    """Points smoothed as much as their noise demands, no more.
+
+    The noise is estimated from how much each point departs from the cubic through its four
+    neighbours; the smoothing spline over the contour's length halves waves of the length L at
+    which the curvature's noise, noise (2 pi/L)^2 sqrt(spacing/L), falls to `CURVATURE_NOISE`.
+    """
+    y, z = work.y, work.z
+    s = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
+    noise = np.hypot(_noise(s, y), _noise(s, z))
+    if noise < NOISE_FLOOR:
+        return y, z
+    if noise > LARGEST_NOISE:
+        raise work.fail(
+            f"noise of {1e3 * noise:.2f} mm from point to point",
+            f"up to {1e3 * LARGEST_NOISE:.1f} mm can be smoothed; measure again",
+        )
+    spacing = float(s[-1] / (s.size - 1))
+    wave = float((noise * (2 * np.pi) ** 2 * np.sqrt(spacing) / CURVATURE_NOISE) ** 0.4)
+    wave = float(np.clip(wave, *SMOOTHING_WAVES))
+    if wave <= 2.5 * spacing:
+        return y, z
+    # a smoothing spline with penalty lam on the second derivative halves the wave 2 pi (lam ds)^1/4
+    lam = (wave / (2 * np.pi)) ** 4 / spacing
+    smooth_y = make_smoothing_spline(s, y, lam=lam)(s)
+    smooth_z = make_smoothing_spline(s, z, lam=lam)(s)
+    change = np.hypot(smooth_y - y, smooth_z - z)
+    work.notes.append(
+        f"noise of {1e6 * noise:.1f} um: smoothed over {1e3 * wave:.1f} mm, points moved by "
+        f"{1e6 * np.sqrt(np.mean(change**2)):.1f} um rms, {1e6 * change.max():.0f} um at most"
+    )
+    return smooth_y, smooth_z
+
+
+def _noise(s: Array, values: Array) -> float:
+    """Robust estimate of the noise of samples over s [unit of values]."""
+    n = values.size
+    if n < 8:
+        return 0.0
+    centre = np.arange(2, n - 2)
+    weights = np.ones((centre.size, 4))
+    places = s[centre[:, None] + np.array([-2, -1, 1, 2])]
+    for a in range(4):
+        for b in range(4):
+            if a != b:
+                weights[:, a] *= (s[centre] - places[:, b]) / (places[:, a] - places[:, b])
+    predicted = np.sum(weights * values[centre[:, None] + np.array([-2, -1, 1, 2])], axis=1)
+    spread = np.sqrt(1.0 + np.sum(weights**2, axis=1))
+    return float(np.median(np.abs(values[centre] - predicted) / spread) / 0.6745)

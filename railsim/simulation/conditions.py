@@ -1,0 +1,153 @@
+"""What the runs of one call have in common, checked: speed, start, end, the state to go on from."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault
+from railsim.result import Result
+
+Floats = NDArray[np.float64]
+SPEED_RANGE = (0.5, 150.0)  # m/s
+# settings that a continued run may have of its own; it has no start and no initial disturbance
+OUTPUT_SETTINGS = ("output_rate", "output_spacing", "outputs", "initial", "start_state")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the runs of one call have in common."""
+
+    track: Track
+    settings: Settings
+    speed: float
+    start: float
+    duration: float | None
+    until: float | None
+
+    @classmethod
+    def checked(
+        cls,
+        track: Track,
+        settings: Settings,
+        speed: float | None,
+        start: float,
+        duration: float | None,
+        until: float | None,
+    ) -> "Inputs":
+        """Return the inputs; raise InputError with all faults of speed, start and end."""
+        speed = initial_speed(settings, speed, start)
+        check_range(track, speed, start, duration, until)
+        return cls(track, settings, speed, start, duration, until)
+
+
+def check_types(vehicles: Sequence[object], track: object) -> None:
+    """Raise TypeError where a name or a file is given in place of what it stands for."""
+    for kind, wanted, given in [
+        *(("vehicle", Vehicle, vehicle) for vehicle in vehicles),
+        ("track", Track, track),
+    ]:
+        if not isinstance(given, wanted):
+            found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
+            raise TypeError(f"the {kind} is {found}; give what railsim.load_{kind} returns")
+
+
+def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
+    """Speed at the start: as given, or from the settings' speed table [m/s]."""
+    if settings.drive.speed_table is not None:
+        place, value = np.array(settings.drive.speed_table).T
+        return float(np.interp(start, place, value))
+    if speed is None:
+        raise InputError(
+            [argument_fault("speed", "", "no speed is given", "a speed in m/s, e.g. 20")]
+        )
+    return speed
+
+
+def check_range(
+    track: Track, speed: float, start: float, duration: float | None, until: float | None
+) -> None:
+    """Raise InputError with all faults of speed, start and end of a run."""
+    faults = []
+    low, high = SPEED_RANGE
+    if not (math.isfinite(speed) and low <= speed <= high):
+        faults.append(
+            argument_fault("speed", "", f"found {speed:g} m/s", f"{low:g} to {high:g} m/s")
+        )
+    if not (math.isfinite(start) and 0.0 <= start < track.length):
+        faults.append(argument_fault("start", "", f"found {start:g} m", f"0 to {track.length:g} m"))
+    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
+        faults.append(argument_fault("duration", "", f"found {duration:g} s", "a positive number"))
+    if duration is not None and until is not None:
+        faults.append(
+            argument_fault("duration", "", "given together with `until`", "one of the two")
+        )
+    if until is not None and not start < until <= track.length:
+        faults.append(
+            argument_fault(
+                "until",
+                "",
+                f"found {until:g} m",
+                f"more than the start, {start:g} m, and at most {track.length:g} m, "
+                "the track's plan",
+            )
+        )
+    if faults:
+        raise InputError(faults)
+
+
+def state_before(
+    vehicle: Vehicle, track: Track, settings: Settings, resume: Result | Floats
+) -> Floats:
+    """State with which a run goes on from another one.
+
+    Raises
+    ------
+    InputError
+        The result holds no state, or is of another vehicle, track or other settings: going on would
+        not give what an undisturbed run gives.
+    """
+    if not isinstance(resume, Result):
+        return np.array(resume, dtype=float)
+    faults = []
+    if "end" not in resume.groups.get("state", {}):
+        faults.append(
+            argument_fault(
+                "resume",
+                "",
+                "the result holds no state at its end",
+                "a result of `railsim run`",
+                "--continue",
+            )
+        )
+    for kind, text in (("vehicle", vehicle.to_toml()), ("track", track.to_toml())):
+        if text != resume.attributes[f"{kind}_toml"]:
+            faults.append(
+                argument_fault(
+                    "resume",
+                    "",
+                    f"the result is of another {kind}",
+                    f"the {kind} and the --set {kind}... of the result",
+                    "--continue",
+                )
+            )
+    here, there = settings.model_dump(mode="json"), resume.settings().model_dump(mode="json")
+    faults += [
+        argument_fault(
+            "resume",
+            f"settings.{key}",
+            f"found {here[key]}",
+            f"{there[key]}, as in the result (--settings, --set)",
+            "--continue",
+        )
+        for key in here
+        if key not in OUTPUT_SETTINGS and here[key] != there[key]
+    ]
+    if faults:
+        raise InputError(faults)
+    return np.array(resume.groups["state"]["end"])

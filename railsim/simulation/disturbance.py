@@ -1,0 +1,147 @@
+"""Initial disturbances: added to the state in which a run begins, wheelsets kept on their rails."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.settings import InitialState, Settings
+from railsim.errors import Fault, InputError, nearest
+from railsim.kernels.contact_columns import W_Q
+from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.status import RUNNING
+from railsim.model.assembly import Model
+from railsim.model.work import work_arrays
+from railsim.notation import SIDES
+
+Floats = NDArray[np.float64]
+
+CLOSE = 1e-6  # error of a wheel load over the static one
+IMPACT = 0.5  # change of a wheel load over the static one
+LONGEST, TURN = 2.5e-4, 5e-3  # way and angle over which the contacts are followed at once [m, rad]
+FARTHEST, WIDEST = 0.012, 0.1  # beyond, a wheelset is where it is put [m, rad]
+_STEPS = 30
+
+
+def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tuple[str, ...]:
+    """Add the initial disturbance of the settings to a state; return what is to be remarked.
+
+    A wheelset that is moved across the track or turned, and for which neither `z` nor `roll` is
+    given, follows its contacts: it is lifted and rolled until its wheels carry what they carried
+    before.  Otherwise it would be pressed into the rails: 3 mm sideways on S1002 and 60E1 make
+    392 kN of a wheel load of 69 kN.
+
+    Parameters
+    ----------
+    model : Model
+        With preloads, on its track.
+    Q0 : float64[wheelset, side]
+        Static wheel loads [N].
+    settings : Settings
+    state : float64[n_state]
+        Changed in place.
+
+    Raises
+    ------
+    InputError
+        There is no such body.
+    """
+    if not settings.initial:
+        return ()
+    faults = [
+        Fault("settings", f"initial.{name}", "no such body", nearest(name, model.index.bodies))
+        for name in settings.initial
+        if name not in model.index.bodies
+    ]
+    if faults:
+        raise InputError(faults)
+    before = _wheel_loads(model, state)
+    for name, change in settings.initial.items():
+        _add(model, name, change, state)
+    remarks = []
+    if before is not None:
+        for w, name in enumerate(model.index.wheelsets):
+            change = settings.initial.get(name, InitialState())
+            given = change.z or change.roll
+            near = abs(change.y) <= FARTHEST and abs(change.yaw) <= WIDEST
+            if (change.y or change.yaw) and near and not given:
+                _follow_contacts(model, w, change, before[w], state)
+        remarks = _impact(model, before, Q0, state)
+    return tuple(remarks)
+
+
+def _add(model: Model, name: str, change: InitialState, state: Floats) -> None:
+    place = model.index.coordinate(name, 0)
+    rate = 6 * model.index.n_bodies + place
+    state[place : place + 6] += (
+        change.x, change.y, change.z, change.roll, change.pitch, change.yaw,
+    )  # fmt: skip
+    state[rate : rate + 6] += (
+        change.vx, change.vy, change.vz, change.vroll, change.vpitch, change.vyaw,
+    )  # fmt: skip
+
+
+def _wheel_loads(model: Model, state: Floats) -> Floats | None:
+    """Wheel loads [wheelset, side] in a state [N]; None where it is outside the model's range."""
+    work = work_arrays(model.system)
+    rows = state[None].copy()
+    status, *_ = right_hand_sides(model.system, work, rows, np.zeros_like(rows))
+    return work.wheel[:, :, W_Q].copy() if status == RUNNING else None
+
+
+def _follow_contacts(
+    model: Model, w: int, change: InitialState, wanted: Floats, state: Floats
+) -> None:
+    """Lift and roll wheelset `w` until its wheels carry `wanted`; as it is where that fails.
+
+    It is moved there bit by bit, so that the contacts never lie deep in one another.
+    """
+    place = model.index.coordinate(model.index.wheelsets[w], 0)
+    parts = max(1, round(abs(change.y) / LONGEST), round(abs(change.yaw) / TURN))
+    trial = state.copy()
+    for part in range(1, parts + 1):
+        left = 1.0 - part / parts
+        trial[[place + 1, place + 5]] = state[[place + 1, place + 5]]
+        trial[place + 1] -= left * change.y
+        trial[place + 5] -= left * change.yaw
+        if not _carries(model, w, place, wanted, trial):
+            return
+    state[[place + 2, place + 3]] = trial[[place + 2, place + 3]]
+
+
+def _carries(model: Model, w: int, place: int, wanted: Floats, trial: Floats) -> bool:
+    """Find the height and roll at which wheelset `w` carries `wanted`, by Newton's method."""
+    moved = [place + 2, place + 3]
+    for _ in range(_STEPS):
+        loads = _wheel_loads(model, trial)
+        if loads is None:
+            return False
+        rest = loads[w] - wanted
+        if np.max(np.abs(rest)) < CLOSE * np.max(wanted):
+            return True
+        slope = np.empty((2, 2))
+        for k, at in enumerate(moved):
+            nudged = trial.copy()
+            nudged[at] += 1e-7
+            beside = _wheel_loads(model, nudged)
+            if beside is None:
+                return False
+            slope[:, k] = (beside[w] - loads[w]) / 1e-7
+        if not loads[w].min() > 0.0:  # a wheel in the air has no slope: down onto its rail
+            slope += np.array([[1.0, -0.75], [1.0, 0.75]]) * 1e9 * (loads[w] <= 0.0)[:, None]
+        trial[moved] -= np.linalg.lstsq(slope, rest, rcond=None)[0]
+    return False
+
+
+def _impact(model: Model, before: Floats, Q0: Floats, state: Floats) -> list[str]:
+    """Remark on a disturbance that loads or unloads wheels at once."""
+    loads = _wheel_loads(model, state)
+    if loads is None:
+        return []
+    ratio = np.abs(loads - before) / Q0
+    w, side = (int(k) for k in np.unravel_index(np.argmax(ratio), ratio.shape))
+    if ratio[w, side] <= IMPACT:
+        return []
+    return [
+        f"The initial disturbance is an impact: Q of {model.index.wheelsets[w]}, {SIDES[side]}, is "
+        f"{loads[w, side] / 1e3:.4g} kN at t = 0, at rest {Q0[w, side] / 1e3:.4g} kN. A wheelset "
+        "for which neither z nor roll is given follows its contacts, where it stays on them."
+    ]

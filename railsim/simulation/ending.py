@@ -1,0 +1,85 @@
+"""The end of a run: its result with all facts about it."""
+
+import json
+import logging
+import math
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.vehicle import Vehicle
+from railsim.kernels.status import NOT_FINITE, STATUS
+from railsim.model.assembly import Model
+from railsim.result import Result
+from railsim.simulation.advance import Run
+from railsim.simulation.conditions import Inputs
+from railsim.simulation.outputs import run_extremes
+from railsim.simulation.remarks import run_remarks
+from railsim.simulation.right_samples import low_pass_remark
+
+Floats = NDArray[np.float64]
+_LOG = logging.getLogger(__name__)
+
+
+def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Result:
+    """Close a run: its result, with all facts about it."""
+    began = time.perf_counter()
+    prepared, settings = run.prepared, inputs.settings
+    simulated = float(run.state[-3] - prepared.state[-3])
+    # a run that ended before its evaluation began is evaluated as a whole
+    evaluates = run.state[-3] > prepared.evaluation
+    of_peaks = run.evaluated if evaluates else run.extremes
+    attributes: dict[str, str | float | int] = {
+        "status": STATUS[run.status][0],
+        "status_reason": _sentence(prepared.model, run.status, run.where),
+        "remarks": "\n".join(run_remarks(run)),
+        "vehicle_toml": vehicle.to_toml(),
+        "track_toml": inputs.track.to_toml(),
+        "settings_json": json.dumps(settings.model_dump(mode="json")),
+        "speed": float(inputs.speed),
+        "start": float(inputs.start),
+        "duration": simulated,
+        "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[-3]),
+        **{
+            f"asked_{name}": float(value)
+            for name, value in (("duration", inputs.duration), ("until", inputs.until))
+            if value is not None
+        },
+        "step": prepared.pace.smallest,
+        "scheme": settings.scheme,
+        "wall_time": run.wall_time + time.perf_counter() - began,
+        "cpu_time": run.cpu_time,
+        "runs_together": run.together,
+        "patches_evaluated": int(run.events[0]),
+        "patches_out_of_range": int(run.events[1]),
+        "steps_divided": run.divided,
+        "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
+    }
+    result = run.sink.close(
+        attributes,
+        {"Q0": prepared.balance.Q0},
+        prepared.model.profiles,
+        {
+            "state": {"end": run.state} | ({} if before is None else {"start": before}),
+            # of quantities that are stored filtered the peaks are those of what is stored
+            **(
+                {}
+                if settings.outputs.low_pass is not None
+                else {"peaks": run_extremes(of_peaks, prepared.balance.Q0)}
+            ),
+        },
+    )
+    for remark in result.remarks:
+        # what was asked for is no warning, and others were given at the start
+        if remark != low_pass_remark(settings) and remark not in prepared.remarks:
+            _LOG.warning(remark)
+    return result
+
+
+def _sentence(model: Model, status: int, where: int) -> str:
+    names = model.index.wheelsets
+    if status == NOT_FINITE:
+        body = where % (6 * model.index.n_bodies) // 6
+        names, where = model.index.bodies, min(body, model.index.n_bodies - 1)
+    return STATUS[status][1].format(where=names[where])

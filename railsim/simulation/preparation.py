@@ -1,0 +1,164 @@
+"""From definitions to a run that can begin: model, equilibrium, step, state, output."""
+
+import logging
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault
+from railsim.model.assembly import Model, SharedTables, assemble
+from railsim.model.equilibrium import equilibrium
+from railsim.model.experience import vehicle_remarks
+from railsim.model.time_step import SCHEMES
+from railsim.profiles import Profile
+from railsim.result import Sink
+from railsim.result.stored import StoredPeaks, lost_peak
+from railsim.simulation.advance import Preparation, Run
+from railsim.simulation.conditions import Inputs
+from railsim.simulation.disturbance import disturb
+from railsim.simulation.outputs import OutputPlan, run_extremes
+from railsim.simulation.pace import Pace
+from railsim.simulation.right_samples import filtering, low_pass_remark, output_words, sampled
+from railsim.simulation.run_in import start_state
+from railsim.simulation.settling import Progress as SettlingProgress
+from railsim.simulation.told import Told
+from railsim.track.irregularity import measured_remarks
+
+Floats = NDArray[np.float64]
+# of the start, before peaks are evaluated: time, and share of the run at most
+LEFT_OUT, SHARE_LEFT_OUT = 1.0, 0.1  # s, 1
+_START = logging.getLogger("railsim.start")  # remarks on a run that begins
+
+
+def prepare(
+    vehicle: Vehicle,
+    track: Track,
+    settings: Settings,
+    speed: float,
+    start: float = 0.0,
+    duration: float | None = None,
+    until: float | None = None,
+    profiles: Mapping[str, Profile] | None = None,
+    shared: SharedTables | None = None,
+    before: Floats | None = None,
+    *,
+    on_judgement: SettlingProgress | None = None,
+    on_run_in: SettlingProgress | None = None,
+) -> Preparation:
+    """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
+    balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
+    model = balance.model
+    pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
+    step, _ = pace.at(speed)
+    unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
+    remarks: list[str] = [*balance.remarks, *unusual, *measured_remarks(track)]
+    if before is None:
+        state = start_state(
+            model,
+            balance,
+            track,
+            start,
+            step,
+            SCHEMES[settings.scheme],
+            on_run_in,
+            remarks.append if settings.start_state == "steady" else None,
+        )
+        remarks += disturb(model, balance.Q0, settings, state)
+    else:
+        state = _taken_up(model, before)
+    prepared = Preparation(
+        model,
+        balance,
+        state,
+        end_time=math.inf if duration is None else float(state[-3]) + duration,
+        end_distance=track.length if until is None else until,
+        pace=pace,
+        fresh=before is None,
+        remarks=tuple(remarks),
+    )
+    return replace(prepared, evaluation=_evaluation(prepared, settings))
+
+
+def _evaluation(prepared: Preparation, settings: Settings) -> float:
+    """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
+    begin = float(prepared.state[-3])
+    if not prepared.fresh:
+        return begin
+    asked = settings.outputs.evaluate_after
+    if asked is None:
+        return begin + min(LEFT_OUT, SHARE_LEFT_OUT * prepared.left(prepared.state))
+    return begin + asked
+
+
+def _taken_up(model: Model, before: Floats) -> Floats:
+    """State `before` in which a run goes on."""
+    if before.shape != (model.n_state,):
+        raise InputError(
+            [
+                argument_fault(
+                    "resume",
+                    "",
+                    f"a state of {before.size} values",
+                    f"{model.n_state} values, those of this vehicle",
+                    "--continue",
+                )
+            ]
+        )
+    return before.copy()
+
+
+def begin(
+    vehicle: Vehicle,
+    inputs: Inputs,
+    sink: Sink,
+    profiles: Mapping[str, Profile] | None,
+    before: Floats | None,
+    shared: SharedTables,
+    told: Told,
+) -> Run:
+    """Prepare a run and tell its sink what will come."""
+    began = time.perf_counter()
+    settings = inputs.settings
+    prepared = prepare(
+        vehicle,
+        inputs.track,
+        settings,
+        inputs.speed,
+        inputs.start,
+        inputs.duration,
+        inputs.until,
+        profiles,
+        shared,
+        before,
+        on_judgement=told.of_judgement,
+        on_run_in=told.of_run_in,
+    )
+    for remark in prepared.remarks:
+        _START.warning(remark)
+    plan = OutputPlan(prepared.model, settings, inputs.track, vehicle)
+    stored = StoredPeaks(sink)
+    sink = filtering(stored, settings)
+    sink.begin(plan.coordinates, plan.quantities)
+    run = Run(
+        prepared,
+        plan,
+        sink,
+        prepared.state.copy(),
+        prepared.fresh,
+        wall_time=time.perf_counter() - began,
+    )
+    # which holds neither the sink nor the run: a circle would keep the tables in memory
+    largest, extremes, Q0 = stored.largest, run.extremes, prepared.balance.Q0
+    stored.remark = lambda: lost_peak(
+        largest, run_extremes(extremes, Q0), output_words(settings),
+        filtered=settings.outputs.low_pass is not None,
+    )  # fmt: skip
+    run.remarks.extend(filter(None, [low_pass_remark(settings)]))
+    return run

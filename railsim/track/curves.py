@@ -1,0 +1,79 @@
+"""The circular curves of a track: the speeds that suit their cant."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from railsim.definitions.layout import Section, cant_sections, curvature_sections
+from railsim.definitions.track import Track
+from railsim.track.alignment import CANT_BASE
+
+GRAVITY = 9.81  # m/s2
+# Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
+USUAL_CANT_DEFICIENCY = 0.150
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One circular element.
+
+    Attributes
+    ----------
+    section : Section
+        Its place in the plan.
+    curvature : float
+        Positive to the right [1/m].
+    cant : float
+        At its middle, positive where the outer rail is higher [m].
+    """
+
+    section: Section
+    curvature: float
+    cant: float
+
+    @property
+    def balanced_speed(self) -> float:
+        """Speed without cant deficiency: V^2 kappa = g cant/(2 b0) [m/s]."""
+        return self.speed(0.0)
+
+    @property
+    def usual_speed(self) -> float:
+        """Speed with the largest cant deficiency of conventional operation [m/s]."""
+        return self.speed(USUAL_CANT_DEFICIENCY)
+
+    def speed(self, cant_deficiency: float) -> float:
+        """Speed with some cant deficiency, 0 where there is none [m/s]."""
+        height = max(self.cant + cant_deficiency, 0.0)
+        return math.sqrt(height * GRAVITY / (CANT_BASE * abs(self.curvature)))
+
+    def cant_deficiency(self, speed: float) -> float:
+        """Cant deficiency at a speed, 2 b0 V^2 kappa/g - cant, negative: cant excess [m]."""
+        return CANT_BASE * speed**2 * abs(self.curvature) / GRAVITY - self.cant
+
+
+def curves(track: Track) -> tuple[Curve, ...]:
+    """Return the circular curves of a track in their order.
+
+    Examples
+    --------
+    >>> from railsim.definitions.loading import load_track
+    >>> (curve,) = curves(load_track("curve_r250"))
+    >>> round(1.0 / curve.curvature), round(curve.cant_deficiency(20.0), 3)
+    (250, 0.095)
+    """
+    cant = cant_sections(track)
+    found = []
+    for section in curvature_sections(track):
+        curvature = max(section.start_value, section.end_value, key=abs)
+        if section.type == "CIR" and curvature:
+            height = cant_at(cant, 0.5 * (section.begin + section.end))
+            found.append(Curve(section, curvature, height if curvature > 0.0 else -height))
+    return tuple(found)
+
+
+def cant_at(cant: Sequence[Section], s: float) -> float:
+    """Cant at an arc length, the last one beyond the sections [m]."""
+    for section in cant:
+        if s < section.end:
+            return section.value(s)
+    return cant[-1].end_value if cant else 0.0

@@ -1,0 +1,109 @@
+"""Sensors of a vehicle: standard ones and those of its table, against the motion of the bodies."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.vehicle import Vehicle
+
+
+@cache
+def run():
+    """A coach with a sensor under a seat, swaying on straight canted track."""
+    data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    data["sensors"] = {
+        "seat": {"body": "carbody", "position": [5.0, 0.8, -1.6]},
+        "centre": {"body": "carbody", "position": data["bodies"]["carbody"]["position"]},
+    }
+    return railsim.simulate(
+        Vehicle.model_validate(data),
+        load_track("straight", ["cant.0.cant=0.05"]),
+        speed=20.0,
+        duration=0.5,
+        settings=railsim.Settings.model_validate(
+            {
+                "output_rate": 1000.0,
+                "outputs": {"sensors": True, "track": True},
+                "initial": {"carbody": {"roll": 0.01, "vy": 0.1}},
+            }
+        ),
+    )
+
+
+def of(name, quantity):
+    result = run()
+    return result[f"sensor_{quantity}"][:, result.coordinates["sensor"].index(name)]
+
+
+def test_standard_sensors_and_own_ones():
+    names = run().coordinates["sensor"]
+    assert {"floor_front", "floor_middle", "frame_1", "axlebox_1_left", "axlebox_4_right"} <= (
+        set(names)
+    )
+    assert names[-2:] == ("seat", "centre")
+
+
+def test_a_sensor_in_the_centre_of_gravity_moves_as_its_body():
+    result = run()
+    body = result.bodies.index("carbody")
+    for quantity, array in (
+        ("displacement", "body_position"),
+        ("velocity", "body_velocity"),
+        ("absolute_acceleration", "body_acceleration"),
+    ):
+        assert of("centre", quantity) == pytest.approx(result[array][:, body, :3], abs=1e-12)
+
+
+def test_velocity_is_the_rate_of_the_displacement_and_acceleration_that_of_the_velocity():
+    """Central differences over 2 ms; on straight track the frame moves evenly.
+
+    From 50 ms on, when the start has decayed.
+
+    The absolute acceleration is in the axes of the body, 10 mrad off.
+    """
+    time = run()["time"]
+    for name in ("seat", "axlebox_1_left"):
+        u, v, a = (of(name, q) for q in ("displacement", "velocity", "absolute_acceleration"))
+        for rate, of_what in ((v, u), (a, v)):
+            found = np.gradient(of_what, time, axis=0)[50:-3, 1:]
+            error = np.max(np.abs(found - rate[50:-3, 1:]))
+            assert error < 0.06 * np.max(np.abs(rate)) + 1e-3
+
+
+def test_an_accelerometer_feels_gravity_and_the_absolute_acceleration_does_not():
+    """At rest on 50 mm of cant it reads g sin(cant angle) to the left, towards the lower side."""
+    difference = of("seat", "acceleration") - of("seat", "absolute_acceleration")
+    body = run().bodies.index("carbody")
+    lean = run()["body_position"][:, body, 3] + np.arcsin(0.05 / 1.5)
+    assert difference[:, 1] == pytest.approx(-9.81 * np.sin(lean), abs=2e-3)
+
+
+def test_an_axlebox_does_not_spin():
+    """Its displacement along the track stays below a millimetre while the wheel turns around."""
+    assert np.max(np.abs(of("axlebox_1_left", "displacement"))) < 2e-3
+
+
+def test_displacement_on_the_rails_beside_that_to_the_ideal_track():
+    """A track moved aside by 4 mm as a whole: on the rails the wheelset stays where it was."""
+    row = "{type='kink', s=40.0, length=60.0, offset=0.004, shape='cosine'}"
+    track = load_track("straight", [f"irregularities=[{row}]"])
+    settings = railsim.Settings.model_validate({"outputs": {"track": True}})
+    vehicle = load_vehicle("coach_manchester")
+    result = railsim.simulate(
+        vehicle, track, speed=20.0, start=40.0, duration=0.1, settings=settings
+    )
+    assert np.min(result["rail_lateral"].mean(axis=-1)) > 0.002
+    assert result["wheelset_lateral"] == pytest.approx(
+        result["wheelset_lateral_on_rails"] + result["rail_lateral"].mean(axis=-1)
+    )
+    assert np.max(np.abs(result["wheelset_lateral_on_rails"])) < 5e-4
+
+
+def test_a_sensor_on_no_body_is_a_fault():
+    data = load_vehicle("coach_manchester").model_dump(exclude_none=True)
+    data["sensors"] = {"seat": {"body": "carbodi", "position": [5.0, 0.8, -1.6]}}
+    with pytest.raises(railsim.InputError, match=r"sensors.seat.body: no body 'carbodi'"):
+        railsim.static_loads(Vehicle.model_validate(data))

@@ -1,0 +1,169 @@
+"""Remarks on vehicles and starts that are allowed but unlike experience; where they are shown."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim import cli
+from railsim.definitions.vehicle import Vehicle
+from railsim.model.experience import vehicle_remarks
+from railsim.result import peak
+
+BODY = {"mass": 8e3, "inertia": [5e3, 9e3, 9e3], "position": [0.0, 0.0, -1.2]}
+AXLE = {
+    "mass": 1300.0,
+    "inertia": [800.0, 90.0, 800.0],
+    "position": [0.0, 0.0, -0.46],
+    "radius": 0.46,
+    "profile": "S1002",
+}
+SPRING = {
+    "kind": "shear_spring",
+    "bodies": ["frame", "axle"],
+    "points": [[0.0, 1.0, -0.9], [0.0, 1.0, -0.6]],
+    "sides": "both",
+    "stiffness": [2e6, 2e6, 4e5],
+    "damping": [0.0, 0.0, 5e3],
+}
+
+
+def vehicle(body=(), spring=(), **others):
+    return Vehicle.model_validate(
+        {
+            "format": "railsim-vehicle/1",
+            "name": "half a wagon",
+            "bodies": {"frame": {**BODY, **dict(body)}},
+            "wheelsets": {"axle": AXLE},
+            "elements": {"spring": {**SPRING, **dict(spring)}, **others},
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("unusual", "names", "words"),
+    [
+        (vehicle(body={"position": [0.0, 0.0, 1.2]}), "frame", "below the rails, z up to 1.2 m"),
+        (vehicle(spring={"stiffness": [2e3, 2e3, 4e2]}), "frame", "bounces at 0.0503 Hz"),
+        (vehicle(spring={"stiffness": [2e9, 2e9, 4e8]}), "frame", "bounces at 50.3 Hz"),
+        (vehicle(spring={"damping": [0.0, 0.0, 5e6]}), "frame", "damping ratio 62.5 of its bounce"),
+        (vehicle(body={"mass": 8.0}), "mass", "mean static wheel load 6.42 kN"),
+        (
+            # it stands on a bracket in front of the axle, which would have to pull at the back
+            vehicle(
+                rod={**SPRING, "points": [[0.5, 0.9, -0.9], [0.5, 0.9, -0.6]]},
+                back={**SPRING, "points": [[1.0, 0.9, -0.9], [1.0, 0.9, -0.6]]},
+            ),
+            "back.left, back.right",
+            "in tension at rest",
+        ),
+        (
+            vehicle(
+                spring={"load_at_length": [12e3, 0.32]},
+                back={**SPRING, "points": [[0.2, 0.9, -0.9], [0.2, 0.9, -0.6]]},
+            ),
+            "spring.left, spring.right",
+            "its length was measured under 12 kN",
+        ),
+    ],
+)
+def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):
+    found = vehicle_remarks(unusual)
+    assert any(names in remark.key and words in remark.text for remark in found), found
+
+
+def test_an_ordinary_vehicle_has_no_remark():
+    assert vehicle_remarks(vehicle()) == []
+
+
+def test_equal_findings_are_one_line_with_a_count():
+    many = {f"box_{k}": {**BODY, "position": [0.0, 0.0, 1.0]} for k in range(20)}
+    hung = {f"on_{k}": {**SPRING, "bodies": [f"box_{k}", "frame"]} for k in range(20)}
+    data = vehicle().model_dump(exclude_none=True)
+    data["bodies"] |= many
+    data["elements"] |= hung
+    below = [r for r in vehicle_remarks(Vehicle.model_validate(data)) if "below" in r.text]
+    assert [r.key for r in below] == ["box_0, box_1, box_2 and 17 more"]
+
+
+def test_they_are_shown_by_validate_info_and_at_the_start_of_a_run(tmp_path, capsys):
+    path = tmp_path / "upside_down.toml"
+    path.write_text(vehicle(body={"position": [0.0, 0.0, 1.2]}).to_toml())
+    for command in ("validate", "info"):
+        assert cli.main([command, str(path)]) == 0
+        assert "frame: below the rails" in capsys.readouterr().out.replace("remark: ", "")
+    out = tmp_path / "run.h5"
+    cli.main(
+        ["run", str(path), "straight", "--speed", "10", "--duration", "0.1", "--out", str(out)]
+    )
+    assert capsys.readouterr().err.count("frame: below the rails") == 1
+    assert any("below the rails" in remark for remark in railsim.open_result(out).remarks)
+
+
+@cache
+def disturbed(duration=0.02, after=None, **change):
+    """The first instants of a coach with its leading wheelset moved."""
+    settings = {
+        "initial": {"front.outer.wheelset": change},
+        "outputs": {} if after is None else {"evaluate_after": after},
+    }
+    return railsim.simulate(
+        railsim.load_vehicle("coach_manchester"),
+        railsim.load_track("straight"),
+        speed=20.0,
+        duration=duration,
+        settings=railsim.Settings.model_validate(settings),
+    )
+
+
+@pytest.mark.parametrize("change", [{"y": 0.003}, {"y": -0.006}, {"yaw": 0.01}, {"y": 0.0075}])
+def test_a_moved_wheelset_follows_its_contacts(change):
+    """Its wheels carry what they carried at rest; pressed sideways into the rails they would not.
+
+    Without irregularities the static load of a wheel is that of the rest, to the 1e-5 that creep
+    forces in steady rolling take from it.
+    """
+    result = disturbed(**change)
+    assert result["Q"][0] == pytest.approx(result["Q0"], rel=1e-4)
+    key, value = next(iter(change.items()))
+    moved = result["wheelset_lateral" if key == "y" else "wheelset_yaw"][0]
+    assert moved == pytest.approx([value, 0.0, 0.0, 0.0], abs=1e-9)
+    assert not [remark for remark in result.remarks if "impact" in remark]
+
+
+def test_an_impact_at_the_start_is_remarked():
+    """Who gives `z` or `roll` gets them."""
+    result = disturbed(y=0.003, z=1e-9)
+    assert np.max(result["Q"][0]) > 5.0 * np.max(result["Q0"])
+    found = [remark for remark in result.remarks if "impact" in remark]
+    assert found[0].startswith("The initial disturbance is an impact: Q of front.outer.wheelset")
+    assert "392.2 kN at t = 0" in found[0]
+
+
+def test_peaks_of_a_run_leave_out_its_start():
+    """By a tenth of a short run, by what the settings say; the histories are the same."""
+    whole, late, usual = (disturbed(0.4, after, y=0.003, z=1e-9) for after in (0.0, 0.2, None))
+    assert np.array_equal(whole["Q"], late["Q"])
+    assert peak(whole, "Q").value == np.max(whole["Q"])  # the impact at t = 0
+    assert usual.attributes["evaluation_start"] == pytest.approx(0.04)
+    assert peak(usual, "Q").time >= 0.04
+    largest = peak(late, "Q")
+    assert largest.time >= 0.2
+    assert np.max(late["Q"][late["time"] >= 0.2]) <= largest.value < peak(usual, "Q").value
+    # what runs were told of is not forgotten
+    assert any("times the static wheel load" in remark for remark in late.remarks)
+
+
+@pytest.mark.parametrize("command", ["validate", "info"])
+def test_twenty_equal_faults_are_one_line_with_a_count(command, tmp_path, capsys):
+    path = tmp_path / "many.toml"
+    data = vehicle().model_dump(exclude_none=True)
+    data["bodies"] |= {f"box_{k}": BODY for k in range(20)}
+    text = Vehicle.model_validate(data).to_toml()
+    assert text.count("mass = 8000.0") == 21
+    path.write_text(text.replace("mass = 8000.0", "mass = -8.0"))
+    assert cli.main([command, str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "mass" in line
+    assert "(and 20 more: " in line

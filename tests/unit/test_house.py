@@ -1,0 +1,91 @@
+"""The house itself: sizes of functions and modules, and where numba's inside may be used."""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+import railsim
+
+PACKAGE = Path(railsim.__file__).parent
+PARAMETERS, FUNCTION, MODULE = 10, 80, 500
+# beyond a limit, with the reason
+LARGER = {
+    "definitions/elements.py": "to be divided",
+    "kernels/support.py": "to be divided",
+    "notation.py": "the table of quantities",
+    "studies/study.py": "to be divided",
+}
+# public functions that take the numbers of one patch or pair of profiles
+MORE_PARAMETERS = {"creep_force", "exact_creep_force"}
+
+
+@cache
+def modules():
+    return {
+        path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text())
+        for path in sorted(PACKAGE.rglob("*.py"))
+    }
+
+
+def functions():
+    for name, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                yield name, node
+
+
+def is_command(function):
+    return any("command" in ast.unparse(mark) for mark in function.decorator_list)
+
+
+def test_no_function_takes_more_than_ten_parameters():
+    """Commands and keyword options of public functions apart."""
+    found = []
+    for name, function in functions():
+        arguments = function.args
+        count = len(arguments.posonlyargs) + len(arguments.args)
+        count -= bool(arguments.args) and arguments.args[0].arg in ("self", "cls")
+        if function.name.startswith("_"):
+            count += len(arguments.kwonlyargs)
+        if count > PARAMETERS and not is_command(function):
+            found.append((name, function.name))
+    found = [(name, function) for name, function in found if function not in MORE_PARAMETERS]
+    assert [row for row in found if row[1] != "__init__"] == []
+
+
+def test_no_function_is_longer_than_eighty_lines_of_code():
+    """Docstring, comments and empty lines do not count."""
+    found = []
+    for name, function in functions():
+        lines = (PACKAGE / name).read_text().splitlines()
+        body = function.body[1:] if ast.get_docstring(function) else function.body
+        if not body:
+            continue
+        text = [line.strip() for line in lines[body[0].lineno - 1 : function.end_lineno]]
+        code = [line for line in text if line and not line.startswith("#")]
+        if len(code) > FUNCTION:
+            found.append((name, function.name, len(code)))
+    assert found == []
+
+
+def test_no_module_is_longer_than_five_hundred_lines():
+    sizes = {name: len((PACKAGE / name).read_text().splitlines()) for name in modules()}
+    assert {name for name, size in sizes.items() if size > MODULE} <= set(LARGER)
+
+
+def test_only_one_module_uses_the_inside_of_numba():
+    """Beside `cgutils`, which numba's manual tells those to use who write instructions."""
+    users = set()
+    for name, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("numba.core"):
+                names = {alias.name for alias in node.names}
+                users |= {name} if names != {"cgutils"} else set()
+    assert users == {"kernels/compiler.py"}
+
+
+def test_every_kernel_module_is_in_the_table_of_the_manual():
+    page = PACKAGE.parent / "docs" / "architecture.md"
+    text = page.read_text().partition("## Kernels")[2]
+    names = {path.stem for path in (PACKAGE / "kernels").glob("*.py")} - {"__init__"}
+    assert [name for name in sorted(names) if f"`{name}`" not in text] == []

@@ -1,0 +1,242 @@
+"""Torques on wheelsets: reaction, traction, load transfer, slip control, nose-suspended motor.
+
+A bogie alone: a frame on four springs, two driven wheelsets.  The frame's x is held, which takes
+the traction at the height of its centre of gravity.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.definitions.loading import load_track
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.vehicle import Vehicle
+
+RADIUS, HEIGHT, HALF_BASE, HALF_WIDTH, KZ = 0.46, 0.9, 1.25, 1.0, 8e5
+MASS, TORQUE = 20e3, 3e3
+WHEELSET = {
+    "mass": 1500.0,
+    "inertia": [800.0, 100.0, 800.0],
+    "position": [0.0, 0.0, -RADIUS],
+    "radius": RADIUS,
+    "profile": "S1002",
+}
+SPRING = {
+    "kind": "bushing",
+    "bodies": ["frame", "wheelset"],
+    "point": [0.0, HALF_WIDTH, -RADIUS],
+    "sides": "both",
+    "stiffness": [1e7, 5e6, KZ],
+    "damping": [2e4, 2e4, 3e4],
+}
+
+
+def traction(**changes):
+    return {
+        "kind": "traction",
+        "bodies": ["frame", "wheelset"],
+        "torque_table": [[0.0, TORQUE]],
+        **changes,
+    }
+
+
+def bogie(drive, bodies=None, elements=None):
+    """The axle behind is the mirror image of the one in front."""
+    both = [
+        {"name": "front", "position": [HALF_BASE, 0.0, 0.0]},
+        {"name": "rear", "position": [-HALF_BASE, 0.0, 0.0], "mirror": True},
+    ]
+    frame = {"mass": MASS, "inertia": [2e4, 3e4, 3e4], "position": [0.0, 0.0, -HEIGHT]}
+    axle = {
+        "placements": both,
+        "bodies": bodies or {},
+        "wheelsets": {"wheelset": WHEELSET},
+        "elements": {"primary": SPRING, **({"drive": drive} if drive else {}), **(elements or {})},
+    }
+    data = {
+        "format": "railsim-vehicle/1",
+        "name": "driven bogie",
+        "bodies": {"frame": frame},
+        "assemblies": {"axle": axle},
+    }
+    return Vehicle.model_validate(data)
+
+
+def run(vehicle, track="straight", speed=10.0, duration=4.0, friction=None, **settings):
+    settings = railsim.Settings.model_validate(
+        {"outputs": {"contact_patches": True, "elements": ["*"]}, **settings}
+    )
+    if isinstance(track, str):
+        track = load_track(track)
+    if friction is not None:
+        track = track.replace(friction=(friction, friction))
+    return railsim.simulate(vehicle, track, speed=speed, duration=duration, settings=settings)
+
+
+@cache
+def driven():
+    return run(bogie(traction()))
+
+
+def on_wheels(result):
+    """Longitudinal forces on the wheelsets [time, wheelset]."""
+    return -np.nansum(result["patch_T_x"], axis=(2, 3))
+
+
+def test_steady_traction_is_the_torque_over_the_rolling_radius():
+    """Both wheelsets push forwards, the one in the mirrored placement too; within 0.1 %."""
+    forces = on_wheels(driven())[-1]
+    assert forces == pytest.approx(TORQUE / RADIUS, rel=1e-3)
+
+
+def test_reaction_turns_the_frame():
+    """By hand: the couple 2 T of the reactions and 2 T/r at axle height, on springs 4 kz a^2.
+
+    2 T + 2 T/r (h - r) = 2 T h/r; with the axles T/(2 r kx) + (h - r) pitch further ahead the
+    frame's weight adds 3 %.  Within 2 %: the turn of the springs' preloads is left out.
+    """
+    pitch = driven()["body_position"][:, 0, 4]
+    weight = MASS * 9.81
+    moment = 2.0 * TORQUE * HEIGHT / RADIUS + weight * TORQUE / RADIUS / 2.0 / 1e7
+    by_hand = moment / (4.0 * KZ * HALF_BASE**2 - weight * (HEIGHT - RADIUS))
+    assert pitch[-1] - pitch[0] == pytest.approx(by_hand, rel=0.02)
+
+
+def test_wheel_loads_balance_the_traction():
+    """Of all external forces: the change of the loads' moment is the traction times its lever.
+
+    Without the reactions the sum would lack 2 T, more than half of it.
+    """
+    result = driven()
+    load = np.sum(result["Q"], axis=2)[-1]
+    place = np.array([HALF_BASE, -HALF_BASE]) + result["body_position"][-1, 1:, 0]
+    weight = place[0] + place[1]  # of the wheelsets, 1.5 t each, which move with their axles
+    moment = -np.sum(load * place) + 1500.0 * 9.81 * weight
+    traction_force = np.sum(on_wheels(result)[-1])
+    assert moment == pytest.approx(traction_force * HEIGHT, rel=1e-3)
+    assert np.sum(load) == pytest.approx(np.sum(result["Q0"]), rel=1e-4)
+
+
+def test_free_running_accelerates_the_mass_and_the_rotating_wheels():
+    """V' (M + sum I/r^2) = sum T/r; braking slows down by the same."""
+    mass = MASS + 2 * WHEELSET["mass"] + 2 * WHEELSET["inertia"][1] / RADIUS**2
+    expected = 2.0 * TORQUE / RADIUS / mass
+    for kind, sign in (("traction", 1.0), ("brake", -1.0)):
+        result = run(bogie(traction(kind=kind)), duration=3.0, drive={"mode": "free"})
+        time, way = result["time"], result["distance"]
+        speed = np.gradient(way, time)
+        rate = np.polyfit(time[200:-2], speed[200:-2], 1)[0]
+        assert rate == pytest.approx(sign * expected, rel=2e-3)
+
+
+def test_the_torque_follows_speed_and_demand():
+    """Half of the demand over time, half of the torque between two rows of speed."""
+    half = traction(
+        torque_table=[[5.0, TORQUE], [15.0, 0.0]], demand_table=[[0.0, 0.0], [1.0, 0.5]]
+    )
+    result = run(bogie(half))
+    # less the rolling resistance of the spin creepage, 4 N
+    assert on_wheels(result)[-1] == pytest.approx(0.25 * TORQUE / RADIUS, rel=3e-3)
+    assert on_wheels(result)[0] == pytest.approx(0.0, abs=20.0)
+    beyond = traction(demand_table=[[20.0, 1.0], [20.001, 0.0]], over="distance")
+    forces = on_wheels(run(bogie(beyond)))
+    # wheelsets pass 20 m one after the other, 2.5 m apart
+    assert forces[-1] == pytest.approx(0.0, abs=30.0)
+    assert forces[np.searchsorted(driven()["time"], 2.0), 1] > 0.8 * TORQUE / RADIUS
+
+
+@cache
+def slipping(control):
+    law = traction(torque_table=[[0.0, 20e3]])
+    if control:
+        law["slip_control"] = [0.01, 0.03]
+    return run(bogie(law), friction=0.1, duration=3.0)
+
+
+def test_slip_control_holds_the_creepage_near_the_optimum_on_low_friction():
+    """Between the two slips, where the force is within 2 % of mu N; without it the wheels spin.
+
+    Ten by ten cells of FASTSIM have 0.7 % more than mu N.
+    """
+    held, spinning = slipping(True), slipping(False)
+    late = held["time"] > 1.0
+    creepage = np.abs(held["xi_x"][late])
+    assert np.all((creepage > 0.01) & (creepage < 0.03))
+    force = on_wheels(held)[late]
+    available = 0.1 * np.nansum(held["patch_N"][late], axis=(2, 3))
+    assert np.all(force > 0.98 * available)
+    assert np.all(force < 1.01 * available)
+    assert np.min(np.abs(spinning["xi_x"][-1])) > 0.3
+
+
+def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back():
+    """On low friction the wheels stop turning; the torque fades to what the rails give."""
+    result = run(bogie(traction(kind="brake", torque_table=[[0.0, 20e3]])), friction=0.1)
+    spin = result["body_velocity"][-1, 1:, 4]  # less than that of rolling, -V/r
+    rim = (10.0 / RADIUS - spin) * RADIUS
+    assert np.all((rim > -1e-3) & (rim < 0.1))
+    assert on_wheels(result)[-1] == pytest.approx(-0.1 * np.sum(result["Q"][-1], axis=1), rel=0.02)
+
+
+def test_nose_suspended_motor_carries_its_reaction():
+    """A motor on the axle and a nose on the frame: the nose's force changes by T over its lever.
+
+    In front the nose lies behind the axle and is pressed down, at the mirrored axle it is lifted.
+    """
+    lever = 0.8
+    motor = {"mass": 1000.0, "inertia": [80.0, 80.0, 80.0], "position": [-0.4, 0.0, -RADIUS]}
+    bearing = {
+        "kind": "bushing",
+        "bodies": ["motor", "wheelset"],
+        "point": [0.0, 0.4, -RADIUS],
+        "sides": "both",
+        "stiffness": [2e7, 2e7, 2e7],
+        "damping": [2e4, 2e4, 2e4],
+    }
+    nose = {
+        "kind": "bushing",
+        "bodies": ["frame", "motor"],
+        "point": [-lever, 0.0, -RADIUS],
+        "stiffness": [0.0, 0.0, 3e6],
+        "damping": [0.0, 0.0, 2e4],
+    }
+    result = run(
+        bogie(
+            traction(bodies=["motor", "wheelset"]),
+            {"motor": motor},
+            {"bearing": bearing, "nose": nose},
+        )
+    )
+    names = list(result.coordinates["element"])
+    force = result["element_force"][:, [names.index(f"{p}.nose") for p in ("front", "rear")], 2]
+    change = force[-1] - force[0]
+    # on the frame: T about y on a motor behind its axle presses its nose down on the frame's end
+    assert change == pytest.approx(np.array([1.0, -1.0]) * TORQUE / lever, rel=0.01)
+    assert on_wheels(result)[-1] == pytest.approx(TORQUE / RADIUS, rel=2e-3)
+
+
+def test_mirror_image():
+    """The left-hand curve with the mirrored vehicle: the mirrored forces to round-off."""
+    vehicle, track = bogie(traction()), load_track("curve_r500")
+    right = run(vehicle, track, duration=1.0)
+    left = run(mirrored_vehicle(vehicle), mirrored_track(track), duration=1.0)
+    assert left["Y"] == pytest.approx(-right["Y"][:, :, ::-1], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        ({"bodies": ["wheelset", "frame"]}, "the body that takes the reaction"),
+        ({"slip_control": [0.03, 0.01]}, "two rising slips"),
+        ({"torque_table": [[5.0, 1.0], [0.0, 1.0]]}, "must increase"),
+        ({"kind": "brake", "torque_table": [[0.0, -1.0]]}, "greater than or equal to 0"),
+    ],
+)
+def test_faults_are_named(change, found):
+    from railsim.definitions.flatten import flatten
+
+    with pytest.raises((ValueError, railsim.InputError), match=found) as caught:
+        flatten(bogie(traction(**change)))
+    assert "drive" in str(caught.value)
