@@ -199,7 +199,9 @@ def test_runs_over_other_tracks_are_drawn_apart():
     data = curve_data(found[0])
     (q,) = [q for q in data["quantities"] if q["name"] == "dQ_over_Q0"]
     assert q["high"] == pytest.approx(200.0 * one.dQ_over_Q0.max())
-    assert (q["unit"], q["limit"]) == ("%", -60.0)
+    assert (q["unit"], q["limit"]) == ("%", None)  # of twisted track at walking speed alone
+    (quotient,) = [q for q in data["quantities"] if q["name"] == "Y_over_Q"]
+    assert quotient["limit"] == 0.8
 
 
 def records(number):
