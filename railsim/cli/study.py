@@ -255,6 +255,7 @@ def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
         "grid": {key: value_texts(values) for key, values in plan.grid.items()},
         "linked": [{k: value_texts(v) for k, v in table.items()} for table in plan.linked],
         "sample": plan.sample,
+        "analyses": plan.analyses,
         "settings": plan.settings,
         "start": plan.start,
         "duration": plan.duration,
