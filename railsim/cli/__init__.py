@@ -29,6 +29,7 @@ DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 COMMANDS = {
     "run": ("run", "One vehicle on one track: one HDF5 file and a table of peak values."),
     "study": ("study", "Every combination of vehicles, tracks and speeds."),
+    "optimise": ("optimise", "Parameters of a vehicle against objectives and constraints."),
     "compare": ("compare", "Results side by side: tables and overlaid plots."),
     "plot": ("plot", "Time histories of a result; a track in plan."),
     "animate": ("animate", "A vehicle and its contacts moving along the track."),

@@ -28,7 +28,7 @@ class Variable(Definition):
         return self
 
 
-class _Value(Definition):
+class Value(Definition):
     """A number of a design: a quantity of the summary of its runs."""
 
     quantity: Text
@@ -39,7 +39,7 @@ class _Value(Definition):
     """Only the runs with these labels, such as `track` or a key of the grid; by default all"""
 
 
-class Objective(_Value):
+class Objective(Value):
     """A quantity that is to be as small or as large as possible."""
 
     goal: Literal["minimise", "maximise"] = "minimise"
@@ -48,7 +48,7 @@ class Objective(_Value):
     """Worst or mean value over the runs of a design"""
 
 
-class Constraint(_Value):
+class Constraint(Value):
     """A quantity that must stay within limits in all runs."""
 
     low: Finite | None = None
