@@ -15,15 +15,15 @@ import numba
 import numpy as np
 
 from railsim import load_settings, load_track, load_vehicle
-from railsim.assembly import work_arrays
 from railsim.contact.creep_table import creep_table
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels import fastsim_simd
 from railsim.kernels.creep import LAW_NUMBERS, creep_forces
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.time_loop import FAST, time_loop
+from railsim.model.assembly import work_arrays
+from railsim.model.time_step import empty_recorder
 from railsim.simulation import prepare
-from railsim.time_step import empty_recorder
 
 GRIDS = (5, 10, 20, 50)
 CURVE = ("coach_manchester", "curve_r250", 20.0, 396.0)  # vehicle, track, m/s, middle of the curve

@@ -18,12 +18,12 @@ import numba
 import numpy as np
 from exudyn_contact import OUTPUT, forces_of
 
-from railsim.assembly import work_arrays
 from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.status import RUNNING
+from railsim.model.assembly import work_arrays
 from railsim.simulation import prepare
 
 GRAVITY = 9.81

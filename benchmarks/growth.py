@@ -17,7 +17,6 @@ import numpy as np
 import tomli_w
 
 from railsim import simulate
-from railsim.assembly import work_arrays
 from railsim.bench import loops
 from railsim.bench.commands import run_command
 from railsim.bench.machine import hardware, versions
@@ -25,6 +24,7 @@ from railsim.bench.parts import CALLS, least_time
 from railsim.definitions.loading import load_track, load_vehicle, load_vehicle_text
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
+from railsim.model.assembly import work_arrays
 from railsim.simulation import prepare
 
 COACHES = (1, 2, 4)

@@ -12,16 +12,16 @@ from typing import Any
 import numba
 import numpy as np
 
-from railsim.advance import Preparation
-from railsim.assembly import work_arrays
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.time_loop import RK4, time_loop
-from railsim.outputs import quantities
+from railsim.model.assembly import work_arrays
+from railsim.model.time_step import empty_recorder
 from railsim.simulation import prepare
-from railsim.time_step import empty_recorder
+from railsim.simulation.advance import Preparation
+from railsim.simulation.outputs import quantities
 
 
 @numba.njit(cache=True)

@@ -13,12 +13,13 @@ import numpy as np
 from generate import fill_page, table
 from scipy.optimize import brentq
 
-from railsim import assembly, load_track, load_vehicle, simulate
+from railsim import load_track, load_vehicle, simulate
 from railsim.contact import build_contact_table, contact_geometry
 from railsim.contact.elastic import loaded_contact
 from railsim.contact.exact_normal import exact_contact
 from railsim.contact.table import TableGrid
 from railsim.definitions.settings import Settings
+from railsim.model import assembly
 from railsim.profiles import load_profile
 from railsim.profiles.builtin import s1002_height
 

@@ -34,12 +34,12 @@ if TYPE_CHECKING:
     from railsim.definitions.vehicle import Vehicle
     from railsim.errors import InputError, ModelError
     from railsim.linear.modes import modes, root_locus
+    from railsim.model.statics import StaticLoads, static_loads
     from railsim.profiles import Profile, load_profile
     from railsim.result import Result, mid_curves, open_result, peaks
     from railsim.simulation import simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
-    from railsim.statics import StaticLoads, static_loads
     from railsim.studies import optimise, study
 
 _HOMES = {
@@ -50,7 +50,7 @@ _HOMES = {
     "Profile": "railsim.profiles",
     "Result": "railsim.result",
     "Settings": "railsim.definitions.settings",
-    "StaticLoads": "railsim.statics",
+    "StaticLoads": "railsim.model.statics",
     "Track": "railsim.definitions.track",
     "TrailingArmSuspension": "railsim.definitions.spring",
     "Vehicle": "railsim.definitions.vehicle",
@@ -74,7 +74,7 @@ _HOMES = {
     "root_locus": "railsim.linear.modes",
     "simulate": "railsim.simulation",
     "simulate_together": "railsim.simulation",
-    "static_loads": "railsim.statics",
+    "static_loads": "railsim.model.statics",
     "study": "railsim.studies",
 }
 

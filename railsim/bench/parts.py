@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.advance import Preparation
-from railsim.assembly import work_arrays
 from railsim.bench import loops
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.kernels.fastsim import fastsim_workspace
 from railsim.kernels.time_loop import FAST, time_loop
+from railsim.model.assembly import work_arrays
+from railsim.model.time_step import empty_recorder
 from railsim.simulation import prepare
-from railsim.time_step import empty_recorder
+from railsim.simulation.advance import Preparation
 
 Floats = NDArray[np.float64]
 GRIDS = (5, 10, 20, 50)

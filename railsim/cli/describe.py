@@ -167,7 +167,7 @@ def _finds_its_preload(element: "Element") -> bool:
 
 def static_data(vehicle: "Vehicle") -> dict[str, Any]:
     """Return static wheel loads and preloads on straight level track [N]."""
-    from railsim.statics import static_loads
+    from railsim.model.statics import static_loads
 
     return static_loads(vehicle).record()
 

@@ -110,7 +110,7 @@ def command(
 
         lines.append(str(save(histories(result), path.with_suffix(".png"), overwrite=overwrite)))
     if check_step and len(result["time"]):
-        from railsim.check_step import difference_record, half_step, step_differences
+        from railsim.simulation.check_step import difference_record, half_step, step_differences
 
         with progress_bar("half the step", quiet=quiet) as progress:
             half = half_step(result, progress=progress)
@@ -196,7 +196,7 @@ def result_record(result: "Result") -> dict[str, Any]:
 def _assumption_lines(case: "Case") -> list[str]:
     """Return what the run rests on, in the habits of the field."""
     from railsim.definitions.flatten import flatten
-    from railsim.right_samples import output_words
+    from railsim.simulation.right_samples import output_words
 
     track, settings = case.track, case.settings
     wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)
@@ -315,7 +315,7 @@ def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
 
 def _step_lines(result: "Result", differences: "Sequence[Comparison]") -> list[str]:
     """Return a table of what half the step changes."""
-    from railsim.check_step import FULL, HALF
+    from railsim.simulation.check_step import FULL, HALF
 
     step = float(result.attributes["step"])
     rows = []

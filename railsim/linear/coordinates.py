@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, components_of, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
@@ -20,6 +19,7 @@ from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import FREE, N_SCALARS, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.system import Linearisation, jacobian_of_rows
+from railsim.model.assembly import Model, components_of, work_arrays
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]

@@ -24,9 +24,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model
 from railsim.kernels.system import AXLEBOX, FIXED, RIGID, WHEELSET
 from railsim.linear.coordinates import Coordinates
+from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]

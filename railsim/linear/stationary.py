@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, level_track
 from railsim.definitions.track import Track
-from railsim.equilibrium import Equilibrium
 from railsim.kernels.aligned import aligned
 from railsim.kernels.system import FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
 from railsim.kernels.wheel_rail import W_Q
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.steady import SteadyRolling, led
+from railsim.model.assembly import Model, level_track
+from railsim.model.equilibrium import Equilibrium
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
@@ -27,6 +26,7 @@ from railsim.kernels.support import RATE, REFERENCE_MASS
 from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.coordinates import track_places
+from railsim.model.assembly import CONSTANT_SPEED, Model, components_of, work_arrays
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, SharedTables, assemble, check_fixed
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
@@ -21,6 +19,8 @@ from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.steady import SteadyRolling, SteadyState, led
 from railsim.linear.system import Linearisation
+from railsim.model.assembly import Model, SharedTables, assemble, check_fixed
+from railsim.model.equilibrium import equilibrium
 from railsim.profiles import Profile
 from railsim.profiles.builtin import cone
 from railsim.track.tables import track_tables

@@ -249,7 +249,7 @@ class Result:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader of the result must know, one sentence each; see `railsim.remarks`."""
+        """What a reader must know, one sentence each; see `railsim.simulation.remarks`."""
         return tuple(str(self._attributes.get("remarks", "")).splitlines())
 
     def vehicle(self) -> "Vehicle":

@@ -15,13 +15,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import GRAVITY, Model, assemble, check_fixed, work_arrays
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
-from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
@@ -33,8 +31,10 @@ from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.linear.vehicle import WALKING_PACE
+from railsim.model.assembly import GRAVITY, Model, assemble, check_fixed, work_arrays
+from railsim.model.equilibrium import equilibrium
+from railsim.model.time_step import Stability, empty_recorder
 from railsim.profiles import Profile
-from railsim.time_step import Stability, empty_recorder
 from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 

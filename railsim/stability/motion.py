@@ -11,7 +11,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.system import TABLE, Drive
@@ -19,7 +18,8 @@ from railsim.kernels.time_loop import time_loop
 from railsim.kernels.wheel_rail import W_Y
 from railsim.linear.circle import PLACE
 from railsim.linear.vehicle import LinearVehicle
-from railsim.time_step import SCHEMES, Stability, empty_recorder
+from railsim.model.assembly import work_arrays
+from railsim.model.time_step import SCHEMES, Stability, empty_recorder
 
 Floats = NDArray[np.float64]
 

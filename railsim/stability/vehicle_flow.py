@@ -8,14 +8,14 @@ rates are counted from steady rolling at the speed at hand.
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, work_arrays
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import time_loop
 from railsim.linear.circle import PLACE
+from railsim.model.assembly import CONSTANT_SPEED, work_arrays
+from railsim.model.time_step import empty_recorder
 from railsim.stability.motion import VehicleMotion
-from railsim.time_step import empty_recorder
 
 Floats = NDArray[np.float64]
 

@@ -144,7 +144,7 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Nu
     """Largest magnitudes over the wheels or wheelsets, and the wear numbers' sum."""
     import numpy as np
 
-    from railsim.assembly import GRAVITY
+    from railsim.model.assembly import GRAVITY
     from railsim.stability.curving import FAILED, curving
     from railsim.track.alignment import CANT_BASE
 

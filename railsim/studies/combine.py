@@ -19,7 +19,7 @@ from railsim.definitions.study import Sample, value_texts
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.profiles.used import profile_faults
-from railsim.simulation import check_range, initial_speed
+from railsim.simulation.run import check_range, initial_speed
 from railsim.studies.case import Case, run_name, short_name
 from railsim.studies.points import Fingerprints, Grid, Overrides, Point, check_number, point_key
 from railsim.studies.rows import made_rows

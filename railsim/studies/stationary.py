@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.assembly import assemble
 from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.limits import Constant, StationaryLimits
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError
 from railsim.linear.stationary import WALKING_PACE, Standing, on_cant, on_twist, roll_coefficient
 from railsim.linear.steady import NotConverged
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
 from railsim.result.filters import Floats
 from railsim.track.alignment import CANT_BASE
 

@@ -5,9 +5,9 @@ import json
 import pytest
 
 import railsim
-from railsim.check_step import FULL, HALF, half_step, step_differences
 from railsim.cli import main
 from railsim.result.extremes import peak
+from railsim.simulation.check_step import FULL, HALF, half_step, step_differences
 
 SHORT = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10"]
 

@@ -7,10 +7,10 @@ import sys
 import pytest
 
 import railsim.cli.interrupts
-import railsim.flange
-import railsim.run_in
-import railsim.settling
-import railsim.simulation
+import railsim.simulation.flange
+import railsim.simulation.run
+import railsim.simulation.run_in
+import railsim.simulation.settling
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
 from railsim.cli.progress import progress_bar
@@ -60,13 +60,13 @@ def comes(monkeypatch):
     """Let a signal come, in one of the ways above, while a run is prepared."""
 
     def during_preparation(way, number):
-        prepare = railsim.simulation.prepare
+        prepare = railsim.simulation.run.prepare
 
         def interrupted(*arguments, **how):
             way(number)
             return prepare(*arguments, **how)
 
-        monkeypatch.setattr(railsim.simulation, "prepare", interrupted)
+        monkeypatch.setattr(railsim.simulation.run, "prepare", interrupted)
 
     return during_preparation
 
@@ -84,7 +84,9 @@ def test_run_obeys_a_signal_that_python_loses(tmp_path, comes, capsys, way, name
 
 
 @pytest.mark.parametrize(
-    ("module", "speed"), [(railsim.run_in, "20"), (railsim.flange, "2")], ids=["run-in", "step"]
+    ("module", "speed"),
+    [(railsim.simulation.run_in, "20"), (railsim.simulation.flange, "2")],
+    ids=["run-in", "step"],
 )
 def test_run_obeys_a_signal_that_python_loses_before_it(
     tmp_path, monkeypatch, capsys, module, speed
@@ -93,7 +95,7 @@ def test_run_obeys_a_signal_that_python_loses_before_it(
 
     Either is left after the call in hand.
     """
-    calls, time_loop = [], railsim.settling.time_loop
+    calls, time_loop = [], railsim.simulation.settling.time_loop
 
     def interrupted(*arguments):
         calls.append(1)
@@ -101,7 +103,7 @@ def test_run_obeys_a_signal_that_python_loses_before_it(
         return time_loop(*arguments)
 
     def advance(*arguments):
-        monkeypatch.setattr(railsim.settling, "time_loop", interrupted)
+        monkeypatch.setattr(railsim.simulation.settling, "time_loop", interrupted)
         return settle(*arguments)
 
     settle = module.advance
@@ -134,7 +136,7 @@ def test_bar_says_what_comes_before_a_run(monkeypatch):
             pass
 
     monkeypatch.setattr("tqdm.tqdm", Bar)
-    monkeypatch.setattr(railsim.settling, "WHEELSET_STEPS", 4000)
+    monkeypatch.setattr(railsim.simulation.settling, "WHEELSET_STEPS", 4000)
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     with progress_bar("a run", quiet=False) as progress:
         railsim.simulate(coach, track, speed=20.0, start=390.0, duration=0.1, progress=progress)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import railsim
-import railsim.advance
-import railsim.settling
+import railsim.simulation.advance
+import railsim.simulation.settling
 
 
 def run():
@@ -18,8 +18,8 @@ def test_calls_within_an_output_interval_change_nothing(monkeypatch):
     vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     settings = railsim.load_settings(None, ["output_rate=10"])
     runs = []
-    for most in (railsim.advance.STEPS, 7):  # of 80 steps from one output to the next
-        monkeypatch.setattr(railsim.advance, "STEPS", most)
+    for most in (railsim.simulation.advance.STEPS, 7):  # of 80 steps from one output to the next
+        monkeypatch.setattr(railsim.simulation.advance, "STEPS", most)
         runs.append(railsim.simulate(vehicle, track, speed=20.0, until=20.0, settings=settings))
     whole, cut = runs
     assert len(whole.time) == 11
@@ -44,7 +44,7 @@ def test_run_in_may_be_interrupted_and_is_the_same_in_pieces(monkeypatch):
     vehicle = railsim.load_vehicle("coach_manchester")
     how = {"speed": 20.0, "start": 390.0, "duration": 0.1}
     whole = railsim.simulate(vehicle, track, **how)
-    monkeypatch.setattr(railsim.settling, "WHEELSET_STEPS", 4 * 137)
+    monkeypatch.setattr(railsim.simulation.settling, "WHEELSET_STEPS", 4 * 137)
     pieces = railsim.simulate(vehicle, track, **how)
     for name in whole:
         np.testing.assert_array_equal(pieces[name], whole[name])

@@ -6,7 +6,7 @@ import weakref
 import pytest
 
 import railsim
-import railsim.simulation
+import railsim.simulation.run
 from railsim.cli import main
 from railsim.result import check_result
 
@@ -57,14 +57,14 @@ def test_physical_end_keeps_its_result(changed, instants, reason, whole, tmp_pat
 
 def test_run_that_has_ended_lets_go_of_its_tables(monkeypatch):
     """Its hundred megabytes do not wait for the collector: hundreds of runs follow each other."""
-    prepare, prepared = railsim.simulation.prepare, []
+    prepare, prepared = railsim.simulation.run.prepare, []
 
     def watched(*arguments, **how):
         found = prepare(*arguments, **how)
         prepared.append(weakref.ref(found))
         return found
 
-    monkeypatch.setattr(railsim.simulation, "prepare", watched)
+    monkeypatch.setattr(railsim.simulation.run, "prepare", watched)
     vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
     gc.disable()
     try:

@@ -13,7 +13,7 @@ PROGRAM = """
 import sys
 import numpy as np
 import railsim
-from railsim.assembly import assemble, work_arrays
+from railsim.model.assembly import assemble, work_arrays
 from railsim.definitions.settings import Settings
 from railsim.kernels.rhs import right_hand_side
 model = assemble(railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250"),

@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from railsim.assembly import assemble, work_arrays
 from railsim.definitions.loading import load_track as load_any_track
 from railsim.definitions.loading import load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
 from railsim.kernels.contact_table import (
     LOOK_UP_SIZE,
     N_WEIGHT,
@@ -21,7 +19,9 @@ from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import AXLEBOX, N_SCALARS, WHEELSET
 from railsim.kernels.time_loop import time_loop
 from railsim.kernels.track_frame import FRAME_SIZE
-from railsim.time_step import SCHEMES, empty_recorder
+from railsim.model.assembly import assemble, work_arrays
+from railsim.model.equilibrium import equilibrium
+from railsim.model.time_step import SCHEMES, empty_recorder
 
 NEVER = 1 << 40
 

@@ -7,9 +7,9 @@ from dynamics import Settings, absolute_frame, changed, load_track, rotation
 from rig import test_vehicle
 from scipy.optimize import brentq
 
-from railsim.assembly import assemble, work_arrays
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.wheel_rail import ANGLE_SIN, T_X, W_Q, W_Y
+from railsim.model.assembly import assemble, work_arrays
 
 GRAVITY = 9.81
 RADIUS = 0.46

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from dynamics import Settings, absolute_frame, load_track, load_vehicle, rotation
 
-from railsim.assembly import assemble, level_track, work_arrays
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
 from railsim.kernels.time_loop import FAST, RK4, time_loop
-from railsim.time_step import empty_recorder
+from railsim.model.assembly import assemble, level_track, work_arrays
+from railsim.model.time_step import empty_recorder
 
 DATA = Path(__file__).parent.parent / "data" / "vehicles"
 

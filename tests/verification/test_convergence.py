@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from dynamics import Settings, load_track, load_vehicle
 
-import railsim.assembly as assembly
+import railsim.model.assembly as assembly
 from railsim.contact.table import TableGrid, build_contact_table
 from railsim.simulation import simulate
 

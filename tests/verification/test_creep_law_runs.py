@@ -8,13 +8,14 @@ import pytest
 from dynamics import Settings, evaluate, load_track, load_vehicle
 from rig import DATA, test_vehicle
 
-from railsim import cli, simulation
+from railsim import cli
 from railsim.contact.creep import LAWS, creep_force
 from railsim.definitions.mirror import mirrored_track
 from railsim.kernels import wheel_rail as columns
 from railsim.kernels.contact_table import A1, B1, D_B1
 from railsim.result import open_result
 from railsim.simulation import prepare, simulate
+from railsim.simulation import run as simulation_run
 
 SPEED = 20.0
 MIDDLE = 390.0  # m, of the circular curve
@@ -190,7 +191,7 @@ def test_error_of_the_step_with_the_table_is_that_with_fastsim(coach):
 @pytest.fixture
 def long_patches(monkeypatch):
     """Runs whose patches are made 90 times as long, over their width, as they are."""
-    assemble = simulation.assemble
+    assemble = simulation_run.assemble
 
     def with_long_patches(*arguments):
         model = assemble(*arguments)
@@ -202,7 +203,7 @@ def long_patches(monkeypatch):
         contact = model.system.contact._replace(values=values)
         return replace(model, system=model.system._replace(contact=contact))
 
-    monkeypatch.setattr(simulation, "assemble", with_long_patches)
+    monkeypatch.setattr(simulation_run, "assemble", with_long_patches)
 
 
 @laws

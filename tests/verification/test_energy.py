@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dynamics import Settings, advance, energy, load_track, load_vehicle, steady, undamped
 
-from railsim.run_in import follow_rails
+from railsim.simulation.run_in import follow_rails
 
 FRICTIONLESS = {"friction": (0.0, 0.0)}
 FREE = Settings(contact_damping=0.0, drive={"mode": "free"})

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from rig import test_vehicle
 
-from railsim import load_track, load_vehicle, pace, simulate, simulate_together
-from railsim.assembly import SharedTables, assemble
+from railsim import load_track, load_vehicle, simulate, simulate_together
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
-from railsim.ensemble import Ensemble
 from railsim.errors import InputError, ModelError
 from railsim.kernels.contact_table import N_PATCH
+from railsim.model.assembly import SharedTables, assemble
+from railsim.model.time_step import empty_recorder
 from railsim.result import MemorySink
-from railsim.simulation import outcomes
-from railsim.time_step import empty_recorder
+from railsim.simulation import outcomes, pace
+from railsim.simulation.ensemble import Ensemble
 
 COACH = "coach_manchester"
 ROUND_OFF = 1e-9  # of the largest value: some operations' rounding, carried along for seconds

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from dynamics import Settings, load_track
 
-import railsim.equilibrium
-from railsim.assembly import assemble
+import railsim.model.equilibrium
 from railsim.definitions.loading import load_vehicle_text
-from railsim.equilibrium import RESIDUAL, equilibrium
 from railsim.errors import ModelError
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import RESIDUAL, equilibrium
 from railsim.profiles import load_profile
 from railsim.profiles.profile import Profile
 
@@ -63,7 +63,7 @@ def test_two_stage_wagon_rolls_steadily_with_kinks_at_rest(along, across):
 
 def test_message_names_the_elements_that_alternate(monkeypatch):
     monkeypatch.setattr(
-        railsim.equilibrium._Balance,
+        railsim.model.equilibrium._Balance,
         "_over_kinks",
         lambda self, state, rest, change: (state, rest, False),
     )

@@ -6,13 +6,13 @@ from dynamics import load_track, load_vehicle
 from rig import test_vehicle
 
 import railsim
-from railsim.assembly import assemble
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
 from railsim.errors import InputError
 from railsim.linear.eigenmodes import loss_of_stability
 from railsim.linear.vehicle import Contact, LinearVehicle
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
 
 STRAIGHT = load_track("straight")
 CURVE = load_track("curve_r250")

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.sources import library_files
-from railsim.element_arrays import vertical_support
+from railsim.model.element_arrays import vertical_support
 
 GRAVITY = 9.81
 # mass t, Q0 kN, bounce, bogie bounce, pitch, frame pitch Hz

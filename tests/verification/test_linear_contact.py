@@ -7,7 +7,6 @@ import pytest
 from dynamics import changed, load_track, load_vehicle
 from rig import test_vehicle
 
-from railsim.assembly import CONSTANT_SPEED, level_track_with_friction, work_arrays
 from railsim.contact import table
 from railsim.contact.table import TableGrid
 from railsim.errors import InputError
@@ -16,9 +15,10 @@ from railsim.linear.eigenmodes import eigenmodes, loss_of_stability, oscillation
 from railsim.linear.modes import modes, root_locus
 from railsim.linear.system import Linearisation
 from railsim.linear.vehicle import Contact, LinearVehicle
+from railsim.model.assembly import CONSTANT_SPEED, level_track_with_friction, work_arrays
+from railsim.model.time_step import SCHEMES, Stability, empty_recorder
 from railsim.profiles import Profile
 from railsim.profiles.builtin import arc_chain_rail
-from railsim.time_step import SCHEMES, Stability, empty_recorder
 
 RIGID = {"preset": "rigid"}
 STRAIGHT = load_track("straight").replace(support=RIGID)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from railsim.assembly import assemble
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
 from railsim.errors import InputError
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
 
 GRAVITY = 9.81
 K = 4e5  # N/m, each of two springs

@@ -6,10 +6,9 @@ from dynamics import Settings, load_track, load_vehicle
 from rig import test_vehicle
 
 import railsim
-from railsim import run_in, simulation
 from railsim.errors import Fault, InputError
 from railsim.result import open_result
-from railsim.simulation import simulate
+from railsim.simulation import run, run_in, simulate
 
 RAMP = ((0.0, 10.0), (50.0, 10.0), (150.0, 30.0), (200.0, 30.0))
 
@@ -214,7 +213,7 @@ def test_continued_run_needs_no_run_in(straight, monkeypatch):
     def refused(*arguments):
         raise AssertionError("a run-in")
 
-    monkeypatch.setattr(simulation, "start_state", refused)
+    monkeypatch.setattr(run, "start_state", refused)
     assert simulate(coach, straight, resume=first, until=10.0).status == "complete"
 
 

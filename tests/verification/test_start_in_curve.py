@@ -6,13 +6,13 @@ from dynamics import load_vehicle
 from rig import test_vehicle
 
 import railsim
-from railsim import run_in
-from railsim.assembly import assemble, work_arrays
 from railsim.definitions.settings import Settings
-from railsim.equilibrium import equilibrium
 from railsim.kernels.rhs import right_hand_side
 from railsim.kernels.wheel_rail import W_Q, W_Y
 from railsim.linear.steady import NotConverged
+from railsim.model.assembly import assemble, work_arrays
+from railsim.model.equilibrium import equilibrium
+from railsim.simulation import run_in
 
 STEADY = Settings(start_state="steady")
 SPEED = 20.0

@@ -5,14 +5,14 @@ import pytest
 from dynamics import Settings, load_track, load_vehicle, steady
 from rig import test_vehicle
 
-from railsim.assembly import work_arrays
 from railsim.kernels.time_loop import FAST, time_loop
 from railsim.kernels.wheel_rail import W_Q, W_Y
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
 from railsim.linear.steady import NotConverged, led
-from railsim.run_in import settled
-from railsim.time_step import empty_recorder
+from railsim.model.assembly import work_arrays
+from railsim.model.time_step import empty_recorder
+from railsim.simulation.run_in import settled
 from railsim.track.tables import track_tables
 
 GRAVITY = 9.81

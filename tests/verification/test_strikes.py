@@ -10,8 +10,8 @@ import xarray
 from dynamics import Settings, load_track, load_vehicle
 
 import railsim
-from railsim.remarks import MOST_Q
 from railsim.simulation import simulate, simulate_together
+from railsim.simulation.remarks import MOST_Q
 
 SPEED, UNTIL = 40.0, 36.0
 AT = {"type": "dip", "s": 20.0, "length": 1.0, "depth": 2e-3}

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from dynamics import Settings, evaluate, load_track, load_vehicle, steady
 
-from railsim.assembly import work_arrays
 from railsim.definitions.support import PRESETS
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.contact_table import K2, K
@@ -12,9 +11,10 @@ from railsim.kernels.support import RATE, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import time_loop
 from railsim.kernels.wheel_rail import W_Q
-from railsim.outputs import rail_deflection
+from railsim.model.assembly import work_arrays
+from railsim.model.time_step import SCHEMES, empty_recorder
 from railsim.simulation import simulate
-from railsim.time_step import SCHEMES, empty_recorder
+from railsim.simulation.outputs import rail_deflection
 
 ELASTIC = ["ballasted", "co-running", "p2", "slab"]
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from dynamics import Settings, changed, load_track, load_vehicle, undamped
 
-from railsim.assembly import assemble, level_track
-from railsim.equilibrium import equilibrium
 from railsim.linear.coordinates import FreeVehicle
 from railsim.linear.eigenmodes import eigenmodes
 from railsim.linear.modes import modes
+from railsim.model.assembly import assemble, level_track
+from railsim.model.equilibrium import equilibrium
 
 
 def held_modes(vehicle, *, loaded):

@@ -26,7 +26,7 @@ from railsim.kernels.wheel_rail import (
     XI_X,
     XI_Y,
 )
-from railsim.run_in import start_state
+from railsim.simulation.run_in import start_state
 
 SPEED = 15.0
 

@@ -1,8 +1,8 @@
 """`simulate`: the story of a run on one page; `simulate_together`: of several in one call.
 
 Definitions are assembled to arrays, the vehicle finds its equilibrium on straight level track, the
-step is chosen, and the time loop runs in chunks (`railsim.advance`).  The outcome goes chunk by
-chunk to a sink.
+step is chosen, and the time loop runs in chunks (`railsim.simulation.advance`).  The outcome goes
+chunk by chunk to a sink.
 """
 
 import json
@@ -15,25 +15,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.advance import Preparation, Run, advance
-from railsim.assembly import Model, SharedTables, assemble
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.status import NOT_FINITE, STATUS
-from railsim.outputs import OutputPlan, run_extremes
-from railsim.pace import Pace
+from railsim.model.assembly import Model, SharedTables, assemble
+from railsim.model.equilibrium import equilibrium
+from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
-from railsim.remarks import run_remarks
 from railsim.result import MemorySink, Result, Sink
 from railsim.result.stored import StoredPeaks, lost_peak
-from railsim.right_samples import filtering, low_pass_remark, output_words, sampled
-from railsim.run_in import start_state
-from railsim.settling import DOING
-from railsim.settling import Progress as SettlingProgress
-from railsim.time_step import SCHEMES
+from railsim.simulation.advance import Preparation, Run, advance
+from railsim.simulation.outputs import OutputPlan, run_extremes
+from railsim.simulation.pace import Pace
+from railsim.simulation.remarks import run_remarks
+from railsim.simulation.right_samples import filtering, low_pass_remark, output_words, sampled
+from railsim.simulation.run_in import start_state
+from railsim.simulation.settling import DOING
+from railsim.simulation.settling import Progress as SettlingProgress
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import assemble
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.equilibrium import equilibrium
+from railsim.model.assembly import assemble
+from railsim.model.equilibrium import equilibrium
 from railsim.profiles import Profile
 from railsim.text import html_table
 

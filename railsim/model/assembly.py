@@ -22,7 +22,6 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.support import Support as SupportDefinition
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.element_arrays import ElementArrays
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned, aligned_zeros
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
@@ -54,6 +53,7 @@ from railsim.kernels.system import (
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.vibration import VIBRATION
 from railsim.kernels.wheel_rail import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
+from railsim.model.element_arrays import ElementArrays
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.alignment import CANT_BASE

@@ -5,15 +5,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, level_track_with_friction
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
-from railsim.equilibrium import equilibrium
 from railsim.errors import Fault, InputError
-from railsim.flange import in_flange_contact
 from railsim.kernels.rhs import STANDSTILL_SPEED
-from railsim.settling import Progress
-from railsim.time_step import Stability
+from railsim.model.assembly import Model, level_track_with_friction
+from railsim.model.equilibrium import equilibrium
+from railsim.model.time_step import Stability
+from railsim.simulation.flange import in_flange_contact
+from railsim.simulation.settling import Progress
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Pace:
     states : dict of float to float64[n_state]
         Steady rolling on straight track at the speeds where it is known.
     progress : callable, optional
-        Called while a step is judged, as in `railsim.flange.in_flange_contact`.
+        Called while a step is judged, as in `railsim.simulation.flange.in_flange_contact`.
     """
 
     CLASS = 1.2  # ratio of a class's speeds

@@ -9,13 +9,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
-from railsim.settling import DOING, Progress, advance, curve_to_settle_in
+from railsim.model.assembly import CONSTANT_SPEED, Model
+from railsim.simulation.settling import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 

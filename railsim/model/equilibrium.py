@@ -19,8 +19,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, components_of, level_track, work_arrays
-from railsim.element_arrays import vertical_support
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_table import K2, K
@@ -33,8 +31,10 @@ from railsim.kernels.system import AXLEBOX, FIXED, N_SCALARS, RIGID, WHEELSET, L
 from railsim.kernels.time_loop import FAST, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.kernels.wheel_rail import NORMAL, W_Q
+from railsim.model.assembly import Model, components_of, level_track, work_arrays
+from railsim.model.element_arrays import vertical_support
+from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, SIDES
-from railsim.time_step import empty_recorder
 
 Floats = NDArray[np.float64]
 

@@ -1,9 +1,9 @@
 """The time step: as long as the scheme stays stable for this vehicle at this speed.
 
 The linearised map of one step is formed by differences about steady rolling, and in flange contact
-in the tightest curve (`railsim.flange`); the step is stable where no mode of the map grows faster
-than the vehicle itself does (a vehicle beyond its critical speed grows, and may).  The margin
-leaves room for higher wheel loads.
+in the tightest curve (`railsim.simulation.flange`); the step is stable where no mode of the map
+grows faster than the vehicle itself does (a vehicle beyond its critical speed grows, and may).  The
+margin leaves room for higher wheel loads.
 """
 
 import math
@@ -12,7 +12,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, work_arrays
 from railsim.errors import ModelError
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
@@ -21,6 +20,7 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.system import N_SCALARS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Recorder, time_loop
 from railsim.kernels.wheel_rail import PATCH_ROWS, WHEEL_COLUMNS
+from railsim.model.assembly import Model, work_arrays
 
 Floats = NDArray[np.float64]
 Situation = tuple[System, Floats]

@@ -20,9 +20,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import CONSTANT_SPEED, Model, work_arrays
 from railsim.definitions.track import Track
-from railsim.equilibrium import Equilibrium, initial_state
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.internal import PAD
 from railsim.kernels.rails import (
@@ -43,7 +41,9 @@ from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import PLACE, circle
 from railsim.linear.steady import NotConverged, led
-from railsim.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
+from railsim.model.assembly import CONSTANT_SPEED, Model, work_arrays
+from railsim.model.equilibrium import Equilibrium, initial_state
+from railsim.simulation.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables
 

@@ -1,8 +1,8 @@
 """From prepared runs to their ends: the time loop, chunk by chunk.
 
 Between two chunks there is time for progress, Ctrl-C and for writing.  Runs of several vehicles
-over one track advance together in one call (`railsim.ensemble`) for as long as they can; a single
-run is the ensemble of one.
+over one track advance together in one call (`railsim.simulation.ensemble`) for as long as they can;
+a single run is the ensemble of one.
 
 Each run is what it would be alone.  A chunk in which one of several vehicles leaves the range of
 the model, or lifts or strikes a rail, is taken back: that vehicle goes on alone, to its own end,
@@ -17,19 +17,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, no_extremes, work_arrays
 from railsim.definitions.settings import Settings
-from railsim.ensemble import Ensemble, contact_grid
-from railsim.equilibrium import Equilibrium
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.time_loop import time_loop
 from railsim.kernels.vibration import VIBRATION
-from railsim.outputs import OutputPlan
-from railsim.pace import Pace, duration
+from railsim.model.assembly import Model, no_extremes, work_arrays
+from railsim.model.equilibrium import Equilibrium
+from railsim.model.time_step import SCHEMES, divide_strikes
 from railsim.result import Sink
-from railsim.time_step import SCHEMES, divide_strikes
+from railsim.simulation.ensemble import Ensemble, contact_grid
+from railsim.simulation.outputs import OutputPlan
+from railsim.simulation.pace import Pace, duration
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -111,7 +111,7 @@ class Run:
     error : Exception or None
         What went wrong with its output.
     remarks : list of str
-        What a reader of its result must know, see `railsim.remarks`.
+        What a reader of its result must know, see `railsim.simulation.remarks`.
     """
 
     prepared: Preparation

@@ -9,7 +9,7 @@ from typing import Any
 
 from railsim.compare import Comparison, compare
 from railsim.result import Result
-from railsim.simulation import simulate
+from railsim.simulation.run import simulate
 
 FULL, HALF = "step", "half"
 

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.advance import Run
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, PLACE
 from railsim.notation import SIDES
-from railsim.outputs import run_extremes
+from railsim.simulation.advance import Run
+from railsim.simulation.outputs import run_extremes
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def beyond_experience(
     Parameters
     ----------
     extremes : mapping of str to ndarray
-        See `railsim.outputs.run_extremes`.
+        See `railsim.simulation.outputs.run_extremes`.
     Q0 : float64[wheelset, side]
         Static wheel loads [N].
     wheelsets : sequence of str

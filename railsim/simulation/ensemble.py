@@ -17,7 +17,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, side_by_side
 from railsim.kernels.aligned import aligned
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.status import (
@@ -41,6 +40,7 @@ from railsim.kernels.system import (
     System,
 )
 from railsim.kernels.time_loop import Recorder
+from railsim.model.assembly import Model, side_by_side
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

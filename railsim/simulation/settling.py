@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model, work_arrays
 from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import time_loop
-from railsim.time_step import divide_strikes, empty_recorder
+from railsim.model.assembly import Model, work_arrays
+from railsim.model.time_step import divide_strikes, empty_recorder
 
 Floats = NDArray[np.float64]
 # called with the time that has been simulated, and all of it [s]; it may raise, as on Ctrl-C

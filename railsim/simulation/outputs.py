@@ -6,7 +6,6 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.assembly import Model
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -18,9 +17,10 @@ from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Recorder
 from railsim.kernels.wheel_rail import W_PHI, W_Q, W_T_GAMMA, W_T_GAMMA_SPIN, W_XI_X, W_XI_Y, W_Y
+from railsim.model.assembly import Model
+from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import readings, sensors
-from railsim.time_step import empty_recorder
 from railsim.track.alignment import CANT_BASE, Alignment
 from railsim.track.irregularity import displacement
 
