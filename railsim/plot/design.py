@@ -14,6 +14,7 @@ from railsim.result.data import Array
 
 Flags = NDArray[np.bool_]
 MOST_PAIRS = 6
+NARROW = 0.05  # of the widest bar, below which its ends bear no words
 FEW = 12  # designs of a front that are numbered
 
 
@@ -95,22 +96,27 @@ def sensitivity_figure(found: Sequence[Mapping[str, Any]], labels: Sequence[str]
         for (left, right), one, label in zip(grid, found, labels, strict=True):
             _tornado(left, one, label)
             _indices(right, one)
-        grid[0][1].legend(loc="lower right")
+        handles, names = grid[0][1].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower right", ncols=2)
     return figure
 
 
 def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
     names = sorted(one["low"], key=lambda name: abs(one["high"][name] - one["low"][name]))
+    axes.use_sticky_edges = False
+    widest = max(abs(one["high"][name] - one["low"][name]) for name in names)
     for place, name in enumerate(names):
         low, high = one["low"][name], one["high"][name]
         axes.barh(place, high - low, left=low, height=0.55, color=DISTINCT[4], zorder=2)
+        if abs(high - low) < NARROW * widest:
+            continue
         for value, words in ((low, "low"), (high, "high")):
             outer = (value >= max(low, high)) if words == "high" else (value > min(low, high))
             axes.annotate(words, (value, place), xytext=(4 if outer else -4, 0),
                           textcoords="offset points", va="center",
                           ha="left" if outer else "right", fontsize=7, color="0.3")  # fmt: skip
     axes.set_yticks(range(len(names)), [_short(name) for name in names])
-    axes.set(xlabel=label, title="One variable from bound to bound, the others as chosen")
+    axes.set(xlabel=label, title="From bound to bound, the others as chosen")
     axes.margins(x=0.15)
 
 

@@ -83,8 +83,8 @@ def sensitivities(
             dists=distributions,
             random_state=np.random.default_rng(0),
         )
-        first[varied] = np.atleast_2d(indices.first_order)
-        total[varied] = np.atleast_2d(indices.total_order)
+        first[varied] = np.reshape(indices.first_order, (len(varied), count))
+        total[varied] = np.reshape(indices.total_order, (len(varied), count))
     errors = model.errors()
     return [
         Sensitivity(
