@@ -7,6 +7,13 @@ from pydantic import Field
 
 from railsim.definitions.base import Definition, Finite, Name, NonNegative, Positive, Text
 
+# units of the numbers, by what stands behind the analysis' name
+UNITS = {
+    "damping": "", "frequency": "Hz", "linear": "m/s", "ramp": "m/s", "bifurcation": "m/s",
+    "continuation": "m/s", "T_gamma": "N", "T_gamma_largest": "N", "Q": "N", "Y": "N",
+    "sum_Y": "N", "sum_abs_Y": "N", "attack": "rad", "lateral": "m", "car_roll": "rad",
+}  # fmt: skip
+
 
 class RunAnalysis(Definition):
     """A run in the time domain: what a study does where nothing else is asked for."""
@@ -81,6 +88,17 @@ class Analyses(Definition):
 
     analyses: dict[Name, Analysis]
     """What is done at each point"""
+
+
+def unit_of_number(name: str) -> str:
+    """Return the unit of an analysis' number, ``NAME.NUMBER``; empty where it has none.
+
+    Examples
+    --------
+    >>> unit_of_number("hunting.linear"), unit_of_number("wear.percentiles_50")
+    ('m/s', '')
+    """
+    return UNITS.get(name.partition(".")[2], "")
 
 
 def needs_run(analyses: Mapping[str, Analysis]) -> bool:

@@ -23,13 +23,6 @@ Numbers = dict[str, float]
 
 PLACES = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
-# units of the numbers, by what stands behind the analysis' name
-UNITS = {
-    "damping": "", "frequency": "Hz", "linear": "m/s", "ramp": "m/s", "bifurcation": "m/s",
-    "continuation": "m/s", "T_gamma": "N", "T_gamma_largest": "N", "Q": "N", "Y": "N",
-    "sum_Y": "N", "sum_abs_Y": "N", "attack": "rad", "lateral": "m", "car_roll": "rad",
-}  # fmt: skip
-
 
 def analysed(case: Case, result: Result | None) -> Numbers:
     """Return the numbers of all analyses of a case.

@@ -14,12 +14,12 @@ from typing import Any, TextIO, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from railsim.definitions.analyses import unit_of_number
 from railsim.errors import Fault, InputError
 from railsim.files import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.result.facts import FACTS, run_facts
-from railsim.studies.analyses import UNITS as ANALYSIS_UNITS
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Record, Records
@@ -244,9 +244,8 @@ def unit_of(column: str) -> str:
     """
     if column in UNITS:
         return UNITS[column]
-    analysis, _, number = column.partition(".")
-    if number and analysis.isidentifier():
-        return ANALYSIS_UNITS.get(number, "")
+    if unit := unit_of_number(column):
+        return unit
     found = _COLUMN.fullmatch(column)
     if not found or found[1] not in QUANTITIES:
         return ""
