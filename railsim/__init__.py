@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from railsim.simulation import simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
-    from railsim.studies import optimise, study
+    from railsim.studies import study
+    from railsim.studies.optimise import optimise
 
 _HOMES = {
     "Assessment": "railsim.assessment",
@@ -69,7 +70,7 @@ _HOMES = {
     "mid_curves": "railsim.result",
     "modes": "railsim.linear.modes",
     "open_result": "railsim.result",
-    "optimise": "railsim.studies",
+    "optimise": "railsim.studies.optimise",
     "peaks": "railsim.result",
     "root_locus": "railsim.linear.modes",
     "simulate": "railsim.simulation",

@@ -24,7 +24,6 @@ Begin reading in `study.py`.
 """
 
 from railsim.studies.case import Case
-from railsim.studies.optimise import Optimisation, optimise
 from railsim.studies.study import Outcome, study
 
-__all__ = ["Case", "Optimisation", "Outcome", "optimise", "study"]
+__all__ = ["Case", "Outcome", "study"]
