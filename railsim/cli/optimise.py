@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, table
+from railsim.cli.common import (
+    echo,
+    json_option,
+    names_of,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    table,
+)
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -15,7 +23,7 @@ MOST_ROWS = 15
 
 
 @click.command()
-@click.argument("study", metavar="STUDY")
+@click.argument("study", metavar="STUDY", shell_complete=names_of("study"))
 @click.option("--out", default="optimise", metavar="DIR", show_default=True, help="Folder.")
 @click.option(
     "--method",

@@ -10,6 +10,7 @@ from railsim.cli.common import (
     echo,
     json_option,
     load_option,
+    names_of,
     overwrite_option,
     print_json,
     quiet_option,
@@ -63,9 +64,21 @@ def _is_number(text: str) -> bool:
 
 
 @click.command(cls=ManyValues)
-@click.argument("file", required=False, metavar="[STUDY]")
-@click.option("--vehicles", multiple=True, metavar="F...", help="Vehicles: files or names.")
-@click.option("--tracks", multiple=True, metavar="F...", help="Tracks: files or names.")
+@click.argument("file", required=False, metavar="[STUDY]", shell_complete=names_of("study"))
+@click.option(
+    "--vehicles",
+    multiple=True,
+    metavar="F...",
+    help="Vehicles: files or names.",
+    shell_complete=names_of("vehicle"),
+)
+@click.option(
+    "--tracks",
+    multiple=True,
+    metavar="F...",
+    help="Tracks: files or names.",
+    shell_complete=names_of("track"),
+)
 @click.option(
     "--speeds",
     multiple=True,
