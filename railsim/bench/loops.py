@@ -10,6 +10,7 @@ from railsim.kernels.contact_table import INSIDE, cell_weights, locate, look_up,
 from railsim.kernels.elements import link_forces, mount_forces
 from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
+from railsim.kernels.support import AS_GIVEN
 from railsim.kernels.wheel_rail import (
     BEYOND,
     C11,
@@ -43,7 +44,7 @@ def many_right_hand_sides(system, work, state, derivative, n):
 def many_mechanics(system, work, state, derivative, n):
     """Everything, as the fast scheme calls it."""
     for _ in range(n):
-        mechanics(system, work, state, derivative)
+        mechanics(system, work, state, derivative, AS_GIVEN)
 
 
 @jit

@@ -36,7 +36,16 @@ from railsim.kernels.lanes import (
 )
 from railsim.kernels.rotation import product, sine_cosine, sine_cosine_lanes, turned, turned_back
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
-from railsim.kernels.support import locate_support, support_rates
+from railsim.kernels.support import (
+    AFTER_STEP,
+    AS_GIVEN,
+    MOST_CORRECTIONS,
+    correct_support,
+    evaluations,
+    locate_support,
+    settle_rates,
+    support_rates,
+)
 from railsim.kernels.system import (
     AXLEBOX,
     BODY_SIZE,
@@ -434,7 +443,7 @@ def right_hand_sides(system, work, states, derivatives):
 @jit_merged
 def rates_of_state(system, work, state, derivative):
     """As `right_hand_side`, within compiled code."""
-    status, where, n_patches = mechanics(system, work, state, derivative)
+    status, where, n_patches = mechanics(system, work, state, derivative, AS_GIVEN)
     internal_rates(system, work, state, derivative)
     support_rates(system, work, state, derivative)
     return status, where, n_patches
@@ -450,8 +459,16 @@ def internal_rates(system, work, state, derivative):
         )
 
 
+@jit_inline
+def keep_counts(events, first, to):
+    """Copy the counts of patches: of repeated evaluations only the last one counts."""
+    for w in range(events.shape[0]):
+        events[w, to] = events[w, first]
+        events[w, to + 1] = events[w, first + 1]
+
+
 @jit_merged
-def mechanics(system, work, state, derivative):
+def mechanics(system, work, state, derivative, rails):
     """Derivative of coordinates, velocities, place and speed; drives of the internal states.
 
     Parameters
@@ -459,6 +476,8 @@ def mechanics(system, work, state, derivative):
     system : System;  work : Work
     state, derivative : float64[n_state]
         See `railsim.kernels.system`; the velocities of fixed bodies in `state` are set.
+    rails : int
+        What becomes of elastic rails in `state`, see `support.AS_GIVEN`.
 
     Returns
     -------
@@ -496,7 +515,23 @@ def mechanics(system, work, state, derivative):
         load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
+    left = evaluations(system, state, rails)
+    keep_counts(work.events, 0, 2)
     status, where, n_patches = wheel_rail(system, work, speed, state)
+    while left > 0 and status == RUNNING:
+        if rails == AFTER_STEP:
+            moved = correct_support(system, work, state, left == MOST_CORRECTIONS)
+        else:
+            moved = settle_rates(system, work, state)
+        if not moved:
+            break
+        left -= 1
+        if left == 0:
+            work.parts[2] += 1
+        keep_counts(work.events, 2, 0)
+        status, where, n_patches = wheel_rail(system, work, speed, state)
+    if rails == AFTER_STEP:
+        state[-4] = -abs(state[-4])
     if status != RUNNING:
         return status, where, n_patches
     dynamics(

@@ -37,6 +37,7 @@ from railsim.kernels.rails import (
     MOTION_Y_RATE,
     MOTION_Z,
     MOTION_Z_RATE,
+    RAIL_SLOPE,
     ROLL,
     ROLL_SLOPE,
     SLOPE_Z,
@@ -45,10 +46,17 @@ from railsim.kernels.rails import (
 from railsim.kernels.system import Z_0
 from railsim.kernels.track_frame import cell_of
 
-# columns of a wheelset's track in the state: u, u', r_0, s_0
+# columns of a wheelset's track in the state: u, u', r_0, s_0, u''
 RAIL_DOF, DOF = 4, 7
-RATE, MEAN_RATE, MEAN_CHANGE = DOF, 2 * DOF, 3 * DOF
-SUPPORT_SIZE = 4 * DOF
+RATE, MEAN_RATE, MEAN_CHANGE, ACCELERATION = DOF, 2 * DOF, 3 * DOF, 4 * DOF
+SUPPORT_SIZE = 5 * DOF
+# what an evaluation does to the rails: nothing; settles them after a step of the fast scheme, see
+# `correct_support`; finds the rates of a massless track, see `settle_rates`
+AS_GIVEN, AFTER_STEP, BALANCED = range(3)
+# share of the static wheel load by which forces may differ from those foreseen; imbalance of a
+# massless track (N, N m); evaluations allowed for either
+SETTLED, BALANCE = 2e-4, 1e-2
+MOST_CORRECTIONS, MOST_BALANCES = 10, 50
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
 (
@@ -74,11 +82,15 @@ SUPPORT_ROW = 14
 F_Y, F_Z = 0, 1
 K_Y_Y, K_Y_Z, K_Y_ROLL, K_Z_Y, K_Z_Z, K_Z_ROLL = range(2, 8)
 D_Y_Y, D_Y_Z, D_Y_ROLL, D_Z_Y, D_Z_Z, D_Z_ROLL = range(8, 14)
-SUPPORT_COLUMNS = 14
+# and by a lateral slip that is no motion of wheel or rail, from the wheelset's yaw
+D_Y_SLIP, D_Z_SLIP = 14, 15
+SUPPORT_COLUMNS = 16
 # columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's motion
 # before the step, see `note_wheelset`, and the factors of pads and ballast
-MOTION, PADS, BALLAST = DOF, DOF + 8, DOF + 9
-SUPPORT_STEP = 24
+MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
+# imbalance of the rails one correction ago, and what corrections are multiplied by
+BEFORE, STRETCH = DOF + 13, DOF + 17
+SUPPORT_STEP = 32
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
 
@@ -280,17 +292,17 @@ def support_rates(system, work, state, derivative):
 
 
 @jit_merged
-def settle_rates(system, work, state, tolerance):
+def settle_rates(system, work, state):
     """One Newton step for the rates of a massless track, with the forces just evaluated.
 
     The slopes are those of `Work.support`, an estimate for the creep forces.  A wheelset whose
-    forces balance to `tolerance` [N, N m] is left alone: it does not depend on the others.
+    forces balance to `BALANCE` is left alone: it does not depend on the others.
 
     Returns
     -------
-    float : largest imbalance of forces before [N, N m].
+    bool : whether rates changed, so that the forces are to be evaluated again.
     """
-    worst = 0.0
+    changed = False
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
         imbalance(system, work, state, w)
@@ -298,13 +310,13 @@ def settle_rates(system, work, state, tolerance):
         own = 0.0
         for k in range(DOF):
             own = max(own, abs(track[k]))
-        worst = max(worst, own)
-        if own < tolerance:
+        if own < BALANCE:
             continue
+        changed = True
         solve_track(system.support, track, work.support[w], 0.0, 1.0, 0.0)
         for k in range(DOF):
             state[first + RATE + k] += track[k]
-    return worst
+    return changed
 
 
 @jit_inline
@@ -324,6 +336,7 @@ def remember_track(system, work, state):
         for k in range(DOF):
             state[first + MEAN_RATE + k] = state[first + RATE + k]
             state[first + MEAN_CHANGE + k] = 0.0
+            state[first + ACCELERATION + k] = 0.0
 
 
 @jit_merged
@@ -355,6 +368,8 @@ def note_wheelset(system, work, state, w):
     track[MOTION + 5] = state[v + 3] - turn
     track[MOTION + 6] = work.rail[w, 0, ASIDE]
     track[MOTION + 7] = work.rail[w, 1, ASIDE]
+    track[MOTION + 8] = speed * (work.rail[w, 0, RAIL_SLOPE] - state[q + 5])
+    track[MOTION + 9] = speed * (work.rail[w, 1, RAIL_SLOPE] - state[q + 5])
 
 
 @jit_inline
@@ -379,7 +394,7 @@ def step_support(system, work, state, h):
         first = support_begin(system) + SUPPORT_SIZE * w
         b = system.contact.body[w]
         track = work.support_step[w]
-        for k in range(8):
+        for k in range(10):
             before[k] = track[MOTION + k]
         if system.track.has_irregularity:
             f = system.bodies.frame[b]
@@ -404,6 +419,7 @@ def step_support(system, work, state, h):
             contact = work.support[w, side]
             i = first + 2 * side
             y = track[MOTION] - before[0] - (track[MOTION + 6 + side] - before[6 + side])
+            slip = track[MOTION + 8 + side] - before[8 + side]
             v_y = y_rate + state[i + RATE] + 0.5 * state[i + MEAN_RATE]
             v_z = z_rate + state[i + RATE + 1] + 0.5 * state[i + MEAN_RATE + 1]
             track[2 * side] += (
@@ -414,6 +430,7 @@ def step_support(system, work, state, h):
                 + contact[D_Y_Y] * v_y
                 + contact[D_Y_Z] * v_z
                 + contact[D_Y_ROLL] * roll_rate
+                + contact[D_Y_SLIP] * slip
             )
             track[2 * side + 1] += (
                 contact[F_Z]
@@ -423,11 +440,84 @@ def step_support(system, work, state, h):
                 + contact[D_Z_Y] * v_y
                 + contact[D_Z_Z] * v_z
                 + contact[D_Z_ROLL] * roll_rate
+                + contact[D_Z_SLIP] * slip
             )
         solve_track(support, track, work.support[w], 2.25 / h, 1.5, h)
         for k in range(DOF):
             rate = 1.5 * track[k] - 0.5 * state[first + MEAN_RATE + k]
             state[first + k] += h * track[k]
-            state[first + MEAN_CHANGE + k] = (rate - state[first + RATE + k]) / h
+            change = (rate - state[first + RATE + k]) / h
+            state[first + ACCELERATION + k] = 1.5 * change - 0.5 * state[first + MEAN_CHANGE + k]
+            state[first + MEAN_CHANGE + k] = change
             state[first + RATE + k] = rate
             state[first + MEAN_RATE + k] = track[k]
+
+
+@jit_inline
+def stretch_correction(track, i, stretch, first_time):
+    """Multiply the imbalance of one rail so that the next correction does what the last missed.
+
+    The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
+    dominates, convergence as with the secant.
+    """
+    y, z = track[i], track[i + 1]
+    if first_time:
+        track[stretch] = 1.0
+    else:
+        d_y, d_z = y - track[BEFORE + i], z - track[BEFORE + i + 1]
+        square = d_y * d_y + d_z * d_z
+        if square > 0.0:
+            share = -(track[BEFORE + i] * d_y + track[BEFORE + i + 1] * d_z) / square
+            track[stretch] = min(3.0, max(0.3, share * track[stretch]))
+    track[BEFORE + i], track[BEFORE + i + 1] = y, z
+    track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
+
+
+@jit_merged
+def correct_support(system, work, state, first_time):
+    """One Newton step for the rails after a step of the fast scheme.
+
+    `step_support` foresees the forces by the slopes of one evaluation.  Where the contact moves
+    over a curved profile or begins to slide, the forces of the new place differ from those, and
+    leaving it at that makes the scheme one of order one.  The rails' accelerations of the state are
+    those of the forces foreseen, so that the imbalance F - M u'' - C u' - K u is the difference.
+
+    Returns
+    -------
+    bool : whether a wheelset's forces differed by more than `SETTLED` of the static wheel load; its
+        rails have moved then, and the forces are to be evaluated again.
+    """
+    h = state[-4]
+    moved = False
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        imbalance(system, work, state, w)
+        track = work.support_step[w]
+        worst = 0.0
+        for k in range(DOF):
+            track[k] -= mass_of(system.support.row, k) * state[first + ACCELERATION + k]
+            worst = max(worst, abs(track[k]))
+        if worst < SETTLED * system.contact.load[w]:
+            continue
+        moved = True
+        for side in range(2):
+            stretch_correction(track, 2 * side, STRETCH + side, first_time)
+        solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
+        for k in range(DOF):
+            r = track[k]
+            state[first + k] += h * r
+            state[first + RATE + k] += 1.5 * r
+            state[first + MEAN_RATE + k] += r
+            state[first + MEAN_CHANGE + k] += 1.5 / h * r
+            state[first + ACCELERATION + k] += 2.25 / h * r
+    return moved
+
+
+@jit_inline
+def evaluations(system, state, rails):
+    """How often the contact forces may be evaluated again for the rails: `rails` as `AS_GIVEN`."""
+    if rails == AFTER_STEP and system.support.elastic and state[-4] > 0.0:
+        return MOST_CORRECTIONS  # the sign tells that the rails have not been settled
+    if rails == BALANCED and system.support.elastic and system.support.massless:
+        return MOST_BALANCES
+    return 0

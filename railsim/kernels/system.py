@@ -8,8 +8,9 @@ State vector (float64[n_state]), for n bodies and m internal element states:
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
-    then 28w      of each wheelset on elastic rails: track under it, see `support`
-    -4            memory of the fast scheme: length of the last step (s), 0 where there was none
+    then 35w      of each wheelset on elastic rails: track under it, see `support`
+    -4            memory of the fast scheme: length of the last step (s), 0 where there was none;
+                  negative once elastic rails have been settled after it
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
@@ -377,8 +378,9 @@ class Work(NamedTuple):
     watch : float64[2]          time for which contact forces are foreseen [s]; share of the static
                                 wheel load by which they may change in a step
     coming : float64[2, COMING] of the wheelset at hand, see `rails.foresee`
-    parts : int64[2]            parts of a step over which a wheel lifts or strikes, 0 where that is
-                                not looked for; steps that were divided so far
+    parts : int64[3]            parts of a step over which a wheel lifts or strikes, 0 where that is
+                                not looked for; steps that were divided so far; evaluations whose
+                                elastic rails did not settle
     extremes : float64[6, w, EXTREMES]  see `extremes`
     present : float64[EXTREMES] scratch of the extremes
     unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]

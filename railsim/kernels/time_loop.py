@@ -19,9 +19,10 @@ from railsim.kernels.internal import MAXWELL_CURVE, PAD, advanced, constant_deca
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics, table_value_slope
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import (
+    AFTER_STEP,
+    BALANCED,
     note_wheelsets,
     remember_track,
-    settle_rates,
     step_compliance,
     step_support,
     support_rates,
@@ -48,8 +49,6 @@ FAST, RK4 = range(2)
 # to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
-# forces of a massless track in the reference scheme (N, N m), and evaluations allowed for them
-BALANCED, MOST_CORRECTIONS = 1e-2, 50
 
 
 class Recorder(NamedTuple):
@@ -226,7 +225,7 @@ def remember(system, work, state, derivative, h):
         state[first + 6 * n + i] = work.drive[i, 0]
     if system.support.elastic:
         remember_track(system, work, state)
-    state[-4] = h
+    state[-4] = -h
 
 
 @jit_inline
@@ -246,7 +245,7 @@ def step_fast(system, work, state, derivative, decay, h):
     frames, half = work.frames, 0.5 * h * state[-1] * state[-1]
     if system.support.elastic:
         note_wheelsets(system, work, state)
-    last = state[-4] if state[-4] > 0.0 else h
+    last = abs(state[-4]) if state[-4] != 0.0 else h
     shift = 0.5 * (last - h)
     for b in range(n):
         q = 6 * b
@@ -315,28 +314,6 @@ def settle_limits(internal, curves, first, drive, state):
 
 
 @jit_inline
-def keep_counts(events, first, to):
-    """Copy the counts of patches: corrections, of which the worst decides, are not counted."""
-    for w in range(events.shape[0]):
-        events[w, to] = events[w, first]
-        events[w, to + 1] = events[w, first + 1]
-
-
-@jit_internal
-def balanced_mechanics(system, work, state, derivative):
-    """As `mechanics`; a massless track first takes the rates with which its forces balance."""
-    status, where, patches = mechanics(system, work, state, derivative)
-    if system.support.elastic and system.support.massless:
-        for _ in range(MOST_CORRECTIONS):
-            if status != RUNNING or settle_rates(system, work, state, BALANCED) < BALANCED:
-                break
-            keep_counts(work.events, 0, 2)
-            status, where, patches = mechanics(system, work, state, derivative)
-            keep_counts(work.events, 2, 0)
-    return status, where, patches
-
-
-@jit_inline
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
@@ -347,7 +324,7 @@ def step_rk4(system, work, state, derivative, stages, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = balanced_mechanics(system, work, trial, rate)
+        status, where, _ = mechanics(system, work, trial, rate, BALANCED)
         if status != RUNNING:
             return status, where
         internal_rates(system, work, trial, rate)
@@ -433,11 +410,9 @@ def time_loop(
     step, end = first_step, first_step + n_steps
     left = np.int64(0)  # parts of a divided step that are still to be taken
     decay, length = work.decay, h
+    rails = BALANCED if scheme == RK4 else AFTER_STEP
     while step < end + closing:
-        if scheme == RK4:
-            status, where, patches = balanced_mechanics(system, work, state, derivative)
-        else:
-            status, where, patches = mechanics(system, work, state, derivative)
+        status, where, patches = mechanics(system, work, state, derivative, rails)
         if status == RUNNING:
             note_extremes(system, work.wheel, state, work.present, work.extremes)
             if scheme == RK4:

@@ -89,9 +89,11 @@ from railsim.kernels.status import (
 )
 from railsim.kernels.support import (
     D_Y_ROLL,
+    D_Y_SLIP,
     D_Y_Y,
     D_Y_Z,
     D_Z_ROLL,
+    D_Z_SLIP,
     D_Z_Y,
     D_Z_Z,
     F_Y,
@@ -511,6 +513,8 @@ def add_slopes(support, w, side, patch, k, across):
     support[w, side, D_Z_Y] += damping * f_z * s - across * s * c
     support[w, side, D_Z_Z] += damping * f_z * c + across * s * s
     support[w, side, D_Z_ROLL] += damping * f_z * lever - across * s * arm
+    support[w, side, D_Y_SLIP] += across * c * c
+    support[w, side, D_Z_SLIP] -= across * s * c
 
 
 @jit_inline

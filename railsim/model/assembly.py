@@ -271,7 +271,7 @@ def work_arrays(system: System) -> Work:
         swing=aligned_zeros(n_wheelsets),
         watch=aligned_zeros(2),
         coming=aligned_zeros((2, COMING)),
-        parts=aligned_zeros(2, np.int64),
+        parts=aligned_zeros(3, np.int64),
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),

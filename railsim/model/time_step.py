@@ -37,9 +37,11 @@ MARGIN = 2.0 ** (1.0 / 6.0)
 # Where a wheel lifts or strikes a step is divided into parts of at most this length (s): a fiftieth
 # of a period of the wheel on a rigid rail, 200 Hz, for the fast scheme, a twentieth for the other
 PART = {FAST: 1e-4, RK4: 2.5e-4}
-# share of the static wheel load by which a contact force may change in a step that is not divided:
-# on smooth curves no step is, on ERRI B176 track at 40 m/s one in sixteen
-SWING = 0.1
+# the same of the fast scheme on elastic rails, where a wheel has no such vibration
+PART_ELASTIC = 2.5e-4
+# share of the static wheel load by which a contact force may change in a step that is not divided,
+# on rigid and on elastic rails: on smooth curves no step is
+SWING, SWING_ELASTIC = 0.1, 0.05
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve
 GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
@@ -82,9 +84,11 @@ def divide_strikes(work: Work, scheme: int, step: float) -> None:
     scheme, step : int, float
         FAST or RK4; time step [s].
     """
-    parts = math.ceil(step / PART[scheme] * (1.0 - 1e-9))
+    elastic = len(work.support) > 0
+    part = PART_ELASTIC if elastic and scheme == FAST else PART[scheme]
+    parts = math.ceil(step / part * (1.0 - 1e-9))
     work.parts[0] = parts if parts > 1 else 0
-    work.watch[1] = SWING
+    work.watch[1] = SWING_ELASTIC if elastic else SWING
 
 
 class Stability:

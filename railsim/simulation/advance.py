@@ -102,6 +102,8 @@ class Run:
         Time during which each wheel has carried nothing [s].
     divided : int
         Steps that were divided because a wheel lifted or struck.
+    unsettled : int
+        Evaluations in which the forces on elastic rails were not found.
     vibration : float64[w, 2, VIBRATION]
         Vibrations of the wheel loads, see `railsim.kernels.vibration`; empty at its begin.
     cpu_time, wall_time : float
@@ -124,6 +126,7 @@ class Run:
     where: int = 0
     events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, dtype=np.int64))
     divided: int = 0
+    unsettled: int = 0
     vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
     cpu_time: float = 0.0
     wall_time: float = 0.0
@@ -351,6 +354,7 @@ class _Convoy:
             _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
             run.unloaded += self._work.unloaded[part.wheelsets]
             run.divided += int(self._work.parts[1])
+            run.unsettled += int(self._work.parts[2])
             run.vibration = self._work.vibration[part.wheelsets].copy()
 
 

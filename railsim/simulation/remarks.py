@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.kernels.support import SETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, PLACE
 from railsim.notation import SIDES
 from railsim.simulation.advance import Run
@@ -44,6 +45,7 @@ def run_remarks(run: Run) -> tuple[str, ...]:
             elastic=bool(model.system.support.elastic),
         ),
         *creep_range(int(run.events[1]), int(run.events[0])),
+        *unsettled_rails(run.unsettled),
     ]
     return tuple(dict.fromkeys(found))
 
@@ -119,6 +121,17 @@ def _place(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], wo
     """Say when and where an extreme value occurs."""
     time, s = (float(extremes[f"{name}_{fact}"][index]) for fact in ("time", "distance"))
     return f"{words}{'' if words.endswith('at') else ','} t = {time:.2f} s, s = {s:.1f} m"
+
+
+def unsettled_rails(evaluations: int) -> tuple[str, ...]:
+    """Remark on forces on elastic rails that the corrections of `kernels.support` did not find."""
+    if evaluations == 0:
+        return ()
+    return (
+        f"In {evaluations} evaluations the forces between wheels and elastic rails differ from "
+        f"those of the rails' motion by more than {SETTLED:.2%} of the static wheel load: repeat "
+        "the run with half the step (settings.step).",
+    )
 
 
 def creep_range(outside: int, patches: int) -> tuple[str, ...]:

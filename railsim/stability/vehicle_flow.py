@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import SUPPORT_SIZE
+from railsim.kernels.support import DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import time_loop
 from railsim.linear.circle import PLACE
@@ -78,11 +78,8 @@ class VehicleFlow:
             first = end - SUPPORT_SIZE * len(system.contact.body)
             track = list(range(first, end))
             places += track
-            seventh = SUPPORT_SIZE // 4
-            floors += [
-                (FLOORS[0], FLOORS[1], FLOORS[1], FLOORS[3])[(k - first) % SUPPORT_SIZE // seventh]
-                for k in track
-            ]
+            kinds = (FLOORS[0], FLOORS[1], FLOORS[1], FLOORS[3], FLOORS[3])
+            floors += [kinds[(k - first) % SUPPORT_SIZE // DOF] for k in track]
         return np.array(places, dtype=np.int64), np.array(floors)
 
     def reduced(self, state: Floats) -> Floats:
