@@ -120,11 +120,11 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     try:
         if len(batch) == 1:
             (job,) = batch
-            found = [run_case(job.case, job.path, overwrite=True, progress=progress)]
+            found = [run_case(job.case, _file(job), overwrite=True, progress=progress)]
         else:
             found = run_cases(
                 [job.case for job in batch],
-                [job.path for job in batch],
+                [_file(job) for job in batch],
                 overwrite=True,
                 progress=progress,
             )
@@ -134,6 +134,11 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         found = [error] * len(batch)
     found.reverse()  # each result is let go of with its record: it holds what was read of its file
     return [_record(job, found.pop()) for job in batch]
+
+
+def _file(job: Job) -> Path | None:
+    """Return the result file of a job; None where nothing but its summary is kept."""
+    return None if job.keep.summary else job.path
 
 
 def _there(job: Job) -> Record | None:
