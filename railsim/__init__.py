@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
     from railsim.studies import study
+    from railsim.studies.optimise import optimise
 
 _HOMES = {
     "Assessment": "railsim.assessment",
@@ -69,6 +70,7 @@ _HOMES = {
     "mid_curves": "railsim.result",
     "modes": "railsim.linear.modes",
     "open_result": "railsim.result",
+    "optimise": "railsim.studies.optimise",
     "peaks": "railsim.result",
     "root_locus": "railsim.linear.modes",
     "simulate": "railsim.simulation",
@@ -105,6 +107,7 @@ __all__ = [
     "mid_curves",
     "modes",
     "open_result",
+    "optimise",
     "peaks",
     "root_locus",
     "simulate",

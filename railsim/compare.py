@@ -11,9 +11,13 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
 
+import numpy as np
+
+from railsim.definitions.layout import curvature_sections
 from railsim.errors import Fault, InputError
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
+from railsim.result.data import Array
 from railsim.text import spreadsheet_cell
 
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
@@ -95,6 +99,95 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
         for (where, _), found in rows.items()
         if first in found
     )
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far a result is from the first one along the track, in one quantity at one place.
+
+    Attributes
+    ----------
+    quantity : Quantity
+    labels : mapping of str to str
+        Where on the vehicle: dimension to name.
+    result : str
+        What the result is called.
+    distance : float64[place]
+        Places of the first result's reference body that both have passed [m].
+    values : float64[place]
+        Value of this result less that of the first [SI].
+    """
+
+    quantity: Quantity
+    labels: Mapping[str, str]
+    result: str
+    distance: Array
+    values: Array
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """The difference of the largest magnitude [SI], and where it is [m]."""
+        place = int(np.argmax(np.abs(self.values)))
+        return float(self.values[place]), float(self.distance[place])
+
+
+def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Difference]:
+    """Return the differences from the first result along the track, of the leading wheelset.
+
+    Values are interpolated linearly between outputs.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+        Results over one and the same plan.
+    names : sequence of str
+        Quantities of wheels or wheelsets.
+
+    Raises
+    ------
+    InputError : results over different plans, or that have no place in common.
+    """
+    (first, base), *others = results.items()
+    faults = []
+    for label, result in others:
+        if curvature_sections(result.track()) != curvature_sections(base.track()):
+            found = f"runs over another plan than {first}"
+            faults.append(Fault(label, "track", found, "results over one plan"))
+        elif not _shared(base, result).any():
+            found = f"passes no place that {first} passes"
+            faults.append(Fault(label, "distance", found, "results that share a part of the track"))
+    if faults:
+        raise InputError(faults)
+    found_ones = []
+    for label, result in others:
+        there = _shared(base, result)
+        places = base["distance"][there]
+        for name in names:
+            if name in base and name in result:
+                mine, other = _leading(base, name), _leading(result, name)
+                for side, values in mine.items():
+                    there_too = np.interp(places, result["distance"], other[side])
+                    labels = {"wheelset": base.wheelsets[0], **({"side": side} if side else {})}
+                    found_ones.append(
+                        Difference(
+                            base.quantities[name], labels, label, places, there_too - values[there]
+                        )
+                    )
+    return found_ones
+
+
+def _leading(result: Result, name: str) -> dict[str, Array]:
+    """Return a quantity of the leading wheelset over time, by side where it has sides."""
+    values = result[name][:, 0]
+    if values.ndim == 1:
+        return {"": values}
+    return {side: values[:, k] for k, side in enumerate(("left", "right"))}
+
+
+def _shared(one: Result, other: Result) -> Any:
+    """Which places of a result lie within the other one's."""
+    places, others = one["distance"], other["distance"]
+    return (places >= others[0]) & (places <= others[-1])
 
 
 def comparison_csv(rows: Sequence[Comparison]) -> str:

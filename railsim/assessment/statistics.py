@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from railsim.result.filters import Floats
 
@@ -90,5 +90,5 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     middle = float(np.mean(x))
     spread = 1.0 + 1.0 / n + (x0 - middle) ** 2 / float(np.sum((x - middle) ** 2))
     line = float(level + slope * x0)
-    t = float(stats.t.ppf(probability, n - 2))
+    t = float(stdtrit(n - 2, probability))  # quantile of Student's t
     return Estimate(n, line, error, line + t * error * math.sqrt(spread), "two")

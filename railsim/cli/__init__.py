@@ -6,15 +6,19 @@ function, so that ``railsim --help`` answers at once.
 """
 
 import logging
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
-from railsim.cli.common import echo
+from railsim.cli.common import echo, print_json
 from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
 from railsim.cli.streams import silence, usable_streams
 from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
@@ -23,12 +27,14 @@ from railsim.version import __version__
 
 use_one_thread()
 
+COMPLETE = "_RAILSIM_COMPLETE"  # by which a shell asks for completions
 DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 
 # name of a command: its module in this package, and what it does
 COMMANDS = {
     "run": ("run", "One vehicle on one track: one HDF5 file and a table of peak values."),
     "study": ("study", "Every combination of vehicles, tracks and speeds."),
+    "optimise": ("optimise", "Parameters of a vehicle against objectives and constraints."),
     "compare": ("compare", "Results side by side: tables and overlaid plots."),
     "plot": ("plot", "Time histories of a result; a track in plan."),
     "animate": ("animate", "A vehicle and its contacts moving along the track."),
@@ -75,6 +81,16 @@ class LazyGroup(click.Group):
             ctx.fail(f"no command '{args[0]}'; {nearest(args[0], self.list_commands(ctx))}")
         return super().resolve_command(ctx, args)
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the commands that begin so, without importing them."""
+        if incomplete.startswith("-"):
+            return super().shell_complete(ctx, incomplete)
+        return [
+            CompletionItem(name, help=COMMANDS[name][1])
+            for name in self.list_commands(ctx)
+            if name.startswith(incomplete)
+        ]
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""
         with formatter.section("Commands"):
@@ -115,6 +131,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # the commands print themselves what the library logs
     logging.getLogger("railsim").addHandler(logging.NullHandler())
     usable_streams()
+    if arguments is None and COMPLETE in os.environ:
+        from click.shell_completion import shell_complete
+
+        return shell_complete(railsim, {}, "railsim", COMPLETE, os.environ[COMPLETE])
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         status = _status(arguments)
@@ -138,15 +158,16 @@ def _status(arguments: list[str]) -> int:
         try:
             return _called(arguments)
         except InputError as error:
-            for line in fault_lines([fault.on_command_line() for fault in error.faults]):
+            faults = [fault.on_command_line() for fault in error.faults]
+            for line in fault_lines(faults):
                 echo(line, err=True)
-            return WRONG_INPUT
+            return _told(arguments, WRONG_INPUT, {"faults": [asdict(fault) for fault in faults]})
         except ModelError as error:
             echo(f"railsim: {error}", err=True)
-            return WRONG_INPUT
+            return _told(arguments, WRONG_INPUT, {"error": str(error)})
         except RailsimError as error:
             echo(f"railsim: {error}", err=True)
-            return FAILED
+            return _told(arguments, FAILED, {"error": str(error)})
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
             echo(f"railsim: {request}", err=True)
@@ -161,6 +182,13 @@ def _status(arguments: list[str]) -> int:
 
             echo(f"railsim: {write_report(error, arguments)}", err=True)
             return FAILED
+
+
+def _told(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int:
+    """Print what went wrong for programs too, where they asked for it; return the status."""
+    if "--json" in arguments:
+        print_json({"exit_status": status, **words})
+    return status
 
 
 def _cache_notices() -> list[str]:
@@ -192,5 +220,5 @@ def _invoked(arguments: list[str]) -> int:
         if where is not None:
             echo(where.get_usage(), err=True)
         echo(f"railsim: {error.format_message()}", err=True)
-        return WRONG_INPUT
+        return _told(arguments, WRONG_INPUT, {"error": error.format_message()})
     return status if isinstance(status, int) else DONE

@@ -1,6 +1,9 @@
 """What the commands share: options, tables, machine-readable output."""
 
 import json
+import re
+import shutil
+import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -32,9 +35,32 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
         return float(click.FLOAT.convert(value, param, ctx))
 
 
+# what `echo` turns into colours where it writes to a terminal
+STYLES = {"\ue000": "1", "\ue001": "31", "\ue002": "32", "\ue003": "0"}
+BOLD, RED, GREEN, PLAIN = STYLES
+_STYLED = re.compile(f"([{''.join(STYLES)}])")
+GOOD, BAD = ("pass", "complete"), ("fail", "failed", "derailed", "exceeded", "waiting")
+
+
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print a line, on stderr with `err`; what would steer the terminal is shown as its code."""
-    click.echo(printable(str(text)), err=err)
+    parts = _STYLED.split(str(text))
+    codes = "".join(f"\x1b[{STYLES[p]}m" if p in STYLES else printable(p) for p in parts)
+    click.echo(codes, err=err)  # without the codes where this is no terminal
+
+
+def names_of(kind: str) -> Callable[..., list[Any]]:
+    """Return what completes an argument in a shell: names of shipped files, or a file."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+        from click.shell_completion import CompletionItem
+
+        from railsim.definitions.sources import shipped_names
+
+        names = [name for name in shipped_names(kind) if name.startswith(incomplete)]
+        return [*map(CompletionItem, names)] or [CompletionItem(incomplete, type="file")]
+
+    return complete
 
 
 def remarks_on(definition: "FileDefinition", known: "Format") -> list["Remark"]:
@@ -132,7 +158,7 @@ def plain(data: Any) -> Any:
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1) -> list[str]:
-    r"""Return the lines of a table.
+    r"""Return the lines of a table; on a terminal folded to its width, with colours.
 
     Parameters
     ----------
@@ -150,6 +176,8 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1
     frame   2615
     car    43628
     """
+    if sys.stdout.isatty():
+        return folded(header, rows, numbers, shutil.get_terminal_size().columns)
     widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
     lines = []
     for row in (header, *rows):
@@ -159,3 +187,36 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1
         ]
         lines.append("  ".join(cells).rstrip())
     return lines
+
+
+def folded(
+    header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int, width: int
+) -> list[str]:
+    """Return the lines of a table that is no wider than `width`: long cells take several lines."""
+    from io import StringIO
+
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    drawn = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    for number, title in enumerate(header):
+        drawn.add_column(
+            Text(printable(title)), justify="left" if number < numbers else "right", overflow="fold"
+        )
+    for row in rows:
+        drawn.add_row(*(Text(printable(cell), _style(cell)) for cell in row))
+    stream = StringIO()
+    console = Console(
+        file=stream, width=width, force_terminal=True, color_system="standard", no_color=False,
+        legacy_windows=False,
+    )  # fmt: skip
+    console.print(drawn)
+    text = stream.getvalue()
+    for mark, code in STYLES.items():
+        text = text.replace(f"\x1b[{code}m", mark)
+    return [re.sub(f" +({PLAIN}?)$", r"\1", line).rstrip() for line in text.splitlines()]
+
+
+def _style(cell: str) -> str:
+    return "green" if cell in GOOD else "red" if cell in BAD else ""

@@ -9,6 +9,7 @@ from railsim.cli.common import (
     echo,
     json_option,
     load_option,
+    names_of,
     overwrite_option,
     print_json,
     quiet_option,
@@ -25,7 +26,7 @@ MARKS = {0: "no steady state", 1: "", 2: "by time integration"}
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE")
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
 @click.option(
     "--radius", required=True, metavar="R,R,... or A:B:N", help="Radii in m, positive to the right."
 )

@@ -10,6 +10,7 @@ from railsim.cli.common import (
     json_option,
     linearisation_options,
     load_option,
+    names_of,
     overwrite_option,
     print_json,
     quiet_option,
@@ -30,8 +31,8 @@ ANIMATION = "mode.html"
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE")
-@click.argument("track", metavar="TRACK", required=False)
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
+@click.argument("track", metavar="TRACK", required=False, shell_complete=names_of("track"))
 @click.option(
     "--speed", type=float, default=20.0, show_default=True, metavar="V", help="Speed in m/s."
 )

@@ -1,19 +1,25 @@
-"""``railsim plot``: time histories of a result, or a track in plan."""
+"""``railsim plot``: time histories of a result, a study over its parameters, a track in plan."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.errors import Fault, InputError, nearest
 from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from railsim.plot.study import Column
+
+# what a study's picture shows where nothing is asked for
+DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_abs_Y_abs", "T_gamma_abs")
+
 
 @click.command()
-@click.argument("file", metavar="R.h5|TRACK")
+@click.argument("file", metavar="R.h5|STUDY|TRACK")
 @click.argument("selections", nargs=-1, metavar="[QUANTITY]...")
 @click.option("--out", metavar="F.png", help="Picture (.png, .svg, .pdf); default FILE.png.")
 @click.option(
@@ -33,6 +39,13 @@ if TYPE_CHECKING:
 @click.option(
     "--between", type=float, nargs=2, metavar="A B", help="Range of the horizontal axis to show."
 )
+@click.option("--against", metavar="KEY", help="Of a study: the parameter of the horizontal axis.")
+@click.option("--family", metavar="KEY", help="Of a study: the parameter that tells curves apart.")
+@click.option(
+    "--kind",
+    type=click.Choice(["curves", "map", "ranking"]),
+    help="Of a study: curves; colours over two parameters; the runs by their values.",
+)
 @overwrite_option
 @json_option
 @quiet_option
@@ -43,28 +56,44 @@ def command(
     over: str,
     by: str,
     between: tuple[float, float] | None,
+    against: str | None,
+    family: str | None,
+    kind: str | None,
     overwrite: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Draw quantities of a result, or a track with its curvature and cant.
+    """Draw quantities of a result or of a study, or a track with its curvature and cant.
 
     Without a QUANTITY: wheel load change, lateral force, derailment quotient, roll, lateral
     displacement and yaw.  A QUANTITY may select wheels, bodies and components: Y:1:left is the left
     wheel of the leading wheelset, body_acceleration:carbody:y the lateral acceleration of the
     carbody.
 
+    Of a STUDY, its folder: values of its summary such as Y_over_Q_abs or sum_abs_Y_mid1 over the
+    parameter of most values, a curve for each value of the next, or as --against, --family and
+    --kind say.
+
     \b
     Example:
       railsim plot coach_manchester_curve_r250_20.h5 --overwrite
+      railsim plot friction --against track.friction --family speed
+      railsim plot friction dQ_over_Q0_max --kind map
       railsim plot run.h5 Y Q:1 --over time --by wheelset --out forces.pdf
       railsim plot curve_r250 --out curve.png
     """  # noqa: D301 - click reads the escape
     path = Path(out or file)
+    of_study = Path(file).is_dir()
     if not out and path.name:
-        path = path.with_suffix(".png")
+        path = path / "study.png" if of_study else path.with_suffix(".png")
     check_file(path, overwrite=overwrite, endings=PICTURES)
-    if Path(file).suffix.lower() in RESULTS:
+    chosen = {"--against": against, "--family": family, "--kind": kind}
+    if of_study:
+        figure = _study_figure(file, selections, chosen)
+    elif wrong := [option for option, value in chosen.items() if value]:
+        fault = Fault(wrong[0], "", f"'{file}' is no study's folder", "a folder of results")
+        raise InputError([fault])
+    elif Path(file).suffix.lower() in RESULTS:
         figure = _result_figure(file, selections, over, by, between)
     else:
         figure = _track_figure(file, selections)
@@ -87,9 +116,66 @@ def _result_figure(
     return histories(open_run(file), selections or STUDY, over=over, by=by, between=between)
 
 
+def _study_figure(
+    file: str, selections: tuple[str, ...], chosen: "dict[str, str | None]"
+) -> "Figure":
+    from railsim.cli.gathered import gather
+    from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
+    from railsim.report.spread import columns, parameters
+
+    ended = ("complete", "derailed", "stopped")
+    records = [record for record in gather([file]).records if record["status"] in ended]
+    known = columns(records)
+    if not known:
+        raise InputError([Fault(file, "", "no run has values", "a study with finished runs")])
+    names = selections or [name for name in DEFAULT if name in known] or list(known)[:4]
+    faults = [
+        Fault("QUANTITY", name, "no such value in the study", nearest(name, known))
+        for name in names
+        if name not in known
+    ]
+    varied = {name: Column(_words(name), values) for name, values in parameters(records).items()}
+    faults += [
+        Fault(
+            option, "", f"'{chosen[option]}' was not varied", nearest(str(chosen[option]), varied)
+        )
+        for option in ("--against", "--family")
+        if chosen[option] and chosen[option] not in varied
+    ]
+    if faults:
+        raise InputError(faults)
+    quantities = [_quantity(known[name]) for name in names]
+    # most values first, numbers before words
+    order = sorted(varied, key=lambda n: (not varied[n].numeric, -len(varied[n].different)))
+    x = chosen["--against"] or next((n for n in order if n != chosen["--family"]), None)
+    rest = [name for name in order if name != x]
+    family = chosen["--family"] or next(iter(rest), None)
+    kind = chosen["--kind"] or ("curves" if x and varied[x].numeric else "ranking")
+    if kind == "ranking" or x is None:
+        return ranking_figure(quantities, [str(record["name"]) for record in records])
+    if kind == "map":
+        if family is None:
+            found = f"only '{x}' was varied"
+            raise InputError([Fault("--kind", "map", found, "a study over two parameters")])
+        return map_figure(quantities, varied[x], varied[family])
+    return curves_figure(quantities, varied[x], varied[family] if family else None)
+
+
+def _quantity(column: "dict[str, Any]") -> "Column":
+    from railsim.plot.study import Column
+
+    words, unit = column["words"], column["unit"]
+    sentence = " " in words  # a name in a file stays as it is
+    words = f"{words[:1].upper()}{words[1:]}" if sentence else words
+    return Column(f"{words} ({unit})" if unit else words, column["values"])
+
+
+def _words(name: str) -> str:
+    return "speed (m/s)" if name == "speed" else name
+
+
 def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":
     from railsim.definitions.loading import load_track
-    from railsim.errors import Fault, InputError
     from railsim.plot.track import track_figure
 
     if selections:

@@ -13,6 +13,7 @@ from railsim.cli.common import (
     echo,
     json_option,
     load_option,
+    names_of,
     overwrite_option,
     print_json,
     quiet_option,
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE")
-@click.argument("track", metavar="TRACK")
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
+@click.argument("track", metavar="TRACK", shell_complete=names_of("track"))
 @click.option("--speed", type=Speed(), metavar="V", help="Speed in m/s, or with a unit: 72km/h.")
 @click.option("--out", metavar="R.h5", help="Result file; default VEHICLE_TRACK_SPEED.h5.")
 @click.option("--start", type=float, metavar="S", help="Start in m along the track; default 0.")

@@ -10,6 +10,7 @@ from railsim.cli.common import (
     echo,
     json_option,
     load_option,
+    names_of,
     overwrite_option,
     print_json,
     quiet_option,
@@ -63,9 +64,21 @@ def _is_number(text: str) -> bool:
 
 
 @click.command(cls=ManyValues)
-@click.argument("file", required=False, metavar="[STUDY]")
-@click.option("--vehicles", multiple=True, metavar="F...", help="Vehicles: files or names.")
-@click.option("--tracks", multiple=True, metavar="F...", help="Tracks: files or names.")
+@click.argument("file", required=False, metavar="[STUDY]", shell_complete=names_of("study"))
+@click.option(
+    "--vehicles",
+    multiple=True,
+    metavar="F...",
+    help="Vehicles: files or names.",
+    shell_complete=names_of("vehicle"),
+)
+@click.option(
+    "--tracks",
+    multiple=True,
+    metavar="F...",
+    help="Tracks: files or names.",
+    shell_complete=names_of("track"),
+)
 @click.option(
     "--speeds",
     multiple=True,
@@ -256,6 +269,7 @@ def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
         "grid": {key: value_texts(values) for key, values in plan.grid.items()},
         "linked": [{k: value_texts(v) for k, v in table.items()} for table in plan.linked],
         "sample": plan.sample,
+        "analyses": plan.analyses,
         "settings": plan.settings,
         "start": plan.start,
         "duration": plan.duration,

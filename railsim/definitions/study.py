@@ -5,15 +5,18 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from railsim.definitions.analyses import Analysis, needs_speed
 from railsim.definitions.base import (
     Count,
     Definition,
     FileDefinition,
     Finite,
+    Name,
     NonNegative,
     Positive,
     Text,
 )
+from railsim.definitions.design import Optimise
 from railsim.units import range_values
 
 STUDY_FORMAT = "railsim-study/1"
@@ -140,6 +143,10 @@ class Study(FileDefinition):
     """Keys whose values go together: the first of one with the first of the others"""
     sample: Sample | None = None
     """Random values of further keys"""
+    analyses: dict[Name, Analysis] = Field(default_factory=dict)
+    """What is done at each point, by a name of one's own; by default a run"""
+    optimise: Optimise | None = None
+    """Variables, objectives and constraints of `railsim optimise`"""
 
     @property
     def runs(self) -> int:
@@ -166,8 +173,10 @@ class Study(FileDefinition):
                 raise ValueError(f"linked keys need equally many values: {told}")
         names = [*self.grid, *(name for table in self.linked for name in table)]
         names += list(self.sample.parameters) if self.sample else []
+        names += list(self.optimise.variables) if self.optimise else []
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"'{twice[0]}' is varied twice")
-        if (self.speeds is None) != ("speed" in names):
+        given = (self.speeds is not None) + ("speed" in names)
+        if given > 1 or (not given and needs_speed(self.analyses)):
             raise ValueError("'speeds' is needed, or 'speed' linked or sampled; not both")
         return self

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from railsim.compare import Difference
 from railsim.definitions.layout import curvature_sections
 from railsim.plot.histories import check_not_empty, draw_limit, unit_label
 from railsim.plot.selection import STUDY, Panel, panels
@@ -68,7 +69,68 @@ def overlay(
         for axes in cells[max(0, count - columns) : count]:
             axes.set_xlabel(first.quantities[over].label)
             axes.tick_params(labelbottom=True)
-        figure.legend(handles=_legend(list(results), drawn), loc="outside lower left", ncols=6)
+        handles = _legend(list(results), drawn)
+        figure.legend(handles=handles, loc="outside lower left", ncols=_columns(figure, handles))
+        return figure
+
+
+def _columns(figure: Figure, handles: Sequence[Line2D]) -> int:
+    """How many columns of a legend fit below a figure."""
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    return max(1, min(6, len(handles), int(figure.get_figwidth() / (0.5 + 0.075 * longest))))
+
+
+def difference_figure(found: Sequence[Difference], first: str) -> Figure:
+    """Differences of results from the first one along the track, an axis for each quantity.
+
+    Parameters
+    ----------
+    found : sequence of Difference
+    first : str
+        What the first result is called.
+    """
+    labels = list(dict.fromkeys(one.result for one in found))
+    names = list(dict.fromkeys(one.quantity.name for one in found))
+    columns = 1 if len(names) < 3 else 2
+    rows = -(-len(names) // columns)
+    with styled():
+        figure = Picture(
+            figsize=(7.0 if columns == 1 else 9.8, 1.5 + 2.1 * rows), layout="constrained"
+        )
+        figure.suptitle(
+            f"Leading wheelset: difference from {unformatted(first)}", x=0.01, ha="left"
+        )
+        cells = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
+        for axes, name in zip_longest(cells, names):
+            if name is None:
+                axes.remove()
+                continue
+            own = [one for one in found if one.quantity.name == name]
+            for one in own:
+                colour = DISTINCT[(1 + labels.index(one.result)) % len(DISTINCT)]
+                style = SIDE_LINES[one.labels.get("side", "left")]
+                axes.plot(one.distance, one.values * one.quantity.scale, color=colour, ls=style)
+            quantity = own[0].quantity
+            axes.set_title(quantity.long_name[:1].upper() + quantity.long_name[1:])
+            axes.set_ylabel(unit_label(quantity))
+            axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
+            axes.margins(x=0.0)
+        for axes in cells[max(0, len(names) - columns) : len(names)]:
+            axes.set_xlabel("distance (m)")
+            axes.tick_params(labelbottom=True)
+        handles = [
+            Line2D(
+                [], [], color=DISTINCT[(1 + k) % len(DISTINCT)], lw=2.0, label=unformatted(label)
+            )
+            for k, label in enumerate(labels)
+        ]
+        sides = {one.labels.get("side") for one in found} - {None}
+        handles += [
+            Line2D([], [], color="0.25", ls=style, label=f"{side} wheel")
+            for side, style in SIDE_LINES.items()
+            if side in sides
+        ]
+        figure.legend(handles=handles, loc="outside lower left", ncols=_columns(figure, handles))
         return figure
 
 

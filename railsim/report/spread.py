@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
+from railsim.definitions.analyses import unit_of_number
 from railsim.notation import QUANTITIES, Quantity
 from railsim.text import printable
 
@@ -55,7 +56,16 @@ def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
             )
             if value == value:
                 column["values"][number] = float(f"{value * quantity.scale:.6g}")
+        for key, value in record.get("quantities", {}).items():
+            if value is not None:
+                column = found.setdefault(key, _own(key, len(records)))
+                column["values"][number] = float(f"{value:.6g}")
     return found
+
+
+def _own(name: str, number: int) -> dict[str, Any]:
+    """A column of an analysis or of an own function, in SI."""
+    return {"words": printable(name), "unit": unit_of_number(name), "values": [None] * number}
 
 
 def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal
+from scipy import fft
 
 Floats = NDArray[np.float64]
 Response = Callable[[Floats], NDArray[np.complex128] | Floats]
@@ -145,6 +145,8 @@ def band_passed(x: Floats, rate: float, low: float, high: float, *, causal: bool
     """
     if not causal:
         return filtered(x, rate, butterworth(low, high), reach(low, high))
+    from scipy import signal  # with scipy.stats, a second to import
+
     if low > 0.0:
         sections = signal.butter(4, [low, high], "bandpass", fs=rate, output="sos")
     else:

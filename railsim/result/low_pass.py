@@ -13,7 +13,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from railsim.notation import Quantity
 from railsim.profiles.profile import Profile
@@ -110,6 +109,8 @@ class _Symmetric:
     """Symmetric filter over a stream; at both ends it goes on as its odd mirror image."""
 
     def __init__(self, rate: float, end_of_pass: float, begin_of_stop: float, every: int) -> None:
+        from scipy import signal  # with scipy.stats, a second to import; few runs need it
+
         length, beta = signal.kaiserord(ATTENUATION, (begin_of_stop - end_of_pass) / (0.5 * rate))
         self._half = max(1, length // 2)
         corner = 0.5 * (end_of_pass + begin_of_stop)
@@ -184,6 +185,9 @@ class _Causal:
     """Butterworth of order 4 over a stream, started in the steady state of its first values."""
 
     def __init__(self, rate: float, corner: float, every: int) -> None:
+        from scipy import signal
+
+        self._signal = signal
         self._sections = signal.butter(4, corner, fs=rate, output="sos")
         self._every = every
         self._states: dict[str, Array] = {}
@@ -196,10 +200,10 @@ class _Causal:
             passed = array
             if name not in UNFILTERED:
                 if name not in self._states:
-                    start = signal.sosfilt_zi(self._sections)
+                    start = self._signal.sosfilt_zi(self._sections)
                     start = start.reshape(*start.shape, *(1 for _ in array.shape[1:]))
                     self._states[name] = start * array[0]
-                passed, self._states[name] = signal.sosfilt(
+                passed, self._states[name] = self._signal.sosfilt(
                     self._sections, array, axis=0, zi=self._states[name]
                 )
             found[name] = passed[self._skip :: self._every]

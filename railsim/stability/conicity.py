@@ -4,13 +4,16 @@ How conicity changes with amplitude decides how hunting begins: where it falls b
 limit cycles come first (Polach 2006).
 """
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from railsim.contact.geometry import contact_geometry
 from railsim.errors import InputError
 from railsim.linear.vehicle import LinearVehicle
+from railsim.profiles import Profile
 
 AMPLITUDES = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
@@ -25,23 +28,32 @@ def conicity_over_amplitude(prepared: LinearVehicle) -> dict[str, Any] | None:
     wheelset, track, known = body.wheelset, prepared.track, prepared.model.profiles
     if wheelset is None:
         return None
-    wheels = [known[name] for name in wheelset.profile]
-    rails = [known[name] for name in track.rail]
-    try:
-        geometry = contact_geometry(
-            (wheels[0], wheels[1]),
-            (rails[0], rails[1]),
-            wheelset.radius,
-            track.gauge,
-            track.inclination,
-            wheelset.back_to_back,
-        )
-    except InputError:
+    wheels = known[wheelset.profile[0]], known[wheelset.profile[1]]
+    rails = known[track.rail[0]], known[track.rail[1]]
+    values = _values(
+        wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
+    )
+    if values is None:
         return None
-    values = geometry.equivalent_conicity(AMPLITUDES)
     there = np.isfinite(values)
     return {
         "wheelset": body.name,
         "amplitude": AMPLITUDES[there].tolist(),
         "conicity": values[there].tolist(),
     }
+
+
+@lru_cache(8)  # maps and optimisations ask for the same profiles over and over
+def _values(
+    wheels: tuple[Profile, Profile],
+    rails: tuple[Profile, Profile],
+    radius: float,
+    gauge: float,
+    inclination: float,
+    back_to_back: float,
+) -> NDArray[np.float64] | None:
+    try:
+        geometry = contact_geometry(wheels, rails, radius, gauge, inclination, back_to_back)
+    except InputError:
+        return None
+    return geometry.equivalent_conicity(AMPLITUDES)

@@ -1,6 +1,6 @@
 """Studies: every combination of vehicles, tracks, speeds and further values, one file a run.
 
-==============  ===========================================================================
+================  ===========================================================================
 `case.py`       `Case`: all that one run depends on, with its name and its key
 `points.py`     what each run is asked for, with a key, before anything is loaded
 `given.py`      definitions given in Python become files of the folder
@@ -12,8 +12,13 @@
 `own.py`        own quantities by a Python function
 `summary.py`    ``summary.csv`` and ``study.json``
 `study.py`      `study`: the whole job
+`analyses.py`   what is computed at a point besides a run: curving, critical speed, modes
+`optimise.py`   `optimise`: parameters against objectives and constraints
+`search.py`     ways to propose designs
+`front.py`      Pareto fronts and their volume
+`sensitivity.py`  what the values of an optimisation depend on
 `stationary.py` a vehicle at a stand on twisted track and on cant, against limits
-==============  ===========================================================================
+================  ===========================================================================
 
 Begin reading in `study.py`.
 """

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
 
+from railsim.definitions.analyses import Analysis, needs_run
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -34,6 +35,8 @@ class Case:
         neither.
     labels : mapping of str to str or float
         What tells the case apart: ``vehicle``, ``track``, ``speed`` and the keys of a grid.
+    analyses : mapping of str to Analysis
+        What is computed, by names; a run where there is none.
     """
 
     name: str
@@ -45,18 +48,19 @@ class Case:
     duration: float | None = None
     until: float | None = None
     labels: Mapping[str, str | float] = field(default_factory=dict)
+    analyses: Mapping[str, Analysis] = field(default_factory=dict)
 
     @property
     def file_name(self) -> str:
-        """Name of the result file."""
-        return f"{self.name}.h5"
+        """Name of the result file; empty where there is no run in the time domain."""
+        return f"{self.name}.h5" if needs_run(self.analyses) else ""
 
     @cached_property
     def key(self) -> str:
         """Hash of everything that the numbers of the run depend on.
 
         Definitions with their defaults, the points of the profiles and the version of railsim;
-        neither the name nor the labels.
+        neither the name nor the labels, nor what is computed from the run afterwards.
         """
         inputs = {
             "railsim": __version__,

@@ -11,6 +11,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
 
+from railsim.definitions.analyses import Analysis, needs_run, needs_speed
 from railsim.definitions.base import FileDefinition
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.overrides import OVERRIDE, split_overrides
@@ -109,6 +110,8 @@ class Plan:
         Random values of further keys.
     told : str
         What else the record of a run depends on.
+    analyses : mapping of str to Analysis, optional
+        What is computed at each point; a run where there is none.
     workers : int
         Processes that will do the runs, for the time that a refused study would take.
 
@@ -137,9 +140,11 @@ class Plan:
         linked: Sequence[Grid] = (),
         sample: Sample | None = None,
         told: str = "",
+        analyses: Mapping[str, Analysis] | None = None,
         workers: int = 1,
     ) -> None:
         grid = grid or {}
+        self._analyses = dict(analyses or {})
         if not (vehicles and tracks and speeds and all(grid.values())):
             raise InputError(
                 [Fault("study", "", "no combination", "give a vehicle, a track, a speed")]
@@ -168,6 +173,7 @@ class Plan:
         # one and the same for all vehicles, tracks and speeds
         own = [self._own(common, row.values) for row in rows]
         fingerprint = Fingerprints()
+        with_run = needs_run(self._analyses)
         self.points = []
         for vehicle, track, speed in product(vehicles, tracks, speeds):
             short = {"vehicle": short_name(vehicle), "track": short_name(track)}
@@ -186,11 +192,14 @@ class Plan:
                     duration,
                     until,
                     *([f"told {told}"] if told else []),
+                    *([f"analyses {self._analyses}"] if self._analyses else []),
                 )
                 name = run_name(vehicle, track, 0.0 if first is None else first) + row.suffix
                 known = math.nan if first is None else first
                 labels: dict[str, str | float] = {**short, "speed": known, **row.values}
-                self.points.append(Point(name, vehicle, track, first, overrides, labels, key))
+                self.points.append(
+                    Point(name, vehicle, track, first, overrides, labels, key, with_run)
+                )
 
     def cases(self, points: Sequence[Point]) -> list[Case]:
         """Load what the runs of some points need.
@@ -204,21 +213,25 @@ class Plan:
             vehicle = self._loaded(load_vehicle, point.vehicle, point.overrides["vehicle"])
             track = self._loaded(load_track, point.track, point.overrides["track"])
             settings = self._loaded(load_settings, self._settings, point.overrides["settings"])
-            if track and point.speed is not None:
-                how = point.speed, self._start, self._duration, self._until
+            speed = point.speed
+            if speed is None and not needs_speed(self._analyses):
+                speed = math.nan
+            elif track and speed is not None and needs_run(self._analyses):
+                how = speed, self._start, self._duration, self._until
                 self._tell(_range_faults(track, *how))
-            if vehicle and track and settings and point.speed is not None:
+            if vehicle and track and settings and speed is not None:
                 found.append(
                     Case(
                         point.name,
                         vehicle,
                         track,
                         settings,
-                        point.speed,
+                        speed,
                         self._start,
                         self._duration,
                         self._until,
                         point.labels,
+                        self._analyses,
                     )
                 )
         if not self._faults:
@@ -274,7 +287,7 @@ class Plan:
 
     def _first_speed(self, overrides: Overrides, speed: float | None) -> float | None:
         settings = self._loaded(load_settings, self._settings, overrides)
-        if settings is None:
+        if settings is None or (speed is None and not needs_speed(self._analyses)):
             return speed
         try:
             return initial_speed(settings, speed, self._start)

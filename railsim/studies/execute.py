@@ -26,15 +26,16 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, RailsimError, words_of
+from railsim.errors import Fault, InputError, ModelError, RailsimError, words_of
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
-from railsim.result import Result
+from railsim.result import Result, open_result
+from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import Record
 from railsim.studies.keep import EVERYTHING, Keep
 from railsim.studies.run import can_share_a_call, run_case, run_cases
-from railsim.studies.summary import failed_record, finished_record
+from railsim.studies.summary import analysed_record, failed_record, finished_record, stopped_record
 from railsim.threads import one_thread_each
 
 GRACE = 3.0  # seconds that running jobs have to stop by themselves
@@ -59,6 +60,8 @@ class Job:
         Function of own quantities, see `railsim.studies.own`.
     keep : Keep
         What is kept of the result.
+    there : bool
+        Whether the run is there, and only its analyses are to be done.
     """
 
     case: Case
@@ -66,6 +69,7 @@ class Job:
     picture: Path | None = None
     own: str | None = None
     keep: Keep = EVERYTHING
+    there: bool = False
 
 
 Batch = tuple[Job, ...]
@@ -86,17 +90,19 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
         No batch is larger than a worker's share of all jobs: none is to wait for another.
     """
     size = min(together, math.ceil(len(jobs) / workers))
-    if size <= 1:
-        return [(job,) for job in jobs]
+    alone: list[Job] = []
     kinds: list[list[Job]] = []
     for job in jobs:
+        if size <= 1 or job.there or not job.case.file_name:
+            alone.append(job)
+            continue
         for kind in kinds:
             if can_share_a_call(kind[0].case, job.case):
                 kind.append(job)
                 break
         else:
             kinds.append([job])
-    found: list[Batch] = []
+    found: list[Batch] = [(job,) for job in alone]
     for kind in kinds:
         parts = math.ceil(len(kind) / size)
         ends = [len(kind) * part // parts for part in range(parts + 1)]
@@ -107,14 +113,18 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
 def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     """Do the jobs of a batch and return their records, whether they went well or not."""
     found: list[Result | Exception]
+    if not batch[0].case.file_name:
+        return [_analysed(job) for job in batch]
+    if batch[0].there and (record := _there(batch[0])) is not None:
+        return [record]
     try:
         if len(batch) == 1:
             (job,) = batch
-            found = [run_case(job.case, job.path, overwrite=True, progress=progress)]
+            found = [run_case(job.case, _file(job), overwrite=True, progress=progress)]
         else:
             found = run_cases(
                 [job.case for job in batch],
-                [job.path for job in batch],
+                [_file(job) for job in batch],
                 overwrite=True,
                 progress=progress,
             )
@@ -124,6 +134,34 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         found = [error] * len(batch)
     found.reverse()  # each result is let go of with its record: it holds what was read of its file
     return [_record(job, found.pop()) for job in batch]
+
+
+def _file(job: Job) -> Path | None:
+    """Return the result file of a job; None where nothing but its summary is kept."""
+    return None if job.keep.summary else job.path
+
+
+def _there(job: Job) -> Record | None:
+    """Return the record of a run that is there; None where its file lacks what is wanted of it."""
+    try:
+        return finished_record(job.case, open_result(job.path), job.own)
+    except RailsimError:
+        return None
+
+
+def _analysed(job: Job) -> Record:
+    """Return the record of a job without a run in the time domain."""
+    begin = time.process_time()
+    try:
+        quantities = analysed(job.case, None)
+    except ModelError as error:  # what the model has no answer to is an answer, given once
+        return stopped_record(job.case, str(error))
+    except RailsimError as error:
+        return failed_record(job.case, str(error))
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        return failed_record(job.case, reason, traceback.format_exc())
+    return analysed_record(job.case, quantities, time.process_time() - begin)
 
 
 def _record(job: Job, outcome: Result | Exception) -> Record:

@@ -34,7 +34,7 @@ class Keep:
     def applied(self, path: Path, result: Result) -> str:
         """Make the result's file what is kept of it; return its name, empty where there is none."""
         if self.summary:
-            path.unlink()
+            path.unlink(missing_ok=True)  # a run before kept it
             return ""
         if self.quantities is not None or self.storage != PLAIN:
             write(result, path, overwrite=True, names=self._names(result), storage=self.storage)

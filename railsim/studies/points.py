@@ -47,6 +47,8 @@ class Point:
         What tells the run apart.
     key : str
         Hash of all inputs; empty where a file cannot be read.
+    has_run : bool
+        Whether a run in the time domain belongs to it, with a result file.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Point:
     overrides: Mapping[str, Overrides]
     labels: Mapping[str, str | float] = field(default_factory=dict)
     key: str = ""
+    has_run: bool = True
 
 
 class Fingerprints:

@@ -1,18 +1,19 @@
 """A case becomes a file; several cases become files in one call."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from railsim.errors import InputError
 from railsim.result import Hdf5Sink, Result
+from railsim.result.sinks import MemorySink
 from railsim.simulation import outcomes, simulate
 from railsim.studies.case import Case
 
 
 def run_case(
     case: Case,
-    path: str | Path,
+    path: str | Path | None,
     *,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -24,8 +25,8 @@ def run_case(
     ----------
     case : Case
         What to run.
-    path : str or Path
-        Result file.
+    path : str or Path or None
+        Result file; None to keep the result in memory.
     overwrite : bool
         Replace an existing file.
     progress : callable, optional
@@ -42,7 +43,7 @@ def run_case(
         facts["inputs_hash"] = case.key
     else:
         facts["continues"] = str(resume.attributes.get("run", "another run"))
-    with Hdf5Sink(path, overwrite=overwrite, attributes=facts) as sink:
+    with _sink(path, overwrite, facts) as sink:
         return simulate(
             case.vehicle,
             case.track,
@@ -57,6 +58,14 @@ def run_case(
         )
 
 
+def _sink(
+    path: str | Path | None, overwrite: bool, facts: Mapping[str, str]
+) -> Hdf5Sink | MemorySink:
+    if path is None:
+        return MemorySink(facts)
+    return Hdf5Sink(path, overwrite=overwrite, attributes=facts)
+
+
 def can_share_a_call(one: Case, other: Case) -> bool:
     """Whether two cases differ in nothing but the vehicle."""
     return (
@@ -69,12 +78,12 @@ def can_share_a_call(one: Case, other: Case) -> bool:
 
 def run_cases(
     cases: Sequence[Case],
-    paths: Sequence[Path],
+    paths: Sequence[Path | None],
     *,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> list[Result | Exception]:
-    """Run cases that differ in the vehicle only into their files, all in one call.
+    """Run cases that differ in the vehicle only into their files or memory, all in one call.
 
     Returns
     -------
@@ -82,17 +91,18 @@ def run_cases(
         One for each case; what went wrong with one of them leaves the others alone.
     """
     found: dict[int, Result | Exception] = {}
-    sinks: dict[int, Hdf5Sink] = {}
+    sinks: dict[int, Hdf5Sink | MemorySink] = {}
     first = cases[0]
     with ExitStack() as stack:
         for number, (case, path) in enumerate(zip(cases, paths, strict=True)):
             facts = {"run": case.name, "inputs_hash": case.key}
             try:
-                sink = Hdf5Sink(path, overwrite=overwrite, attributes=facts)
+                sink = _sink(path, overwrite, facts)
             except InputError as error:
                 found[number] = error
             else:
-                sinks[number] = stack.enter_context(sink)
+                stack.enter_context(sink)
+                sinks[number] = sink
         done = outcomes(
             [cases[number].vehicle for number in sinks],
             first.track,

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from railsim.definitions.base import FileDefinition
+from railsim.definitions.analyses import Analyses, Analysis, needs_run
+from railsim.definitions.base import Definition, FileDefinition
 from railsim.definitions.settings import Settings
 from railsim.definitions.study import Sample, value_texts
 from railsim.definitions.track import Track
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 MANY = 10_000  # runs from which on an index that is up to date is not made once more
+CHANGED = "--resume computes what has changed, --overwrite everything; or another --out"
 # after one of these no other run could be written either
 NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
 
@@ -160,6 +162,7 @@ def study(
     linked: Sequence[Mapping[str, Iterable[object] | str]] = (),
     sample: Sample | Mapping[str, Any] | None = None,
     quantities: str | Function | None = None,
+    analyses: Mapping[str, Analysis | Mapping[str, Any]] | None = None,
     settings: str | Path | Settings | None = None,
     start: float = 0.0,
     duration: float | None = None,
@@ -199,6 +202,9 @@ def study(
     quantities : callable or str, optional
         Function of the result that returns further numbers by their names, or
         ``FILE.py:FUNCTION``.
+    analyses : mapping of str to Analysis or mapping, optional
+        What is computed at each point, as the tables ``analyses`` of a study file; by default a
+        run.
     settings : str, Path or Settings, optional
         Settings for all runs.
     start : float
@@ -264,6 +270,10 @@ def study(
     tables = [_written("linked", table) for table in linked]
     drawn = None if sample is None else _sample(sample)
     own = named(quantities)
+    work = _analyses(analyses or {})
+    if own and not needs_run(work):
+        fault = Fault("--quantities", "", "no analysis makes a run", 'add one of kind = "run"')
+        raise InputError([fault])
     plan = Plan(
         vehicles,
         tracks,
@@ -272,6 +282,7 @@ def study(
         linked=tables,
         sample=drawn,
         told=fingerprint(own),
+        analyses=work,
         settings=settings,
         start=start,
         duration=duration,
@@ -289,6 +300,9 @@ def study(
         "linked": tables,
         "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
         "quantities": own,
+        "analyses": {
+            name: one.model_dump(mode="json", exclude_none=True) for name, one in work.items()
+        },
         "keep": keep,
         "compress": compress,
         "single": single,
@@ -379,7 +393,10 @@ def carry_out(
         remark = on_remark or _LOG.warning
         for text in state.settle(journal):
             remark(text)
-        jobs = [_job(case, folder, plots, own, keep) for case in state.cases]
+        jobs = [
+            _job(case, folder, plots, own, keep, there=case.name in state.there)
+            for case in state.cases
+        ]
         if longest_first:
             jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
         keys = {point.name: point.key for point in plan.points}
@@ -416,6 +433,8 @@ class _State:
         What is to be computed.
     found : list of (Point, Record)
         Results that are there and that the journal does not know.
+    there : set of str
+        Names of the cases whose run is there, but not their analyses.
 
     Raises
     ------
@@ -442,13 +461,11 @@ class _State:
         self._changed: list[str] = []
         self._lines = known.damaged if known else 0
         self.found: list[tuple[Point, Record]] = []
+        self.there: set[str] = set()
         points = [point for point in plan.points if not self._is_done(point)]
         self._waiting = dict(zip(points, plan.cases(points), strict=True))
         faults = [
-            fault
-            for point, case in self._waiting.items()
-            if case.file_name in self._there
-            for fault in self._look_at(point, case)
+            fault for point, case in self._waiting.items() for fault in self._faults_of(point, case)
         ]
         if faults and not resume:
             raise InputError(faults)
@@ -460,9 +477,20 @@ class _State:
         entry = self._entries.get(point.name)
         if entry is None or entry.status in ("failed", "waiting") or not point.key:
             return False
-        if not entry.size and not self._keep.summary:  # the summary was kept, the file is wanted
-            return False
+        if not entry.size and not self._keep.summary and point.has_run:
+            return False  # the summary was kept, the file is wanted
         return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
+
+    def _faults_of(self, point: Point, case: Case) -> list[Fault]:
+        """Look at what is there of a case: a file, or a summary without one."""
+        if case.file_name in self._there:
+            return self._look_at(point, case)
+        entry = self._entries.get(case.name)
+        done = entry is not None and entry.status not in ("failed", "waiting") and not entry.size
+        if entry is None or not done or entry.key == point.key:
+            return []
+        self._changed.append(case.name)
+        return [Fault("--out", case.name, "a summary of other inputs", CHANGED)]
 
     def _look_at(self, point: Point, case: Case) -> list[Fault]:
         """Take a result that is there, or say why it cannot be taken."""
@@ -470,14 +498,16 @@ class _State:
         try:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
-                self.found.append((point, finished_record(case, result, self._own)))
+                if case.analyses:  # these take their time: it is a job like others
+                    self.there.add(case.name)
+                else:
+                    self.found.append((point, finished_record(case, result, self._own)))
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
             return list(error.faults)
         self._changed.append(case.name)
-        allowed = "--resume computes what has changed, --overwrite everything; or another --out"
-        return [Fault("--out", str(path), "a result of other inputs", allowed)]
+        return [Fault("--out", str(path), "a result of other inputs", CHANGED)]
 
     def settle(self, journal: Journal) -> list[str]:
         """Record what was found, move away what is damaged; return what the user should know."""
@@ -604,13 +634,19 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") and not isinstance(value, str) else value
 
 
+def _analyses(given: Mapping[str, Analysis | Mapping[str, Any]]) -> dict[str, Analysis]:
+    whole = {name: one if isinstance(one, Definition) else dict(one) for name, one in given.items()}
+    return checked(Analyses, {"analyses": whole}, "analyses").analyses
+
+
 def _sample(given: Sample | Mapping[str, Any]) -> Sample:
     return given if isinstance(given, Sample) else checked(Sample, dict(given), "sample")
 
 
-def _job(case: Case, folder: Path, plots: bool, own: str | None, keep: Keep) -> Job:
-    path = (folder / case.file_name).resolve()
-    return Job(case, path, path.with_suffix(".png") if plots else None, own, keep)
+def _job(case: Case, folder: Path, plots: bool, own: str | None, keep: Keep, *, there: bool) -> Job:
+    path = (folder / f"{case.name}.h5").resolve()
+    picture = path.with_suffix(".png") if plots and case.file_name else None
+    return Job(case, path, picture, own, keep, there)
 
 
 def _executed(

@@ -14,11 +14,13 @@ from typing import Any, TextIO, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from railsim.definitions.analyses import unit_of_number
 from railsim.errors import Fault, InputError
 from railsim.files import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.result.facts import FACTS, run_facts
+from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Record, Records
 from railsim.studies.own import own_quantities
@@ -45,15 +47,26 @@ def waiting_record(case: Case) -> Record:
 
 
 def finished_record(case: Case, result: Result, own: str | None = None) -> Record:
-    """Return the record of a run that has its result, with the quantities of its own function.
+    """Return the record of a run that has its result, with its own quantities and analyses.
 
     Raises
     ------
-    RailsimError : that function goes wrong.
+    RailsimError : one of these goes wrong.
     """
-    found = own_quantities(own, result)
+    found = own_quantities(own, result) | analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result)}
-    return {**facts, "quantities": found} if own else facts
+    return {**facts, "quantities": found} if own or case.analyses else facts
+
+
+def analysed_record(case: Case, quantities: Mapping[str, float], cpu_time: float) -> Record:
+    """Return the record of a point without a run in the time domain."""
+    facts = {"status": "complete", "cpu_time": cpu_time, "quantities": dict(quantities)}
+    return {**waiting_record(case), **facts}
+
+
+def stopped_record(case: Case, reason: str) -> Record:
+    """Return the record of a point to which the model has no answer; it is not tried again."""
+    return {**waiting_record(case), "status": "stopped", "status_reason": reason}
 
 
 def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
@@ -97,6 +110,7 @@ class Inputs(BaseModel):
     linked: list[dict[str, list[str]]] = []
     sample: dict[str, Any] | None = None
     quantities: str | None = None
+    analyses: dict[str, dict[str, Any]] = {}
     keep: str = "all"
     compress: bool = False
     single: bool = False
@@ -230,6 +244,8 @@ def unit_of(column: str) -> str:
     """
     if column in UNITS:
         return UNITS[column]
+    if unit := unit_of_number(column):
+        return unit
     found = _COLUMN.fullmatch(column)
     if not found or found[1] not in QUANTITIES:
         return ""

@@ -59,6 +59,7 @@ def test_folder_holds_table_record_and_picture(files, tmp_path):
         "compare.csv",
         "compare.json",
         "compare.png",
+        "differences.png",
     ]
     rows = list(csv.DictReader((folder / "compare.csv").open(encoding="utf-8")))
     assert float(rows[0]["difference"]) == 0.0

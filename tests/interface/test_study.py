@@ -134,16 +134,25 @@ def test_resume_computes_only_what_has_changed(tmp_path, simulated):
     assert simulated == [10.0, 20.0, 30.0]
 
 
-def test_change_of_a_file_is_noticed(tmp_path, simulated):
+@pytest.mark.parametrize("keep", ["all", "summary"])
+def test_vehicle_file_edited_between_two_resumes_is_computed_again_and_named(
+    tmp_path, simulated, keep
+):
     vehicle = tmp_path / "coach.toml"
     text = (ROOT / "vehicles" / "coach_manchester.toml").read_text(encoding="utf-8")
     vehicle.write_text(text, encoding="utf-8")
-    study = {"out": tmp_path / "study", "workers": 1, "resume": True}
-    railsim.study([vehicle], [CURVE], [20.0], **study)
+    remarks = []
+    how = {"out": tmp_path / "study", "workers": 1, "keep": keep, "on_remark": remarks.append}
+    railsim.study([vehicle], [CURVE], [20.0], **how)
     vehicle.write_text(text.replace("mass = 43628.0", "mass = 43629.0"), encoding="utf-8")
-    railsim.study([vehicle], [CURVE], [20.0], **study)
-    railsim.study([vehicle], [CURVE], [20.0], **study)
+    with pytest.raises(InputError, match="of other inputs"):
+        railsim.study([vehicle], [CURVE], [20.0], **how)
+    assert remarks == []
+    railsim.study([vehicle], [CURVE], [20.0], resume=True, **how)
+    assert remarks == [f"1 result is of other inputs and computed again: coach_{CURVE}_20"]
+    railsim.study([vehicle], [CURVE], [20.0], **how)
     assert simulated == [20.0, 20.0]
+    assert len(remarks) == 1
 
 
 def test_interrupted_study_goes_on_from_what_it_has(tmp_path, simulated, monkeypatch):
@@ -504,6 +513,32 @@ def test_processes_end_after_a_study_that_was_killed(tmp_path):
     # what the killed processes have left goes when the study goes on
     assert main([*arguments(tmp_path, 20)[:-2], "--resume", "--until", "10"]) == 0
     assert set(os.listdir(tmp_path)) == {f"{COACH}_{CURVE}_20.h5", *LEFT}
+
+
+@pytest.mark.slow
+def test_killed_group_that_is_resumed_has_the_summary_of_an_undisturbed_study(tmp_path):
+    """SIGKILL of the study and its workers: what the journal holds is kept, the rest computed."""
+    speeds = [15.0, 17.0, 20.0]
+    short = ["--until", "10", "--keep", "summary"]
+    given = [*arguments(tmp_path / "killed", *speeds)[:-2], *short]
+    journal = tmp_path / "killed" / "study.journal"
+    process = started([*given, "--workers", "2"])
+    while not journal.exists() or journal.read_bytes().count(b"\n") < 2:  # the first: the inputs
+        assert process.poll() is None
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate(timeout=300)
+    before = journal.read_bytes()
+    assert main([*given, "--workers", "1"]) == 0
+    assert journal.read_bytes().startswith(before)
+    assert main([*arguments(tmp_path / "whole", *speeds), *short]) == 0
+    measured = ("wall_time", "cpu_time", "real_time_factor")
+
+    def computed(folder):
+        return [{k: v for k, v in row.items() if k not in measured} for row in rows(folder)]
+
+    assert computed(tmp_path / "killed") == computed(tmp_path / "whole")
+    assert set(os.listdir(tmp_path / "killed")) == LEFT
 
 
 def test_python_takes_single_values_too(tmp_path, simulated):

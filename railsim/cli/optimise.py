@@ -1,0 +1,137 @@
+"""``railsim optimise``: parameters of a vehicle against objectives and constraints."""
+
+import math
+from typing import TYPE_CHECKING
+
+import click
+
+from railsim.cli.common import (
+    echo,
+    json_option,
+    names_of,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    table,
+)
+from railsim.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from railsim.studies.optimise import Design, Optimisation
+
+MOST_ROWS = 15
+
+
+@click.command()
+@click.argument("study", metavar="STUDY", shell_complete=names_of("study"))
+@click.option("--out", default="optimise", metavar="DIR", show_default=True, help="Folder.")
+@click.option(
+    "--method",
+    type=click.Choice(["surrogate", "nsga2", "differential_evolution"]),
+    help="In place of the file's. nsga2 needs pip install 'railsim[optimise]'.",
+)
+@click.option(
+    "--evaluations",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Designs, in place of the file's.",
+)
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="In place of the file's.")
+@click.option(
+    "--choose",
+    type=int,
+    metavar="N",
+    help="Design that becomes a vehicle file; by default the one nearest to the best of each "
+    "objective.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Number of processes; default: all cores.",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
+@click.option("--resume", is_flag=True, help="Continue in DIR although STUDY has changed.")
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    study: str,
+    out: str,
+    method: str | None,
+    evaluations: int | None,
+    seed: int | None,
+    choose: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    resume: bool,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Seek the best compromises of a vehicle's parameters.
+
+    STUDY is a study file with a table [optimise]: variables with bounds, objectives and
+    constraints over any quantity of its summary.  DIR receives the front, what the objectives
+    depend on, a vehicle file of the chosen design, and the study of all runs.  What is done there
+    is not computed again: the command can be repeated after an interruption, or with more
+    evaluations.
+
+    \b
+    Example:
+      railsim optimise examples/primary_and_yaw_damper.toml --out compromise
+      railsim optimise my_study.toml --evaluations 200 --method nsga2 --seed 3
+    """  # noqa: D301 - click reads the escape
+    from railsim.studies.optimise import optimise
+
+    with progress_bar("optimise", quiet=quiet) as progress:
+        found = optimise(
+            study,
+            out=out,
+            method=method,
+            evaluations=evaluations,
+            seed=seed,
+            choose=choose,
+            workers=workers,
+            scheduler=scheduler,
+            resume=resume,
+            overwrite=overwrite,
+            progress=progress,
+            on_remark=lambda text: echo(f"remark: {text}", err=True),
+        )
+    if as_json:
+        print_json({"folder": str(found.folder), **found.record()})
+        return
+    for line in _lines(found):
+        echo(line)
+
+
+def _lines(found: "Optimisation") -> list[str]:
+    from railsim.studies.optimise import with_unit
+
+    definition = found.definition
+    if found.chosen is None:
+        reasons = {design.reason for design in found.designs if design.reason}
+        why = f": {sorted(reasons)[0]}" if reasons else ""
+        return [f"none of {len(found.designs)} designs keeps all constraints{why}"]
+    ones = (*definition.objectives, *definition.constraints)
+    header = ["", "design", *(path.removeprefix("vehicle.") for path in definition.variables)]
+    header += [with_unit(one) for one in ones]
+    step = math.ceil(len(found.front) / MOST_ROWS)
+    shown = [*found.front[::step]]
+    if found.chosen not in shown:
+        shown.append(found.chosen)
+    rows = [_row(design, design is found.chosen) for design in shown]
+    number = f"front of {len(found.front)} in {len(found.designs)} designs"
+    lines = [number, "", *table(header, rows, numbers=1), ""]
+    lines += [f"active: {words}" for words in found.active]
+    for one in found.sensitivities:
+        shares = sorted(one.total.items(), key=lambda item: -item[1])
+        words = ", ".join(f"{p.removeprefix('vehicle.')} {100.0 * s:.0f} %" for p, s in shares)
+        lines.append(f"{one.quantity} depends on: {words}")
+    return [*lines, *map(str, found.vehicles), str(found.folder / "front.png")]
+
+
+def _row(design: "Design", chosen: bool) -> list[str]:
+    numbers = (*design.variables.values(), *design.objectives, *design.constraints)
+    return ["chosen" if chosen else "", str(design.number), *(f"{value:.5g}" for value in numbers)]

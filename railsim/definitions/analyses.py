@@ -1,0 +1,116 @@
+"""What a study does at each point of its grid: a run, its assessment, modes, hunting, curving."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from railsim.definitions.base import Definition, Finite, Name, NonNegative, Positive, Text
+
+# units of the numbers, by what stands behind the analysis' name
+UNITS = {
+    "damping": "", "frequency": "Hz", "linear": "m/s", "ramp": "m/s", "bifurcation": "m/s",
+    "continuation": "m/s", "T_gamma": "N", "T_gamma_largest": "N", "Q": "N", "Y": "N",
+    "sum_Y": "N", "sum_abs_Y": "N", "attack": "rad", "lateral": "m", "car_roll": "rad",
+}  # fmt: skip
+
+
+class RunAnalysis(Definition):
+    """A run in the time domain: what a study does where nothing else is asked for."""
+
+    kind: Literal["run"]
+    """`run`: peaks and mid-curve values"""
+
+
+class AssessAnalysis(Definition):
+    """A run and its assessment, as `railsim assess`."""
+
+    kind: Literal["assess"]
+    """`assess`: a run against a standard"""
+    standard: Literal["en14363", "uic518", "comfort", "wear", "safety"] = "en14363"
+    """Standard, as `railsim assess --standard`"""
+    limits: Text | None = None
+    """Limits file; by default that of the standard"""
+
+
+class _Linear(Definition):
+    """How the contact is linearised."""
+
+    linearisation: Literal["tangent", "harmonic"] = "tangent"
+    """Contact: its derivative, or its first harmonic"""
+    amplitude: Positive = 3e-3
+    """Lateral amplitude of the wheelsets for `harmonic` [m]"""
+    conicity: Positive | None = None
+    """Cones of this conicity instead of the profiles"""
+
+
+class ModesAnalysis(_Linear):
+    """Modes at the speed of the point, on straight track."""
+
+    kind: Literal["modes"]
+    """`modes`: damping of the least damped oscillation"""
+
+
+class CriticalSpeedAnalysis(_Linear):
+    """Critical speed on straight track."""
+
+    kind: Literal["critical_speed"]
+    """`critical_speed`: from which speed the vehicle hunts"""
+    methods: tuple[Literal["linear", "ramp", "bifurcation", "continuation"], ...] = ("linear",)
+    """How it is sought"""
+    low: Positive = 5.0
+    """Lowest speed of the search [m/s]"""
+    high: Positive = 120.0
+    """Highest speed of the search [m/s]"""
+
+
+class CurvingAnalysis(Definition):
+    """Steady curving on a circle, by Newton's method."""
+
+    kind: Literal["curving"]
+    """`curving`: steady state in a curve, with the rails and the friction of the point's track"""
+    radius: Finite
+    """Radius, negative to the left [m]"""
+    cant: NonNegative = 0.0
+    """Cant over 1.5 m [m]"""
+    cant_deficiency: Finite | None = None
+    """Cant deficiency [m]; by default that of the point's speed"""
+
+
+Analysis = Annotated[
+    RunAnalysis | AssessAnalysis | ModesAnalysis | CriticalSpeedAnalysis | CurvingAnalysis,
+    Field(discriminator="kind"),
+]
+
+
+class Analyses(Definition):
+    """Analyses by names of one's own."""
+
+    analyses: dict[Name, Analysis]
+    """What is done at each point"""
+
+
+def unit_of_number(name: str) -> str:
+    """Return the unit of an analysis' number, ``NAME.NUMBER``; empty where it has none.
+
+    Examples
+    --------
+    >>> unit_of_number("hunting.linear"), unit_of_number("wear.percentiles_50")
+    ('m/s', '')
+    """
+    return UNITS.get(name.partition(".")[2], "")
+
+
+def needs_run(analyses: Mapping[str, Analysis]) -> bool:
+    """Whether any of the analyses, or their absence, asks for a run in the time domain."""
+    kinds = (RunAnalysis, AssessAnalysis)
+    return not analyses or any(isinstance(one, kinds) for one in analyses.values())
+
+
+def needs_speed(analyses: Mapping[str, Analysis]) -> bool:
+    """Whether anything depends on the speed of the points."""
+    return not analyses or any(
+        not isinstance(analysis, CriticalSpeedAnalysis)
+        and not (isinstance(analysis, CurvingAnalysis) and analysis.cant_deficiency is not None)
+        for analysis in analyses.values()
+    )

@@ -1,0 +1,94 @@
+"""The table `optimise` of a study file: variables, objectives and constraints of a design."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import Count, Definition, Finite, Flag, Text
+
+
+class Variable(Definition):
+    """A parameter that is varied between bounds."""
+
+    low: Finite
+    """Lower bound [SI]"""
+    high: Finite
+    """Upper bound [SI]"""
+    scale: Literal["linear", "log"] = "linear"
+    """Whether equal differences or equal ratios count alike"""
+    also: tuple[Text, ...] = ()
+    """Paths of further keys that get the same value"""
+
+    @model_validator(mode="after")
+    def _rising(self) -> Self:
+        if not self.low < self.high:
+            raise ValueError("'low' must be below 'high'")
+        if self.scale == "log" and not self.low > 0.0:
+            raise ValueError('scale = "log" needs bounds above zero')
+        return self
+
+
+class Value(Definition):
+    """A number of a design: a quantity of the summary of its runs."""
+
+    quantity: Text
+    """Column of `summary.csv`, without its unit"""
+    magnitude: Flag = False
+    """Take the value without its sign"""
+    where: dict[Text, Text | Finite] = Field(default_factory=dict)
+    """Only the runs with these labels, such as `track` or a key of the grid; by default all"""
+
+
+class Objective(Value):
+    """A quantity that is to be as small or as large as possible."""
+
+    goal: Literal["minimise", "maximise"] = "minimise"
+    """Whether it is to be small or large"""
+    over: Literal["worst", "mean"] = "worst"
+    """Worst or mean value over the runs of a design"""
+
+
+class Constraint(Value):
+    """A quantity that must stay within limits in all runs."""
+
+    low: Finite | None = None
+    """Lower limit [SI]"""
+    high: Finite | None = None
+    """Upper limit [SI]"""
+
+    @model_validator(mode="after")
+    def _some_limit(self) -> Self:
+        if self.low is None and self.high is None:
+            raise ValueError("'low' or 'high' is needed")
+        return self
+
+
+class Optimise(Definition):
+    """What `railsim optimise` seeks."""
+
+    variables: Annotated[dict[Text, Variable], Field(min_length=1)]
+    """Parameters by their paths, as in a grid"""
+    objectives: Annotated[tuple[Objective, ...], Field(min_length=1)]
+    """What is to be small or large; several give a Pareto front"""
+    constraints: tuple[Constraint, ...] = ()
+    """What must hold"""
+    method: Literal["surrogate", "nsga2", "differential_evolution"] = "surrogate"
+    """Surrogate models (few designs), genetic algorithm (pymoo), or scipy's, for one objective"""
+    evaluations: Count = 80
+    """How many designs are computed at most"""
+    batch: Count = 8
+    """How many designs are computed at a time; of a genetic algorithm, its population"""
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    """Where the random numbers begin: the same seed gives the same designs"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        names = [*self.variables, *(key for v in self.variables.values() for key in v.also)]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"'{twice[0]}' is varied twice")
+        wrong = [name for name in names if not name.startswith("vehicle.")]
+        if wrong:
+            raise ValueError(f"'{wrong[0]}' is no key of a vehicle; paths begin with vehicle.")
+        if self.method == "differential_evolution" and len(self.objectives) > 1:
+            raise ValueError('method = "differential_evolution" takes one objective')
+        return self

@@ -1,0 +1,175 @@
+"""The analyses of a case: what a study computes beside, or in place of, a run in the time domain.
+
+Each gives numbers by names, which become columns of ``summary.csv``: those of an analysis that the
+study calls ``curve`` begin with ``curve.``.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from railsim.definitions.analyses import (
+    AssessAnalysis,
+    CriticalSpeedAnalysis,
+    CurvingAnalysis,
+    ModesAnalysis,
+    RunAnalysis,
+)
+from railsim.errors import ModelError
+from railsim.result import Result
+from railsim.studies.case import Case
+
+Numbers = dict[str, float]
+
+PLACES = ("x", "blocks", "wheelset")  # of comfort points and wheels
+
+
+def analysed(case: Case, result: Result | None) -> Numbers:
+    """Return the numbers of all analyses of a case.
+
+    Parameters
+    ----------
+    case : Case
+    result : Result or None
+        Its run, where one of its analyses needs one.
+
+    Raises
+    ------
+    InputError, ModelError : an analysis goes wrong, with its name.
+    """
+    found: Numbers = {}
+    for name, analysis in case.analyses.items():
+        numbers = _ACTIONS[type(analysis)](case, analysis, result)
+        found |= {f"{name}.{key}": value for key, value in numbers.items()}
+    return found
+
+
+def _nothing_more(case: Case, analysis: RunAnalysis, result: Result | None) -> Numbers:
+    """A run has its peaks and mid-curve values, as in every study."""
+    return {}
+
+
+def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Numbers:
+    """Largest share of each limit; comfort, wear and safety by their own numbers."""
+    from railsim.assessment import assess
+
+    assert result is not None  # a case with this analysis has a run
+    (found,) = assess(
+        result, analysis.standard, limits=analysis.limits, service=case.vehicle.service, coarse=True
+    )
+    shares: dict[str, float] = {}
+    for row in found.worst:
+        if not math.isnan(row.share):
+            name = row.rule.name
+            shares[name] = max(row.share, shares.get(name, 0.0))
+    numbers = {f"{name}_share": share for name, share in shares.items()}
+    if shares:
+        numbers["largest_share"] = max(shares.values())
+    if found.verdict:
+        numbers["exceeded"] = float(found.exceeded)
+    return {**numbers, **_largest(found.record(), analysis.standard)}
+
+
+def _largest(record: Mapping[str, Any], standard: str) -> Numbers:
+    """Largest magnitudes over points or wheels of comfort, wear and safety."""
+    if standard not in ("comfort", "wear", "safety"):
+        return {}
+    ((_, report),) = record[standard].items()
+    found: Numbers = {}
+    rows = report["wheels"] if standard == "safety" else report
+    parts = [*rows, {"overturning": report["overturning"]}] if standard == "safety" else rows
+    for row in parts:
+        for key, value in _numbers(row):
+            found[key] = max(found.get(key, 0.0), abs(value))
+    return found
+
+
+def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a table by their names, those of tables in it after the table's."""
+    for key, value in row.items():
+        if isinstance(value, Mapping):
+            yield from _numbers(value, f"{before}{key}_")
+        elif isinstance(value, int | float) and math.isfinite(value) and key not in PLACES:
+            yield f"{before}{key}", float(value)
+
+
+def _modes(case: Case, analysis: ModesAnalysis, result: Result | None) -> Numbers:
+    """Damping ratio and frequency of the least damped oscillation from 0.3 to 40 Hz."""
+    from railsim.linear.modes import modes
+
+    found = modes(
+        case.vehicle, case.track, speed=case.speed, settings=case.settings, **_contact(analysis)
+    ).least_damped
+    if found is None:
+        raise ModelError("no oscillation from 0.3 to 40 Hz")
+    return {"damping": found.damping_ratio, "frequency": found.frequency}
+
+
+def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result | None) -> Numbers:
+    """Critical speeds by method; the end of the search where it hunts at none, or at all speeds."""
+    from railsim.stability.critical_speed import critical_speed
+
+    found = critical_speed(
+        case.vehicle,
+        case.track,
+        methods=analysis.methods,
+        low=analysis.low,
+        high=analysis.high,
+        settings=case.settings,
+        **_contact(analysis),
+    )
+    if found.linear is not None:
+        numbers = {"linear": found.linear["speed"], "frequency": found.linear["frequency"]}
+    else:
+        unstable = any(remark.startswith("unstable at") for remark in found.remarks)
+        numbers = {"linear": analysis.low if unstable else analysis.high}
+    for method, sustained in found.nonlinear.items():
+        numbers[method] = analysis.high if sustained.speed is None else sustained.speed
+    return numbers
+
+
+def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
+    names = ("linearisation", "amplitude", "conicity")
+    return {name: getattr(analysis, name) for name in names}
+
+
+def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Numbers:
+    """Largest magnitudes over the wheels or wheelsets, and the wear numbers' sum."""
+    import numpy as np
+
+    from railsim.model.assembly import GRAVITY
+    from railsim.stability.curving import FAILED, curving
+    from railsim.track.alignment import CANT_BASE
+
+    deficiency = analysis.cant_deficiency
+    if deficiency is None:
+        needed = CANT_BASE * case.speed**2 / (GRAVITY * abs(analysis.radius))
+        deficiency = needed - analysis.cant
+    found = curving(
+        case.vehicle,
+        radius=[analysis.radius],
+        cant=analysis.cant,
+        cant_deficiency=[deficiency],
+        track=case.track,
+        settings=case.settings,
+    )
+    if found.converged.item() == FAILED:
+        raise ModelError(f"no steady state on a radius of {analysis.radius:g} m")
+    names = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "car_roll")
+    numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in names}
+    numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards it derails nothing
+    return {
+        **numbers,
+        "sum_abs_Y": float(np.max(np.abs(found.Y).sum(axis=-1))),
+        "T_gamma": float(np.sum(found.T_gamma)),
+        "T_gamma_largest": float(np.max(found.T_gamma)),
+    }
+
+
+_ACTIONS: dict[type[Any], Callable[..., Numbers]] = {
+    RunAnalysis: _nothing_more,
+    AssessAnalysis: _assessed,
+    ModesAnalysis: _modes,
+    CriticalSpeedAnalysis: _critical_speed,
+    CurvingAnalysis: _curving,
+}

@@ -1,0 +1,299 @@
+"""Ways to propose designs: surrogate models, a genetic algorithm, differential evolution.
+
+A search sees a cube of side 1 for the variables, objectives that are to be small and constraints
+that are kept where they are not above zero, both NaN for designs without an answer.  It asks for
+values of several designs at a time through one function, and is deterministic: the same seed and
+values lead to the same designs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import Fault, InputError
+from railsim.studies.front import non_dominated
+
+Floats = NDArray[np.float64]
+
+CANDIDATES = 512  # points of Sobol's sequence that a batch is chosen from
+NEAR = 256  # further ones about members of the front, at each distance
+CELLS = 1024  # points by which the gain of a candidate is measured
+SMALLEST_DISTANCE = 2e-3  # of the cube's side, between designs
+MARGIN = 0.1  # of the front's range, by which the reference point lies behind it
+
+
+@dataclass(frozen=True)
+class Values:
+    """Values of designs.
+
+    Attributes
+    ----------
+    objectives : float64[design, objective]
+    constraints : float64[design, constraint]
+    """
+
+    objectives: Floats
+    constraints: Floats
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Whether each design has an answer and keeps all constraints."""
+        known = np.isfinite(self.objectives).all(axis=1)
+        kept = (self.constraints <= 0.0).all(axis=1)
+        return np.logical_and(known, kept)
+
+
+Evaluate = Callable[[Floats], Values]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a search is asked for.
+
+    Attributes
+    ----------
+    evaluate : callable
+        Takes designs, float64[design, variable] between 0 and 1; returns the values of all designs
+        so far.
+    variables, objectives, constraints : int
+        How many there are.
+    number, batch : int
+        Designs in all, and at a time.
+    seed : int
+    """
+
+    evaluate: Evaluate
+    variables: int
+    objectives: int
+    constraints: int
+    number: int
+    batch: int
+    seed: int
+
+
+def search(method: str, task: Task) -> None:
+    """Have designs evaluated by one of `METHODS` until there are as many as wanted."""
+    METHODS[method](task)
+
+
+def _surrogate(task: Task) -> None:
+    """Fit radial basis functions to what is known, and compute where they promise most.
+
+    The first two batches are Sobol's sequence with the cube's centre in front.  Then each batch
+    maximises the gain of dominated volume by the surrogate, one design after the other, each as if
+    the ones before had come out as predicted; the last of a batch is the candidate farthest from
+    all known designs, so that no region is left to a wrong surrogate.  Compare Knowles (2006),
+    Mueller (2017).
+    """
+    from scipy.stats import qmc
+
+    count = task.variables
+    begin = min(task.number, max(2 * count + 2, 2 * task.batch))
+    sequence = qmc.Sobol(count, seed=task.seed).random(1 << (begin - 1).bit_length())
+    designs = np.vstack([np.full((1, count), 0.5), sequence[: begin - 1]])
+    values = task.evaluate(designs)
+    while len(designs) < task.number:
+        size = min(task.batch, task.number - len(designs))
+        new = _promising(designs, values, size, np.random.default_rng([task.seed, len(designs)]))
+        if not len(new):
+            return
+        designs = np.vstack([designs, new])
+        values = task.evaluate(new)
+
+
+def _promising(designs: Floats, values: Values, size: int, rng: np.random.Generator) -> Floats:
+    from scipy.stats import qmc
+
+    count = designs.shape[1]
+    feasible = values.feasible
+    candidates = [qmc.Sobol(count, seed=rng).random(CANDIDATES)]
+    if feasible.any():
+        rows = np.flatnonzero(feasible)
+        best = designs[rows[non_dominated(values.objectives[rows])]]
+        for width in (0.1, 0.02):
+            moved = best[rng.integers(len(best), size=NEAR)]
+            candidates.append(np.clip(moved + rng.normal(0.0, width, moved.shape), 0.0, 1.0))
+        candidates.append(_at_bounds(candidates[-1], rng))
+    points = np.vstack(candidates)
+    model = Surrogate(designs, np.hstack([values.objectives, values.constraints]))
+    predicted = model(points)
+    m = values.objectives.shape[1]
+    objectives, constraints = predicted[:, :m], predicted[:, m:]
+    # where nothing is allowed, the least wrong comes first
+    excess = np.maximum(constraints, 0.0).sum(axis=1) if constraints.shape[1] else None
+    allowed = np.ones(len(points), bool) if excess is None else excess <= 0.0
+    if excess is not None and not allowed.any():
+        allowed = excess <= np.quantile(excess, 0.02)
+    front = values.objectives[feasible]
+    chosen: list[int] = []
+    gain = _Gain(front, objectives[allowed], rng)
+    distance = np.sqrt(((points[:, None] - designs[None]) ** 2).sum(axis=2)).min(axis=1)
+    for place in range(size):
+        free = distance > SMALLEST_DISTANCE
+        if not free.any():
+            break
+        worth = np.where(allowed & free, gain.of(objectives), 0.0)
+        explore = place == size - 1 and size > 1
+        pick = int(np.argmax(np.where(free, distance, 0.0) if explore or worth.max() <= 0.0
+                             else worth + 1e-9 * distance))  # fmt: skip
+        chosen.append(pick)
+        distance = np.minimum(distance, np.sqrt(((points - points[pick]) ** 2).sum(axis=1)))
+        gain.take(objectives[pick])
+    return points[chosen]
+
+
+def _at_bounds(points: Floats, rng: np.random.Generator) -> Floats:
+    """Return the points with one variable each at a bound, where many an optimum lies."""
+    moved = points.copy()
+    column = rng.integers(points.shape[1], size=len(points))
+    moved[np.arange(len(points)), column] = rng.integers(2, size=len(points))
+    return moved
+
+
+class _Gain:
+    """Dominated volume that candidates would add, measured by random points.
+
+    Parameters
+    ----------
+    front : float64[design, objective]
+        Known feasible designs.
+    predicted : float64[candidate, objective]
+        What is promised.
+    """
+
+    def __init__(self, front: Floats, predicted: Floats, rng: np.random.Generator) -> None:
+        from scipy.stats import qmc
+
+        both = np.vstack([front, predicted])
+        shown = both[non_dominated(both)]
+        low, high = shown.min(axis=0), shown.max(axis=0)
+        span = np.where(high > low, high - low, np.maximum(np.abs(high), 1e-12))
+        unit = qmc.Sobol(both.shape[1], seed=rng).random(CELLS)
+        self._points = low + unit * (1.0 + MARGIN) * span
+        self._open = np.ones(CELLS, bool)
+        for row in front:
+            self.take(row)
+
+    def of(self, objectives: Floats) -> Floats:
+        """Return the share of the volume that each candidate would add."""
+        left = self._points[self._open]
+        dominated = np.ones((len(objectives), len(left)), bool)
+        for k in range(objectives.shape[1]):
+            dominated &= objectives[:, k, None] <= left[None, :, k]
+        share: Floats = dominated.sum(axis=1) / CELLS
+        return share
+
+    def take(self, row: Floats) -> None:
+        """Count a design as known."""
+        self._open &= ~(row <= self._points).all(axis=1)
+
+
+class Surrogate:
+    """Radial basis functions through the values of designs, thin-plate splines with a linear part.
+
+    Designs without an answer get the worst known value, so that a search keeps away from them.
+
+    Parameters
+    ----------
+    designs : float64[design, variable]
+    values : float64[design, column]
+    """
+
+    def __init__(self, designs: Floats, values: Floats) -> None:
+        from scipy.interpolate import RBFInterpolator
+
+        worst = np.nanmax(np.where(np.isnan(values), -np.inf, values), axis=0)
+        filled = np.where(np.isnan(values), np.where(np.isfinite(worst), worst, 0.0), values)
+        self._middle, spread = filled.mean(axis=0), filled.std(axis=0)
+        self._spread = np.where(spread > 0.0, spread, 1.0)
+        self._designs, self._values = designs, (filled - self._middle) / self._spread
+        self._make = partial(RBFInterpolator, kernel="thin_plate_spline", degree=1)
+        self._fit = self._make(designs, self._values)
+
+    def __call__(self, points: Floats) -> Floats:
+        """Return the predicted values at some points."""
+        found: Floats = self._fit(points) * self._spread + self._middle
+        return found
+
+    def errors(self) -> Floats:
+        """Return the error of each column: root mean square of leaving out, over the deviation."""
+        missed = []
+        for i in range(len(self._designs)):
+            others = np.arange(len(self._designs)) != i
+            fit = self._make(self._designs[others], self._values[others])
+            missed.append(fit(self._designs[i : i + 1])[0] - self._values[i])
+        found: Floats = np.sqrt(np.mean(np.square(missed), axis=0))
+        return found
+
+
+def _nsga2(task: Task) -> None:
+    """Genetic algorithm of Deb et al. (2002), by pymoo; the batch is its population."""
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+    except ImportError:
+        found = "the package 'pymoo' is not installed"
+        allowed = "install it with: pip install 'railsim[optimise]'; or method = \"surrogate\""
+        raise InputError([Fault("optimise.method", "nsga2", found, allowed)]) from None
+    problem = Problem(
+        n_var=task.variables, n_obj=task.objectives, n_ieq_constr=task.constraints, xl=0.0, xu=1.0
+    )
+    algorithm = NSGA2(pop_size=task.batch)
+    algorithm.setup(problem, termination=NoTermination(), seed=task.seed)
+    for _ in range(max(1, task.number // task.batch)):
+        asked = algorithm.ask()
+        if asked is None or not len(asked):
+            return
+        values = task.evaluate(asked.get("X"))
+        objectives, constraints = values.objectives, values.constraints
+        asked.set("F", _without_nan(objectives)[-len(asked) :])
+        if task.constraints:
+            asked.set("G", _without_nan(constraints)[-len(asked) :])
+        algorithm.tell(infills=asked)
+
+
+def _without_nan(values: Floats) -> Floats:
+    """Return values in which designs without an answer are worse than all others."""
+    known = np.where(np.isnan(values), -np.inf, values)
+    worst = np.where(np.isfinite(known).any(axis=0), known.max(axis=0), 0.0)
+    return np.where(np.isnan(values), worst + np.abs(worst) + 1.0, values)
+
+
+def _differential_evolution(task: Task) -> None:
+    """Differential evolution of Storn and Price (1997) for one objective, by scipy."""
+    from scipy.optimize import Bounds, differential_evolution
+
+    size = max(5, task.batch)
+
+    def worth(designs: Any) -> Any:
+        values = task.evaluate(designs.T)
+        number = designs.shape[1]
+        found = _without_nan(values.objectives)[:, 0]
+        # a design that breaks a constraint is worse than all that break none (Deb 2000)
+        excess = np.maximum(_without_nan(values.constraints), 0.0).sum(axis=1)
+        worst = found.max()
+        return np.where(excess > 0.0, worst + abs(worst) + excess, found)[-number:]
+
+    differential_evolution(
+        worth,
+        Bounds(np.zeros(task.variables), np.ones(task.variables)),
+        maxiter=max(0, task.number // size - 1),
+        init=np.random.default_rng(task.seed).random((size, task.variables)),
+        seed=task.seed,
+        tol=0.0,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+    )
+
+
+METHODS: dict[str, Callable[[Task], None]] = {
+    "surrogate": _surrogate,
+    "nsga2": _nsga2,
+    "differential_evolution": _differential_evolution,
+}

@@ -1,0 +1,103 @@
+"""What matters: tornado and Sobol indices of an optimisation's values, from its surrogate.
+
+All designs that were computed are used, and none beside them; how well the surrogate knows them is
+the error of leaving one out, over the standard deviation.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.studies.search import Surrogate
+
+Floats = NDArray[np.float64]
+SAMPLES = 1024  # a power of two, times the number of variables and two
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How one quantity depends on the variables.
+
+    Attributes
+    ----------
+    quantity : str
+    low, high : dict of str to float
+        Its value with one variable at its lower or upper bound, the others as chosen [SI].
+    first, total : dict of str to float
+        Sobol indices over the whole range of all variables: the share of the variance that a
+        variable explains alone, and with its interactions [1].
+    error : float
+        Of the surrogate: root mean square of leaving one design out, over the deviation [1].
+    """
+
+    quantity: str
+    low: dict[str, float]
+    high: dict[str, float]
+    first: dict[str, float]
+    total: dict[str, float]
+    error: float
+
+    def record(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return dict(self.__dict__)
+
+
+def sensitivities(
+    designs: Floats, values: Floats, chosen: Floats, variables: list[str], quantities: list[str]
+) -> list[Sensitivity]:
+    """Return the sensitivities of each quantity.
+
+    Parameters
+    ----------
+    designs : float64[design, variable]
+        Between 0 and 1.
+    values : float64[design, quantity]
+        NaN where a design has no answer.
+    chosen : float64[variable]
+        About which single variables are moved.
+    variables, quantities : list of str
+        Names.
+    """
+    from scipy.stats import sobol_indices, uniform
+
+    count = len(variables)
+    known = ~np.isnan(values).any(axis=1)
+    if known.sum() < count + 2:
+        return []
+    model = Surrogate(designs[known], values[known])
+    ends = np.repeat(chosen[None], 2 * count, axis=0)
+    ends[np.arange(count), np.arange(count)] = 0.0
+    ends[count + np.arange(count), np.arange(count)] = 1.0
+    moved = model(ends)
+    spread = np.ptp(values[known], axis=0)
+    # a quantity that does not vary has no variance to explain
+    varied = np.flatnonzero(spread > 1e-12 * np.abs(values[known]).max(axis=0))
+    first, total = np.zeros((2, len(quantities), count))
+    if len(varied):
+        distributions: list[Any] = [uniform()] * count
+        indices = sobol_indices(
+            func=lambda x: model(x.T)[:, varied].T,
+            n=SAMPLES,
+            dists=distributions,
+            random_state=np.random.default_rng(0),
+        )
+        first[varied] = np.reshape(indices.first_order, (len(varied), count))
+        total[varied] = np.reshape(indices.total_order, (len(varied), count))
+    errors = model.errors()
+    return [
+        Sensitivity(
+            quantity,
+            _named(variables, moved[:count, k]),
+            _named(variables, moved[count:, k]),
+            _named(variables, first[k]),
+            _named(variables, total[k]),
+            float(errors[k]),
+        )
+        for k, quantity in enumerate(quantities)
+    ]
+
+
+def _named(names: list[str], values: Floats) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}

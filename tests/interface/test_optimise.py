@@ -1,0 +1,216 @@
+"""`railsim optimise` and the analyses of a study, through the command line and Python."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.cli import main
+from railsim.definitions.loading import load_study, load_vehicle
+from railsim.errors import InputError
+
+STUDY = """format = "railsim-study/1"
+name = "Primary stiffness in a curve"
+vehicles = ["mine.toml"]
+tracks = ["curve_r250"]
+speeds = [20.0]
+[analyses.curve]
+kind = "curving"
+radius = 300.0
+cant = 0.15
+[optimise]
+evaluations = 6
+batch = 3
+[optimise.variables]
+"vehicle.primary.stiffness.x" = { low = 5e6, high = 40e6, scale = "log" }
+[[optimise.objectives]]
+quantity = "curve.T_gamma"
+[[optimise.objectives]]
+quantity = "curve.attack"
+goal = "maximise"
+[[optimise.constraints]]
+quantity = "curve.Y_over_Q"
+high = 0.9
+"""
+VEHICLE = 'format = "railsim-vehicle/1"\nname = "mine"\nextends = "coach_manchester"\n'
+X = "vehicle.primary.stiffness.x"
+
+
+def written(folder, text=STUDY):
+    (folder / "mine.toml").write_text(VEHICLE, encoding="utf-8")
+    file = folder / "study.toml"
+    file.write_text(text, encoding="utf-8")
+    return str(file)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """An optimisation of six designs, and its file."""
+    folder = tmp_path_factory.mktemp("optimise")
+    file = written(folder)
+    return railsim.optimise(file, out=folder / "o", workers=1), file
+
+
+def test_front_choice_and_files(found):
+    optimised, _ = found
+    assert len(optimised.designs) == optimised.computed == 6
+    # wear and angle of attack both grow with the stiffness: every design is a compromise
+    assert [design.number for design in optimised.front] == sorted(
+        range(1, 7), key=lambda number: optimised.designs[number - 1].variables[X]
+    )
+    record = json.loads((optimised.folder / "optimise.json").read_text())
+    assert record["chosen"]["number"] == optimised.chosen.number
+    with open(optimised.folder / "designs.csv", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["front"] for row in rows] == ["1"] * 6
+    assert {"curve.T_gamma (N)", "curve.attack (rad)", X} <= set(rows[0])
+    assert (optimised.folder / "front.png").stat().st_size > 5000
+    wear = optimised.sensitivities[0]
+    assert wear.low[X] < optimised.chosen.objectives[0] < wear.high[X]
+    assert wear.total == pytest.approx({X: 1.0}, abs=0.05)
+
+
+def test_chosen_vehicle_extends_its_original(found):
+    optimised, _ = found
+    (file,) = optimised.vehicles
+    stiffness = optimised.chosen.variables[X]
+    original = load_vehicle("coach_manchester", [f"primary.stiffness.x={stiffness:.6g}"])
+    written_one = load_vehicle(file)
+    assert written_one.name == "mine, optimised"
+    assert written_one.replace(name=original.name) == original
+    assert "bodies" not in file.read_text()  # nothing but what differs
+    curve = railsim.curving(
+        written_one,
+        railsim.load_track("curve_r250"),
+        radius=[300.0],
+        cant_deficiency=[1.5 * 20.0**2 / (9.81 * 300.0) - 0.15],
+    )
+    assert float(np.sum(curve.T_gamma)) == pytest.approx(optimised.chosen.objectives[0], rel=1e-6)
+
+
+def test_repeated_it_computes_nothing_and_more_evaluations_go_on(found, capsys):
+    optimised, file = found
+    out = str(optimised.folder)
+    before = (optimised.folder / "optimise.json").read_bytes()
+    again = railsim.optimise(file, out=out, workers=1)
+    assert again.computed == 0
+    assert (optimised.folder / "optimise.json").read_bytes() == before
+    command = ["optimise", file, "--out", out, "--workers", "1", "--quiet"]
+    assert main([*command, "--evaluations", "7", "--choose", "2"]) == 0
+    words = capsys.readouterr().out
+    assert "front of 7 in 7 designs" in words
+    assert "mine_chosen.toml" in words
+    chosen = load_vehicle(optimised.folder / "mine_chosen.toml")
+    second = optimised.designs[1].variables[X]
+    assert (
+        chosen.to_toml()
+        == load_vehicle(
+            str(optimised.folder.parent / "mine.toml"), [f"primary.stiffness.x={second}"]
+        )
+        .replace(name=chosen.name)
+        .to_toml()
+    )
+
+
+def test_another_file_is_refused(found, capsys):
+    optimised, _ = found
+    other = written(optimised.folder, STUDY.replace("high = 0.9", "high = 0.8"))
+    try:
+        assert main(["optimise", other, "--out", str(optimised.folder)]) == 2
+    finally:
+        written(optimised.folder)
+    assert "holds another optimisation" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('goal = "maximise"', 'goal = "most"', "optimise.objectives.1.goal"),
+        ("low = 5e6", "low = 5e7", "'low' must be below 'high'"),
+        ('"vehicle.primary', '"track.primary', "no key of a vehicle"),
+        ("high = 0.9", "", "'low' or 'high' is needed"),
+        ("evaluations = 6", 'method = "differential_evolution"', "takes one objective"),
+        ('kind = "curving"', 'kind = "curve"', "analyses.curve"),
+        ("speeds = [20.0]", "", "'speeds' is needed"),
+        ("[optimise]", "[optimize]", "optimize"),
+    ],
+)
+def test_faults_of_the_file(tmp_path, capsys, old, new, words):
+    file = written(tmp_path, STUDY.replace(old, new, 1))
+    assert main(["optimise", file, "--out", str(tmp_path / "o")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_quantity_that_no_run_has(tmp_path):
+    file = written(tmp_path, STUDY.replace("curve.attack", "curve.atack").replace("= 6", "= 1"))
+    with pytest.raises(InputError, match=r"no run has 'curve.atack'.*'curve.attack'"):
+        railsim.optimise(file, out=tmp_path / "o", workers=1)
+
+
+def test_a_study_without_the_table(tmp_path, capsys):
+    assert main(["optimise", "curving_reference", "--out", str(tmp_path / "o")]) == 2
+    assert "optimise: missing" in capsys.readouterr().err
+
+
+def test_the_example_is_a_study():
+    study = load_study("examples/primary_and_yaw_damper.toml")
+    assert study.optimise is not None
+    (vehicle,) = study.vehicles
+    for key in study.optimise.variables:
+        load_vehicle(vehicle, [f"{key.removeprefix('vehicle.')}=1e5"])
+
+
+ANALYSES = {
+    "curve": {"kind": "curving", "radius": 300.0, "cant": 0.15, "cant_deficiency": 0.05},
+    "hunting": {"kind": "critical_speed", "low": 20.0, "high": 60.0},
+    "shape": {"kind": "modes", "linearisation": "harmonic"},
+}
+
+
+def test_analyses_are_columns_of_the_summary(tmp_path):
+    outcome = railsim.study(
+        "coach_manchester", "curve_r250", 20.0, analyses=ANALYSES, out=tmp_path, workers=1
+    )
+    (record,) = outcome.records
+    assert record["status"] == "complete"
+    assert record["file"] == ""
+    assert not list(tmp_path.glob("*.h5"))
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    hunting = railsim.critical_speed(vehicle, track, methods=["linear"], low=20.0, high=60.0)
+    assert record["quantities"]["hunting.linear"] == hunting.linear["speed"]
+    least = railsim.modes(vehicle, track, speed=20.0, linearisation="harmonic").least_damped
+    assert record["quantities"]["shape.damping"] == least.damping_ratio
+    header = (tmp_path / "summary.csv").read_text().splitlines()[0]
+    assert "hunting.linear (m/s)" in header
+    assert "curve.T_gamma (N)" in header
+    again = railsim.study(
+        "coach_manchester", "curve_r250", 20.0, analyses=ANALYSES, out=tmp_path, workers=1
+    )
+    assert again.computed == 0
+
+
+def test_analyses_that_no_speed_counts_for_need_none(tmp_path):
+    analyses = {"curve": ANALYSES["curve"]}
+    outcome = railsim.study(
+        "coach_manchester", "straight", None, analyses=analyses, out=tmp_path, workers=1
+    )
+    assert outcome.records[0]["status"] == "complete"
+
+
+def test_run_with_an_assessment_is_kept_when_only_the_analysis_changes(tmp_path):
+    how = {"out": tmp_path, "workers": 1, "until": 90.0, "resume": True}
+    first = {"wear": {"kind": "assess", "standard": "wear"}}
+    outcome = railsim.study("coach_manchester", "curve_r250", 20.0, analyses=first, **how)
+    (record,) = outcome.records
+    assert record["quantities"]["wear.T_gamma"] > 0.0
+    file = tmp_path / record["file"]
+    written_at = file.stat().st_mtime_ns
+    more = {**first, "shape": ANALYSES["shape"]}
+    outcome = railsim.study("coach_manchester", "curve_r250", 20.0, analyses=more, **how)
+    (second,) = outcome.records
+    assert file.stat().st_mtime_ns == written_at
+    assert second["quantities"]["wear.T_gamma"] == record["quantities"]["wear.T_gamma"]
+    assert "shape.damping" in second["quantities"]

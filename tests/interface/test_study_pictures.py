@@ -1,0 +1,122 @@
+"""`railsim plot` and `railsim compare` on the folders of studies."""
+
+import json
+
+import numpy as np
+import pytest
+from example_result import example_result
+from test_study import COACH, CURVE
+from test_study import simulated as simulated
+
+import railsim
+from railsim.cli import main
+from railsim.compare import differences
+from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
+
+SPEEDS = [10.0, 12.0]
+
+
+@pytest.fixture
+def folder(tmp_path, simulated):
+    railsim.study([COACH, "coach_flexicoil"], CURVE, SPEEDS, grid={"track.friction": [0.3, 0.4]},
+                  out=tmp_path / "s", workers=1)  # fmt: skip
+    return tmp_path / "s"
+
+
+@pytest.mark.parametrize("chosen", [[], ["--kind", "map"], ["Y_over_Q_abs", "--kind", "ranking"]])
+def test_study_is_drawn(folder, capsys, chosen):
+    assert main(["plot", str(folder), *chosen]) == 0
+    assert capsys.readouterr().out.strip() == str(folder / "study.png")
+    assert (folder / "study.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("chosen", "words"),
+    [
+        (["Y_over_Q_ab"], "did you mean 'Y_over_Q_abs'"),
+        (["--against", "fricton"], "'fricton' was not varied; did you mean 'track.friction'"),
+    ],
+)
+def test_what_the_study_lacks_is_refused(folder, capsys, chosen, words):
+    assert main(["plot", str(folder), *chosen]) == 2
+    assert words in capsys.readouterr().err
+    assert not (folder / "study.png").exists()
+
+
+def test_parameters_of_a_study_are_refused_of_a_track(tmp_path, capsys):
+    out = str(tmp_path / "t.png")
+    assert main(["plot", "curve_r250", "--kind", "map", "--out", out]) == 2
+    assert "'curve_r250' is no study's folder" in capsys.readouterr().err
+
+
+VALUES = Column("value", [1.0, 2.0, 3.0, 4.0, None])
+SPEED = Column("speed (m/s)", [10.0, 20.0, 10.0, 20.0, 20.0])
+VEHICLE = Column("vehicle", ["a", "a", "b", "b", "b"])
+
+
+def test_curves_and_bands_hold_the_values():
+    figure = curves_figure([VALUES], SPEED, VEHICLE)
+    first, second = figure.axes[0].get_lines()
+    assert first.get_xydata().tolist() == [[10.0, 1.0], [20.0, 2.0]]
+    assert second.get_xydata().tolist() == [[10.0, 3.0], [20.0, 4.0]]
+    (middle,) = curves_figure([VALUES], SPEED, None).axes[0].get_lines()
+    assert middle.get_ydata().tolist() == [2.0, 3.0]  # medians of 1 and 3, 2 and 4
+    figure = curves_figure([VALUES], VEHICLE, None)
+    assert [t.get_text() for t in figure.axes[0].get_xticklabels()] == ["a", "b"]
+
+
+def test_map_and_ranking_hold_the_values():
+    image = map_figure([VALUES], SPEED, VEHICLE).axes[0].get_images()[0]
+    assert image.get_array().tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    axes = ranking_figure([VALUES], ["p", "q", "r", "s", "t"]).axes[0]
+    assert [bar.get_width() for bar in axes.patches] == [4.0, 3.0, 2.0, 1.0]
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["s", "r", "q", "p"]
+
+
+def test_runs_that_differ_in_the_vehicle_are_compared(folder, capsys):
+    assert main(["compare", str(folder), "--json"]) == 0
+    groups = json.loads(capsys.readouterr().out)["groups"]
+    assert [group["group"] for group in groups] == [
+        f"{CURVE}_{v:g}_friction={f}" for v in SPEEDS for f in (0.3, 0.4)
+    ]
+    assert all(group["results"] == [COACH, "coach_flexicoil"] for group in groups)
+
+
+def test_runs_of_the_same_name_are_compared(tmp_path, simulated, capsys):
+    for name, speeds in (("before", [10.0, 12.0]), ("after", [12.0])):
+        railsim.study(COACH, CURVE, speeds, out=tmp_path / name, workers=1)
+    out = tmp_path / "c"
+    folders = [str(tmp_path / name) for name in ("before", "after")]
+    assert main(["compare", *folders, "--out", str(out)]) == 0
+    printed = capsys.readouterr()
+    assert "1 runs of" in printed.err
+    assert "along the track, leading wheelset" in printed.out
+    assert {path.name for path in out.iterdir()} == {
+        "compare.csv", "compare.json", "compare.png", "differences.png"
+    }  # fmt: skip
+
+
+def test_what_cannot_be_compared_is_refused_with_the_reason(tmp_path, simulated, capsys):
+    railsim.study(COACH, CURVE, SPEEDS, out=tmp_path / "s", workers=1)
+    railsim.study(COACH, CURVE, [20.0], out=tmp_path / "o", workers=1, keep="summary")
+    s, o = str(tmp_path / "s"), str(tmp_path / "o")
+    for given, words in (
+        ([s], "no two runs differ in nothing but the vehicle"),
+        ([o], "no result files"),
+        ([s, o], "no result that all folders have"),
+        ([s, str(tmp_path / "s" / f"{COACH}_{CURVE}_10.h5")], "results and folders together"),
+    ):
+        assert main(["compare", *given]) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_difference_along_the_track_is_that_of_the_values():
+    base, other = example_result(), example_result(gain=0.9)
+    found = differences({"base": base, "lower": other}, ["Y", "wheelset_yaw"])
+    assert [one.labels.get("side") for one in found] == ["left", "right", None]
+    for k in (0, 1):
+        assert found[k].values == pytest.approx(-0.1 * base.Y[:, 0, k], abs=1e-9)
+    value, place = found[2].largest
+    yaw = base["wheelset_yaw"][:, 0]
+    assert abs(value) == pytest.approx(0.1 * np.max(np.abs(yaw)))
+    assert np.interp(place, base["distance"], np.abs(yaw)) == pytest.approx(np.max(np.abs(yaw)))
