@@ -137,14 +137,12 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Nu
     """Largest magnitudes over the wheels or wheelsets, and the wear numbers' sum."""
     import numpy as np
 
-    from railsim.model.assembly import GRAVITY
+    from railsim.assessment.sections import cant_deficiency
     from railsim.stability.curving import FAILED, curving
-    from railsim.track.alignment import CANT_BASE
 
     deficiency = analysis.cant_deficiency
     if deficiency is None:
-        needed = CANT_BASE * case.speed**2 / (GRAVITY * abs(analysis.radius))
-        deficiency = needed - analysis.cant
+        deficiency = cant_deficiency(case.speed, abs(analysis.radius), analysis.cant)
     found = curving(
         case.vehicle,
         radius=[analysis.radius],
