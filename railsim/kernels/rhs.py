@@ -410,8 +410,10 @@ def mechanics(system, work, state, derivative, rails):
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     left = evaluations(system, state, rails)
     keep_counts(work.events, 0, 2)
-    status, where, n_patches = wheel_rail(system, work, speed, state)
-    while left > 0 and status == RUNNING:
+    while True:  # one call only: it becomes part of this function
+        status, where, n_patches = wheel_rail(system, work, speed, state)
+        if left == 0 or status != RUNNING:
+            break
         if rails == AFTER_STEP:
             moved = correct_support(system, work, state, left == MOST_CORRECTIONS)
         else:
@@ -422,7 +424,6 @@ def mechanics(system, work, state, derivative, rails):
         if left == 0:
             work.parts[2] += 1
         keep_counts(work.events, 2, 0)
-        status, where, n_patches = wheel_rail(system, work, speed, state)
     if rails == AFTER_STEP:
         state[-4] = -abs(state[-4])
     if status != RUNNING:

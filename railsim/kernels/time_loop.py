@@ -345,6 +345,12 @@ def settle_limits(internal, curves, first, drive, state):
             state[k] = within_table(curves, internal.curve[i], state[k])
 
 
+@compiled(python=False)
+def balanced_mechanics(system, work, state, derivative):
+    """As `mechanics` for the reference scheme; a function of its own, to compile it only once."""
+    return mechanics(system, work, state, derivative, BALANCED)
+
+
 @compiled(inline=True)
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
@@ -356,7 +362,7 @@ def step_rk4(system, work, state, derivative, stages, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = mechanics(system, work, trial, rate, BALANCED)
+        status, where, _ = balanced_mechanics(system, work, trial, rate)
         if status != RUNNING:
             return status, where
         internal_rates(system, work, trial, rate)
@@ -426,9 +432,11 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
     step, end = first_step, first_step + chunk.steps
     left = np.int64(0)  # parts of a divided step that are still to be taken
     decay, length = work.decay, h
-    rails = BALANCED if scheme == RK4 else AFTER_STEP
     while step < end + chunk.closing:
-        status, where, patches = mechanics(system, work, state, derivative, rails)
+        if scheme == RK4:
+            status, where, patches = balanced_mechanics(system, work, state, derivative)
+        else:
+            status, where, patches = mechanics(system, work, state, derivative, AFTER_STEP)
         if status == RUNNING:
             note_extremes(system, work.wheel, state, work.present, work.extremes)
             if scheme == RK4:
