@@ -10,12 +10,11 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.definitions.layout import Section, cant_sections, curvature_sections
 from railsim.definitions.limits import RunningLimits, Zone
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Service
-
-GRAVITY, CANT_BASE = 9.81, 1.5
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,12 @@ A track without `speed` is not judged.
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.definitions.base import Remark
 
 if TYPE_CHECKING:
     from railsim.definitions.layout import Section
 
-GRAVITY, CANT_BASE = 9.81, 1.5
 HIGH_SPEED = 230.0  # km/h: the cant of high-speed lines from here on
 MOST_CANT, MOST_CANT_HIGH_SPEED = 160.0, 180.0  # mm
 MOST_DEFICIENCY, MOST_EXCESS = 160.0, 110.0  # mm

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
 from railsim.definitions.elements import AxleTorque, Element
 from railsim.definitions.loads import load_faults, loaded
@@ -83,7 +84,6 @@ class FlatElement:
 
 
 KEPT = "_flattened"
-GRAVITY = 9.81  # m/s2
 
 
 @dataclass(frozen=True)

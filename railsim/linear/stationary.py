@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.constants import CANT_BASE
 from railsim.definitions.track import Track
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_columns import W_Q
@@ -21,7 +22,6 @@ from railsim.linear.steady import SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.work import level_track
-from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]

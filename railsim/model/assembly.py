@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.contact.coupling import coupling
 from railsim.contact.creep import creep_law
 from railsim.contact.kalker import creep_tables
@@ -43,10 +44,9 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.element_arrays import ElementArrays
-from railsim.model.work import CONSTANT_SPEED, GRAVITY
+from railsim.model.work import CONSTANT_SPEED
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
-from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from railsim.constants import GRAVITY
 from railsim.definitions.base import Remark
 from railsim.definitions.elements import (
     Airspring,
@@ -28,7 +29,6 @@ from railsim.errors import ModelError
 from railsim.model.assembly import Model, without_rails
 from railsim.model.element_arrays import vertical_support
 from railsim.model.preloads import static_shares
-from railsim.model.work import GRAVITY
 
 Floats = NDArray[np.float64]
 

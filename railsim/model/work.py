@@ -28,7 +28,6 @@ from railsim.kernels.vibration import VIBRATION
 Floats = NDArray[np.float64]
 
 
-GRAVITY = 9.81  # m/s2, as in the reference study
 CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
 
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.constants import GRAVITY
 from railsim.definitions.flatten import flatten
 from railsim.definitions.vehicle import Vehicle
 from railsim.track.alignment import Alignment
 
 Floats = NDArray[np.float64]
-GRAVITY = 9.81
 BOX = 1.0
 """Distance of a sensor on an axlebox from the middle of the wheelset [m]."""
 NEAR = 3.0

@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.constants import CANT_BASE
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -29,7 +30,7 @@ from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
-from railsim.track.alignment import CANT_BASE, Alignment
+from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement
 
 Floats = NDArray[np.float64]

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from railsim.constants import GRAVITY
 from railsim.definitions.flatten import FlatVehicle
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
 from railsim.errors import Fault, InputError
@@ -26,7 +27,6 @@ from railsim.springs.verification_checks import Case
 
 LIKELY = (0.75, 1.25)
 """Load of an axlebox in the vehicle over the load at which the springs are taken."""
-GRAVITY = 9.81
 _DIGITS = 7
 _INNERMOST_ARRAY = re.compile(r"\[\n([^\[\]]+)\]")
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -34,9 +35,8 @@ from railsim.linear.vehicle import WALKING_PACE
 from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
-from railsim.model.work import GRAVITY, work_arrays
+from railsim.model.work import work_arrays
 from railsim.profiles import Profile
-from railsim.track.alignment import CANT_BASE
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]

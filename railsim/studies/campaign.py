@@ -12,6 +12,7 @@ from itertools import product
 from pathlib import Path
 
 from railsim.assessment import Assessment, assess
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.definitions.loading import load_scenario, load_vehicle
 from railsim.definitions.scenario import Scenario, Speed
 from railsim.definitions.vehicle import Service
@@ -25,8 +26,6 @@ from railsim.studies.points import Point, check_number
 from railsim.studies.rows import in_a_name
 from railsim.studies.study import carry_out, cores
 from railsim.version import __version__
-
-GRAVITY, CANT_BASE = 9.81, 1.5
 
 
 @dataclass(frozen=True)

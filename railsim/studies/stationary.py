@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.constants import CANT_BASE
 from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.limits import Constant, StationaryLimits
 from railsim.definitions.settings import Settings
@@ -20,7 +21,6 @@ from railsim.linear.steady import NotConverged
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.result.filters import Floats
-from railsim.track.alignment import CANT_BASE
 
 
 @dataclass(frozen=True)

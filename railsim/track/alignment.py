@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from railsim.constants import CANT_BASE
 from railsim.definitions.layout import (
     Section,
     cant_sections,
@@ -25,9 +26,6 @@ from railsim.definitions.layout import (
 )
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
-
-# Distance between the lines on which the cant is measured, 2 b0 [m].
-CANT_BASE = 1.5
 
 Array = NDArray[np.float64]
 

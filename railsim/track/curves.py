@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from railsim.constants import CANT_BASE, GRAVITY
 from railsim.definitions.layout import Section, cant_sections, curvature_sections
 from railsim.definitions.track import Track
-from railsim.track.alignment import CANT_BASE
 
-GRAVITY = 9.81  # m/s2
 # Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].
 USUAL_CANT_DEFICIENCY = 0.150
 

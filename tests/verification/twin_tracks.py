@@ -11,9 +11,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from railsim.constants import CANT_BASE
 from railsim.definitions.track import Track
 from railsim.simulation import simulate
-from railsim.track.alignment import CANT_BASE, Alignment
+from railsim.track.alignment import Alignment
 from railsim.track.irregularity import displacement
 from railsim.track.tables import track_tables
 
