@@ -56,8 +56,9 @@ def command(
 ) -> int:
     """Put a vehicle on twisted track and on cant, and compare wheel loads and floor with limits.
 
-    Unloading on the twists of EN 14363, 6.1, unloading and angle of the floor on a cant equal to
-    the admissible cant deficiency, and the roll coefficient.
+    Unloading on the twists of EN 14363, 6.1, guiding force in a level curve of R 150 m over the
+    least load on them, unloading and angle of the floor on a cant equal to the admissible cant
+    deficiency, and the roll coefficient.
 
     \b
     Example:

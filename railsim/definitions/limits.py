@@ -262,8 +262,17 @@ class BodyTwist(Sourced):
     """[1]"""
 
 
+class Guiding(Sourced):
+    """Guiding force in a tight level curve over the least wheel load on twisted track."""
+
+    value: Positive
+    """Y/Q [1]"""
+    radius: Positive
+    """Radius of the curve [m]"""
+
+
 class StationaryLimits(FileDefinition):
-    """Tests at a stand: twisted track, cant."""
+    """Tests at a stand: twisted track, cant; and a tight curve at walking pace."""
 
     format: Literal["railsim-stationary-limits/1"]
     """Kind and version of the file"""
@@ -275,6 +284,8 @@ class StationaryLimits(FileDefinition):
     """Twist of the track over the wheelbase of a bogie"""
     body_twist: BodyTwist
     """Twist of the track over the spacing of bogies, or of the axles of a vehicle without"""
+    guiding: Guiding
+    """Y/Q of the leading outer wheel"""
     lean_unloading: Constant
     """(Q0 - Q)/Q0 of the least loaded wheel on a cant equal to the admissible cant deficiency"""
     lean_angle: Constant

@@ -1,7 +1,11 @@
-"""Tests at a stand: unloading on twisted track (EN 14363, 6.1), cant, roll coefficient.
+"""Tests at a stand: unloading and guiding on twisted track (EN 14363, 6.1), cant, roll coefficient.
 
 Each is solved by Newton's method (`railsim.linear.stationary`), the twists to both sides.  A case
 without a steady state is told, and the verdict is then no pass.
+
+Guiding (EN 14363, 6.1, the method with two separate tests): the guiding force Y_a of the leading
+outer wheel at walking pace in a level curve of R 150 m (`railsim.stability.curving`), over the
+least load of that wheelset's wheels on the twists, Y_a/Q_a <= 1.2.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from railsim.assessment.sections import cant_deficiency
 from railsim.constants import CANT_BASE
 from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.limits import Constant, StationaryLimits
@@ -21,6 +26,7 @@ from railsim.linear.steady import NotConverged
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.result.filters import Floats
+from railsim.stability.curving import FAILED, curving
 
 
 @dataclass(frozen=True)
@@ -142,9 +148,12 @@ def stationary(
     def twisted(case: str, heights: Floats) -> Standing | None:
         return found(case, lambda: on_twist(balance, track, heights, held=held))
 
+    loads = []
     for name, heights in twists.items():
         stands = [twisted(name, heights), twisted(name, -heights)]
         values.append(_unloading(name, stands, limits.unloading))
+        loads += [np.nan if stand is None else float(stand.Q[0].min()) for stand in stands]
+    values.append(_guiding(vehicle, track, limits, min(loads), settings, reasons))
     name = f"cant {1e3 * height:g} mm"
     standing = found(name, lambda: on_cant(balance, track, height, held=held))
     values.append(_unloading(name, [standing], limits.lean_unloading))
@@ -201,6 +210,37 @@ def _admissible_cant(vehicle: Vehicle) -> float:
         allowed = "give --cant, or add [service] with cant_deficiency"
         raise InputError([Fault(vehicle.name, "service", "missing", allowed)])
     return vehicle.service.cant_deficiency
+
+
+def _guiding(
+    vehicle: Vehicle,
+    track: Track,
+    limits: StationaryLimits,
+    load: float,
+    settings: Settings | None,
+    reasons: list[str],
+) -> StationaryValue:
+    """Guiding force in the tight curve over the least load [N] of the leading wheelset."""
+    limit = limits.guiding
+    case = f"R {limit.radius:g} m, level"
+    deficiency = cant_deficiency(WALKING_PACE, limit.radius, 0.0)
+    found = curving(
+        vehicle,
+        radius=[limit.radius],
+        cant=0.0,
+        cant_deficiency=[deficiency],
+        track=track,
+        settings=settings,
+    )
+    quotient = float("nan")
+    if found.converged.item() == FAILED:
+        reasons.append(f"{case}: no steady state in the curve")
+    else:
+        outer = 0  # left in a right-hand curve
+        quotient = abs(float(found.Y.reshape(-1, 2)[0, outer])) / load
+    return StationaryValue(
+        case, "guiding Y/Q", quotient, limit.value, "wheelset 1 outer", limit.source, limit.checked
+    )
 
 
 def _unloading(case: str, stands: Sequence[Standing | None], limit: Constant) -> StationaryValue:

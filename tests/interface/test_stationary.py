@@ -9,6 +9,7 @@ import railsim.studies.stationary
 from railsim.cli import main
 from railsim.definitions.loading import load_stationary_limits
 from railsim.linear.steady import NotConverged
+from railsim.stability.curving import curving
 from railsim.studies.stationary import stationary
 
 COACH = ["stationary", "benchmark_vehicle1", "--cant", "0.1"]
@@ -25,6 +26,18 @@ def test_values_of_the_benchmark_coach(capsys):
     assert values["cant", "roll"]["value"] == pytest.approx(0.1899, rel=5e-3)
     slope = 0.1 / 1.5
     assert values["cant", "angle"]["value"] == pytest.approx(slope * 1.1899, rel=2e-3)
+    # guiding: the force of steady curving at walking pace over the least load on both twists
+    steady = curving(
+        railsim.load_vehicle("benchmark_vehicle1"),
+        radius=[-150.0],
+        cant=0.0,
+        cant_deficiency=[1.5 / 9.81 / 150.0],
+        track=railsim.load_track("straight"),
+    )
+    Q = 0.25 * steady.Q.sum() / 2.0 * (1.0 - on_twists[2])
+    guiding = values["R", "guiding"]
+    assert guiding["value"] == pytest.approx(steady.Y.reshape(-1, 2)[0, 1] / Q, rel=5e-3)
+    assert guiding["limit"] == 1.2
     assert found["verdict"] == "pass"
     assert not any(v["checked"] for v in found["values"])
 
