@@ -108,10 +108,16 @@ def test_low_passed_run_has_the_percentiles_of_the_fine_one():
     assert set(runs[200.0]) == {
         "time",
         "distance",
+        "curvature",
+        "cant",
+        "mileage",
         "Q",
         "Q0",
         "wheelset_distance",
         "sensor_acceleration",
+        "sensor_absolute_acceleration",
+        "sensor_displacement",
+        "sensor_velocity",
         "sensor_roll_rate",
     }
     assert "flat to 80 Hz" in runs[200.0].remarks[0]
