@@ -37,7 +37,7 @@ _HOMES = {
     "ExactCreepForce": "exact_creep",
     "HertzContact": "hertzian",
     "build_contact_table": "table",
-    "cached_contact_table": "table",
+    "cached_contact_table": "stored_table",
     "contact_geometry": "geometry",
     "creep_force": "creep",
     "equivalent_conicity": "conicity",
