@@ -1,5 +1,6 @@
 """``railsim compare``: results side by side."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -99,7 +100,7 @@ def _groups(files: tuple[str, ...]) -> "dict[str, dict[str, Result]]":
     """
     from railsim.errors import Fault, InputError
 
-    folders = [file for file in files if Path(file).is_dir()]
+    folders = [file for file in files if os.path.isdir(file)]
     if not folders:
         return {"": _opened(files)}
     if len(folders) < len(files):

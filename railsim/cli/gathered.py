@@ -1,5 +1,6 @@
 """Runs from result files and from folders of studies, for commands that take either."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -52,14 +53,14 @@ def gather(files: Sequence[str]) -> Gathered:
     for file in files:
         path = Path(file)
         try:
-            records = _of_folder(path) if path.is_dir() else [_of_file(path)]
+            records = _of_folder(path) if os.path.isdir(path) else [_of_file(path)]
         except InputError as error:
             faults.extend(error.faults)
             continue
         if not records:
             allowed = "the folder of a study, or one with .h5 files"
             faults.append(Fault(file, "", "no results in this folder", allowed))
-        _add(found, records, path if path.is_dir() else path.parent, prefix=len(files) > 1)
+        _add(found, records, path if os.path.isdir(path) else path.parent, prefix=len(files) > 1)
     names = [record["name"] for record in found.records]
     twice = {name for name in names if names.count(name) > 1} if len(files) > 1 else set()
     faults += [Fault(name, "", "given twice", "give each result once") for name in sorted(twice)]

@@ -1,5 +1,6 @@
 """``railsim plot``: time histories of a result, a study over its parameters, a track in plan."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,7 +84,7 @@ def command(
       railsim plot curve_r250 --out curve.png
     """  # noqa: D301 - click reads the escape
     path = Path(out or file)
-    of_study = Path(file).is_dir()
+    of_study = os.path.isdir(file)
     if not out and path.name:
         path = path / "study.png" if of_study else path.with_suffix(".png")
     check_file(path, overwrite=overwrite, endings=PICTURES)
