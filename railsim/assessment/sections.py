@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.cant import cant_deficiency
 from railsim.definitions.layout import Section, cant_sections, curvature_sections
 from railsim.definitions.limits import RunningLimits, Zone
 from railsim.definitions.track import Track
@@ -53,8 +53,8 @@ class TestSection:
         return 0 if math.isinf(self.radius) else int(math.copysign(1.0, self.radius))
 
 
-def cant_deficiency(speed: float, radius: float, cant: float) -> float:
-    """Cant deficiency V^2 2b0/(g R) - h, positive where the curve is taken too fast [m].
+def outer_deficiency(speed: float, radius: float, cant: float) -> float:
+    """Return the cant deficiency towards the outer rail, the cant on straight track [m].
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def cant_deficiency(speed: float, radius: float, cant: float) -> float:
 
     Examples
     --------
-    >>> round(cant_deficiency(20.0, 250.0, 0.15), 4)
+    >>> round(outer_deficiency(20.0, -250.0, -0.15), 4)
     0.0946
     """
     if math.isinf(radius):
         return abs(cant)
-    return speed**2 * CANT_BASE / (GRAVITY * abs(radius)) - math.copysign(1.0, radius) * cant
+    return math.copysign(1.0, radius) * cant_deficiency(speed, 1.0 / radius, cant)
 
 
 def track_sections(
@@ -100,7 +100,7 @@ def track_sections(
         if begin >= end:
             continue
         speed = speed_at(0.5 * (begin + end))
-        deficiency = cant_deficiency(speed, radius, cant)
+        deficiency = outer_deficiency(speed, radius, cant)
         zone = zone_of(radius, deficiency, limits)
         length = section_length(limits.zones[zone], speed) if zone else end - begin
         reason = "" if zone else f"no zone has the radius {abs(radius):.6g} m"
@@ -112,7 +112,7 @@ def track_sections(
         for number in range(whole):
             first = begin + number * length
             speed = speed_at(first + 0.5 * length)
-            deficiency = cant_deficiency(speed, radius, cant)
+            deficiency = outer_deficiency(speed, radius, cant)
             why = reason or _outside(limits.zones[zone], radius, deficiency, speed, service)
             found.append(TestSection(zone, first, first + length, radius, deficiency, speed, why))
     return found

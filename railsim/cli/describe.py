@@ -327,7 +327,7 @@ def _row(section: "Section") -> dict[str, Any]:
 def _plan_row(
     section: "Section", cant: Sequence["Section"], curve: "Curve | None", speeds: Sequence[float]
 ) -> dict[str, Any]:
-    from railsim.track.curves import cant_at
+    from railsim.definitions.alignment_rules import cant_at
 
     row = _row(section)
     row["radii"] = tuple(1.0 / k if k else math.inf for k in row.pop("values"))

@@ -12,10 +12,11 @@ with V in km/h and cant d, deficiency I in mm over the cant base of 1.5 m:
 A track without `speed` is not judged.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.cant import cant_deficiency
 from railsim.definitions.base import Remark
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def alignment_remarks(
     ]
 
 
-def height(cant: Sequence["Section"], s: float) -> float:
+def cant_at(cant: Sequence["Section"], s: float) -> float:
     """Cant at an arc length [m]; the last value continues."""
     for section in cant:
         if s <= section.end:
@@ -58,17 +59,12 @@ def height(cant: Sequence["Section"], s: float) -> float:
     return cant[-1].end_value if cant else 0.0
 
 
-def deficiency(kappa: float, cant: float, speed: float) -> float:
-    """Cant deficiency, positive towards the outer rail of a right-hand curve [mm]."""
-    return 1e3 * (CANT_BASE * speed**2 * kappa / GRAVITY - cant)
-
-
 def _cants(plan: Sequence["Section"], cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
     most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
     for section in plan:
         if section.type != "CIR":
             continue
-        d = 1e3 * abs(height(cant, 0.5 * (section.begin + section.end)))
+        d = 1e3 * abs(cant_at(cant, 0.5 * (section.begin + section.end)))
         radius = 1.0 / abs(section.start_value)
         if d > most * ROUND_OFF:
             yield Remark(section.key, f"a cant of {d:.0f} mm is more than {most:g} mm")
@@ -95,8 +91,8 @@ def _deficiencies(
         if section.type != "CIR":
             continue
         kappa = section.start_value
-        h = height(cant, 0.5 * (section.begin + section.end))
-        outwards = deficiency(kappa, h, speed) * (1.0 if kappa > 0.0 else -1.0)
+        h = cant_at(cant, 0.5 * (section.begin + section.end))
+        outwards = 1e3 * math.copysign(1.0, kappa) * cant_deficiency(speed, kappa, h)
         at = f"at {3.6 * speed:.0f} km/h"
         if outwards > MOST_DEFICIENCY * ROUND_OFF:
             text = f"a cant deficiency of {outwards:.0f} mm {at} is more than {MOST_DEFICIENCY:g}"
@@ -112,9 +108,9 @@ def _transitions(
     for section in plan:
         if section.type != "CLO":
             continue
-        heights = [height(cant, s) for s in (section.begin, section.end)]
+        heights = [cant_at(cant, s) for s in (section.begin, section.end)]
         values = (section.start_value, section.end_value)
-        ends = [deficiency(k, h, speed) for k, h in zip(values, heights, strict=True)]
+        ends = [1e3 * cant_deficiency(speed, k, h) for k, h in zip(values, heights, strict=True)]
         change = abs(ends[1] - ends[0]) / section.length * speed
         if change > CHANGE * ROUND_OFF:
             beyond = ", and than 90" if change > CHANGE_EXCEPTIONAL * ROUND_OFF else ""

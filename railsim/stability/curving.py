@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.cant import curve_speed
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -274,8 +274,7 @@ def _check(
 
 
 def _speed(radius: float, cant: float, deficiency: float) -> float:
-    square = GRAVITY * abs(radius) * (cant + deficiency) / CANT_BASE
-    return math.sqrt(square) if square > 0.0 else math.nan
+    return curve_speed(radius, cant + deficiency) or math.nan
 
 
 @dataclass(frozen=True)

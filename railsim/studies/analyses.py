@@ -137,12 +137,12 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Nu
     """Largest magnitudes over the wheels or wheelsets, and the wear numbers' sum."""
     import numpy as np
 
-    from railsim.assessment.sections import cant_deficiency
+    from railsim.cant import cant_deficiency
     from railsim.stability.curving import FAILED, curving
 
     deficiency = analysis.cant_deficiency
     if deficiency is None:
-        deficiency = cant_deficiency(case.speed, abs(analysis.radius), analysis.cant)
+        deficiency = cant_deficiency(case.speed, 1.0 / abs(analysis.radius), analysis.cant)
     found = curving(
         case.vehicle,
         radius=[analysis.radius],

@@ -4,7 +4,6 @@ It is carried out as a study is: with its journal, index and summary, and a run 
 with the same inputs is not computed again.
 """
 
-import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from itertools import product
 from pathlib import Path
 
 from railsim.assessment import Assessment, assess
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.cant import curve_speed
 from railsim.definitions.loading import load_scenario, load_vehicle
 from railsim.definitions.scenario import Scenario, Speed
 from railsim.definitions.vehicle import Service
@@ -188,4 +187,4 @@ def part_speed(speed: Speed, service: Service) -> float:
     if speed.admissible is not None:
         return speed.admissible * service.admissible_speed
     deficiency = (speed.cant_deficiency or 0.0) * service.cant_deficiency
-    return math.sqrt(GRAVITY * (speed.radius or 0.0) * (speed.cant + deficiency) / CANT_BASE)
+    return curve_speed(speed.radius or 0.0, speed.cant + deficiency)

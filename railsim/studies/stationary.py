@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.assessment.sections import cant_deficiency
+from railsim.cant import cant_deficiency
 from railsim.constants import CANT_BASE
 from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.limits import Constant, StationaryLimits
@@ -153,7 +153,7 @@ def stationary(
         stands = [twisted(name, heights), twisted(name, -heights)]
         values.append(_unloading(name, stands, limits.unloading))
         loads += [np.nan if stand is None else float(stand.Q[0].min()) for stand in stands]
-    values.append(_guiding(vehicle, track, limits, min(loads), settings, reasons))
+    values.append(_guiding(vehicle, track, limits, float(np.min(loads)), settings, reasons))
     name = f"cant {1e3 * height:g} mm"
     standing = found(name, lambda: on_cant(balance, track, height, held=held))
     values.append(_unloading(name, [standing], limits.lean_unloading))
@@ -223,7 +223,7 @@ def _guiding(
     """Guiding force in the tight curve over the least load [N] of the leading wheelset."""
     limit = limits.guiding
     case = f"R {limit.radius:g} m, level"
-    deficiency = cant_deficiency(WALKING_PACE, limit.radius, 0.0)
+    deficiency = cant_deficiency(WALKING_PACE, 1.0 / abs(limit.radius), 0.0)
     found = curving(
         vehicle,
         radius=[limit.radius],

@@ -1,10 +1,9 @@
 """The circular curves of a track: the speeds that suit their cant."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from railsim.constants import CANT_BASE, GRAVITY
+from railsim.cant import cant_deficiency, curve_speed
+from railsim.definitions.alignment_rules import cant_at
 from railsim.definitions.layout import Section, cant_sections, curvature_sections
 from railsim.definitions.track import Track
 
@@ -42,12 +41,11 @@ class Curve:
 
     def speed(self, cant_deficiency: float) -> float:
         """Speed with some cant deficiency, 0 where there is none [m/s]."""
-        height = max(self.cant + cant_deficiency, 0.0)
-        return math.sqrt(height * GRAVITY / (CANT_BASE * abs(self.curvature)))
+        return curve_speed(1.0 / self.curvature, max(self.cant + cant_deficiency, 0.0))
 
     def cant_deficiency(self, speed: float) -> float:
         """Cant deficiency at a speed, 2 b0 V^2 kappa/g - cant, negative: cant excess [m]."""
-        return CANT_BASE * speed**2 * abs(self.curvature) / GRAVITY - self.cant
+        return cant_deficiency(speed, abs(self.curvature), self.cant)
 
 
 def curves(track: Track) -> tuple[Curve, ...]:
@@ -68,11 +66,3 @@ def curves(track: Track) -> tuple[Curve, ...]:
             height = cant_at(cant, 0.5 * (section.begin + section.end))
             found.append(Curve(section, curvature, height if curvature > 0.0 else -height))
     return tuple(found)
-
-
-def cant_at(cant: Sequence[Section], s: float) -> float:
-    """Cant at an arc length, the last one beyond the sections [m]."""
-    for section in cant:
-        if s < section.end:
-            return section.value(s)
-    return cant[-1].end_value if cant else 0.0
