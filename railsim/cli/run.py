@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from railsim.studies.case import Case
 
 
+MOST_CURVES = 3  # with a table each; more are listed, one line each
+
+
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
 @click.argument("track", metavar="TRACK", shell_complete=names_of("track"))
@@ -307,8 +310,12 @@ def _report_lines(result: "Result", path: Path) -> list[str]:
         "",
         *(peak_lines(result, peaks(result)) if len(result["time"]) else ()),
     ]
-    for curve in mid_curves(result):
-        lines += ["", *_mid_curve_lines(result, curve)]
+    curves = mid_curves(result)
+    if len(curves) > MOST_CURVES:
+        lines += ["", *_curve_list(result, curves)]
+    else:
+        for curve in curves:
+            lines += ["", *_mid_curve_lines(result, curve)]
     return [*lines, "", str(path)]
 
 
@@ -366,6 +373,20 @@ def _with_scatter(quantity: "Quantity", values: "Array", scatter: "Array") -> li
         zero = float(around) == 0.0 if around != "nan" else True
         cells.append(quantity.text(value) + ("" if zero else f" ± {around}"))
     return cells
+
+
+def _curve_list(result: "Result", curves: "Sequence[MidCurve]") -> list[str]:
+    """Return one line for each curve: the largest median of each quantity over all wheels."""
+    names = list(curves[0].medians)
+    rows = []
+    for curve in curves:
+        largest = {peak.quantity.name: peak for peak in curve.median_peaks}
+        begin, end = curve.full_curve
+        cells = [largest[n].quantity.text(largest[n].value) if n in largest else "" for n in names]
+        rows.append([f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}", *cells])
+    header = ["Full curves, largest medians", "s (m)"]
+    header += [f"{n} ({result.quantities[n].shown_unit})" for n in names]
+    return table(header, rows, numbers=1)
 
 
 def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.kernels.support import SETTLED
+from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, PLACE
 from railsim.notation import SIDES
 from railsim.simulation.advance import Run
@@ -124,13 +124,16 @@ def _place(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], wo
 
 
 def unsettled_rails(evaluations: int) -> tuple[str, ...]:
-    """Remark on forces on elastic rails that the corrections of `kernels.support` did not find."""
+    """Remark on evaluations that took all corrections that `kernels.support` allows.
+
+    Whether the last of them was enough is not evaluated.
+    """
     if evaluations == 0:
         return ()
     return (
-        f"In {evaluations} evaluations the forces between wheels and elastic rails differ from "
-        f"those of the rails' motion by more than {SETTLED:.2%} of the static wheel load: repeat "
-        "the run with half the step (settings.step).",
+        f"In {evaluations} evaluations the forces between wheels and elastic rails took all "
+        f"{MOST_CORRECTIONS} corrections and may be off by more than {SETTLED:.2%} of the static "
+        "wheel load: --check-step shows whether that matters.",
     )
 
 
