@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+import railsim.contact.stored_table  # uses the class that the fixture replaces
 import railsim.contact.table
 from railsim.contact.table import TableGrid
 

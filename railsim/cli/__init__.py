@@ -45,6 +45,7 @@ COMMANDS = {
     "critical-speed": ("critical_speed", "Linear and non-linear critical speed."),
     "curving": ("curving", "Steady curving over radius, cant deficiency and friction."),
     "stationary": ("stationary", "Standing on twisted track and on cant, against limits."),
+    "wear": ("wear", "Wheel profile over the distance run, with the worn profile run again."),
     "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
     "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
     "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),

@@ -1,8 +1,7 @@
 """Critical speeds over conicity, friction or any key of the files, point by point over the cores.
 
 Each point is kept in the folder as it is done, under a name that hashes its inputs: the same
-command goes on where it was interrupted.  A kept point holds the CRC-32 of its record; a damaged
-one is computed again.
+command goes on where it was interrupted.  A damaged point is computed again.
 """
 
 import hashlib
@@ -10,7 +9,6 @@ import json
 import logging
 import multiprocessing
 import os
-import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -20,14 +18,13 @@ from typing import Any
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, RailsimError
-from railsim.files import TABLE_BYTES, make_folder, read_text, whole_file
+from railsim.errors import InputError, RailsimError
 from railsim.stability.critical_speed import critical_speed
+from railsim.studies.kept import Record, keep, read_kept
 from railsim.threads import one_thread_each
 from railsim.version import __version__
 
 Progress = Callable[[float], None]
-Record = dict[str, Any]
 
 _LOG = logging.getLogger(__name__)
 
@@ -87,7 +84,7 @@ def stability_map(
     for number, path in enumerate(kept):
         if path is not None and path.exists() and not overwrite:
             try:
-                found[number] = _read(path)
+                found[number] = read_kept(path)
             except InputError as error:
                 (on_remark or _LOG.warning)(f"{error.faults[0]}: it is computed again")
     tell = progress or (lambda _: None)
@@ -98,9 +95,7 @@ def stability_map(
         found[number] = record
         path = kept[number]
         if path is not None:
-            make_folder(path.parent)
-            with whole_file(path) as partial:
-                partial.write_text(_text(record), encoding="utf-8")
+            keep(path, record)
         tell(len(found) / len(jobs))
     return [found[number] for number in range(len(jobs))]
 
@@ -142,32 +137,3 @@ def _kept(folder: Path | None, job: tuple[MapPoint, dict[str, Any]]) -> Path | N
     files = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
     text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
-
-
-def _text(record: Record) -> str:
-    """Record of a kept point as JSON, with the CRC-32 of the record's own JSON."""
-    return json.dumps({"crc32": _crc(record), "record": record})
-
-
-def _crc(record: Any) -> str:
-    # what is read is written again in the same words: order and all digits of numbers are kept
-    return f"{zlib.crc32(json.dumps(record).encode()):08x}"
-
-
-def _read(path: Path) -> Record:
-    """Record of a kept point.
-
-    Raises
-    ------
-    InputError : it cannot be read, or is not as it was written.
-    """
-    text = read_text(path, TABLE_BYTES)
-    try:
-        kept = json.loads(text)
-        whole = kept["crc32"] == _crc(kept["record"])
-    except (ValueError, TypeError, KeyError, RecursionError):
-        whole = False
-    if not whole:
-        raise InputError([Fault(str(path), "", "not as it was written", "")])
-    record: Record = kept["record"]
-    return record

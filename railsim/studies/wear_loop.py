@@ -4,12 +4,19 @@ All wheels have one profile: their wear is averaged, as on a train that runs bot
 turned.
 """
 
+import hashlib
+import json
+import logging
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from railsim.assessment.wear_depth import worn_depth, worn_profile
+from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -19,6 +26,19 @@ from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.filters import Floats
 from railsim.simulation import simulate
+from railsim.studies.kept import keep, read_kept
+from railsim.version import __version__
+
+AMPLITUDE = 3e-3  # m, at which EN 15302 compares equivalent conicities
+_LOG = logging.getLogger(__name__)
+
+
+class Route(NamedTuple):
+    """A track, the speed on it [m/s] and its share of the distance, in any unit."""
+
+    track: Track
+    speed: float
+    share: float
 
 
 @dataclass(frozen=True)
@@ -27,15 +47,16 @@ class WearStep:
 
     Attributes
     ----------
-    distance : float
-        Distance run before the step [m].
+    distance, length : float
+        Distance run before the step, and in it [m].
     profile, worn : Profile
         Wheel profile in this step, and after it.
-    depth : float64[place]
+    depth : float64[position]
         Its depth of wear per distance, mean of all wheels, over `wear_depth.grid` [m/m].
     """
 
     distance: float
+    length: float
     profile: Profile
     worn: Profile
     depth: Floats
@@ -48,7 +69,10 @@ def wear_loop(
     step: float,
     steps: int,
     settings: Settings | None = None,
+    folder: Path | None = None,
     on_step: Callable[[WearStep], None] | None = None,
+    on_remark: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[WearStep]:
     """Wear of a vehicle's wheels over distance, with the worn profile back in the simulation.
 
@@ -56,7 +80,7 @@ def wear_loop(
     ----------
     vehicle : Vehicle
         All its wheels have one profile.
-    routes : sequence of (Track, float, float)
+    routes : sequence of Route or (Track, float, float)
         Tracks with their speeds [m/s] and shares of the distance.
     step : float
         Distance between two updates of the profile [m]: so short that no step wears off more
@@ -65,46 +89,173 @@ def wear_loop(
         Number of updates.
     settings : Settings, optional
         `outputs.contact_patches` is switched on.
+    folder : Path, optional
+        Where finished steps are kept: the same call, or one with more steps, goes on after them.
     on_step : callable, optional
         Called after each step.
+    on_remark : callable, optional
+        Called with a sentence on every kept step that is damaged and computed again; by default
+        these go to the log.
+    progress : callable, optional
+        Called with the finished fraction now and then.
 
     Raises
     ------
-    InputError : different profiles; no route; a step that wears off too much.
+    InputError : different profiles; no route, or one without a share; no step; a step that wears
+        off too much.
     ModelError : a run ended early.
     """
-    names = {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
-    if len(names) != 1 or not routes:
-        found = f"{len(names)} wheel profiles" if routes else "no route"
-        raise InputError([Fault("vehicle", "profile", found, "one for all wheels, and a route")])
-    (name,) = names
+    name = _profile_name(vehicle)
+    ways = [Route(*route) for route in routes]
+    _check(ways, step, steps)
     given = settings or Settings()
     outputs = given.outputs.model_copy(update={"contact_patches": True})
     given = given.model_copy(update={"outputs": outputs})
-    profile, found_steps = load_profile(name), []
+    tell, remark = progress or (lambda _: None), on_remark or _LOG.warning
+    profile, found = load_profile(name), []
     for number in range(steps):
-        depth = np.zeros(0)
-        total = sum(share for _, _, share in routes)
-        for track, speed, share in routes:
-            profiles = _profiles(track, name, profile)
-            result = simulate(vehicle, track, speed=speed, settings=given, profiles=profiles)
-            own = share / total * _mean_depth(result)
-            depth = own if not depth.size else depth + own
+        path = None if folder is None else folder / _file_name(vehicle, ways, given, step, profile)
+        depth = _kept(path, remark)
+        if depth is None:
+
+            def part(share: float, before: int = number) -> None:
+                tell((before + share) / steps)
+
+            depth = _depth(vehicle, ways, given, {name: profile}, part)
+            if path is not None:
+                keep(path, {"distance": number * step, "depth": depth.tolist()})
         worn = worn_profile(profile, depth, step)
-        done = WearStep(number * step, profile, worn, depth)
-        found_steps.append(done)
+        done = WearStep(number * step, step, profile, worn, depth)
+        found.append(done)
+        tell((number + 1) / steps)
         if on_step is not None:
             on_step(done)
         profile = worn
-    return found_steps
+    return found
 
 
-def _profiles(track: Track, name: str, profile: Profile) -> dict[str, Profile]:
-    return {**{rail: load_profile(rail) for rail in track.rail}, name: profile}
+def wear_rows(
+    found: Sequence[WearStep], vehicle: Vehicle, track: Track
+) -> list[dict[str, float | None]]:
+    """What was worn off after each step.
+
+    Parameters
+    ----------
+    found : sequence of WearStep
+        Of `wear_loop`, from its beginning.
+    vehicle, track : Vehicle, Track
+        Wheelset and rails for the equivalent conicity.
+
+    Returns
+    -------
+    list of dict
+        The new wheel, then the wheel after each step: `distance` [m], `area` [m2], `deepest` [m]
+        and its position `deepest_y` from the tape circle [m], all since the beginning, and
+        `equivalent_conicity` at 3 mm (EN 15302), None where there is none.
+    """
+    if not found:
+        return []
+    new = found[0].profile
+    wheels = [(0.0, new), *((done.distance + done.length, done.worn) for done in found)]
+    return [_row(distance, new, worn, vehicle, track) for distance, worn in wheels]
+
+
+def _row(
+    distance: float, new: Profile, worn: Profile, vehicle: Vehicle, track: Track
+) -> dict[str, float | None]:
+    lost = np.asarray(new.z) - np.asarray(worn.z)
+    at = int(np.argmax(lost))
+    (wheelset, *_) = (body.wheelset for body in flatten(vehicle).bodies if body.wheelset)
+    left, right = (load_profile(rail) for rail in track.rail)
+    geometry = contact_geometry(
+        worn, (left, right), wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
+    )  # fmt: skip
+    (conicity,) = geometry.equivalent_conicity([AMPLITUDE])
+    return {
+        "distance": distance,
+        "area": float(np.trapezoid(lost, new.y)),
+        "deepest": float(lost[at]),
+        "deepest_y": float(new.y[at]),
+        "equivalent_conicity": float(conicity) if math.isfinite(conicity) else None,
+    }
+
+
+def _profile_name(vehicle: Vehicle) -> str:
+    names = {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
+    if len(names) != 1:
+        found = f"{len(names)} wheel profiles"
+        raise InputError([Fault("vehicle", "profile", found, "one for all wheels")])
+    return names.pop()
+
+
+def _check(routes: Sequence[Route], step: float, steps: int) -> None:
+    faults = []
+    if not routes:
+        faults.append(Fault("wear", "routes", "no route", "one at least"))
+    for route in routes:
+        if not (route.share > 0.0 and math.isfinite(route.share)):
+            name = route.track.name
+            faults.append(Fault("wear", "share", f"found {route.share:g} for {name}", "above 0"))
+    if not (step > 0.0 and math.isfinite(step)):
+        faults.append(Fault("wear", "step", f"found {step:g} m", "above 0"))
+    if steps < 1:
+        faults.append(Fault("wear", "steps", f"found {steps}", "1 or more"))
+    if faults:
+        raise InputError(faults)
+
+
+def _file_name(
+    vehicle: Vehicle, routes: Sequence[Route], settings: Settings, step: float, profile: Profile
+) -> str:
+    """Name of the file of a step: a hash of all that its wear depends on."""
+    rails = {rail for route in routes for rail in route.track.rail}
+    inputs: list[Any] = [
+        __version__, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
+        [(route.track.to_toml(), route.speed, route.share) for route in routes],
+        [load_profile(rail).key().hex() for rail in sorted(rails)],
+    ]  # fmt: skip
+    return f"{hashlib.sha256(json.dumps(inputs).encode()).hexdigest()[:24]}.json"
+
+
+def _kept(path: Path | None, remark: Callable[[str], None]) -> Floats | None:
+    """Wear of a step that was computed before."""
+    if path is None or not path.exists():
+        return None
+    try:
+        return np.asarray(read_kept(path)["depth"], dtype=np.float64)
+    except InputError as error:
+        remark(f"{error.faults[0]}: it is computed again")
+        return None
+
+
+def _depth(
+    vehicle: Vehicle,
+    routes: Sequence[Route],
+    settings: Settings,
+    worn: dict[str, Profile],
+    progress: Callable[[float], None],
+) -> Floats:
+    """Depth of wear per distance, mean of all wheels and of the routes by their shares."""
+    total = sum(route.share for route in routes)
+    depths = []
+    for number, (track, speed, share) in enumerate(routes):
+
+        def part(done: float, before: int = number) -> None:
+            progress((before + done) / len(routes))
+
+        rails = {rail: load_profile(rail) for rail in track.rail}
+        result = simulate(
+            vehicle, track, speed=speed, settings=settings, profiles=rails | worn, progress=part
+        )
+        depths.append(share / total * _mean_depth(result))
+    return np.asarray(np.sum(depths, axis=0))
 
 
 def _mean_depth(result: Result) -> Floats:
     if result.status != "complete":
-        raise ModelError(f"a run of the wear loop ended early: {result.status}")
+        raise ModelError(
+            f"a run of the wear loop ended early: {result.status}, "
+            f"{result.attributes['status_reason']}"
+        )
     depths = [worn_depth(result, w, side) for w in range(len(result.wheelsets)) for side in (0, 1)]
     return np.asarray(np.mean(depths, axis=0))

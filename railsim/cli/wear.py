@@ -1,0 +1,172 @@
+"""``railsim wear``: wheel profile over the distance run, with the worn profile run again."""
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from railsim.cli.common import (
+    Speed,
+    echo,
+    json_option,
+    load_option,
+    names_of,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+    table,
+)
+from railsim.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from railsim.profiles import Profile
+    from railsim.studies.wear_loop import Route, WearStep
+
+FILES = ("wear.json", "wear.png")
+STEPS = "steps"  # folder of the finished steps
+MOST_STEPS = 1000
+
+
+@click.command()
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
+@click.option(
+    "--route", "routes", required=True, multiple=True, type=(str, Speed(), float),
+    metavar="TRACK V SHARE", help="A track, its speed in m/s or with a unit, and its share of the "
+    "distance in any unit; may be repeated.",
+)  # fmt: skip
+@click.option("--distance", required=True, type=float, metavar="KM", help="Distance to run in km.")
+@click.option(
+    "--step", required=True, type=float, metavar="KM",
+    help="Distance in km after which the worn profile is put back into the simulation.",
+)  # fmt: skip
+@click.option("--out", metavar="DIR", help="Folder for wear.json, wear.png and the profiles.")
+@click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
+@load_option
+@set_option
+@overwrite_option
+@json_option
+@quiet_option
+def command(
+    vehicle: str,
+    routes: tuple[tuple[str, float, float], ...],
+    distance: float,
+    step: float,
+    out: str | None,
+    settings: str | None,
+    load: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Wear the wheels of a vehicle on a mix of tracks, and run again with the worn profile.
+
+    Each step runs every track once with the wheel profile of the step, averages the wear of all
+    wheels and takes it off the profile.  With --out finished steps are kept: the same command goes
+    on after them, and one with a longer distance and --overwrite too.
+
+    \b
+    Example:
+      railsim wear coach_manchester --route curve_r500 20 0.3 --route straight 40 0.7 \\
+          --distance 6000 --step 1000 --out worn
+    """  # noqa: D301 - click reads the escape
+    from railsim.cli.analysis import Folder, load_inputs
+    from railsim.studies.wear_loop import Route, wear_loop, wear_rows
+
+    steps = _number_of_steps(distance, step)
+    inputs = [load_inputs(vehicle, name, settings, assignments, load) for name, _, _ in routes]
+    ways = [
+        Route(one.track, speed, share)
+        for one, (_, speed, share) in zip(inputs, routes, strict=True)
+    ]
+    profiles = [f"wheel_{1e-3 * at:g}_km.csv" for at in _ends(steps, 1e3 * step)]
+    folder = Folder(out, (*FILES, *profiles), overwrite)
+    coach = inputs[0].vehicle
+    with progress_bar("wear", quiet=quiet) as progress:
+        found = wear_loop(
+            coach, ways, step=1e3 * step, steps=steps, settings=inputs[0].settings,
+            folder=None if folder.path is None else folder.path / STEPS, progress=progress,
+            on_remark=lambda words: echo(f"remark: {words}", err=True),
+        )  # fmt: skip
+    rows = wear_rows(found, coach, ways[0].track)
+    record = {
+        "vehicle": coach.name,
+        "routes": [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways],
+        "step": 1e3 * step,
+        "rows": rows,
+    }
+    folder.write_json(FILES[0], record)
+    if folder.path is not None:
+        from railsim.plot.wear import wear_figure
+
+        for name, done in zip(profiles, found, strict=True):
+            folder.written.append(_write_profile(folder.path / name, done.worn))
+        title = f"{coach.name}: wear of the wheels"
+        folder.write_picture(FILES[1], wear_figure(_wheels(found), rows, title))
+    if as_json:
+        print_json(record)
+        return
+    echo("\n".join(_lines(coach.name, ways, rows)))
+    folder.tell()
+
+
+def _number_of_steps(distance: float, step: float) -> int:
+    from railsim.errors import Fault, InputError
+
+    faults = [
+        Fault(option, "", f"found {value:g}", "above 0")
+        for option, value in (("--distance", distance), ("--step", step))
+        if not 0.0 < value < float("inf")
+    ]
+    if faults:
+        raise InputError(faults)
+    steps = round(distance / step)
+    if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
+        found = f"found {step:g} km with a distance of {distance:g} km"
+        allowed = f"the distance divided by a whole number from 1 to {MOST_STEPS}"
+        raise InputError([Fault("--step", "", found, allowed)])
+    return steps
+
+
+def _ends(steps: int, step: float) -> list[float]:
+    return [(number + 1) * step for number in range(steps)]
+
+
+def _wheels(found: "list[WearStep]") -> "list[tuple[float, Profile]]":
+    """Distance [m] and wheel, from the new one on."""
+    return [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
+
+
+def _write_profile(path: "Path", profile: "Profile") -> "Path":
+    """Write a profile so that it can stand in a vehicle file."""
+    from railsim.files import whole_file
+
+    lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
+    lines += [f"{1e3 * y:.6f},{1e3 * z:.6f}" for y, z in zip(profile.y, profile.z, strict=True)]
+    with whole_file(path) as partial:
+        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def _lines(vehicle: str, ways: "list[Route]", rows: "list[dict[str, float | None]]") -> list[str]:
+    total = sum(way.share for way in ways)
+    shares = ", ".join(
+        f"{way.share / total:.0%} {way.track.name} at {way.speed:g} m/s" for way in ways
+    )
+    cells = []
+    for row in rows:
+        conicity = row["equivalent_conicity"]
+        worn = bool(row["area"])
+        cells.append([
+            f"{1e-3 * (row['distance'] or 0.0):g}",
+            f"{1e6 * (row['area'] or 0.0):.2f}",
+            f"{1e3 * (row['deepest'] or 0.0):.3f}",
+            f"{1e3 * (row['deepest_y'] or 0.0):.1f}" if worn else "",
+            "" if conicity is None else f"{conicity:.3f}",
+        ])  # fmt: skip
+    header = ["distance (km)", "worn area (mm2)", "deepest (mm)", "at y (mm)", "conicity at 3 mm"]
+    note = "Pearce and Sherratt (1991), mean of all wheels; y from the tape circle, flange negative"
+    return [vehicle, f"  {shares}", f"  {note}", "", *table(header, cells, numbers=0)]

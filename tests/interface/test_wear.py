@@ -1,0 +1,86 @@
+"""`railsim wear`: steps of wear, files, going on after an end, bad input."""
+
+import json
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.cli import main
+from railsim.profiles import load_profile
+
+SHORT = """format = "railsim-track/1"
+name = "some metres of a curve"
+plan = [{ type = "CIR", length = 6.0, radius = 1500.0 }]
+cant = [{ type = "CST", length = 6.0, cant = 0.05 }]
+"""
+
+
+@pytest.fixture
+def command(tmp_path):
+    track = tmp_path / "short.toml"
+    track.write_text(SHORT)
+    return [
+        "wear", "coach_manchester", "--route", str(track), "72km/h", "1", "--step", "100",
+        "--set", 'settings.start_state="steady"', "--out", str(tmp_path / "worn"), "--quiet",
+    ]  # fmt: skip
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys, monkeypatch):
+    folder = tmp_path / "worn"
+    assert main([*command, "--distance", "100", "--json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    (kept,) = (folder / "steps").iterdir()
+    content = kept.read_bytes()
+    # the second hundred kilometres only; the first are read
+    runs = []
+    simulate = railsim.studies.wear_loop.simulate
+    monkeypatch.setattr(
+        "railsim.studies.wear_loop.simulate",
+        lambda *given, **more: (runs.append(more["profiles"]), simulate(*given, **more))[1],
+    )
+    assert main([*command, "--distance", "200", "--overwrite"]) == 0
+    told = capsys.readouterr().out
+    assert len(runs) == 1
+    assert kept.read_bytes() == content
+    record = json.loads((folder / "wear.json").read_text())
+    assert record["rows"][:2] == first["rows"]
+    new, once, twice = record["rows"]
+    assert new["area"] == 0.0 < once["area"] < twice["area"]
+    assert [row["distance"] for row in record["rows"]] == [0.0, 1e5, 2e5]
+    (line,) = [line for line in told.splitlines() if line.split()[:1] == ["200"]]
+    assert f"{1e6 * twice['area']:.2f}" in line
+    assert (folder / "wear.png").stat().st_size > 10_000
+    # the last profile can stand in a vehicle file; it has lost what the table says.  A profile
+    # that is read has z = 0 on the tape circle, which has worn: the flange tells by how much
+    worn, wheel = load_profile(str(folder / "wheel_200_km.csv"), "wheel"), load_profile("S1002")
+    y = np.linspace(-0.06, 0.05, 5001)
+    lost = np.interp(y, wheel.y, wheel.z) - np.interp(y, worn.y, worn.z)
+    assert np.trapezoid(lost - lost.min(), y) == pytest.approx(twice["area"], rel=0.1)
+    # damage: told and computed again
+    kept.write_bytes(content.replace(b"0", b"1", 3))
+    assert main([*command, "--distance", "200", "--overwrite"]) == 0
+    assert (
+        capsys.readouterr().err == f"remark: {kept}: not as it was written: it is computed again\n"
+    )
+    assert len(runs) == 2
+    assert kept.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--distance", "0"], "--distance: found 0"),
+        (["--distance", "150"], "--step: found 100 km with a distance of 150 km"),
+        (["--distance", "100", "--route", "straight", "20", "-1"], "share: found -1 for Straight"),
+        (["--distance", "100", "--route", "nowhere", "20", "1"], "nowhere"),
+        (["--distance", "100", "--set", 'vehicle.wheelsets.w.profile="x"'], "w"),
+    ],
+)
+def test_bad_input_is_met_before_anything_is_computed(command, tmp_path, capsys, given, said):
+    assert main([*command, *given]) == 2
+    found = capsys.readouterr()
+    assert said in found.err
+    assert "Traceback" not in found.err
+    assert not (tmp_path / "worn").exists()
