@@ -17,7 +17,8 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from railsim.studies.optimise import Design, Optimisation
+    from railsim.studies.designs import Design
+    from railsim.studies.optimise import Optimisation
 
 MOST_ROWS = 15
 
@@ -107,7 +108,7 @@ def command(
 
 
 def _lines(found: "Optimisation") -> list[str]:
-    from railsim.studies.optimise import with_unit
+    from railsim.studies.designs import with_unit
 
     definition = found.definition
     if found.chosen is None:
