@@ -15,6 +15,7 @@ from railsim.cli.common import (
     table,
 )
 from railsim.cli.progress import progress_bar
+from railsim.processes import begin_server
 
 if TYPE_CHECKING:
     from railsim.studies.designs import Design
@@ -83,6 +84,8 @@ def command(
       railsim optimise examples/primary_and_yaw_damper.toml --out compromise
       railsim optimise my_study.toml --evaluations 200 --method nsga2 --seed 3
     """  # noqa: D301 - click reads the escape
+    if workers != 1 and scheduler is None:
+        begin_server()  # which imports on another core while this process does
     from railsim.studies.optimise import optimise
 
     with progress_bar("optimise", quiet=quiet) as progress:

@@ -18,6 +18,7 @@ from railsim.cli.common import (
     with_load,
 )
 from railsim.cli.progress import progress_bar
+from railsim.processes import begin_server
 
 if TYPE_CHECKING:
     from railsim.studies import Outcome
@@ -188,6 +189,8 @@ def command(
             as_json=as_json,
             quiet=quiet,
         )
+    if how["workers"] != 1 and how["scheduler"] is None:
+        begin_server()  # which imports on another core while this process does
     from railsim.studies import study
 
     inputs: dict[str, Any] = {

@@ -29,6 +29,7 @@ from typing import Any
 from railsim.errors import Fault, InputError, ModelError, RailsimError, words_of
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
+from railsim.processes import interrupts_later, worker_context
 from railsim.result import Result, open_result
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
@@ -237,8 +238,7 @@ class _Pool:
     """
 
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
-        # "spawn" everywhere: a fork of a process that has run compiled code with threads may hang
-        context = multiprocessing.get_context("spawn")
+        context: Any = worker_context()
         self._batches, self._indices = batches, indices
         self._shares = _shares(batches)
         self._fractions = context.Array("d", len(batches), lock=False)
@@ -253,7 +253,7 @@ class _Pool:
 
     def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
         new = set()
-        with _interrupts_later(), one_thread_each():  # the processes inherit it
+        with interrupts_later(), one_thread_each():  # the processes inherit it
             for index in indices:
                 future = self._pool.submit(_work, index, self._batches[index])
                 self._index_of[future] = index
@@ -465,20 +465,10 @@ def _work(index: int, batch: Batch) -> list[Record]:
 
 def _end(processes: set[BaseProcess]) -> None:
     """Wait a moment for processes to end and end the rest."""
-    with _interrupts_later():
+    with interrupts_later():
         for process in processes:
             process.join(GRACE / max(1, len(processes)))
         for process in processes:
             if process.is_alive():
                 process.terminate()
                 process.join()
-
-
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of the block; processes that begin in it never hear it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
