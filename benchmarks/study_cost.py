@@ -1,16 +1,16 @@
 """Where the CPU time of a study of many short runs goes, and what it needs of memory and disk.
 
-    python benchmarks/study_cost.py OUT [--speeds 10] [--frictions 25] [--duration 40] [--workers 2]
+    python benchmarks/study_cost.py OUT [--vehicles V...] [--tracks T...] [--speeds 10]
+        [--frictions 25] [--duration 40] [--workers 2]
 
-Two coaches on two curves at so many speeds and coefficients of friction; `keep = "summary"`.  The
-share of the own time loops of the runs in the CPU time of all processes (loops that settle vehicles
-and judge time steps are not counted); their private memory over the time.
+By default two coaches on two curves at so many speeds and coefficients of friction, with
+`keep = "summary"`.  Printed: the share of the own time loops of the runs in the CPU time of all
+processes (loops that settle vehicles and judge time steps are not counted), and private memory.
 """
 
 import argparse
 import json
 import os
-import resource
 import threading
 import time
 from pathlib import Path
@@ -24,6 +24,8 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser()
     parser.add_argument("out", type=Path)
+    parser.add_argument("--vehicles", nargs="*", default=["coach_manchester", "coach_flexicoil"])
+    parser.add_argument("--tracks", nargs="*", default=["curve_r250", "curve_r500"])
     parser.add_argument("--speeds", type=int, default=10)
     parser.add_argument("--frictions", type=int, default=25)
     parser.add_argument("--duration", type=float, default=40.0)
@@ -32,8 +34,8 @@ def main() -> None:
     memory = Memory()
     begin = time.perf_counter()
     outcome = study(
-        ["coach_manchester", "coach_flexicoil"],
-        ["curve_r250", "curve_r500"],
+        asked.vehicles,
+        asked.tracks,
         [f"{speed:.4g}" for speed in np.linspace(12.0, 22.0, asked.speeds)],
         grid={"track.friction": [f"{mu:.4g}" for mu in np.linspace(0.2, 0.5, asked.frictions)]},
         duration=asked.duration,
@@ -44,10 +46,7 @@ def main() -> None:
     )
     wall = time.perf_counter() - begin
     memory.stop()
-    cpu = sum(
-        usage.ru_utime + usage.ru_stime
-        for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    )
+    cpu = sum(map(_cpu_time, _family(os.getpid())))
     own = sum(record["cpu_time"] for record in outcome.records)
     runs = len(outcome.records)
     size = sum(path.stat().st_size for path in asked.out.rglob("*") if path.is_file())
@@ -95,6 +94,13 @@ def _family(root: int) -> set[int]:
     while more := {pid for pid, parent in parents.items() if parent in found} - found:
         found |= more
     return found
+
+
+def _cpu_time(pid: int) -> float:
+    """Return the CPU time of a process and of its children that have ended [s]."""
+    text = Path(f"/proc/{pid}/stat").read_text()
+    ticks = map(int, text.rpartition(")")[2].split()[11:15])
+    return sum(ticks) / os.sysconf("SC_CLK_TCK")
 
 
 def _resident(pid: int) -> int:
