@@ -29,7 +29,7 @@ from railsim.simulation.settling import Progress
 Floats = NDArray[np.float64]
 
 CLASS = 1.2  # ratio of the speeds of a class
-FRICTION_CLASS = 0.05  # difference of the coefficients of friction of a class
+FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
 MOST_JUDGED = 10_000
 # whether steps hold in classes that have been judged in this process, by a hash of all inputs
 _JUDGED: dict[str, bool] = {}

@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -31,6 +31,7 @@ from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import interrupts_later, worker_context
 from railsim.result import Result, open_result
+from railsim.result.facts import OF_FACTS
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import Record
@@ -121,7 +122,8 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     try:
         if len(batch) == 1:
             (job,) = batch
-            found = [run_case(job.case, _file(job), overwrite=True, progress=progress)]
+            only = _quantities(job)
+            found = [run_case(job.case, _file(job), overwrite=True, progress=progress, only=only)]
         else:
             found = run_cases(
                 [job.case for job in batch],
@@ -140,6 +142,12 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
 def _file(job: Job) -> Path | None:
     """Return the result file of a job; None where nothing but its summary is kept."""
     return None if job.keep.summary else job.path
+
+
+def _quantities(job: Job) -> Collection[str] | None:
+    """Return the quantities that a job's record is taken from; None for all."""
+    wants_all = job.own is not None or job.case.analyses or job.picture is not None
+    return None if wants_all or not job.keep.summary else OF_FACTS
 
 
 def _there(job: Job) -> Record | None:

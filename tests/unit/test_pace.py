@@ -25,8 +25,8 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
         }
 
     monkeypatch.setattr(pace, "in_flange_contact", settled)
-    forwards = steps([0.21, 0.24, 0.3])
+    forwards = steps([0.21, 0.28, 0.35])
     # one judgement for two runs, at the lowest speed and highest friction of their class
-    assert judged == [pytest.approx((1.2**16, 0.25)), pytest.approx((1.2**16, 0.3))]
-    assert steps([0.3, 0.24, 0.21]) == forwards
+    assert judged == [pytest.approx((1.2**16, 0.3)), pytest.approx((1.2**16, 0.4))]
+    assert steps([0.35, 0.28, 0.21]) == forwards
     assert len(judged) == 2
