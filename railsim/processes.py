@@ -10,7 +10,7 @@ themselves.
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import forkserver
 from multiprocessing.context import BaseContext
@@ -18,6 +18,7 @@ from multiprocessing.context import BaseContext
 from railsim.threads import one_thread_each
 
 PRELOADED = "railsim.studies.worker"
+REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # variables by which a process does something else
 NAMES = ("HOME", "PATH", "TMPDIR")
 BEGINNINGS = ("RAILSIM_", "NUMBA_", "XDG_", "PYTHON", "OPENBLAS_", "MKL_", "OMP_")
@@ -33,7 +34,8 @@ def begin_server() -> None:
     # the folder in which a command is given may hold modules of anybody
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
-        with interrupts_later(), one_thread_each():
+        # it outlives what ends its copies, to say how they ended
+        with signals_later(REQUESTS), one_thread_each():
             multiprocessing.set_forkserver_preload([PRELOADED])
             forkserver.ensure_running()
     finally:
@@ -57,10 +59,15 @@ def _that_matter() -> dict[str, str]:
     }
 
 
+def hear_requests() -> None:
+    """Let this process, a worker, end on what ends processes, except for Ctrl-C."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS[1:])
+
+
 @contextmanager
-def interrupts_later() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of the block; processes that begin in it never hear it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+def signals_later(signals: Sequence[signal.Signals] = REQUESTS[:1]) -> Iterator[None]:
+    """Let signals wait for the end of the block; processes that begin in it never hear them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         yield
     finally:

@@ -29,7 +29,7 @@ from typing import Any
 from railsim.errors import Fault, InputError, ModelError, RailsimError, words_of
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
-from railsim.processes import interrupts_later, worker_context
+from railsim.processes import hear_requests, signals_later, worker_context
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.studies.analyses import analysed
@@ -261,7 +261,7 @@ class _Pool:
 
     def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
         new = set()
-        with interrupts_later(), one_thread_each():  # the processes inherit it
+        with signals_later(), one_thread_each():  # the processes inherit it
             for index in indices:
                 future = self._pool.submit(_work, index, self._batches[index])
                 self._index_of[future] = index
@@ -445,6 +445,7 @@ _shared: Any = None
 def _begin(fractions: Any, holders: Any, stop: Any) -> None:
     global _shared
     _shared = fractions, holders, stop
+    hear_requests()
     threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
 
 
@@ -473,7 +474,7 @@ def _work(index: int, batch: Batch) -> list[Record]:
 
 def _end(processes: set[BaseProcess]) -> None:
     """Wait a moment for processes to end and end the rest."""
-    with interrupts_later():
+    with signals_later():
         for process in processes:
             process.join(GRACE / max(1, len(processes)))
         for process in processes:

@@ -588,7 +588,7 @@ def test_killed_worker_costs_nothing_but_time(tmp_path):
             "--set",
             "settings.step=1e-4",
             "--until",
-            "400",
+            "200",
             "--workers",
             "2",
         ]
