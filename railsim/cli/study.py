@@ -189,7 +189,8 @@ def command(
             as_json=as_json,
             quiet=quiet,
         )
-    if how["workers"] != 1 and how["scheduler"] is None:
+    done = not how["overwrite"] and Path(out, "study.json").exists()
+    if not done and how["workers"] != 1 and how["scheduler"] is None:
         begin_server()  # which imports on another core while this process does
     from railsim.studies import study
 
