@@ -42,7 +42,7 @@ def main() -> None:
             journal._line = unsynced(journal)
             for point in points:
                 file = folder / f"{point.name}.h5"
-                file.touch()
+                file.write_bytes(b"\0")  # an empty one would not count as done
                 record = {"name": point.name, "file": file.name, "labels": dict(point.labels)}
                 journal.add({**record, **facts}, point.key, file.stat())
             size = journal.path.stat().st_size

@@ -15,9 +15,11 @@ from railsim.cli.common import (
     table,
 )
 from railsim.cli.progress import progress_bar
+from railsim.processes import begin_server
 
 if TYPE_CHECKING:
-    from railsim.studies.optimise import Design, Optimisation
+    from railsim.studies.designs import Design
+    from railsim.studies.optimise import Optimisation
 
 MOST_ROWS = 15
 
@@ -82,6 +84,8 @@ def command(
       railsim optimise examples/primary_and_yaw_damper.toml --out compromise
       railsim optimise my_study.toml --evaluations 200 --method nsga2 --seed 3
     """  # noqa: D301 - click reads the escape
+    if workers != 1 and scheduler is None:
+        begin_server()  # which imports on another core while this process does
     from railsim.studies.optimise import optimise
 
     with progress_bar("optimise", quiet=quiet) as progress:
@@ -107,7 +111,7 @@ def command(
 
 
 def _lines(found: "Optimisation") -> list[str]:
-    from railsim.studies.optimise import with_unit
+    from railsim.studies.designs import with_unit
 
     definition = found.definition
     if found.chosen is None:

@@ -18,6 +18,7 @@ from railsim.cli.common import (
     with_load,
 )
 from railsim.cli.progress import progress_bar
+from railsim.processes import begin_server
 
 if TYPE_CHECKING:
     from railsim.studies import Outcome
@@ -188,6 +189,9 @@ def command(
             as_json=as_json,
             quiet=quiet,
         )
+    done = not how["overwrite"] and Path(out, "study.json").exists()
+    if not done and how["workers"] != 1 and how["scheduler"] is None:
+        begin_server()  # which imports on another core while this process does
     from railsim.studies import study
 
     inputs: dict[str, Any] = {
@@ -250,7 +254,6 @@ def command(
 def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
     """Return the inputs of a study file, with the assignments of the command line after its own."""
     from railsim.definitions.loading import load_study
-    from railsim.definitions.study import value_texts
     from railsim.errors import Fault, InputError
 
     both = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
@@ -262,21 +265,9 @@ def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
     if faults:
         raise InputError(faults)
     plan = load_study(file)
-    return {
-        "vehicles": list(plan.vehicles),
-        "tracks": list(plan.tracks),
-        "speeds": None if plan.speeds is None else value_texts(plan.speeds),
-        "grid": {key: value_texts(values) for key, values in plan.grid.items()},
-        "linked": [{k: value_texts(v) for k, v in table.items()} for table in plan.linked],
-        "sample": plan.sample,
-        "analyses": plan.analyses,
-        "settings": plan.settings,
-        "start": plan.start,
-        "duration": plan.duration,
-        "until": plan.until,
-        "assignments": [*plan.assignments, *given["assignments"]],
-        "quantities": given["quantities"],
-    }
+    inputs = plan.arguments()
+    inputs["assignments"] += given["assignments"]
+    return {**inputs, "quantities": given["quantities"]}
 
 
 def _report(outcome: "Outcome") -> Path:

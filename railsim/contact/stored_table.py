@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import zlib
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from railsim.kernels import cache, contact_geometry, elastic_patch, non_elliptic
 from railsim.kernels import hertz as hertz_kernel
 from railsim.kernels import table_slice as kernel
 from railsim.profiles.profile import Profile
+
+MOST_OPEN = 16  # stored tables that a process keeps open, mapped and checked
 
 
 def cache_folder() -> Path | None:
@@ -84,8 +87,17 @@ def cached_contact_table(
 
 def _stored_table(path: Path) -> ContactTable | None:
     text = cache.stored(path.with_suffix(".json"))
-    if text is None or not path.exists():
+    if text is None:
         return None
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return _checked_table(path, text, (found.st_mtime_ns, found.st_size, found.st_ino))
+
+
+@lru_cache(MOST_OPEN)  # the check reads all of a table: once a process, and after each change
+def _checked_table(path: Path, text: str | bytes, stamp: tuple[int, ...]) -> ContactTable | None:
     try:
         facts = json.loads(text)
         crc = facts.pop("crc32")

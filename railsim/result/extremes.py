@@ -152,11 +152,13 @@ def _peak_of_steps(result: Result, name: str, kind: str) -> Peak:
     )
 
 
-def low_pass_of(result: Result, name: str) -> Array | None:
+def low_pass_of(result: Result, name: str, known: dict[str, Array] | None = None) -> Array | None:
     """Return a quantity after a low pass of `LOW_PASS` without phase, over the evaluated part.
 
     Butterworth of order 4.  Y/Q is the quotient of both after the low pass, so that a wheel that
     has lifted does not spoil the rest.  None where outputs are too seldom or not at equal times.
+
+    `known` keeps what has been filtered of this result, and is filled.
     """
     time = result["time"]
     if len(time) < 3:
@@ -166,21 +168,28 @@ def low_pass_of(result: Result, name: str) -> Array | None:
     if np.ptp(steps) > 1e-6 * step or step * LOW_PASS * LEAST_RATE > 1.0:
         return None
     rate = 1.0 / step
+    known = {} if known is None else known
+
+    def passed(part: str) -> Array:
+        if part not in known:
+            known[part] = low_passed(result[part], rate, LOW_PASS)
+        return known[part]
+
     if name == "Y_over_Q" and {"Y", "Q"} <= set(result):
         outwards = np.array([-1.0, 1.0])
-        Y, Q = (low_passed(result[part], rate, LOW_PASS) for part in ("Y", "Q"))
+        Y, Q = passed("Y"), passed("Q")
         with np.errstate(divide="ignore", invalid="ignore"):
             smooth = np.where(Q > 0.0, outwards * Y / Q, np.nan)
     else:
         array = result[name]
         if np.isnan(array).any():
             return None
-        smooth = low_passed(array, rate, LOW_PASS)
+        smooth = passed(name)
     return np.asarray(smooth[evaluated(result)])
 
 
-def _with_low_pass(result: Result, found: Peak) -> Peak:
-    smooth = low_pass_of(result, found.quantity.name)
+def _with_low_pass(result: Result, found: Peak, known: dict[str, Array]) -> Peak:
+    smooth = low_pass_of(result, found.quantity.name, known)
     if smooth is None or not len(smooth) or np.isnan(smooth).all():
         return found
     return replace(found, smooth=float(smooth[_extreme(smooth, found.kind)]))
@@ -209,8 +218,10 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
     for name in names:
         kinds = ("max", "min") if name in BY_SIGN else ("abs",)
         found.extend(peak(result, name, kind) for kind in kinds)
+    known: dict[str, Array] = {}
     return tuple(
-        _with_low_pass(result, each) if each.quantity.name in FORCES else each for each in found
+        _with_low_pass(result, each, known) if each.quantity.name in FORCES else each
+        for each in found
     )
 
 
@@ -327,7 +338,9 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
             continue
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # a wheel that never carries: NaN
-            bounds = np.nanpercentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
+            # a wheel in the air has no quotient; where there is none, it takes half of the time
+            percentile = np.nanpercentile if np.isnan(over).any() else np.percentile
+            bounds = percentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
         medians[name], scatter[name] = bounds[1], 0.5 * (bounds[2] - bounds[0])
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
     return MidCurve(

@@ -3,12 +3,16 @@
 from typing import Any
 
 from railsim.result.data import Result
-from railsim.result.extremes import mid_curves, peaks
+from railsim.result.extremes import PEAK_QUANTITIES, mid_curves, peaks
 
 FACTS = (
     "status", "status_reason", "step", "wall_time", "cpu_time", "real_time_factor",
     "patches_out_of_range",
 )  # fmt: skip
+
+
+OF_FACTS = frozenset({*PEAK_QUANTITIES, "time", "distance", "wheelset_distance"})
+"""Quantities that facts are taken from."""
 
 
 def run_facts(result: Result) -> dict[str, Any]:

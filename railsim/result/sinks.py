@@ -12,7 +12,7 @@ it leaves nothing behind.
         result = sink.close(attributes, statics)
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from types import MappingProxyType, TracebackType
 from typing import Any, Protocol, Self
@@ -101,10 +101,15 @@ class MemorySink(SinkContext):
     ----------
     attributes : mapping
         Root attributes to add to those of the run.
+    only : collection of str, optional
+        Names of the quantities that are kept; by default all.
     """
 
-    def __init__(self, attributes: Attributes = NOTHING) -> None:
+    def __init__(
+        self, attributes: Attributes = NOTHING, only: Collection[str] | None = None
+    ) -> None:
         self._attributes = dict(attributes)
+        self._only = only
         self._quantities: dict[str, Quantity] = {}
         self._coordinates: dict[str, tuple[str, ...]] = {}
         self._chunks: dict[str, list[Array]] = {}
@@ -113,7 +118,11 @@ class MemorySink(SinkContext):
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
     ) -> None:
         """See `Sink.begin`."""
-        self._quantities = {quantity.name: quantity for quantity in quantities}
+        self._quantities = {
+            quantity.name: quantity
+            for quantity in quantities
+            if self._only is None or quantity.name in self._only
+        }
         self._coordinates = full_coordinates(coordinates)
         self._chunks = {name: [] for name in timed(self._quantities)}
 

@@ -1,38 +1,55 @@
-"""Step and output interval of a run at any speed."""
+"""Step and output interval of a run at any speed.
 
+The longest step that a scheme allows is taken where it is stable for all of a class of runs: at the
+lowest speed and the highest friction of the class.  That is judged once in a process, so that runs
+of a study that differ by little share it.  Where it does not hold, the run's own speed and friction
+are judged.  Either way the step depends on the inputs of the run alone, not on other runs.
+"""
+
+import hashlib
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
-from railsim.errors import Fault, InputError
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.rhs import STANDSTILL_SPEED
+from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
-from railsim.model.time_step import Stability
+from railsim.model.time_step import MARGIN, Stability
 from railsim.model.work import level_track_with_friction
 from railsim.simulation.flange import in_flange_contact
 from railsim.simulation.settling import Progress
 
 Floats = NDArray[np.float64]
 
+CLASS = 1.2  # ratio of the speeds of a class
+FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
+MOST_JUDGED = 10_000
+# whether steps hold in classes that have been judged in this process, by a hash of all inputs
+_JUDGED: dict[str, bool] = {}
+
 
 class Pace:
-    """Step and output interval of a run, chosen once for each class of speeds.
+    """Step and output interval of a run, chosen once for each class of speeds where these vary.
 
-    Creep forces stiffen as 1/V: the step of a class is that of its lowest speed.
+    Creep forces stiffen as 1/V, and in flange contact friction feeds vibrations: a class is judged
+    at its lowest speed and highest friction.
 
     Parameters
     ----------
     states : dict of float to float64[n_state]
         Steady rolling on straight track at the speeds where it is known.
+    inputs : str
+        Hash of all that the model was made of, friction apart, see `inputs_hash`.
     progress : callable, optional
         Called while a step is judged, as in `railsim.simulation.flange.in_flange_contact`.
     """
-
-    CLASS = 1.2  # ratio of a class's speeds
 
     def __init__(
         self,
@@ -40,13 +57,15 @@ class Pace:
         settings: Settings,
         track: Track,
         states: dict[float, Floats],
+        inputs: str,
         progress: Progress | None = None,
     ) -> None:
         self._model = model
         self._track = track
         self._settings = settings
         self._progress = progress
-        self._known: dict[tuple[float, float], float] = {}
+        self._inputs = inputs
+        self._known: dict[float, float] = {}
         self._states = states
         self.varies = settings.drive.mode != "constant"
         self.smallest = math.inf
@@ -56,12 +75,9 @@ class Pace:
         interval = output_interval(self._settings, speed)
         if self._settings.output_spacing is not None:
             interval = duration(self._settings.output_spacing, speed, rate)
-        key = speed
-        if self.varies:
-            lowest = self.CLASS ** math.floor(math.log(speed, self.CLASS))
-            key = max(lowest, 1.02 * STANDSTILL_SPEED)  # below there is no steady rolling
-        longest = self._known.get((key, 0.0)) or self._choose(key, interval)
-        self._known[key, 0.0] = longest
+        key = class_speed(speed) if self.varies else speed
+        longest = self._known.get(key) or self._choose(key, interval)
+        self._known[key] = longest
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         self.smallest = min(self.smallest, interval / every)
         return interval / every, every
@@ -69,7 +85,9 @@ class Pace:
     def _choose(self, speed: float, interval: float) -> float:
         given = self._settings.step
         if given is None:
-            return self._stability(speed).choose(interval)
+            stability = self._stability(self._model, speed, self._states.get(speed))
+            longest = interval / max(1, math.ceil(interval / stability.longest * (1.0 - 1e-9)))
+            return longest if self._in_class(speed, longest) else stability.choose(interval)
         if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
             raise InputError(
                 [
@@ -81,7 +99,7 @@ class Pace:
                     )
                 ]
             )
-        stability = self._stability(speed)
+        stability = self._stability(self._model, speed, self._states.get(speed))
         if not stability.holds(given):
             raise InputError(
                 [
@@ -95,18 +113,67 @@ class Pace:
             )
         return given
 
-    def _stability(self, speed: float) -> Stability:
-        state = self._states.get(speed)
-        if state is None:
-            state = equilibrium(self._model, speed).state
-        level = level_track_with_friction(self._model.system)
+    def _in_class(self, speed: float, step: float) -> bool:
+        """Whether a step, with the margin, is stable for the class of a speed and the friction."""
+        lowest, model = class_speed(speed), with_class_friction(self._model)
+        digest = hashlib.sha256(f"{self._inputs} {lowest!r} {step!r}".encode())
+        digest.update(model.system.track.rail[:, MU_LEFT : MU_RIGHT + 1, 0].tobytes())
+        key = digest.hexdigest()
+        if key not in _JUDGED:
+            if len(_JUDGED) >= MOST_JUDGED:
+                _JUDGED.clear()
+            try:
+                _JUDGED[key] = self._stability(model, lowest, None).holds(step, MARGIN)
+            except ModelError:  # no steady rolling there: the run's own speed is judged
+                _JUDGED[key] = False
+        return _JUDGED[key]
+
+    def _stability(self, model: Model, speed: float, state: Floats | None) -> Stability:
+        rolling = equilibrium(model, speed).state if state is None else state
         return Stability(
-            self._model,
-            level,
-            state,
+            model,
+            level_track_with_friction(model.system),
+            rolling,
             self._settings.scheme,
-            lambda step: in_flange_contact(self._model, self._track, state, step, self._progress),
+            lambda step: in_flange_contact(model, self._track, rolling, step, self._progress),
         )
+
+
+def class_speed(speed: float) -> float:
+    """Return the lowest speed of the class of a speed [m/s].
+
+    Examples
+    --------
+    >>> [round(class_speed(speed), 2) for speed in (18.5, 20.0, 22.0, 22.5)]
+    [18.49, 18.49, 18.49, 22.19]
+    """
+    lowest: float = CLASS ** math.floor(math.log(speed, CLASS))
+    # below a standstill there is no steady rolling
+    return min(speed, max(lowest, 1.02 * STANDSTILL_SPEED))
+
+
+def with_class_friction(model: Model) -> Model:
+    """Return a model with the coefficients of friction of its track rounded up to their class."""
+    track = model.system.track
+    rail = track.rail.copy()
+    friction = rail[:, MU_LEFT : MU_RIGHT + 1, 0]
+    rail[:, MU_LEFT : MU_RIGHT + 1, 0] = FRICTION_CLASS * np.ceil(friction / FRICTION_CLASS - 1e-9)
+    return replace(model, system=model.system._replace(track=track._replace(rail=rail)))
+
+
+def inputs_hash(vehicle: Vehicle, track: Track, settings: Settings, model: Model) -> str:
+    """Return a hash of all that a model was made of, except for the friction of its track."""
+    digest = hashlib.sha256()
+    texts = (
+        vehicle.to_toml(),
+        track.model_dump_json(exclude={"friction", "friction_table"}),
+        settings.to_toml(),
+    )
+    for part in (*texts, *sorted(model.profiles)):
+        digest.update(part.encode())
+    for name in sorted(model.profiles):
+        digest.update(model.profiles[name].key())
+    return digest.hexdigest()
 
 
 def duration(distance: float, speed: float, rate: float) -> float:

@@ -24,7 +24,7 @@ from railsim.simulation.advance import Preparation, Run
 from railsim.simulation.conditions import Inputs
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.outputs import OutputPlan, run_extremes
-from railsim.simulation.pace import Pace
+from railsim.simulation.pace import Pace, inputs_hash
 from railsim.simulation.right_samples import filtering, low_pass_remark, output_words, sampled
 from railsim.simulation.run_in import start_state
 from railsim.simulation.settling import Progress as SettlingProgress
@@ -55,7 +55,8 @@ def prepare(
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
     balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
     model = balance.model
-    pace = Pace(model, sampled(settings), track, {speed: balance.state}, on_judgement)
+    inputs = inputs_hash(vehicle, track, settings, model)
+    pace = Pace(model, sampled(settings), track, {speed: balance.state}, inputs, on_judgement)
     step, _ = pace.at(speed)
     unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
     remarks: list[str] = [*balance.remarks, *unusual, *measured_remarks(track)]

@@ -18,12 +18,12 @@ from railsim.definitions.vehicle import Service
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import check_folder
 from railsim.result import Result, open_result
+from railsim.studies.carry_out import carry_out, cores
 from railsim.studies.case import Case, short_name
 from railsim.studies.combine import load_case, name_faults
 from railsim.studies.journal import Record
 from railsim.studies.points import Point, check_number
 from railsim.studies.rows import in_a_name
-from railsim.studies.study import carry_out, cores
 from railsim.version import __version__
 
 

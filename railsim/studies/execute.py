@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -29,7 +29,9 @@ from typing import Any
 from railsim.errors import Fault, InputError, ModelError, RailsimError, words_of
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
+from railsim.processes import hear_requests, signals_later, worker_context
 from railsim.result import Result, open_result
+from railsim.result.facts import OF_FACTS
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import Record
@@ -120,7 +122,8 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     try:
         if len(batch) == 1:
             (job,) = batch
-            found = [run_case(job.case, _file(job), overwrite=True, progress=progress)]
+            only = _quantities(job)
+            found = [run_case(job.case, _file(job), overwrite=True, progress=progress, only=only)]
         else:
             found = run_cases(
                 [job.case for job in batch],
@@ -139,6 +142,12 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
 def _file(job: Job) -> Path | None:
     """Return the result file of a job; None where nothing but its summary is kept."""
     return None if job.keep.summary else job.path
+
+
+def _quantities(job: Job) -> Collection[str] | None:
+    """Return the quantities that a job's record is taken from; None for all."""
+    wants_all = job.own is not None or job.case.analyses or job.picture is not None
+    return None if wants_all or not job.keep.summary else OF_FACTS
 
 
 def _there(job: Job) -> Record | None:
@@ -237,8 +246,7 @@ class _Pool:
     """
 
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
-        # "spawn" everywhere: a fork of a process that has run compiled code with threads may hang
-        context = multiprocessing.get_context("spawn")
+        context: Any = worker_context()
         self._batches, self._indices = batches, indices
         self._shares = _shares(batches)
         self._fractions = context.Array("d", len(batches), lock=False)
@@ -253,7 +261,7 @@ class _Pool:
 
     def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
         new = set()
-        with _interrupts_later(), one_thread_each():  # the processes inherit it
+        with signals_later(), one_thread_each():  # the processes inherit it
             for index in indices:
                 future = self._pool.submit(_work, index, self._batches[index])
                 self._index_of[future] = index
@@ -437,6 +445,7 @@ _shared: Any = None
 def _begin(fractions: Any, holders: Any, stop: Any) -> None:
     global _shared
     _shared = fractions, holders, stop
+    hear_requests()
     threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
 
 
@@ -465,20 +474,10 @@ def _work(index: int, batch: Batch) -> list[Record]:
 
 def _end(processes: set[BaseProcess]) -> None:
     """Wait a moment for processes to end and end the rest."""
-    with _interrupts_later():
+    with signals_later():
         for process in processes:
             process.join(GRACE / max(1, len(processes)))
         for process in processes:
             if process.is_alive():
                 process.terminate()
                 process.join()
-
-
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of the block; processes that begin in it never hear it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

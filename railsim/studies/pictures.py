@@ -3,7 +3,7 @@
 from railsim.plot.histories import histories
 from railsim.plot.overlay import overlay
 from railsim.plot.style import save
-from railsim.studies.study import Outcome
+from railsim.studies.outcome import Outcome
 
 
 def draw(outcome: Outcome) -> None:

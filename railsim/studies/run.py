@@ -1,6 +1,6 @@
 """A case becomes a file; several cases become files in one call."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -18,6 +18,7 @@ def run_case(
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
     resume: Result | None = None,
+    only: Collection[str] | None = None,
 ) -> Result:
     """Run a case into its file, which carries the case's name and key.
 
@@ -33,6 +34,8 @@ def run_case(
         Called with the finished fraction now and then.
     resume : Result, optional
         A result whose end is the beginning of this run; the file then carries no key.
+    only : collection of str, optional
+        Names of the quantities that a result in memory holds; by default all.
 
     Raises
     ------
@@ -43,7 +46,7 @@ def run_case(
         facts["inputs_hash"] = case.key
     else:
         facts["continues"] = str(resume.attributes.get("run", "another run"))
-    with _sink(path, overwrite, facts) as sink:
+    with _sink(path, overwrite, facts, only) as sink:
         return simulate(
             case.vehicle,
             case.track,
@@ -59,10 +62,13 @@ def run_case(
 
 
 def _sink(
-    path: str | Path | None, overwrite: bool, facts: Mapping[str, str]
+    path: str | Path | None,
+    overwrite: bool,
+    facts: Mapping[str, str],
+    only: Collection[str] | None = None,
 ) -> Hdf5Sink | MemorySink:
     if path is None:
-        return MemorySink(facts)
+        return MemorySink(facts, only)
     return Hdf5Sink(path, overwrite=overwrite, attributes=facts)
 
 

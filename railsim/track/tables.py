@@ -6,6 +6,9 @@ of about 1e-10 m for the position.  The tables reach beyond both ends of the tra
 elements continue.
 """
 
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 import numpy as np
 
 from railsim.definitions.track import Track
@@ -20,6 +23,8 @@ CELL_LENGTH = 0.25
 MOST_CELLS = 200_000
 # How far the tables reach beyond the track, so that wheelsets ahead and behind have rails [m].
 BEFORE, AFTER = 100.0, 200.0
+# Lines that a process keeps for runs that differ in their rails, and their cells at most (4 MB).
+MOST_LINES, MOST_CELLS_KEPT = 8, 20_000
 
 # Nodes and weights of the Gauss-Legendre rule on [0, 1] that integrates the position in a cell.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -57,14 +62,38 @@ def track_tables(
     cells_before = int(np.ceil(before / ds))
     n_cells = cells_before + int(np.ceil((track.length + after) / ds))
     s: Array = ds * np.arange(-cells_before, n_cells - cells_before + 1, dtype=np.float64)
-    coefficients = aligned_zeros((n_cells, 6, 4))
-    for row, (value, rate) in enumerate(_centre_line(alignment, s, cells_before)):
-        coefficients[:, row] = hermite(value, rate, ds)
-    for row, (value, rate) in enumerate(_angles(alignment, s)):
-        coefficients[:, 3 + row] = hermite(value, rate, ds)
+    text = track.model_dump_json(exclude={"friction", "friction_table"})
+    line = _Line(text, float(ds), cells_before, n_cells, alignment, s)
+    make = _kept_coefficients if n_cells <= MOST_CELLS_KEPT else _coefficients
+    coefficients = make(line)
     moved = displacement(track)
     rail = _rails(track, moved, s)
     return TrackTables(float(s[0]), float(ds), coefficients, rail, int(moved is not None))
+
+
+@dataclass(frozen=True)
+class _Line:
+    """What the table of a centre line follows from: a track apart from its friction, its cells."""
+
+    track: str
+    ds: float
+    before: int
+    cells: int
+    alignment: Alignment = field(compare=False)
+    s: Array = field(compare=False)
+
+
+def _coefficients(line: _Line) -> Array:
+    """Position, heading, grade and cant angle over the cells, float64[n_cells, 6, 4]."""
+    found = aligned_zeros((line.cells, 6, 4))
+    for row, (value, rate) in enumerate(_centre_line(line.alignment, line.s, line.before)):
+        found[:, row] = hermite(value, rate, line.ds)
+    for row, (value, rate) in enumerate(_angles(line.alignment, line.s)):
+        found[:, 3 + row] = hermite(value, rate, line.ds)
+    return found
+
+
+_kept_coefficients = lru_cache(MOST_LINES)(_coefficients)
 
 
 def usual_cell_length(track: Track, margin: float = BEFORE + AFTER) -> float:

@@ -14,6 +14,7 @@ import railsim.simulation.settling
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
 from railsim.cli.progress import progress_bar
+from railsim.simulation import pace
 
 RUN = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10", "--quiet"]
 STUDY = ["study", "--vehicles", "coach_manchester", "--tracks", "curve_r250", "--speeds", "20"]
@@ -107,6 +108,7 @@ def test_run_obeys_a_signal_that_python_loses_before_it(
         return settle(*arguments)
 
     settle = module.advance
+    monkeypatch.setattr(pace, "_JUDGED", {})  # by another test, perhaps
     monkeypatch.setattr(module, "advance", advance)
     run = ["run", "coach_manchester", "curve_r250", "--speed", speed, "--start", "390", "--quiet"]
     assert main([*run, "--out", str(tmp_path / "run.h5")]) == 130
@@ -135,6 +137,7 @@ def test_bar_says_what_comes_before_a_run(monkeypatch):
         def close(self):
             pass
 
+    monkeypatch.setattr(pace, "_JUDGED", {})  # by another test, perhaps
     monkeypatch.setattr("tqdm.tqdm", Bar)
     monkeypatch.setattr(railsim.simulation.settling, "WHEELSET_STEPS", 4000)
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")

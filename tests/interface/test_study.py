@@ -561,18 +561,19 @@ def test_python_raises_what_the_command_prints(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def children(process):
-    """Worker processes of a study: those that it has spawned, besides the tracker of semaphores."""
-    found = []
+def workers_of(process):
+    """Worker processes of a study: copies of its server, see `railsim.processes`."""
+    parents, servers = {}, set()
     for number in map(int, filter(str.isdecimal, os.listdir("/proc"))):
         try:
             status = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
             line = Path(f"/proc/{number}/cmdline").read_bytes()
         except OSError:
             continue
-        if int(status[1]) == process.pid and b"spawn_main" in line:
-            found.append(number)
-    return found
+        parents[number] = int(status[1])
+        if parents[number] == process.pid and b"forkserver" in line:
+            servers.add(number)
+    return [number for number, parent in parents.items() if parent in servers]
 
 
 @pytest.mark.slow
@@ -587,14 +588,14 @@ def test_killed_worker_costs_nothing_but_time(tmp_path):
             "--set",
             "settings.step=1e-4",
             "--until",
-            "400",
+            "200",
             "--workers",
             "2",
         ]
     )
     while not list(tmp_path.glob(".*.partial")):
         time.sleep(0.05)
-    os.kill(children(process)[0], signal.SIGKILL)
+    os.kill(workers_of(process)[0], signal.SIGKILL)
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     assert set(os.listdir(tmp_path)) == {*LEFT, *(f"{COACH}_{CURVE}_{v}.h5" for v in (20, 21, 22))}

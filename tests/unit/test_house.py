@@ -13,8 +13,6 @@ LARGER = {
     "definitions/elements.py": "to be divided",
     "kernels/support.py": "to be divided",
     "notation.py": "the table of quantities",
-    "studies/optimise.py": "to be divided",
-    "studies/study.py": "to be divided",
 }
 # public functions that take the numbers of one patch or pair of profiles
 MORE_PARAMETERS = {"creep_force", "exact_creep_force"}

@@ -1,0 +1,74 @@
+"""Worker processes for runs: copies of a server that has imported what they need.
+
+A process of its own imports railsim and loads its compiled code for longer than a short run takes.
+The server does so once, while the process that wants workers prepares their work.  A copy of this
+process itself would not do: one that has run compiled code with threads may hang.  The server has
+none, and has the environment in which it began: where that has changed since, workers begin by
+themselves.
+"""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import forkserver
+from multiprocessing.context import BaseContext
+
+from railsim.threads import one_thread_each
+
+PRELOADED = "railsim.studies.worker"
+REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# variables by which a process does something else
+NAMES = ("HOME", "PATH", "TMPDIR")
+BEGINNINGS = ("RAILSIM_", "NUMBA_", "XDG_", "PYTHON", "OPENBLAS_", "MKL_", "OMP_")
+_environment: dict[str, str] = {}  # of the server; empty before it begins
+
+
+def begin_server() -> None:
+    """Let the server begin, to be there when workers are wanted; once is enough."""
+    if _environment:
+        return
+    before = dict(os.environ)
+    _environment.update(_that_matter())
+    # the folder in which a command is given may hold modules of anybody
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        # it outlives what ends its copies, to say how they ended
+        with signals_later(REQUESTS), one_thread_each():
+            multiprocessing.set_forkserver_preload([PRELOADED])
+            forkserver.ensure_running()
+    finally:
+        del os.environ["PYTHONSAFEPATH"]
+        os.environ |= before
+
+
+def worker_context() -> BaseContext:
+    """Return how worker processes begin: as copies of the server, where it suits."""
+    begin_server()
+    same = _environment == _that_matter()
+    return multiprocessing.get_context("forkserver" if same else "spawn")
+
+
+def _that_matter() -> dict[str, str]:
+    """Return the variables of the environment that matter to a worker."""
+    return {
+        name: value
+        for name, value in os.environ.items()
+        if name in NAMES or name.startswith(BEGINNINGS)
+    }
+
+
+def hear_requests() -> None:
+    """Let this process, a worker, end on what ends processes, except for Ctrl-C."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS[1:])
+
+
+@contextmanager
+def signals_later(signals: Sequence[signal.Signals] = REQUESTS[:1]) -> Iterator[None]:
+    """Let signals wait for the end of the block; processes that begin in it never hear them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,170 @@
+"""`carry_out`: the runs of a study or a campaign that are not done, with its folder's journal."""
+
+import errno
+import logging
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+from railsim.errors import Fault, InputError
+from railsim.files import is_file, make_folder, sweep
+from railsim.studies.case import Case
+from railsim.studies.execute import (
+    Batch,
+    Job,
+    batches,
+    cluster,
+    in_processes,
+    in_this_process,
+    on_cluster,
+)
+from railsim.studies.journal import JOURNAL, Journal, Record
+from railsim.studies.keep import EVERYTHING, Keep
+from railsim.studies.outcome import Outcome
+from railsim.studies.state import Runs, State
+from railsim.studies.summary import read_index, write_index
+
+_LOG = logging.getLogger(__name__)
+MANY = 10_000  # runs from which on an index that is up to date is not made once more
+# after one of these no other run could be written either
+NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
+
+
+def carry_out(
+    plan: Runs,
+    inputs: Mapping[str, Any],
+    folder: Path,
+    *,
+    workers: int | None = None,
+    together: int = 1,
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    plots: bool = False,
+    longest_first: bool = False,
+    own: str | None = None,
+    keep: Keep = EVERYTHING,
+    progress: Callable[[float], None] | None = None,
+    on_record: Callable[[Record], None] | None = None,
+    on_remark: Callable[[str], None] | None = None,
+) -> Outcome:
+    """Do the runs of a study or a campaign that are not done, with the journal of its folder.
+
+    Parameters
+    ----------
+    plan : Runs
+        What is to be done.
+    inputs : mapping
+        What was asked for, as the journal and the index keep it, see `Inputs`.
+    longest_first : bool
+        Begin with the longest runs, so that no core is left with one of them at the end.
+    own : str, optional
+        Function of own quantities, see `railsim.studies.own`.
+    keep : Keep
+        What is kept of each result.
+
+    Others as in `study`.
+    """
+    with ExitStack() as stack:
+        known = None
+        if is_file(folder / JOURNAL):
+            known = stack.enter_context(Journal(folder))
+        if not (resume or overwrite):
+            _refuse_another_study(folder, known, inputs)
+        state = State(folder, plan, known, own, keep, resume=resume, overwrite=overwrite)
+        client = None if scheduler is None else cluster(scheduler)
+        make_folder(folder)
+        sweep(folder)
+        journal = known or stack.enter_context(Journal(folder))
+        if overwrite:
+            journal.clear()
+        elif known is None and journal.entries:
+            raise InputError([Fault("--out", "", f"another study has begun in {folder}", "")])
+        journal.begin(inputs)
+        remark = on_remark or _LOG.warning
+        for text in state.settle(journal):
+            remark(text)
+        jobs = [
+            _job(case, folder, plots, own, keep, there=case.name in state.there)
+            for case in state.cases
+        ]
+        if longest_first:
+            jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
+        keys = {point.name: point.key for point in plan.points}
+        status = "interrupted"
+        try:
+            if jobs:
+                with suppress(FileNotFoundError):  # it would be out of date
+                    (folder / "study.json").unlink()
+            for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
+                there = record["status"] != "failed" and record["file"]
+                file = folder / record["file"] if there else None
+                journal.add(record, keys[record["name"]], None if file is None else file.stat())
+                if on_record is not None:
+                    on_record(record)
+                if record.get("errno") in NOTHING_MORE:
+                    raise OSError(record["errno"], os.strerror(record["errno"]), str(folder))
+            status = "complete"
+        except BaseException:
+            with suppress(OSError):  # the disk may be full
+                write_index(folder, inputs, status, state.records(journal))
+            raise
+        whole = len(plan.points) > MANY and _is_newer(folder / "study.json", journal.path)
+        if jobs or state.found or not whole:
+            write_index(folder, inputs, status, state.records(journal))
+        return Outcome(folder, state.records(journal), len(jobs))
+
+
+def _job(case: Case, folder: Path, plots: bool, own: str | None, keep: Keep, *, there: bool) -> Job:
+    path = (folder / f"{case.name}.h5").resolve()
+    picture = path.with_suffix(".png") if plots and case.file_name else None
+    return Job(case, path, picture, own, keep, there)
+
+
+def _executed(
+    jobs: Sequence[Job],
+    together: int,
+    workers: int | None,
+    client: Any,
+    progress: Callable[[float], None],
+) -> Iterable[Record]:
+    if client is not None:
+        threads = sum(client.nthreads().values())
+        return on_cluster(batches(jobs, together, max(1, threads)), client, progress)
+    count = workers or cores()
+    work: Sequence[Batch] = batches(jobs, together, count)
+    count = min(count, len(work))
+    return in_processes(work, count, progress) if count > 1 else in_this_process(work, progress)
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _refuse_another_study(
+    folder: Path, known: Journal | None, inputs: Mapping[str, object]
+) -> None:
+    there = known.inputs if known else None
+    if there is None:
+        try:
+            there = read_index(folder / "study.json").inputs.model_dump()
+        except InputError:
+            return
+    asked = {name: value for name, value in inputs.items() if name != "folder"}
+    differing = [name for name, value in asked.items() if there.get(name, value) != value]
+    if differing:
+        found = f"{folder} holds a study with other " + ", ".join(differing)
+        allowed = "--resume goes on with these inputs, --overwrite computes everything; or another"
+        raise InputError([Fault("--out", "", found, f"{allowed} --out")])
+
+
+def _is_newer(one: Path, other: Path) -> bool:
+    try:
+        return one.stat().st_mtime_ns >= other.stat().st_mtime_ns
+    except OSError:
+        return False

@@ -1,0 +1,276 @@
+"""Designs of an optimisation: values of the variables through a study, and what came of them."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.design import Constraint, Objective, Optimise, Value, Variable
+from railsim.definitions.study import Study
+from railsim.errors import Fault, InputError, nearest
+from railsim.studies.journal import Record
+from railsim.studies.outcome import Outcome
+from railsim.studies.search import Floats, Values
+from railsim.studies.study import study
+from railsim.studies.summary import summary_row, unit_of
+
+DIGITS = 6  # of the values of variables
+INPUTS = "optimise.toml"
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Design:
+    """Values of the variables, and what came of them.
+
+    Attributes
+    ----------
+    number : int
+        In the order of computation, from 1.
+    variables : dict of str to float
+        By their paths [SI].
+    objectives : tuple of float
+        In the order of the definition [SI]; NaN where a run has no such value.
+    constraints : tuple of float
+        Worst value of each constraint's quantity [SI].
+    feasible : bool
+        Whether all values are there and all constraints kept.
+    reason : str
+        Why there are no values.
+    """
+
+    number: int
+    variables: dict[str, float]
+    objectives: tuple[float, ...]
+    constraints: tuple[float, ...]
+    feasible: bool
+    reason: str = ""
+
+
+class Evaluation:
+    """Designs through a study; what a search calls.
+
+    Attributes
+    ----------
+    rows : list of tuple of str
+        Values of the variables of all designs, as written.
+    asked : list of int
+        For each point that the search has asked for, the number of its row.
+    """
+
+    def __init__(
+        self,
+        definition: Study,
+        wanted: Optimise,
+        folder: Path,
+        how: Mapping[str, Any],
+        *,
+        overwrite: bool,
+        progress: Progress,
+    ) -> None:
+        self.definition, self.wanted, self.folder = definition, wanted, folder
+        self.rows: list[tuple[str, ...]] = []
+        self.asked: list[int] = []
+        self.computed = 0
+        self.designs: tuple[Design, ...] = ()
+        self._margins = np.zeros((0, len(wanted.constraints)))
+        self._how, self._overwrite, self._progress = how, overwrite, progress
+        self._inputs = definition.arguments()
+
+    @cached_property
+    def variables(self) -> list[tuple[str, Variable]]:
+        """Paths and bounds."""
+        return list(self.wanted.variables.items())
+
+    def __call__(self, points: Floats) -> Values:
+        """Compute designs, and return the values of all that were asked for."""
+        known = {row: number for number, row in enumerate(self.rows)}
+        for point in points:
+            row = tuple(
+                _written(variable, float(share))
+                for share, (_, variable) in zip(point, self.variables, strict=True)
+            )
+            if row not in known:
+                known[row] = len(self.rows)
+                self.rows.append(row)
+            self.asked.append(known[row])
+        before, number = self._done, self.wanted.evaluations
+        self._study(lambda share: self._progress(min(1.0, (before + share * len(points)) / number)))
+        objectives = np.array([design.objectives for design in self.designs])
+        values = signs_of(self.wanted) * objectives
+        return Values(values[self.asked], self._margins[self.asked])
+
+    @property
+    def _done(self) -> int:
+        return len(self.designs)
+
+    def _study(self, progress: Progress) -> None:
+        linked: dict[str, list[str]] = {}
+        for place, (path, variable) in enumerate(self.variables):
+            for key in (path, *variable.also):
+                linked[key] = [row[place] for row in self.rows]
+        outcome = study(
+            out=self.folder,
+            linked=[*self._inputs["linked"], linked],
+            keep="summary",
+            resume=not self._overwrite,
+            overwrite=self._overwrite,
+            progress=progress,
+            **{name: value for name, value in self._inputs.items() if name != "linked"},
+            **self._how,
+        )
+        self._overwrite = False
+        self.computed += outcome.computed
+        self._take(outcome)
+
+    def _take(self, outcome: Outcome) -> None:
+        """Gather the runs of each design."""
+        runs: dict[tuple[str, ...], list[Record]] = {row: [] for row in self.rows}
+        for record in outcome.records:
+            runs[tuple(str(record["labels"][path]) for path, _ in self.variables)].append(record)
+        _check_quantities(self.wanted, outcome)
+        designs, margins = [], []
+        for number, row in enumerate(self.rows, start=1):
+            rows = [(record["labels"], summary_row(record)) for record in runs[row]]
+            bad = [record for record in runs[row] if record["status"] != "complete"]
+            objectives = tuple(_objective(one, rows) for one in self.wanted.objectives)
+            worst = [_constraint(one, rows) for one in self.wanted.constraints]
+            excess = tuple(margin for _, margin in worst)
+            if bad:
+                objectives = tuple(math.nan for _ in objectives)
+                excess = tuple(math.nan for _ in excess)
+            fine = not any(map(math.isnan, objectives)) and all(one <= 0.0 for one in excess)
+            values = {
+                path: float(text) for (path, _), text in zip(self.variables, row, strict=True)
+            }
+            reason = str(bad[0]["status_reason"]) if bad else ""
+            limits = tuple(value for value, _ in worst)
+            designs.append(Design(number, values, objectives, limits, fine, reason))
+            margins.append(excess)
+        self.designs = tuple(designs)
+        self._margins = np.array(margins, dtype=float).reshape(len(designs), -1)
+
+    def shares(self) -> Floats:
+        """Return all designs as points of the unit cube."""
+        return np.array(
+            [
+                [share_of(v, design.variables[path]) for path, v in self.variables]
+                for design in self.designs
+            ]
+        )
+
+
+def _written(variable: Variable, share: float) -> str:
+    """Return the value at a share of a variable's range as text.
+
+    Examples
+    --------
+    >>> _written(Variable(low=1e3, high=1e5, scale="log"), 0.5)
+    '10000'
+    """
+    if variable.scale == "log":
+        value = variable.low * (variable.high / variable.low) ** share
+    else:
+        value = variable.low + (variable.high - variable.low) * share
+    return f"{value:.{DIGITS}g}"
+
+
+def share_of(variable: Variable, value: float) -> float:
+    """Return the share of a variable's range below a value."""
+    if variable.scale == "log":
+        return math.log(value / variable.low) / math.log(variable.high / variable.low)
+    return (value - variable.low) / (variable.high - variable.low)
+
+
+def signs_of(wanted: Optimise) -> NDArray[np.float64]:
+    """Return 1 for each objective that is to be small, -1 for one that is to be large."""
+    return np.array([1.0 if one.goal == "minimise" else -1.0 for one in wanted.objectives])
+
+
+Rows = Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]
+
+
+def _values(one: Value, rows: Rows) -> list[float]:
+    """Return a quantity in the runs that count, NaN where a run lacks it."""
+    found = []
+    for labels, cells in rows:
+        if not all(_alike(labels.get(key), value) for key, value in one.where.items()):
+            continue
+        cell = cells.get(one.quantity)
+        value = float(cell) if isinstance(cell, int | float) else math.nan
+        found.append(abs(value) if one.magnitude else value)
+    return found
+
+
+def _alike(label: object, wanted: object) -> bool:
+    """Whether a label, a text in a grid, is a value."""
+    try:
+        return label == wanted or float(str(label)) == float(str(wanted))
+    except ValueError:
+        return False
+
+
+def _objective(one: Objective, rows: Rows) -> float:
+    values = _values(one, rows)
+    if not values or any(map(math.isnan, values)):
+        return math.nan
+    if one.over == "mean":
+        return math.fsum(values) / len(values)
+    return max(values) if one.goal == "minimise" else min(values)
+
+
+def _constraint(one: Constraint, rows: Rows) -> tuple[float, float]:
+    """Return the worst value, and by how much of the limit it is beyond it, negative within."""
+    found = (math.nan, math.nan)
+    for value in _values(one, rows):
+        if math.isnan(value):
+            return math.nan, math.nan
+        for limit, sign in ((one.high, 1.0), (one.low, -1.0)):
+            if limit is None:
+                continue
+            beyond = sign * (value - limit) / (abs(limit) or 1.0)
+            if not beyond <= found[1]:
+                found = value, beyond
+    return found
+
+
+def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
+    """Refuse a quantity that no complete run has, or labels that no run has."""
+    rows = [
+        (record["labels"], summary_row(record))
+        for record in outcome.records
+        if record["status"] == "complete"
+    ]
+    if not rows:
+        return
+    known = {name for _, cells in rows for name, v in cells.items() if isinstance(v, int | float)}
+    faults = []
+    for table, ones in (("objectives", wanted.objectives), ("constraints", wanted.constraints)):
+        for number, one in enumerate(ones):
+            key = f"optimise.{table}.{number}"
+            if one.quantity not in known:
+                found = f"no run has '{one.quantity}'"
+                faults.append(Fault(INPUTS, f"{key}.quantity", found, nearest(one.quantity, known)))
+            elif not _values(one, rows):
+                faults.append(Fault(INPUTS, f"{key}.where", "no run is like this", ""))
+    if faults:
+        raise InputError(faults)
+
+
+def name_of(one: Value) -> str:
+    """Return what a value is called: its quantity, with the runs that count."""
+    where = ", ".join(f"{key}={value}" for key, value in one.where.items())
+    name = f"|{one.quantity}|" if one.magnitude else one.quantity
+    return f"{name} at {where}" if where else name
+
+
+def with_unit(one: Value) -> str:
+    """Return what a value is called, with its unit."""
+    unit = unit_of(one.quantity)
+    return f"{name_of(one)} ({unit})" if unit else name_of(one)

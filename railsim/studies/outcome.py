@@ -1,0 +1,103 @@
+"""`Outcome`: what a study left in its folder, and its summary as a table or an array."""
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from railsim.result import Result, open_result
+from railsim.studies.journal import Record, Records
+from railsim.studies.summary import summary_row, unit_of
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a study left in its folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Holds the result files, ``summary.csv`` and ``study.json``.
+    records : sequence of dict
+        One for every run, in the order of the combinations; read when asked for.
+    computed : int
+        Number of runs that were computed now; the others were there.
+    """
+
+    folder: Path
+    records: Records
+    computed: int
+
+    @property
+    def failed(self) -> tuple[Record, ...]:
+        """Runs without a result."""
+        return self.records.with_status("failed")
+
+    @property
+    def ended_early(self) -> tuple[Record, ...]:
+        """Runs that ended early for a physical reason."""
+        return self.records.with_status(but=("complete", "failed"))
+
+    def results(self) -> dict[str, Result]:
+        """Return the results by the names of their runs; arrays are read when asked for."""
+        return {
+            record["name"]: open_result(self.folder / record["file"])
+            for record in self.records
+            if record["status"] not in ("failed", "waiting") and record["file"]
+        }
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """Return the summary, one row a run, as a `pandas.DataFrame` [SI].
+
+        Raises
+        ------
+        ImportError : pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError(
+                "to_dataframe needs pandas; install it with: pip install pandas"
+            ) from None
+        rows = [summary_row(record) for record in self.records]
+        frame = pandas.DataFrame(rows)
+        labels = [name for name in dict.fromkeys(n for r in self.records for n in r["labels"])]
+        for name in labels:  # values of a grid are texts, as in a file
+            with suppress(ValueError, TypeError):
+                frame[name] = pandas.to_numeric(frame[name])
+        return frame
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the numbers of the summary as an `xarray.Dataset` with the grid as dimensions.
+
+        Dimensions are what differs between the runs; where these are no full grid, as with a
+        sample, the dimension is ``run``.  Each variable has its ``units``.
+
+        Raises
+        ------
+        ImportError : pandas or xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(
+                "to_xarray needs xarray; install it with: pip install 'railsim[xarray]'"
+            ) from None
+        frame = self.to_dataframe()
+        labels = list(dict.fromkeys(name for record in self.records for name in record["labels"]))
+        varied = [name for name in labels if frame[name].nunique(dropna=False) > 1]
+        numbers = frame.select_dtypes("number").columns.difference(labels, sort=False)
+        full = math.prod(frame[name].nunique() for name in varied) == len(frame)
+        if varied and full and not frame.duplicated(varied).any():
+            data = xarray.Dataset.from_dataframe(frame.set_index(varied)[list(numbers)])
+        else:
+            indexed = frame.set_index("name").rename_axis("run")
+            data = xarray.Dataset.from_dataframe(indexed[[*varied, *numbers]]).set_coords(varied)
+        for name in data:
+            data[name].attrs["units"] = unit_of(str(name)) or "1"
+        return data

@@ -1,0 +1,170 @@
+"""`State`: what of a study is done, by journal and files, and what is to be computed."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+from railsim.errors import Fault, InputError
+from railsim.result import open_result
+from railsim.studies.case import Case
+from railsim.studies.journal import JOURNAL, Journal, Record, Records
+from railsim.studies.keep import Keep
+from railsim.studies.points import Point
+from railsim.studies.summary import finished_record, waiting_record
+
+CHANGED = "--resume computes what has changed, --overwrite everything; or another --out"
+
+
+class Runs(Protocol):
+    """What is to be done, such as `Plan`.
+
+    Attributes
+    ----------
+    points : list of Point
+        What each run is asked for.
+    """
+
+    points: list[Point]
+
+    def cases(self, points: Sequence[Point]) -> list[Case]:
+        """Load what the runs of some points need."""
+
+
+class State:
+    """What of a study is done and what is to be computed.
+
+    Attributes
+    ----------
+    cases : list of Case
+        What is to be computed.
+    found : list of (Point, Record)
+        Results that are there and that the journal does not know.
+    there : set of str
+        Names of the cases whose run is there, but not their analyses.
+
+    Raises
+    ------
+    InputError
+        Everything that is wrong in what is to be computed; without `resume` also results that would
+        have to be replaced.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        plan: Runs,
+        known: Journal | None,
+        own: str | None,
+        keep: Keep,
+        *,
+        resume: bool,
+        overwrite: bool,
+    ) -> None:
+        self._folder, self._plan, self._own, self._keep = folder, plan, own, keep
+        self._entries = dict(known.entries) if known and not overwrite else {}
+        self._there = {} if overwrite else _files(folder)
+        self._damaged: dict[Path, str] = {}
+        self._changed: list[str] = []
+        self._lines = known.damaged if known else 0
+        self.found: list[tuple[Point, Record]] = []
+        self.there: set[str] = set()
+        points = [point for point in plan.points if not self._is_done(point)]
+        self._waiting = dict(zip(points, plan.cases(points), strict=True))
+        faults = [
+            fault for point, case in self._waiting.items() for fault in self._faults_of(point, case)
+        ]
+        if faults and not resume:
+            raise InputError(faults)
+        known_ones = {point for point, _ in self.found}
+        self.cases = [case for point, case in self._waiting.items() if point not in known_ones]
+
+    def _is_done(self, point: Point) -> bool:
+        """Whether the journal knows the result, of these inputs, and its file has not changed."""
+        entry = self._entries.get(point.name)
+        if entry is None or entry.status in ("failed", "waiting") or not point.key:
+            return False
+        if not entry.size and not self._keep.summary and point.has_run:
+            return False  # the summary was kept, the file is wanted
+        return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
+
+    def _faults_of(self, point: Point, case: Case) -> list[Fault]:
+        """Look at what is there of a case: a file, or a summary without one."""
+        if case.file_name in self._there:
+            return self._look_at(point, case)
+        entry = self._entries.get(case.name)
+        done = entry is not None and entry.status not in ("failed", "waiting") and not entry.size
+        if entry is None or not done or entry.key == point.key:
+            return []
+        self._changed.append(case.name)
+        return [Fault("--out", case.name, "a summary of other inputs", CHANGED)]
+
+    def _look_at(self, point: Point, case: Case) -> list[Fault]:
+        """Take a result that is there, or say why it cannot be taken."""
+        path = self._folder / case.file_name
+        try:
+            result = open_result(path)
+            if result.attributes.get("inputs_hash") == case.key:
+                if case.analyses:  # these take their time: it is a job like others
+                    self.there.add(case.name)
+                else:
+                    self.found.append((point, finished_record(case, result, self._own)))
+                return []
+        except InputError as error:
+            self._damaged[path] = str(error.faults[0])
+            return list(error.faults)
+        self._changed.append(case.name)
+        return [Fault("--out", str(path), "a result of other inputs", CHANGED)]
+
+    def settle(self, journal: Journal) -> list[str]:
+        """Record what was found, move away what is damaged; return what the user should know."""
+        remarks = []
+        if self._lines:
+            remarks.append(f"{self._lines} damaged lines of {JOURNAL} are left out")
+        for point, record in self.found:
+            if self._keep.summary:
+                (self._folder / record["file"]).unlink()
+                journal.add({**record, "file": ""}, point.key, None)
+            else:
+                journal.add(record, point.key, self._there[record["file"]])
+        for path, words in self._damaged.items():
+            kept = path.with_name(f"{path.name}.damaged")
+            os.replace(path, kept)
+            remarks.append(f"{words}: it is computed again; the old file is kept as {kept.name}")
+        lost = [
+            case.name
+            for case in self.cases
+            if self._entries.get(case.name)
+            and case.file_name not in self._there
+            and self._entries[case.name].size
+        ]
+        for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
+            if names:
+                number = "1 result is" if len(names) == 1 else f"{len(names)} results are"
+                remarks.append(f"{number} {words} and computed again: {_listed(names)}")
+        return remarks
+
+    def records(self, journal: Journal) -> Records:
+        """Return the records of all runs, done or waiting, in the order of the combinations."""
+        waiting = {point.name: case for point, case in self._waiting.items()}
+        return Records(
+            journal.path,
+            [
+                journal.entries.get(point.name) or waiting_record(waiting[point.name])
+                for point in self._plan.points
+            ],
+        )
+
+
+def _files(folder: Path) -> dict[str, os.stat_result]:
+    """Return the result files of a folder; a hundred thousand take less than a second."""
+    try:
+        with os.scandir(folder) as entries:
+            return {entry.name: entry.stat() for entry in entries if entry.name.endswith(".h5")}
+    except OSError:  # not there, or no folder
+        return {}
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more

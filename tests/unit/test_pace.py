@@ -1,0 +1,32 @@
+"""The step of a run: judged for a class of runs, whatever was judged before."""
+
+import pytest
+
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.simulation import pace
+from railsim.simulation.preparation import prepare
+
+
+def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
+    vehicle, track = load_vehicle("coach_manchester"), load_track("curve_r250")
+    judged = []
+
+    def settled(model, track, state, step, progress):
+        judged.append((float(state[-1]), float(model.system.track.rail[0, 4, 0])))
+
+    def steps(frictions):
+        monkeypatch.setattr(pace, "_JUDGED", {})
+        judged.clear()
+        runs = {mu: track.replace(friction=(mu, mu)) for mu in frictions}
+        return {
+            mu: prepare(vehicle, run, Settings(), 20.0, duration=1.0).pace.at(20.0)
+            for mu, run in runs.items()
+        }
+
+    monkeypatch.setattr(pace, "in_flange_contact", settled)
+    forwards = steps([0.21, 0.28, 0.35])
+    # one judgement for two runs, at the lowest speed and highest friction of their class
+    assert judged == [pytest.approx((1.2**16, 0.3)), pytest.approx((1.2**16, 0.4))]
+    assert steps([0.35, 0.28, 0.21]) == forwards
+    assert len(judged) == 2
