@@ -18,9 +18,8 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
 
-BRAKES_FULLY = (
-    0.1  # m/s; speed of the wheel's rim below which a brake's torque fades to that at rest
-)
+# speed of the wheel's circumference below which a brake's torque decreases linearly to 0 (m/s)
+BRAKES_FULLY = 0.1
 
 
 @compiled

@@ -32,18 +32,15 @@ from railsim.definitions.elements import (
 from railsim.definitions.flatten import FlatBody, FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned_zeros
-from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
-from railsim.kernels.system import (
+from railsim.kernels.element_columns import (
+    LINK_COLUMNS,
     LINK_SIZE,
+    MOUNT_COLUMNS,
     MOUNT_SIZE,
     ONE_SIDED,
-    Curves,
-    Drives,
-    Links,
-    Loads,
-    Mounts,
-    mount_laws,
 )
+from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
+from railsim.kernels.system import Curves, Drives, Links, Loads, Mounts, mount_laws
 
 Floats = NDArray[np.float64]
 Rows = tuple[tuple[float, float], ...]
@@ -138,9 +135,11 @@ class ElementArrays:
             {
                 "name": element.name,
                 "body": self._pair(element),
-                "point": self._levers(element, point1, point2),
+                **self._levers(element, point1, point2),
                 "length": float(np.linalg.norm(point2 - point1)),
-                "spring": (law.stiffness, 0.0 if in_series else law.damping, preload),
+                "stiffness": law.stiffness,
+                "damping": 0.0 if in_series else law.damping,
+                "preload": preload,
                 "internal": internal,
                 "curve": (self._curve(law.spring_table), -1 if in_series else damper_curve),
             }
@@ -153,7 +152,7 @@ class ElementArrays:
         row: dict[str, Any] = {
             "name": element.name,
             "body": self._pair(element),
-            "point": self._levers(element, place, place),
+            **self._levers(element, place, place),
             "stiffness": _NOTHING,
             "damping": _NOTHING,
             "preload": _NOTHING,
@@ -306,9 +305,9 @@ class ElementArrays:
     def _pair(self, element: FlatElement) -> tuple[int, int]:
         return self._number(element.body1), self._number(element.body2)
 
-    def _levers(self, element: FlatElement, point1: Floats, point2: Floats) -> Floats:
+    def _levers(self, element: FlatElement, point1: Floats, point2: Floats) -> dict[str, Floats]:
         centre1, centre2 = self._centre(element.body1), self._centre(element.body2)
-        return np.array([point1 - centre1, point2 - centre2])
+        return {"point_1": point1 - centre1, "point_2": point2 - centre2}
 
     def _centre(self, name: str) -> Floats:
         # an axlebox turns about its axle: its levers count from the wheelset's centre
@@ -334,7 +333,7 @@ class ElementArrays:
         rows = self.link_rows
         return Links(
             body=_column(rows, "body", (2,), np.int64),
-            row=_table(rows, ("point", "length", "spring"), LINK_SIZE),
+            row=_table(rows, LINK_COLUMNS, LINK_SIZE),
             internal=_column(rows, "internal", (), np.int64),
             curve=_column(rows, "curve", (2,), np.int64),
         )
@@ -342,21 +341,12 @@ class ElementArrays:
     def mounts(self) -> Mounts:
         """Arrays of all three-axis elements."""
         rows = self.mount_rows
-        floats = (
-            "point",
-            "share",
-            "stiffness",
-            "damping",
-            "preload",
-            "rotation",
-            "rotation_damping",
-        )
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
         flags = _column(rows, "flags", (4,), np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
-            row=_table(rows, floats, MOUNT_SIZE),
+            row=_table(rows, MOUNT_COLUMNS, MOUNT_SIZE),
             friction=_column(rows, "friction", (3, 2)),
             internal=internal,
             curve=curve,
@@ -420,12 +410,12 @@ def _starts(tables: Sequence[Floats]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum([len(table) for table in tables])]).astype(np.int64)
 
 
-def _table(rows: list[dict[str, Any]], keys: Sequence[str], size: int) -> Floats:
-    """Values of all keys side by side, one row an element."""
-    values = [np.concatenate([np.ravel(row[key]) for key in keys]) for row in rows]
+def _table(rows: list[dict[str, Any]], columns: Mapping[str, slice], size: int) -> Floats:
+    """Values of all names in their columns, one row an element."""
     table = aligned_zeros((len(rows), size))
-    if rows:
-        table[:, : len(values[0])] = values
+    for row, values in zip(table, rows, strict=True):
+        for name, place in columns.items():
+            row[place] = values[name]
     return table
 
 

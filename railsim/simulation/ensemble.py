@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.aligned import aligned
+from railsim.kernels.element_columns import BOTH_ENDS, ROTATES
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.status import (
     DERAILED,
@@ -29,17 +30,7 @@ from railsim.kernels.status import (
     YAW_RANGE,
 )
 from railsim.kernels.support import SUPPORT_SIZE
-from railsim.kernels.system import (
-    BOTH_ENDS,
-    N_SCALARS,
-    ROTATES,
-    Bodies,
-    Contact,
-    Curves,
-    Mounts,
-    System,
-    mount_laws,
-)
+from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, Mounts, System, mount_laws
 from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model, side_by_side
 
