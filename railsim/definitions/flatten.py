@@ -12,7 +12,8 @@ from typing import Literal
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
-from railsim.definitions.elements import AxleTorque, Element
+from railsim.definitions.element_base import Element
+from railsim.definitions.given_elements import AxleTorque
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
 from railsim.definitions.offered import offers

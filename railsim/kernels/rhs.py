@@ -49,12 +49,12 @@ from railsim.kernels.support import (
     AFTER_STEP,
     AS_GIVEN,
     MOST_CORRECTIONS,
-    correct_support,
     evaluations,
     locate_support,
     settle_rates,
     support_rates,
 )
+from railsim.kernels.support_step import correct_support
 from railsim.kernels.system import (
     BODY_SIZE,
     COS_ROLL,

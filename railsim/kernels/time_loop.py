@@ -28,14 +28,12 @@ from railsim.kernels.internal import (
 )
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
-from railsim.kernels.support import (
-    AFTER_STEP,
-    BALANCED,
+from railsim.kernels.support import AFTER_STEP, BALANCED, support_rates
+from railsim.kernels.support_step import (
     note_wheelsets,
     remember_track,
     step_compliance,
     step_support,
-    support_rates,
 )
 from railsim.kernels.system import (
     AXLEBOX,

@@ -12,24 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.elements import (
+from railsim.definitions.element_base import Element, two_sided
+from railsim.definitions.flatten import FlatBody, FlatElement
+from railsim.definitions.friction_elements import Friction, SideBearer, Wedge
+from railsim.definitions.given_elements import AppliedForce, AxleTorque, Brake, Traction
+from railsim.definitions.spring_elements import (
     Airspring,
-    AppliedForce,
-    AxleTorque,
-    Brake,
     BumpStop,
     Bushing,
-    Element,
-    Friction,
     RollBar,
     ShearSpring,
-    SideBearer,
     SpringDamper,
-    Traction,
-    Wedge,
-    two_sided,
 )
-from railsim.definitions.flatten import FlatBody, FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.element_columns import (
@@ -48,23 +42,6 @@ Triple = tuple[float, float, float]
 
 _NOTHING: Triple = (0.0, 0.0, 0.0)
 _NONE = (-1, -1, -1)
-
-
-def vertical_support(law: Element) -> float:
-    """Static stiffness with which an element carries weight [N/m]; a link's along its line."""
-    if isinstance(law, SpringDamper):
-        if law.spring_table is None:
-            return law.stiffness
-        rows = np.array(two_sided(law.spring_table))
-        return float(np.max(np.diff(rows[:, 1]) / np.diff(rows[:, 0])))
-    if isinstance(law, Bushing | ShearSpring | Friction | Wedge):
-        return law.stiffness[2]
-    if isinstance(law, SideBearer):
-        return law.stiffness
-    if isinstance(law, Airspring):
-        both = law.bellows_stiffness + law.reservoir_stiffness
-        return law.area_stiffness + law.bellows_stiffness * law.reservoir_stiffness / both
-    return 0.0
 
 
 def rotation_potential(stiffness: Sequence[float]) -> Triple:

@@ -8,8 +8,8 @@ from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
-from railsim.kernels.lanes import LANES
 from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.registers import LANES
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
 from railsim.kernels.system import (
     AXLEBOX,

@@ -10,8 +10,6 @@ PACKAGE = Path(railsim.__file__).parent
 PARAMETERS, FUNCTION, MODULE = 10, 80, 500
 # beyond a limit, with the reason
 LARGER = {
-    "definitions/elements.py": "to be divided",
-    "kernels/support.py": "to be divided",
     "notation.py": "the table of quantities",
     "studies/optimise.py": "to be divided",
     "studies/study.py": "to be divided",
