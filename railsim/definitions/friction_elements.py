@@ -5,7 +5,14 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from railsim.definitions.base import AutoOrVector, NonNegative, NonNegativeVector, Positive, Vector
+from railsim.definitions.base import (
+    AutoOrVector,
+    Definition,
+    NonNegative,
+    NonNegativeVector,
+    Positive,
+    Vector,
+)
 from railsim.definitions.element_base import (
     Element,
     PairElement,
@@ -15,7 +22,26 @@ from railsim.definitions.element_base import (
 )
 
 
-class Friction(VerticalSpring, PointElement):
+class SlidingFriction(Definition):
+    """Dry friction that may fall with the speed: r + (1 - r) exp(-|v|/v_s) times that at rest.
+
+    Source: Bo, Pavelescu (1982), The friction-speed relation and its influence on the critical
+    velocity of stick-slip motion, Wear 82, 277-289.
+    """
+
+    sliding_ratio: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1.0)] = 1.0
+    """Friction at high sliding speed over that at rest [1]; 1: it does not fall"""
+    stribeck_speed: Positive | None = None
+    """Sliding speed at which the difference has fallen to 1/e of itself [m/s]"""
+
+    @model_validator(mode="after")
+    def _ratio_with_speed(self) -> Self:
+        if (self.sliding_ratio < 1.0) != (self.stribeck_speed is not None):
+            raise ValueError("a 'sliding_ratio' below 1 and 'stribeck_speed' belong together")
+        return self
+
+
+class Friction(SlidingFriction, VerticalSpring, PointElement):
     """Dry friction along the axes of body 1, with a spring in parallel: leaf spring, friction pad.
 
     The largest friction force along an axis is friction_force + friction_coefficient N, with N the
@@ -53,7 +79,7 @@ class Friction(VerticalSpring, PointElement):
         return self
 
 
-class SideBearer(PointElement):
+class SideBearer(SlidingFriction, PointElement):
     """A sliding pad on which body 2 rests on body 1: pressure without tension, friction in x and y.
 
     The friction force has any direction in the plane and at most mu N; where the pad lifts there is
@@ -105,7 +131,7 @@ class SideBearer(PointElement):
         return ((-1.0, 0.0), (first, 0.0), (first + 1.0, self.stop_stiffness))
 
 
-class CentrePlate(PairElement):
+class CentrePlate(SlidingFriction, PairElement):
     """Flat plate (ring) of body 2 that turns and slides on a bowl of body 1.
 
     The pressure is that of an elastic layer without tension; it follows a tilted body 2 to the
@@ -167,6 +193,8 @@ class CentrePlate(PairElement):
                     preload="auto" if self.preload == "auto" else 0.25 * share * self.preload,
                     friction_coefficient=self.friction_coefficient,
                     stick_stiffness=0.25 * share * self.stick_stiffness,
+                    sliding_ratio=self.sliding_ratio,
+                    stribeck_speed=self.stribeck_speed,
                 )
                 place = (radius * cos(angle), radius * sin(angle), 0.0)
                 found.append((f"pad_{4 * ring + quarter + 1}", place, pad))

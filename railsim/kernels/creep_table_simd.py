@@ -67,7 +67,7 @@ def _emit(builder, table, start, strides, weights, sums):
                     pointer = builder.bitcast(builder.gep(table, [at]), ir.PointerType(_FLOATS))
                     values = builder.fpext(builder.load(pointer, align=4), VECTOR)
                     sums_k[half] = fma(inner[k], values, sums_k[half])
-            sums_j = [builder.call(fma, [middle[j], sums_k[h], sums_j[h]]) for h in range(2)]
+            sums_j = [fma(middle[j], sums_k[h], sums_j[h]) for h in range(2)]
         outer = weight(loop.index)
         for half in range(2):
             present = builder.load(totals[half])

@@ -16,7 +16,7 @@ force times rate.  Dampers with a series stiffness, friction pads and air spring
 states (see `internal`).
 """
 
-from math import sqrt
+from math import exp, sqrt
 
 from railsim.kernels import compiled
 from railsim.kernels.element_columns import (
@@ -164,13 +164,35 @@ def link_forces(links, curves, inner, drive, laws, pose):
 
 
 @compiled(inline=True)
-def limit_of(mounts, e, k, normal):
-    """Largest friction force of mount `e` along axis `k` under the load `normal`."""
-    return mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal
+def limit_of(mounts, e, k, pad):
+    """Largest friction force of mount `e` along axis `k`; `pad`: its load, share at its speed."""
+    normal, share = pad
+    return share * (mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal)
+
+
+@compiled(inline=True)
+def share_at_speed(mounts, internal, e, k, laws, lane):
+    """Friction at the sliding speed over that at rest, r + (1 - r) exp(-|v|/v_s), of one axis.
+
+    v is the rate of the deflection, of a pad that slides in any direction that along all its axes
+    (Bo, Pavelescu 1982; as in the elastic pads of Canudas de Wit et al. 1995 it is not reduced by
+    the rate of the pad's own elastic deflection).
+    """
+    ratio = mounts.friction[e, k, 2]
+    if ratio == 1.0:
+        return 1.0
+    m = mounts.internal[e, k]
+    together = m >= 0 and internal.parameter[m, 1] > 0.0
+    square = 0.0
+    for i in range(3):
+        if i == k or (together and mounts.internal[e, i] >= 0):
+            rate = laws[(3 + i) * LANES + lane]
+            square += rate * rate
+    return ratio + (1.0 - ratio) * exp(-sqrt(square) / mounts.friction[e, k, 3])
 
 
 @compiled(python=False)
-def grip(mounts, internal, e, normal, inner):
+def grip(mounts, internal, e, pad, inner):
     """Factor that brings the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
@@ -182,7 +204,7 @@ def grip(mounts, internal, e, normal, inner):
     for k in range(3):
         m = mounts.internal[e, k]
         if m >= 0:
-            limit = limit_of(mounts, e, k, normal)
+            limit = limit_of(mounts, e, k, pad)
             z = inner[m] / limit if limit > 0.0 else 0.0
             square += z * z
             skew = internal.parameter[m, 2]
@@ -191,20 +213,20 @@ def grip(mounts, internal, e, normal, inner):
 
 
 @compiled(inline=True)
-def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
-    """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
+def axis_law(mounts, internal, curves, e, k, d, rate, pad, inner, drive):
+    """Force along axis `k` of mount `e` of its table and internal state; `pad`: see `limit_of`."""
     force = 0.0
     if mounts.curve[e, k] >= 0:
         force += curve_value(curves, mounts.curve[e, k], d)
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = limit_of(mounts, e, k, normal)
+            limit = limit_of(mounts, e, k, pad)
             drive[m, 0], drive[m, 1] = rate, limit
             if internal.parameter[m, 1] == 0.0:
                 force += min(limit, max(-limit, inner[m]))
             elif limit > 0.0:
-                force += inner[m] * grip(mounts, internal, e, normal, inner)
+                force += inner[m] * grip(mounts, internal, e, pad, inner)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
@@ -212,7 +234,7 @@ def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
             drive[m, 0] = rate
             force += inner[m]
     if k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED:
-        force += lifted_part(mounts, e, d, rate, normal)
+        force += lifted_part(mounts, e, d, rate, pad[0])
     return force
 
 
@@ -253,9 +275,10 @@ def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
         lane = e - first
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
-        normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
+        share = share_at_speed(mounts, internal, e, k, laws, lane)
+        pad = (pad_load(mounts, curves, e, laws[2 * LANES + lane]), share)
         laws[(6 + k) * LANES + lane] = axis_law(
-            mounts, internal, curves, e, k, d, rate, normal, inner, drive
+            mounts, internal, curves, e, k, d, rate, pad, inner, drive
         )
 
 

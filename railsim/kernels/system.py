@@ -176,8 +176,9 @@ class Mounts(NamedTuple):
     ----------
     body : int64[e, 2]
     row : float64[e, MOUNT_SIZE]   see `element_columns.MOUNT_COLUMNS`
-    friction : float64[e, 3, 2]  limit of a friction pad: constant [N], share of the vertical
-                                 spring force [1]
+    friction : float64[e, 3, 4]  limit of a friction pad along each axis: constant [N], share of the
+                                 vertical spring force [1]; its fall with the sliding speed: ratio
+                                 of sliding to static friction [1], Stribeck speed [m/s]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
     flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational

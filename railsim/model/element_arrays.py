@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.element_base import Element, two_sided
 from railsim.definitions.flatten import FlatBody, FlatElement
-from railsim.definitions.friction_elements import Friction, SideBearer, Wedge
+from railsim.definitions.friction_elements import Friction, SideBearer, SlidingFriction, Wedge
 from railsim.definitions.given_elements import AppliedForce, AxleTorque, Brake, Traction
 from railsim.definitions.spring_elements import (
     Airspring,
@@ -42,6 +42,7 @@ Triple = tuple[float, float, float]
 
 _NOTHING: Triple = (0.0, 0.0, 0.0)
 _NONE = (-1, -1, -1)
+_STEADY = (0.0, 0.0, 1.0, 1.0)  # friction that does not fall with the speed
 
 
 def rotation_potential(stiffness: Sequence[float]) -> Triple:
@@ -135,7 +136,7 @@ class ElementArrays:
             "preload": _NOTHING,
             "rotation": _NOTHING,
             "rotation_damping": _NOTHING,
-            "friction": np.zeros((3, 2)),
+            "friction": np.tile(_STEADY, (3, 1)),
             "internal": _NONE,
             "curve": _NONE,
             "flags": (1, 0, 0, 0),
@@ -197,7 +198,8 @@ class ElementArrays:
         raise ModelError(f"no force law for an element of type '{type(law).__name__}'")
 
     def _friction(self, law: Friction) -> dict[str, Any]:
-        limits = np.stack((law.friction_force, law.friction_coefficient), axis=1)
+        limits = _friction_limits(law)
+        limits[:, :2] = np.stack((law.friction_force, law.friction_coefficient), axis=1)
         return {
             "stiffness": law.stiffness,
             "damping": law.damping,
@@ -210,7 +212,7 @@ class ElementArrays:
         }
 
     def _side_bearer(self, law: SideBearer) -> dict[str, Any]:
-        limits = np.zeros((3, 2))
+        limits = _friction_limits(law)
         limits[:2, 1] = law.friction_coefficient
         load = -law.stiffness * law.clearance if law.preload == 0.0 else law.preload
         return {
@@ -224,7 +226,7 @@ class ElementArrays:
         }
 
     def _wedge(self, law: Wedge) -> dict[str, Any]:
-        limits = np.zeros((3, 2))
+        limits = np.tile(_STEADY, (3, 1))
         limits[1:, 1] = law.share
         return {
             "stiffness": law.stiffness,
@@ -239,7 +241,7 @@ class ElementArrays:
         self, stiffness: Triple, limits: Floats, *, together: bool = True, skew: float = 0.0
     ) -> Triple:
         """Internal states of the friction forces along the axes that have a limit."""
-        axes = [k for k in range(3) if np.any(limits[k] > 0.0)]
+        axes = [k for k in range(3) if np.any(limits[k, :2] > 0.0)]
         together = together and len(axes) > 1
         found = [-1, -1, -1]
         for k in axes:
@@ -324,7 +326,7 @@ class ElementArrays:
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
             row=_table(rows, MOUNT_COLUMNS, MOUNT_SIZE),
-            friction=_column(rows, "friction", (3, 2)),
+            friction=_column(rows, "friction", (3, 4)),
             internal=internal,
             curve=curve,
             flags=flags,
@@ -371,6 +373,11 @@ class ElementArrays:
             parameter=np.array([row[1] for row in rows], dtype=float).reshape(-1, 3),
             curve=np.array([row[2] for row in rows], dtype=np.int64),
         )
+
+
+def _friction_limits(law: SlidingFriction) -> Floats:
+    """Rows of `Mounts.friction` without limits yet, with the fall of friction with the speed."""
+    return np.tile((0.0, 0.0, law.sliding_ratio, law.stribeck_speed or 1.0), (3, 1))
 
 
 def _kind_of_mount(row: dict[str, Any]) -> tuple[bool, ...]:
