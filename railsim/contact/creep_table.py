@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POISSON = 0.28
-"""Poisson's number of the tabulated solutions; others scale Kalker's coefficients."""
+"""Poisson's ratio of the tabulated solutions; others scale Kalker's coefficients."""
 SPIN_ARM = 0.8
 # the solver's error falls with about the power 1.5 of the cell: from two grids, one twice as fine
 _EXTRAPOLATION = 1.0 / (math.sqrt(8.0) - 1.0)
@@ -247,7 +247,7 @@ def build_nodes(folder: Path, workers: int = 2) -> Iterator[tuple[int, int]]:
     """Compute all missing rows of nodes into `folder`; yields (rows done, rows in all).
 
     Each row (one ratio, one theta) is a file that appears when it is whole: a build that was
-    interrupted goes on where it was.  Rows do not depend on each other nor on the workers.
+    interrupted is continued.  Rows do not depend on each other nor on the workers.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows = [(i, j) for i in range(N_RATIO + 1) for j in range(N_THETA + 1)]
@@ -307,7 +307,7 @@ def creep_table(nu: float = POISSON) -> CreepTable:
     Parameters
     ----------
     nu : float
-        Poisson's number.  The table was computed for 0.28; for others the creepages are scaled by
+        Poisson's ratio.  The table was computed for 0.28; for others the creepages are scaled by
         the ratios of Kalker's printed coefficients, which is exact for small creepage.
 
     Returns

@@ -285,7 +285,7 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
     for group, place in _places(vehicle, _Place()):
         faults += _side_faults(group, place)
         faults += _torque_faults(group, place, {body.name: body.kind for body in flat.bodies})
-    # a definition that stands several times is told of once
+    # a definition that stands several times is reported once
     return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
 

@@ -112,7 +112,7 @@ def stored(path: Path) -> bytes | None:
 
 def discard(path: Path) -> None:
     """Remove a damaged file of the cache, and say so."""
-    notice(f"the cache {path.parent} was damaged; what was lost is made anew")
+    notice(f"the cache {path.parent} was damaged; what was lost is made again")
     with suppress(OSError):
         path.unlink()
 
@@ -144,7 +144,7 @@ def store_file(path: Path, write: Callable[[int], None]) -> bool:
         _unwritable.add(path.parent)
         notice(
             f"the cache {path.parent} cannot be written ({error.strerror or error}); the next "
-            "run prepares itself anew"
+            "run prepares itself again"
         )
         return False
     except BaseException:

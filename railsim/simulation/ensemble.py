@@ -1,6 +1,6 @@
 """Several vehicles on one track as one system: many runs per compiled call.
 
-The vehicles share time, place and speed and do not feel each other; each has its own bodies,
+The vehicles share time, place and speed and do not interact; each has its own bodies,
 elements and wheels.  In the time loop FASTSIM then marches the strips of all their wheels side by
 side, and what a call or an evaluation costs by itself is spent once.
 

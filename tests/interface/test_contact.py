@@ -47,7 +47,7 @@ def test_json_has_the_names_units_and_signs_of_the_interface(capsys):
     assert np.all(lists["contact_angle_left"] > 0)
     assert np.all(lists["contact_y_left"] < -0.7)
     assert np.all(lists["contact_y_right"] > 0.7)
-    assert np.all(lists["wheel_y_right"][right] < 0)  # between tape circle and flange
+    assert np.all(lists["wheel_y_right"][right] < 0)  # between nominal rolling circle and flange
     assert np.all(lists["roll"][right] < 0)  # the right side is lifted
     conicity = {row["amplitude"]: row["value"] for row in data["equivalent_conicity"]}
     assert conicity[0.003] == pytest.approx(0.177, abs=0.002)  # PHYSICS.md: about 0.18
