@@ -8,7 +8,7 @@ part is spread evenly:
 - scaled creepages ``q = G a b/(mu N) (c11 xi_x, c22 xi_y, sqrt(c11 c22) rho phi)`` with Kalker's
   coefficients and rho = 0.8 sqrt((a^2 + b^2)/2), so that each is the force of linear theory and
   spin counts by the slip near the ellipse's far edge (the place where the slip turns round moves
-  over the patch at even pace);
+  over the patch uniformly);
 - direction of q by the angles theta from the axis of xi_x, psi from xi_y to phi;
 - magnitude as ``t = |q|/(|q| + 2)``: linear theory at 0, full sliding at 1.
 

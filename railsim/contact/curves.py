@@ -216,8 +216,8 @@ def wheel_curve(
 def tape_circle_place(back_to_back: float) -> float:
     """Place of the right nominal rolling circle from the wheelset's centre [m].
 
-    The wheels sit on the axle at the given back-to-back distance; profiles are given from a tape
-    circle 70 mm from the flange back.
+    The wheels sit on the axle at the given back-to-back distance; profiles are given from a nominal
+    rolling circle 70 mm from the flange back.
     """
     return 0.5 * back_to_back - FLANGE_BACK
 

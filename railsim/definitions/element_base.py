@@ -33,9 +33,11 @@ def _characteristic(rows: Rows) -> Rows:
 def _through_zero(rows: Rows) -> Rows:
     first, last = rows[0][0], rows[-1][0]
     if first > 0.0 or last <= 0.0:
-        raise ValueError("the first column must begin at 0 (same both ways) or below 0")
+        raise ValueError("the first column must begin at 0 (same in both directions) or below 0")
     if first == 0.0 and rows[0][1] != 0.0:
-        raise ValueError("a table that begins at 0 must begin with force 0 (same both ways)")
+        raise ValueError(
+            "a table that begins at 0 must begin with force 0 (same in both directions)"
+        )
     return rows
 
 

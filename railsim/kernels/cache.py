@@ -3,7 +3,7 @@
 Compiled code is loaded and executed.  So nothing is taken from a folder or a file that another
 user could have written, and nothing that is not, byte for byte, what was stored: every file begins
 with the length and CRC-32 of the rest.  A folder that is refused, cannot be written to or is full
-costs time, never the run; `notices` says so, once.
+costs time, never the run; `notices` reports it once.
 
 A folder that can only be read is used as it is, when it belongs to this user or to root.
 """

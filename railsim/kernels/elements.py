@@ -193,7 +193,7 @@ def share_at_speed(mounts, internal, e, k, laws, lane):
 
 @compiled(python=False)
 def grip(mounts, internal, e, pad, inner):
-    """Factor that brings the friction forces of a pad that slides in any direction to its limit.
+    """Factor that reduces the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
     wedge without mass, on a spring force F and under a smooth face at `angle` to the column,
@@ -260,7 +260,7 @@ def pad_load(mounts, curves, e, z):
 
 @compiled(inline=True)
 def lifted_part(mounts, e, z, rate, normal):
-    """What takes the tension out of the spring and damper of a pad that only presses."""
+    """Force that cancels the tension of spring and damper of a pad that only presses."""
     spring = mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
     damper = mounts.row[e, DAMPING_Z] * rate
     if normal <= 0.0:

@@ -239,7 +239,7 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
 
 @compiled(inline=True)
 def axlebox_dynamics(bodies, pose, rates, derivative):
-    """Pitch accelerations of the axleboxes; everything else they hand to their wheelsets."""
+    """Pitch accelerations of the axleboxes; all other forces and moments act on their wheelsets."""
     n = bodies.kind.shape[0]
     zero = spread(0.0)
     count = bodies.axleboxes.shape[0]
@@ -324,7 +324,7 @@ def right_hand_side(system, work, state, derivative):
 def right_hand_sides(system, work, states, derivatives):
     """Derivatives of several states, one a row, as for difference quotients.
 
-    A call from Python takes a `System` apart, which lasts longer than an evaluation.  Status,
+    A call from Python unpacks a `System`, which takes longer than an evaluation.  Status,
     wheelset and number of patches are those of the last state, or of the first that is not
     `RUNNING`.
     """

@@ -1,8 +1,8 @@
 """Moving track model: two rails on pads and a sleeper on ballast under each wheelset.
 
-Degrees of freedom of the track under one wheelset, displacements from the unloaded place in track
-axes: y and z of the left and of the right rail head, y, z and roll of the sleeper.  They move along
-with the wheelset and feel no travel: no convective terms, no inertia from the track's curvature.
+Degrees of freedom of the track under one wheelset, displacements from the unloaded position in
+track axes: y and z of the left and of the right rail head, y, z and roll of the sleeper.  They move
+along with the wheelset: no convective terms, no inertia from the track's curvature.
 With the forces F = (Y, Q) of the wheels on the rails, pads between rail and sleeper and ballast
 between sleeper and ground
 
@@ -272,7 +272,7 @@ def settle_rates(system, work, state):
     """One Newton step for the rates of a massless track, with the forces just evaluated.
 
     The slopes are those of `Work.support`, an estimate for the creep forces.  A wheelset whose
-    forces balance to `BALANCE` is left alone: it does not depend on the others.
+    forces balance to `BALANCE` is not changed: it does not depend on the others.
 
     Returns
     -------

@@ -9,7 +9,7 @@ once a step about the last evaluation, with the wheelset's motion over the step 
 
 r_0 and s_0 are the mean rate and the mean acceleration of the step before; the state keeps them, so
 that the step may change.  The forces themselves are always those of the contact at (q, u): the
-linearisation is felt through a change of u within one step only.
+linearisation affects only the change of u within one step.
 """
 
 from railsim.kernels import compiled
@@ -76,7 +76,7 @@ def step_compliance(support, h, out):
 
 @compiled(merge=True)
 def remember_track(system, work, state):
-    """Let the memory of `step_support` begin at `state`."""
+    """Initialise the memory of `step_support` from `state`."""
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
         for k in range(DOF):
@@ -87,7 +87,7 @@ def remember_track(system, work, state):
 
 @compiled(merge=True)
 def note_wheelsets(system, work, state):
-    """Keep where the wheelsets are in the planes of their rails before a step."""
+    """Store the positions of the wheelsets in the planes of their rails before a step."""
     for w in range(work.support.shape[0]):
         note_wheelset(system, work, state, w)
 
@@ -211,8 +211,8 @@ def correct_support(system, work, state, first_time):
     """One Newton step for the rails after a step of the fast scheme.
 
     `step_support` foresees the forces by the slopes of one evaluation.  Where the contact moves
-    over a curved profile or begins to slide, the forces of the new place differ from those, and
-    leaving it at that makes the scheme one of order one.  The rails' accelerations of the state are
+    over a curved profile or begins to slide, the forces in the new position differ from those, and
+    without a correction the scheme has order one.  The rails' accelerations of the state are
     those of the forces foreseen, so that the imbalance F - M u'' - C u' - K u is the difference.
 
     Returns

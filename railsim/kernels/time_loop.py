@@ -400,7 +400,7 @@ def all_finite(state):
 
 @compiled
 def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chunk):
-    """Advance by some steps of length `h` [s], recording states on the way.
+    """Advance by some steps of length `h` [s], recording states.
 
     Parameters
     ----------
