@@ -149,7 +149,8 @@ def test_creep_has_a_row_for_each_law_direction_and_size(capsys):
     places = {(row["case"], row["size"]) for row in rows}
     assert len(rows) == len(places) * len(LAWS)
     sizes = np.array([np.hypot(row["T_x"], row["T_y"]) for row in rows])
-    assert (sizes < 1.016).all()  # 10 x 10 cells exceed mu N by up to 1.6 %
+    # midpoint sums of the elliptic bound over 10 x 10 cells exceed mu N by 1.48 %
+    assert (sizes < 1.0148).all()
     assert cli.main(["contact", "--creep"]) == 0
     printed = capsys.readouterr().out
     assert "Creep force over mu N" in printed
