@@ -1,8 +1,8 @@
 """Runs of several vehicles in one call: each is what it is alone.
 
 They share no force, only the call.  Where FASTSIM is written in vector registers the results are
-equal to the last bit, and so it is asserted; otherwise the compiler may round sums of few patches in
-another way than those of many, hence `ROUND_OFF`.
+equal to the last bit; otherwise the compiler may round sums of few patches in another way than
+those of many, hence `ROUND_OFF`.
 """
 
 import numpy as np
