@@ -22,6 +22,7 @@ from railsim.kernels import compiled
 from railsim.kernels.element_columns import (
     BOTH_ENDS,
     DAMPING_Z,
+    FALLS,
     FRICTION,
     ONE_SIDED,
     PRELOAD_Z,
@@ -57,6 +58,11 @@ from railsim.kernels.vectors import (
     times,
     vector_at,
 )
+
+# scratch of eight mounts, in lanes: deflections (0 to 2), rates, forces of internal states and
+# tables, friction over that at rest
+RATE, OTHER, SHARE = 3, 6, 9
+MOUNT_SCRATCH = 12
 
 
 @compiled(inline=True)
@@ -164,35 +170,41 @@ def link_forces(links, curves, inner, drive, laws, pose):
 
 
 @compiled(inline=True)
-def limit_of(mounts, e, k, pad):
-    """Largest friction force of mount `e` along axis `k`; `pad`: its load, share at its speed."""
-    normal, share = pad
+def limit_of(mounts, e, k, normal, share):
+    """Largest friction force of mount `e` along axis `k` under the load `normal`.
+
+    ``share``: see `shares_at_speed`.
+    """
     return share * (mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal)
 
 
 @compiled(inline=True)
-def share_at_speed(mounts, internal, e, k, laws, lane):
-    """Friction at the sliding speed over that at rest, r + (1 - r) exp(-|v|/v_s), of one axis.
+def shares_at_speed(mounts, internal, first, n, laws):
+    """Friction at the sliding speed over that at rest, r + (1 - r) exp(-|v|/v_s), into `laws`.
 
     v is the rate of the deflection, of a pad that slides in any direction that along all its axes
     (Bo, Pavelescu 1982; as in the elastic pads of Canudas de Wit et al. 1995 it is not reduced by
     the rate of the pad's own elastic deflection).
     """
-    ratio = mounts.friction[e, k, 2]
-    if ratio == 1.0:
-        return 1.0
-    m = mounts.internal[e, k]
-    together = m >= 0 and internal.parameter[m, 1] > 0.0
-    square = 0.0
-    for i in range(3):
-        if i == k or (together and mounts.internal[e, i] >= 0):
-            rate = laws[(3 + i) * LANES + lane]
-            square += rate * rate
-    return ratio + (1.0 - ratio) * exp(-sqrt(square) / mounts.friction[e, k, 3])
+    for e in range(first, first + n):
+        lane = e - first
+        for k in range(3):
+            ratio = mounts.friction[e, k, 2]
+            m = mounts.internal[e, k]
+            if m < 0 or ratio == 1.0:
+                continue
+            square = 0.0
+            for i in range(3):
+                together = internal.parameter[m, 1] > 0.0 and mounts.internal[e, i] >= 0
+                if i == k or together:
+                    rate = laws[(RATE + i) * LANES + lane]
+                    square += rate * rate
+            fallen = exp(-sqrt(square) / mounts.friction[e, k, 3])
+            laws[(SHARE + k) * LANES + lane] = ratio + (1.0 - ratio) * fallen
 
 
 @compiled(python=False)
-def grip(mounts, internal, e, pad, inner):
+def grip(mounts, internal, e, normal, inner, laws, lane):
     """Factor that reduces the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
@@ -204,7 +216,7 @@ def grip(mounts, internal, e, pad, inner):
     for k in range(3):
         m = mounts.internal[e, k]
         if m >= 0:
-            limit = limit_of(mounts, e, k, pad)
+            limit = limit_of(mounts, e, k, normal, laws[(SHARE + k) * LANES + lane])
             z = inner[m] / limit if limit > 0.0 else 0.0
             square += z * z
             skew = internal.parameter[m, 2]
@@ -213,20 +225,21 @@ def grip(mounts, internal, e, pad, inner):
 
 
 @compiled(inline=True)
-def axis_law(mounts, internal, curves, e, k, d, rate, pad, inner, drive):
-    """Force along axis `k` of mount `e` of its table and internal state; `pad`: see `limit_of`."""
+def axis_law(mounts, internal, curves, e, k, lane, normal, inner, drive, laws):
+    """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
+    d, rate = laws[k * LANES + lane], laws[(RATE + k) * LANES + lane]
     force = 0.0
     if mounts.curve[e, k] >= 0:
         force += curve_value(curves, mounts.curve[e, k], d)
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = limit_of(mounts, e, k, pad)
+            limit = limit_of(mounts, e, k, normal, laws[(SHARE + k) * LANES + lane])
             drive[m, 0], drive[m, 1] = rate, limit
             if internal.parameter[m, 1] == 0.0:
                 force += min(limit, max(-limit, inner[m]))
             elif limit > 0.0:
-                force += inner[m] * grip(mounts, internal, e, pad, inner)
+                force += inner[m] * grip(mounts, internal, e, normal, inner, laws, lane)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
@@ -234,7 +247,7 @@ def axis_law(mounts, internal, curves, e, k, d, rate, pad, inner, drive):
             drive[m, 0] = rate
             force += inner[m]
     if k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED:
-        force += lifted_part(mounts, e, d, rate, pad[0])
+        force += lifted_part(mounts, e, d, rate, normal)
     return force
 
 
@@ -270,15 +283,13 @@ def lifted_part(mounts, e, z, rate, normal):
 
 @compiled(inline=True)
 def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
-    """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
+    """Forces of internal states and tables of mounts, see `MOUNT_SCRATCH`."""
     for i in range(law, end):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
         lane = e - first
-        d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
-        share = share_at_speed(mounts, internal, e, k, laws, lane)
-        pad = (pad_load(mounts, curves, e, laws[2 * LANES + lane]), share)
-        laws[(6 + k) * LANES + lane] = axis_law(
-            mounts, internal, curves, e, k, d, rate, pad, inner, drive
+        normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
+        laws[(OTHER + k) * LANES + lane] = axis_law(
+            mounts, internal, curves, e, k, lane, normal, inner, drive, laws
         )
 
 
@@ -299,16 +310,25 @@ def spring_damper(law, d, rate):
 def other_laws(mounts, internal, curves, block, d, rate, inner, drive, laws):
     """Forces of internal states and tables of a block of mounts, see `mount_laws`.
 
-    ``block``: first mount, first of `Mounts.law` and the one after the last.
+    ``block``: first mount and their number, first of `Mounts.law` and the one after the last.
     """
-    first, law, end = block
-    zero = spread(0.0)
+    first, n, law, end = block
+    falls = 0
+    for e in range(first, first + n):
+        falls |= mounts.flags[e, FALLS]
     for k in range(3):
         store_lanes(laws, k * LANES, d[k])
-        store_lanes(laws, (3 + k) * LANES, rate[k])
-        store_lanes(laws, (6 + k) * LANES, zero)
+        store_lanes(laws, (RATE + k) * LANES, rate[k])
+        store_lanes(laws, (OTHER + k) * LANES, spread(0.0))
+        store_lanes(laws, (SHARE + k) * LANES, spread(1.0))
+    if falls:
+        shares_at_speed(mounts, internal, first, n, laws)
     mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws)
-    return load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
+    return (
+        load_lanes(laws, OTHER * LANES),
+        load_lanes(laws, (OTHER + 1) * LANES),
+        load_lanes(laws, (OTHER + 2) * LANES),
+    )
 
 
 @compiled(inline=True)
@@ -364,7 +384,7 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         d, rate = in_axes_of(R1, omega_1, g, w)
         t = spring_damper(spring, d, rate)
         if law < end:
-            block = (first, law, end)
+            block = (first, n, law, end)
             t = plus(t, other_laws(mounts, internal, curves, block, d, rate, inner, drive, laws))
         f = rotate(R1, times(share[0], t))
         moment_1 = cross(g, f)

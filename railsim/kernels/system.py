@@ -181,8 +181,9 @@ class Mounts(NamedTuple):
                                  of sliding to static friction [1], Stribeck speed [m/s]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
-    flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
-                                 part, friction pads (`ONE_SIDED` where they may lift)
+    flags : int64[e, 5]          1 if: translational part, axes of both bodies (shear), rotational
+                                 part, friction pads (`ONE_SIDED` where they may lift), friction
+                                 that falls with the sliding speed
     law : int64[l]               see `mount_laws`
     """
 
@@ -353,7 +354,7 @@ class Work(NamedTuple):
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
-    laws : float64[9 * LANES]   of the elements at hand, see `elements`
+    laws : float64[MOUNT_SCRATCH * LANES]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];

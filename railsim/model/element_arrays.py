@@ -322,11 +322,13 @@ class ElementArrays:
         rows = self.mount_rows
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
-        flags = _column(rows, "flags", (4,), np.int64)
+        friction = _column(rows, "friction", (3, 4))
+        falls = (friction[:, :, 2] < 1.0).any(axis=1)
+        flags = np.column_stack([_column(rows, "flags", (4,), np.int64), falls])
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
             row=_table(rows, MOUNT_COLUMNS, MOUNT_SIZE),
-            friction=_column(rows, "friction", (3, 4)),
+            friction=friction,
             internal=internal,
             curve=curve,
             flags=flags,
