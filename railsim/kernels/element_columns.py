@@ -46,7 +46,7 @@ STIFFNESS_Z, DAMPING_Z, PRELOAD_Z = (
 )
 
 # columns of Mounts.flags
-TRANSLATES, BOTH_ENDS, ROTATES, FRICTION, FALLS = range(5)
+TRANSLATES, BOTH_ENDS, ROTATES, FRICTION = range(4)
 ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and never pull
 
 

@@ -80,9 +80,18 @@ def mount_output(system, work, inner, index, e, out):
     if mounts.flags[index, TRANSLATES]:
         d, rate = in_axes_of(R1, omega_1, g, w)
         begin = laws_before(mounts.law, 0, 3 * index)
-        block = (index, 1, begin, laws_before(mounts.law, begin, 3 * index + 3))
+        block = (index, begin, laws_before(mounts.law, begin, 3 * index + 3))
         more = other_laws(
-            mounts, system.internal, system.curves, block, d, rate, inner, work.drive, laws
+            mounts,
+            system.internal,
+            system.curves,
+            work.friction,
+            block,
+            d,
+            rate,
+            inner,
+            work.drive,
+            laws,
         )
         force = plus(spring_damper(spring, d, rate), more)
         put(out, e, DEFLECTION, laws, d)

@@ -22,7 +22,6 @@ from railsim.kernels import compiled
 from railsim.kernels.element_columns import (
     BOTH_ENDS,
     DAMPING_Z,
-    FALLS,
     FRICTION,
     ONE_SIDED,
     PRELOAD_Z,
@@ -58,11 +57,6 @@ from railsim.kernels.vectors import (
     times,
     vector_at,
 )
-
-# scratch of eight mounts, in lanes: deflections (0 to 2), rates, forces of internal states and
-# tables, friction over that at rest
-RATE, OTHER, SHARE = 3, 6, 9
-MOUNT_SCRATCH = 12
 
 
 @compiled(inline=True)
@@ -170,41 +164,13 @@ def link_forces(links, curves, inner, drive, laws, pose):
 
 
 @compiled(inline=True)
-def limit_of(mounts, e, k, normal, share):
-    """Largest friction force of mount `e` along axis `k` under the load `normal`.
-
-    ``share``: see `shares_at_speed`.
-    """
-    return share * (mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal)
-
-
-@compiled(inline=True)
-def shares_at_speed(mounts, internal, first, n, laws):
-    """Friction at the sliding speed over that at rest, r + (1 - r) exp(-|v|/v_s), into `laws`.
-
-    v is the rate of the deflection, of a pad that slides in any direction that along all its axes
-    (Bo, Pavelescu 1982; as in the elastic pads of Canudas de Wit et al. 1995 it is not reduced by
-    the rate of the pad's own elastic deflection).
-    """
-    for e in range(first, first + n):
-        lane = e - first
-        for k in range(3):
-            ratio = mounts.friction[e, k, 2]
-            m = mounts.internal[e, k]
-            if m < 0 or ratio == 1.0:
-                continue
-            square = 0.0
-            for i in range(3):
-                together = internal.parameter[m, 1] > 0.0 and mounts.internal[e, i] >= 0
-                if i == k or together:
-                    rate = laws[(RATE + i) * LANES + lane]
-                    square += rate * rate
-            fallen = exp(-sqrt(square) / mounts.friction[e, k, 3])
-            laws[(SHARE + k) * LANES + lane] = ratio + (1.0 - ratio) * fallen
+def limit_of(friction, e, k, normal):
+    """Largest friction force of mount `e` along axis `k` under the load `normal`."""
+    return friction[e, k, 0] + friction[e, k, 1] * normal
 
 
 @compiled(python=False)
-def grip(mounts, internal, e, normal, inner, laws, lane):
+def grip(mounts, internal, friction, e, normal, inner):
     """Factor that reduces the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
@@ -216,7 +182,7 @@ def grip(mounts, internal, e, normal, inner, laws, lane):
     for k in range(3):
         m = mounts.internal[e, k]
         if m >= 0:
-            limit = limit_of(mounts, e, k, normal, laws[(SHARE + k) * LANES + lane])
+            limit = limit_of(friction, e, k, normal)
             z = inner[m] / limit if limit > 0.0 else 0.0
             square += z * z
             skew = internal.parameter[m, 2]
@@ -225,21 +191,21 @@ def grip(mounts, internal, e, normal, inner, laws, lane):
 
 
 @compiled(inline=True)
-def axis_law(mounts, internal, curves, e, k, lane, normal, inner, drive, laws):
+def axis_law(mounts, internal, curves, friction, e, k, motion, normal, inner, drive):
     """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
-    d, rate = laws[k * LANES + lane], laws[(RATE + k) * LANES + lane]
+    d, rate = motion
     force = 0.0
     if mounts.curve[e, k] >= 0:
         force += curve_value(curves, mounts.curve[e, k], d)
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = limit_of(mounts, e, k, normal, laws[(SHARE + k) * LANES + lane])
+            limit = limit_of(friction, e, k, normal)
             drive[m, 0], drive[m, 1] = rate, limit
             if internal.parameter[m, 1] == 0.0:
                 force += min(limit, max(-limit, inner[m]))
             elif limit > 0.0:
-                force += inner[m] * grip(mounts, internal, e, normal, inner, laws, lane)
+                force += inner[m] * grip(mounts, internal, friction, e, normal, inner)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
@@ -282,14 +248,15 @@ def lifted_part(mounts, e, z, rate, normal):
 
 
 @compiled(inline=True)
-def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
-    """Forces of internal states and tables of mounts, see `MOUNT_SCRATCH`."""
+def mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive, laws):
+    """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
     for i in range(law, end):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
         lane = e - first
+        d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
         normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
-        laws[(OTHER + k) * LANES + lane] = axis_law(
-            mounts, internal, curves, e, k, lane, normal, inner, drive, laws
+        laws[(6 + k) * LANES + lane] = axis_law(
+            mounts, internal, curves, friction, e, k, (d, rate), normal, inner, drive
         )
 
 
@@ -307,28 +274,19 @@ def spring_damper(law, d, rate):
 
 
 @compiled(inline=True)
-def other_laws(mounts, internal, curves, block, d, rate, inner, drive, laws):
+def other_laws(mounts, internal, curves, friction, block, d, rate, inner, drive, laws):
     """Forces of internal states and tables of a block of mounts, see `mount_laws`.
 
-    ``block``: first mount and their number, first of `Mounts.law` and the one after the last.
+    ``block``: first mount, first of `Mounts.law` and the one after the last.
     """
-    first, n, law, end = block
-    falls = 0
-    for e in range(first, first + n):
-        falls |= mounts.flags[e, FALLS]
+    first, law, end = block
+    zero = spread(0.0)
     for k in range(3):
         store_lanes(laws, k * LANES, d[k])
-        store_lanes(laws, (RATE + k) * LANES, rate[k])
-        store_lanes(laws, (OTHER + k) * LANES, spread(0.0))
-        store_lanes(laws, (SHARE + k) * LANES, spread(1.0))
-    if falls:
-        shares_at_speed(mounts, internal, first, n, laws)
-    mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws)
-    return (
-        load_lanes(laws, OTHER * LANES),
-        load_lanes(laws, (OTHER + 1) * LANES),
-        load_lanes(laws, (OTHER + 2) * LANES),
-    )
+        store_lanes(laws, (3 + k) * LANES, rate[k])
+        store_lanes(laws, (6 + k) * LANES, zero)
+    mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive, laws)
+    return load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
 
 
 @compiled(inline=True)
@@ -361,12 +319,42 @@ def rotation_law(R1, R2, omega_1, omega_2, law):
 
 
 @compiled(merge=True)
-def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
+def friction_at_speed(mounts, internal, laws, pose, friction):
+    """Limits of pads with friction that falls: r + (1 - r) exp(-|v|/v_s) of those at rest.
+
+    v is the rate of the deflection, of a pad that slides in any direction that along all its axes
+    (Bo, Pavelescu 1982; as in the elastic pads of Canudas de Wit et al. 1995 it is not reduced by
+    the rate of the pad's own elastic deflection).
+    """
+    for i in range(mounts.falling.shape[0]):
+        e = mounts.falling[i]
+        which = eight_from(e, e + 1)
+        one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
+        point_1, point_2, _, _, _ = mount_columns(mounts.row, which)
+        R1, _, omega_1, _, _, _, g, w = relative_motion(pose, one, two, point_1, point_2)
+        _, rate = in_axes_of(R1, omega_1, g, w)
+        for k in range(3):
+            store_lanes(laws, k * LANES, rate[k])
+        for k in range(3):
+            m = mounts.internal[e, k]
+            together = m >= 0 and internal.parameter[m, 1] > 0.0
+            square = 0.0
+            for j in range(3):
+                if j == k or (together and mounts.internal[e, j] >= 0):
+                    square += laws[j * LANES] * laws[j * LANES]
+            ratio = mounts.friction[e, k, 2]
+            share = ratio + (1.0 - ratio) * exp(-sqrt(square) / mounts.friction[e, k, 3])
+            friction[e, k, 0] = share * mounts.friction[e, k, 0]
+            friction[e, k, 1] = share * mounts.friction[e, k, 1]
+
+
+@compiled(merge=True)
+def mount_forces(mounts, internal, curves, friction, inner, drive, laws, pose):
     """Add the forces of all three-axis elements to the bodies' rows in `pose`.
 
     The force acts in the axes of body 1, of a shear spring half of it in those of body 2.  The
     gradient of the potential puts the moment g x f on the body whose axes they are, besides the
-    forces +-f at the points.
+    forces +-f at the points.  ``friction``: limits at the sliding speed, see `friction_at_speed`.
     """
     count = mounts.body.shape[0]
     end = 0
@@ -384,8 +372,11 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         d, rate = in_axes_of(R1, omega_1, g, w)
         t = spring_damper(spring, d, rate)
         if law < end:
-            block = (first, n, law, end)
-            t = plus(t, other_laws(mounts, internal, curves, block, d, rate, inner, drive, laws))
+            block = (first, law, end)
+            t = plus(
+                t,
+                other_laws(mounts, internal, curves, friction, block, d, rate, inner, drive, laws),
+            )
         f = rotate(R1, times(share[0], t))
         moment_1 = cross(g, f)
         moment_2 = spread(0.0), spread(0.0), spread(0.0)

@@ -31,7 +31,13 @@ from railsim.kernels.driving import (
     speed_change,
     turn_fixed,
 )
-from railsim.kernels.elements import link_forces, load_forces, motion_of, mount_forces
+from railsim.kernels.elements import (
+    friction_at_speed,
+    link_forces,
+    load_forces,
+    motion_of,
+    mount_forces,
+)
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.lanes import (
     LANES,
@@ -403,8 +409,17 @@ def mechanics(system, work, state, derivative, rails):
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
     link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
+    if system.mounts.falling.shape[0] > 0:
+        friction_at_speed(system.mounts, system.internal, work.laws, work.pose, work.friction)
     mount_forces(
-        system.mounts, system.internal, system.curves, inner, work.drive, work.laws, work.pose
+        system.mounts,
+        system.internal,
+        system.curves,
+        work.friction,
+        inner,
+        work.drive,
+        work.laws,
+        work.pose,
     )
     hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
     if system.loads.body.shape[0] > 0:

@@ -181,10 +181,10 @@ class Mounts(NamedTuple):
                                  of sliding to static friction [1], Stribeck speed [m/s]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
-    flags : int64[e, 5]          1 if: translational part, axes of both bodies (shear), rotational
-                                 part, friction pads (`ONE_SIDED` where they may lift), friction
-                                 that falls with the sliding speed
+    flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
+                                 part, friction pads (`ONE_SIDED` where they may lift)
     law : int64[l]               see `mount_laws`
+    falling : int64[f]           mounts whose friction falls with the sliding speed
     """
 
     body: np.ndarray
@@ -194,6 +194,7 @@ class Mounts(NamedTuple):
     curve: np.ndarray
     flags: np.ndarray
     law: np.ndarray
+    falling: np.ndarray
 
     @property
     def point(self) -> np.ndarray:
@@ -231,6 +232,11 @@ def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np
     has_law = (internal >= 0) | (curve >= 0)
     has_law[:, 2] |= flags[:, FRICTION] == ONE_SIDED
     return np.flatnonzero(has_law)
+
+
+def falling_friction(friction: np.ndarray) -> np.ndarray:
+    """Mounts whose friction falls with the sliding speed."""
+    return np.flatnonzero((friction[:, :, 2] < 1.0).any(axis=1))
 
 
 class Curves(NamedTuple):
@@ -354,7 +360,8 @@ class Work(NamedTuple):
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
-    laws : float64[MOUNT_SCRATCH * LANES]   of the elements at hand, see `elements`
+    friction : float64[e, 3, 2]  limits of the pads of mounts, see `elements.friction_at_speed`
+    laws : float64[9 * LANES]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
@@ -394,6 +401,7 @@ class Work(NamedTuple):
     rail_force: np.ndarray
     acceleration: np.ndarray
     drive: np.ndarray
+    friction: np.ndarray
     laws: np.ndarray
     decay: np.ndarray
     contact_jacobian: np.ndarray

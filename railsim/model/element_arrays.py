@@ -34,7 +34,15 @@ from railsim.kernels.element_columns import (
     ONE_SIDED,
 )
 from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
-from railsim.kernels.system import Curves, Drives, Links, Loads, Mounts, mount_laws
+from railsim.kernels.system import (
+    Curves,
+    Drives,
+    Links,
+    Loads,
+    Mounts,
+    falling_friction,
+    mount_laws,
+)
 
 Floats = NDArray[np.float64]
 Rows = tuple[tuple[float, float], ...]
@@ -323,8 +331,7 @@ class ElementArrays:
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
         friction = _column(rows, "friction", (3, 4))
-        falls = (friction[:, :, 2] < 1.0).any(axis=1)
-        flags = np.column_stack([_column(rows, "flags", (4,), np.int64), falls])
+        flags = _column(rows, "flags", (4,), np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
             row=_table(rows, MOUNT_COLUMNS, MOUNT_SIZE),
@@ -333,6 +340,7 @@ class ElementArrays:
             curve=curve,
             flags=flags,
             law=mount_laws(internal, curve, flags),
+            falling=falling_friction(friction),
         )
 
     def loads(self) -> Loads:

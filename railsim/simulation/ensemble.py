@@ -30,7 +30,8 @@ from railsim.kernels.status import (
     YAW_RANGE,
 )
 from railsim.kernels.support import SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, Mounts, System, mount_laws
+from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, Mounts, System, falling_friction,
+    mount_laws
 from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model, side_by_side
 
@@ -204,9 +205,16 @@ def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
     joint = _joined([system.mounts for system in systems], **shifts)
     order = _order_of_mounts(systems)
     joint = joint._replace(
-        **{name: aligned(getattr(joint, name)[order]) for name in joint._fields if name != "law"}
+        **{
+            name: aligned(getattr(joint, name)[order])
+            for name in joint._fields
+            if name not in ("law", "falling")
+        }
     )
-    return joint._replace(law=mount_laws(joint.internal, joint.curve, joint.flags))
+    return joint._replace(
+        law=mount_laws(joint.internal, joint.curve, joint.flags),
+        falling=falling_friction(joint.friction),
+    )
 
 
 def _order_of_mounts(systems: Sequence[System]) -> Ints:
