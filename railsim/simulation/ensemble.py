@@ -30,8 +30,16 @@ from railsim.kernels.status import (
     YAW_RANGE,
 )
 from railsim.kernels.support import SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, Bodies, Contact, Curves, Mounts, System, falling_friction,
-    mount_laws
+from railsim.kernels.system import (
+    N_SCALARS,
+    Bodies,
+    Contact,
+    Curves,
+    Mounts,
+    System,
+    falling_friction,
+    mount_laws,
+)
 from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model, side_by_side
 
