@@ -408,26 +408,18 @@ def mechanics(system, work, state, derivative, rails):
     kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
-    link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
-    if system.mounts.falling.shape[0] > 0:
-        friction_at_speed(system.mounts, system.internal, work.laws, work.pose, work.friction)
+    mounts, laws, pose = system.mounts, work.laws, work.pose
+    link_forces(system.links, system.curves, inner, work.drive, laws, pose)
+    if mounts.falling.shape[0] > 0:
+        friction_at_speed(mounts, system.internal, laws, pose, work.friction)
     mount_forces(
-        system.mounts,
-        system.internal,
-        system.curves,
-        work.friction,
-        inner,
-        work.drive,
-        work.laws,
-        work.pose,
+        mounts, system.internal, system.curves, work.friction, inner, work.drive, laws, pose
     )
-    hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
+    hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, pose)
     if system.loads.body.shape[0] > 0:
-        load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
+        load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, pose)
     if system.drives.body.shape[0] > 0:
-        add_axle_torques(
-            system.drives, time, s, system.frame_offset, bodies, speed, state, work.pose
-        )
+        add_axle_torques(system.drives, time, s, system.frame_offset, bodies, speed, state, pose)
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     left = evaluations(system, state, rails)
