@@ -14,11 +14,12 @@ from generate import fill_page, table
 
 from railsim import load_settings, load_track, load_vehicle, simulate
 from railsim.contact.creep import LAWS, CreepForce, creep_force
+from railsim.contact.creep_curves import CASES, Patch, exact_force
 from railsim.contact.creep_table import linear_coefficients
 from railsim.contact.exact_creep import exact_creep_force
 from railsim.contact.kalker import kalker_coefficients
 from railsim.notation import QUANTITIES
-from railsim.plot.creep import CASES, Patch, creep_curves_figure, exact_force, traction_figure
+from railsim.plot.creep import creep_curves_figure, traction_figure
 from railsim.plot.style import save
 
 DOCS = Path(__file__).parent

@@ -319,7 +319,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         with PartialFile(path) as partial:
             yield partial.path
             partial.finish()
-    except OSError as error:  # a full disk is told by the name that the user knows
+    except OSError as error:  # a full disk is reported with the name that the user knows
         hidden = error.filename is None or _PARTIAL.fullmatch(Path(str(error.filename)).name)
         if error.errno is None or not hidden:
             raise

@@ -341,7 +341,7 @@ _ELEMENT = ("time", "element", "component")
 _PATCH = ("time", "wheelset", "side", "patch")
 PATCHES = ("tread", "flange root", "flange")
 
-# Quantities that a run puts out only where its settings ask for them.
+# Quantities that a run outputs only where its settings ask for them.
 REQUESTED: dict[str, Quantity] = _table(
     Quantity(
         "element_deflection",

@@ -1,4 +1,4 @@
-"""Texts from files of others, shown literally: in a terminal, a picture, a spreadsheet.
+"""Texts from files of other sources, shown literally: in a terminal, a picture, a spreadsheet.
 
 A vehicle may be called ``$x^$``, ``=1+1`` or hold escape sequences; wherever it is shown, it is
 these characters and does nothing.  Pages escape theirs by themselves (jinja2).

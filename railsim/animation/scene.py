@@ -22,7 +22,7 @@ FRAMES = 600
 TRACK_STEP = 1.0  # m
 AROUND = 60.0  # m of track ahead and behind
 NEEDED = ("body_position", "Q", "Y")
-OVERHANG, WIDTH, ROOF = 3.2, 2.8, 3.9  # m, of a car body that says nothing of its shape
+OVERHANG, WIDTH, ROOF = 3.2, 2.8, 3.9  # m, of a car body whose shape is not specified
 LARGEST = 0.05  # displacement of a mode over the vehicle's length
 
 

@@ -78,7 +78,14 @@ def many_mounts(system, work, state, derivative, n):
     inner = state[first : first + system.internal.kind.shape[0]]
     for _ in range(n):
         mount_forces(
-            system.mounts, system.internal, system.curves, inner, work.drive, work.laws, work.pose
+            system.mounts,
+            system.internal,
+            system.curves,
+            work.friction,
+            inner,
+            work.drive,
+            work.laws,
+            work.pose,
         )
 
 

@@ -102,7 +102,7 @@ def right_hand_side_parts(
         loop = getattr(loops, name)
         what = patches if name in _BY_PATCHES else derivative
         found = least_time(lambda: loop(system, work, state, what, CALLS), repetitions, CALLS)
-        # forces add up and columns are overwritten: begin anew
+        # forces add up and columns are overwritten: start again
         loops.many_right_hand_sides(system, work, state, derivative, 1)
         return found
 

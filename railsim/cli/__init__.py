@@ -126,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 2 wrong input, 3 ended early for a physical reason, 4 a limit is exceeded where
         that was asked for, 130 interrupted by Ctrl-C (143 by SIGTERM), 1 anything else, such as a
-        full disk.  An error that nobody foresaw is one line too, with the path of a report
+        full disk.  An unforeseen error is one line too, with the path of a report
         (`railsim.cli.fault_report`).
     """
     # the commands print themselves what the library logs

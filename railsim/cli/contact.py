@@ -7,28 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.contact_tables import TABLES, contact_data, contact_lines, write_tables
 from railsim.files import check_folder, make_folder
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from railsim.contact.elastic import LoadedContact
-    from railsim.contact.exact_normal import ExactContact
-    from railsim.contact.geometry import ContactGeometry
-    from railsim.contact.table import ContactTable
-    from railsim.plot.contact import Pair
-from railsim.cli.contact_tables import (
-    PATCH_SHARES,
-    TABLES,
-    contact_data,
-    contact_lines,
-    write_tables,
-)
+    from railsim.contact.summary import ContactSummary
 
 PICTURES = ("profiles.png", "functions.png", "conicity.png", "patches.png")
-OTHER_NORMAL = {"hertz": "kik-piotrowski", "kik-piotrowski": "hertz"}
-STEP = 5e-5
-"""Step of the lateral displacement [m]."""
+NORMAL = ("hertz", "kik-piotrowski")
 
 RANGES = {
     "gauge": (0.3, 2.5, "m"),
@@ -86,7 +72,7 @@ RANGES = {
 )
 @click.option(
     "--normal",
-    type=click.Choice(list(OTHER_NORMAL)),
+    type=click.Choice(NORMAL),
     default="hertz",
     show_default=True,
     help="Normal contact of the table; with --exact both are compared.",
@@ -149,11 +135,9 @@ def command(
       railsim contact --wheel measured.whl --rail 54E1 --exact --json
       railsim contact --creep --friction 0.35 --out creep
     """  # noqa: D301 - click reads the escape
-    import numpy as np
-
     from railsim.cli import creep as creep_part
-    from railsim.contact import contact_geometry
-    from railsim.plot.contact import Pair
+    from railsim.contact.creep_curves import forces_by_law
+    from railsim.contact.summary import contact_summary
 
     if build_creep_table:
         creep_part.build_table(out, workers, as_json, quiet)
@@ -167,52 +151,38 @@ def command(
         load=load,
         max_shift=max_shift,
     )
+    if creep:
+        creep_part.check_friction(friction)
     written = (*PICTURES, *TABLES, *((*creep_part.PICTURES, *creep_part.TABLES) if creep else ()))
     folder = Path(out) if out else None
     if folder:
         check_folder(folder, written, overwrite=overwrite)
-    wheel_pair, rail_pair = _profiles(wheels, "wheel"), _profiles(rails, "rail")
-    radius_pair = (radii[0], radii[-1])
-    steps = max(round(max_shift / STEP), 10)
-    geometry = contact_geometry(
-        wheel_pair,
-        rail_pair,
-        radius_pair,
-        gauge,
-        inclination,
-        back_to_back,
-        np.linspace(-max_shift, max_shift, 2 * steps + 1),
+    found = contact_summary(
+        _profiles(wheels, "wheel"),
+        _profiles(rails, "rail"),
+        radii=(radii[0], radii[-1]),
+        gauge=gauge,
+        inclination=inclination,
+        back_to_back=back_to_back,
+        load=load,
+        max_shift=max_shift,
+        normal=normal,  # type: ignore[arg-type]
+        exact=exact,
     )
-    amplitudes = 1e-3 * np.arange(0.5, 1e3 * max_shift + 1e-9, 0.5)
-    conicity = geometry.equivalent_conicity(amplitudes)
-    pairs = [
-        Pair(w, r, gauge, inclination, back_to_back)
-        for w, r in zip(wheel_pair, rail_pair, strict=True)
-    ]
-    contact_table = _table(pairs[1], radius_pair, normal)
-    places = [round(share * max_shift, 6) for share in PATCH_SHARES]
-    contacts = _loaded(contact_table, geometry, places, load)
-    solutions = _exact(pairs[1], radius_pair[1], geometry, list(contacts), load, exact)
-    notes = _notes(pairs)
-    patch = creep_part.patch_of(contacts, friction) if creep else None
-    creep_rows = creep_part.rows_of(patch) if patch else []
+    patch = found.main_patch(friction) if creep else None
+    creep_rows = forces_by_law(patch) if patch else []
     if folder:
         make_folder(folder)
-    if folder and patch:
-        creep_part.write(folder, patch, creep_rows)
-    if folder:
-        write_tables(folder, geometry, amplitudes, conicity, contacts, solutions)
-        other = _other_table(pairs[1], radius_pair, geometry, list(contacts), load, normal, exact)
-        _write_pictures(
-            folder, geometry, pairs, amplitudes, conicity, contacts, load, normal, solutions, other
-        )
+        if patch:
+            creep_part.write(folder, patch, creep_rows)
+        write_tables(folder, found)
+        _write_pictures(folder, found)
     if as_json:
-        data = contact_data(geometry, amplitudes, conicity, contacts, solutions, notes)
-        print_json(data | ({"creep": creep_rows} if patch else {}))
+        print_json(contact_data(found) | ({"creep": creep_rows} if patch else {}))
         return
-    for note in notes:
+    for note in found.notes:
         echo(note, err=True)
-    for line in contact_lines(geometry, amplitudes, conicity, contacts, solutions, load):
+    for line in contact_lines(found):
         echo(line)
     if patch:
         for line in creep_part.lines_of(patch, creep_rows):
@@ -257,123 +227,19 @@ def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
     return loaded[names[0]], loaded[names[-1]]
 
 
-def _notes(pairs: Sequence["Pair"]) -> list[str]:
-    """What was recognised in the profiles' files, once each."""
-    profiles = {p.name: p for pair in pairs for p in (pair.wheel, pair.rail)}
-    return [f"{p.source or p.name}: {note}" for p in profiles.values() for note in p.notes]
-
-
-def _table(pair: "Pair", radii: tuple[float, float], normal: str) -> "ContactTable":
-    from railsim.contact import cached_contact_table
-    from railsim.contact.table import TableGrid
-
-    return cached_contact_table(
-        pair.wheel,
-        pair.rail,
-        radius=radii[1],
-        gauge=pair.gauge,
-        inclination=pair.inclination,
-        back_to_back=pair.back_to_back,
-        centre_height=0.5 * (radii[0] + radii[1]),
-        grid=TableGrid(normal=normal),  # type: ignore[arg-type]
-    )
-
-
-def _loaded(
-    contact_table: "ContactTable", geometry: "ContactGeometry", places: Sequence[float], load: float
-) -> dict[float, "LoadedContact"]:
-    """Patches of the right wheel at the given displacements, where the geometry knows them."""
-    import numpy as np
-
-    from railsim.contact.elastic import loaded_contact
-    from railsim.errors import ModelError
-
-    contacts = {}
-    for y in places:
-        i = int(np.argmin(np.abs(geometry.lateral - y)))
-        roll = float(geometry.roll[i])
-        if np.isfinite(roll):
-            try:
-                contacts[y] = loaded_contact(contact_table, y, roll, load)
-            except ModelError:
-                continue  # beyond the table: a wheel that has climbed its rail
-    return contacts
-
-
-def _exact(
-    pair: "Pair",
-    radius: float,
-    geometry: "ContactGeometry",
-    places: Sequence[float],
-    load: float,
-    wanted: bool,
-) -> dict[float, "ExactContact"]:
-    """The same patches by boundary elements."""
-    if not wanted:
-        return {}
-    import numpy as np
-
-    from railsim.contact.exact_normal import exact_contact
-    from railsim.errors import ModelError
-
-    solutions = {}
-    for y in places:
-        roll = float(geometry.roll[int(np.argmin(np.abs(geometry.lateral - y)))])
-        try:
-            solutions[y] = exact_contact(
-                pair.wheel,
-                pair.rail,
-                y,
-                roll,
-                load,
-                radius=radius,
-                gauge=pair.gauge,
-                inclination=pair.inclination,
-                back_to_back=pair.back_to_back,
-            )
-        except ModelError:
-            continue  # the load is not reached: a wheel that hangs on its flange
-    return solutions
-
-
-def _other_table(
-    pair: "Pair",
-    radii: tuple[float, float],
-    geometry: "ContactGeometry",
-    places: Sequence[float],
-    load: float,
-    normal: str,
-    wanted: bool,
-) -> dict[float, "LoadedContact"] | None:
-    """Patches with the other kind of normal contact, for the comparison."""
-    if not wanted:
-        return None
-    return _loaded(_table(pair, radii, OTHER_NORMAL[normal]), geometry, places, load)
-
-
-def _write_pictures(
-    folder: Path,
-    geometry: "ContactGeometry",
-    pairs: Sequence["Pair"],
-    amplitudes: "np.ndarray[Any, Any]",
-    conicity: "np.ndarray[Any, Any]",
-    contacts: dict[float, "LoadedContact"],
-    load: float,
-    normal: str,
-    solutions: dict[float, "ExactContact"],
-    other: dict[float, "LoadedContact"] | None,
-) -> None:
+def _write_pictures(folder: Path, found: "ContactSummary") -> None:
+    from railsim.contact.summary import OTHER_NORMAL
     from railsim.plot import contact as plot
     from railsim.plot.style import save
 
-    names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in pairs)
+    names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in found.pairs)
+    other = found.with_other_normal() if found.exact else None
+    labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
     figures = (
-        plot.profiles_figure(geometry, pairs),
-        plot.functions_figure(geometry),
-        plot.conicity_figure({" / ".join(names): (amplitudes, conicity)}),
-        plot.patches_figure(
-            contacts, load, solutions, other, (f"table, {normal}", f"table, {OTHER_NORMAL[normal]}")
-        ),
+        plot.profiles_figure(found.geometry, found.pairs),
+        plot.functions_figure(found.geometry),
+        plot.conicity_figure({" / ".join(names): (found.amplitudes, found.conicity)}),
+        plot.patches_figure(found.contacts, found.load, found.exact, other, labels),
     )
     for name, figure in zip(PICTURES, figures, strict=True):
         save(figure, folder / name, overwrite=True)

@@ -10,84 +10,35 @@ from railsim.cli.progress import progress_bar
 from railsim.files import check_folder, whole_file
 
 if TYPE_CHECKING:
-    from railsim.contact.elastic import LoadedContact
-    from railsim.plot.creep import Patch
+    from railsim.contact.creep_curves import Patch
 
 PICTURES = ("creep_curves.png", "traction.png")
 TABLES = ("creep_curves.csv",)
-SIZES = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0)
-"""Sizes of the normalised creepage in the table."""
-
 FIELD_SIZE = 1.2
 """Size of the normalised creepage of the traction fields."""
 
 TABLE_FILE = "creep_table.npz"
 
 
-def patch_of(contacts: dict[float, "LoadedContact"], friction: float) -> "Patch":
-    """Return the most loaded patch of the centred wheel.
-
-    Raises
-    ------
-    InputError
-        If the friction coefficient is out of its range.
-    """
+def check_friction(friction: float) -> None:
+    """Refuse a friction coefficient out of its range."""
     from railsim.errors import Fault, InputError
-    from railsim.plot.creep import Patch
 
     if not 0.0 < friction <= 1.0:
         raise InputError([Fault("--friction", "", f"{friction:g}", "above 0, at most 1")])
-    centred = contacts[min(contacts, key=abs)]
-    largest = max(centred.patches, key=lambda patch: patch.N)
-    return Patch(largest.a, largest.b, largest.N, friction)
-
-
-def rows_of(patch: "Patch") -> list[dict[str, Any]]:
-    """Creep forces of all laws for all directions and sizes, over mu N (moment: times size)."""
-    import numpy as np
-
-    from railsim.contact.creep import LAWS, creep_force
-    from railsim.plot.creep import CASES
-
-    rows = []
-    size = float(np.sqrt(patch.a * patch.b))
-    bound = patch.mu * patch.N
-    for case, direction in CASES.items():
-        unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
-        for scale in SIZES:
-            xi_x, xi_y, phi = (float(value) for value in scale * unit)
-            for law in LAWS:
-                force = creep_force(
-                    patch.a, patch.b, patch.N, patch.mu, xi_x, xi_y, phi, patch.G, patch.nu, law
-                )
-                rows.append(
-                    {
-                        "case": case,
-                        "size": scale,
-                        "xi_x": xi_x,
-                        "xi_y": xi_y,
-                        "phi": phi,
-                        "law": law,
-                        "T_x": float(force.T_x) / bound,
-                        "T_y": float(force.T_y) / bound,
-                        "M_z": float(force.M_z) / (bound * size),
-                    }
-                )
-    return rows
 
 
 def write(folder: Path, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
     """Write pictures and table; the folder exists and files may be replaced."""
-    import numpy as np
-
     from railsim.contact.creep import LAWS
-    from railsim.plot.creep import CASES, creep_curves_figure, exact_force, traction_figure
+    from railsim.contact.creep_curves import CASES, exact_force
+    from railsim.plot.creep import creep_curves_figure, traction_figure
     from railsim.plot.style import save
 
-    fields = {}
-    for case, direction in CASES.items():
-        unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
-        fields[case] = exact_force(patch, FIELD_SIZE * unit)
+    fields = {
+        case: exact_force(patch, FIELD_SIZE * patch.unit_creepages(direction))
+        for case, direction in CASES.items()
+    }
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
     for name, figure in zip(PICTURES, figures, strict=True):
         save(figure, folder / name, overwrite=True)

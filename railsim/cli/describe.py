@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from railsim.cli.common import table
 
 if TYPE_CHECKING:
-    from railsim.definitions.elements import Element
+    from railsim.definitions.element_base import Element
     from railsim.definitions.irregularity import Irregularity
     from railsim.definitions.layout import Section
     from railsim.definitions.mechanism import Mechanism
@@ -68,7 +68,7 @@ def vehicle_data(vehicle: "Vehicle") -> dict[str, Any]:
 
 
 def vehicle_lines(vehicle: "Vehicle") -> list[str]:
-    """Return a vehicle in a screenful: bodies, then elements as they are written."""
+    """Return a vehicle on one screen: bodies, then elements as they are written."""
     data = vehicle_data(vehicle)
     kinds = Counter(body["kind"] for body in data["bodies"])
     counted = ", ".join(f"{n} {_counted_kind(kind, n)}" for kind, n in kinds.items())
@@ -186,7 +186,7 @@ def static_lines(static: dict[str, Any]) -> list[str]:
 
 
 def mechanism_lines(mechanism: "Mechanism") -> list[str]:
-    """Return a mechanism file in a screenful: parts, driver, parameters with their provenance."""
+    """Return a mechanism file on one screen: parts, driver, parameters with their provenance."""
     from railsim.definitions.mechanism_values import parameter_values
 
     values = parameter_values(mechanism)
@@ -219,7 +219,7 @@ def mechanism_lines(mechanism: "Mechanism") -> list[str]:
 
 
 def spring_lines(suspension: "TrailingArmSuspension") -> list[str]:
-    """Return a spring file in a screenful: arm, springs, loads, and what else it holds."""
+    """Return a spring file on one screen: arm, springs, loads, and what else it holds."""
     arm, material = suspension.arm, suspension.material
     lines = [
         f"{suspension.name}",
@@ -340,7 +340,7 @@ def _plan_row(
 
 
 def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
-    """Return a track in a screenful: plan with cant, speeds of the curves, vertical profile."""
+    """Return a track on one screen: plan with cant, speeds of the curves, vertical profile."""
     data = track_data(track, speeds)
     lines = [
         f"{track.name}",
@@ -422,7 +422,7 @@ def result_data(result: "Result") -> dict[str, Any]:
 
 
 def result_lines(result: "Result") -> list[str]:
-    """Return a result in a screenful: facts about the run, dimensions, quantities."""
+    """Return a result on one screen: facts about the run, dimensions, quantities."""
     data = result_data(result)
     lines = [f"{name:18} {value}" for name, value in data["attributes"].items()]
     lines += [f"{'remark':18} {remark}" for remark in data["remarks"]]

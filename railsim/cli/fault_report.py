@@ -1,4 +1,4 @@
-"""The net under the command line: an error that nobody foresaw becomes one line and a report.
+"""The net under the command line: an unforeseen error becomes one line and a report.
 
 The report is a text file in the system's folder for temporary files, which only its user can read:
 what was called, where, with which files, which versions, and the traceback.  It is what the

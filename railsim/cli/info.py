@@ -1,4 +1,4 @@
-"""``railsim info``: what a vehicle, track or result file holds, in a screenful."""
+"""``railsim info``: what a vehicle, track or result file holds, on one screen."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

@@ -15,7 +15,7 @@ from typing import Any
 from railsim.cli.common import echo
 from railsim.cli.interrupts import obey
 
-PATIENCE = 5.0  # seconds without progress before the user is told why
+PATIENCE = 5.0  # seconds without progress before the reason is printed
 FIRST_RUN = (
     "preparing: the first run after an installation compiles the time loop and builds the contact "
     "tables of its profiles (up to a minute; kept for later runs)"

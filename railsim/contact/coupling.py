@@ -39,7 +39,7 @@ def coupling(values: Floats, G: float, nu: float) -> Floats:
     values : float64[patch, w, roll, s, field]
         Contact table.
     G, nu : float
-        Shear modulus [Pa] and Poisson's number [1].
+        Shear modulus [Pa] and Poisson's ratio [1].
 
     Returns
     -------

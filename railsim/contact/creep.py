@@ -87,7 +87,7 @@ def creep_force(
     G : float
         Shear modulus of wheel and rail [Pa].
     nu : float
-        Poisson's number of wheel and rail [1].
+        Poisson's ratio of wheel and rail [1].
     law : str
         One of `LAWS`.
     nx, ny : int

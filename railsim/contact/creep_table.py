@@ -8,7 +8,7 @@ part is spread evenly:
 - scaled creepages ``q = G a b/(mu N) (c11 xi_x, c22 xi_y, sqrt(c11 c22) rho phi)`` with Kalker's
   coefficients and rho = 0.8 sqrt((a^2 + b^2)/2), so that each is the force of linear theory and
   spin counts by the slip near the ellipse's far edge (the place where the slip turns round moves
-  over the patch at even pace);
+  over the patch uniformly);
 - direction of q by the angles theta from the axis of xi_x, psi from xi_y to phi;
 - magnitude as ``t = |q|/(|q| + 2)``: linear theory at 0, full sliding at 1.
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POISSON = 0.28
-"""Poisson's number of the tabulated solutions; others scale Kalker's coefficients."""
+"""Poisson's ratio of the tabulated solutions; others scale Kalker's coefficients."""
 SPIN_ARM = 0.8
 # the solver's error falls with about the power 1.5 of the cell: from two grids, one twice as fine
 _EXTRAPOLATION = 1.0 / (math.sqrt(8.0) - 1.0)
@@ -247,7 +247,7 @@ def build_nodes(folder: Path, workers: int = 2) -> Iterator[tuple[int, int]]:
     """Compute all missing rows of nodes into `folder`; yields (rows done, rows in all).
 
     Each row (one ratio, one theta) is a file that appears when it is whole: a build that was
-    interrupted goes on where it was.  Rows do not depend on each other nor on the workers.
+    interrupted is continued.  Rows do not depend on each other nor on the workers.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows = [(i, j) for i in range(N_RATIO + 1) for j in range(N_THETA + 1)]
@@ -307,7 +307,7 @@ def creep_table(nu: float = POISSON) -> CreepTable:
     Parameters
     ----------
     nu : float
-        Poisson's number.  The table was computed for 0.28; for others the creepages are scaled by
+        Poisson's ratio.  The table was computed for 0.28; for others the creepages are scaled by
         the ratios of Kalker's printed coefficients, which is exact for small creepage.
 
     Returns

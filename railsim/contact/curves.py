@@ -46,7 +46,7 @@ class WheelCurve:
     Attributes
     ----------
     y : ndarray, shape (n,)
-        Lateral place from the tape circle, field side positive [m].
+        Lateral place from the nominal rolling circle, field side positive [m].
     u : ndarray, shape (n,)
         Place along the axle from the wheelset's centre [m].
     r : ndarray, shape (n,)
@@ -165,9 +165,9 @@ def wheel_curve(
     profile : Profile
         Wheel profile.
     radius : float
-        Rolling radius at the tape circle [m].
+        Rolling radius at the nominal rolling circle [m].
     tape_circle : float
-        Place of the tape circle from the wheelset's centre [m].
+        Place of the nominal rolling circle from the wheelset's centre [m].
     spacing : float
         Distance of the candidates on level parts [m]; it shrinks with the slope t by the factor
         (1 + t^2)^(-3/4), as the width of a contact in lateral projection does.
@@ -214,10 +214,10 @@ def wheel_curve(
 
 
 def tape_circle_place(back_to_back: float) -> float:
-    """Place of the right tape circle from the wheelset's centre [m].
+    """Place of the right nominal rolling circle from the wheelset's centre [m].
 
-    The wheels sit on the axle at the given back-to-back distance; profiles are given from a tape
-    circle 70 mm from the wheel back.
+    The wheels sit on the axle at the given back-to-back distance; profiles are given from a nominal
+    rolling circle 70 mm from the flange back.
     """
     return 0.5 * back_to_back - FLANGE_BACK
 

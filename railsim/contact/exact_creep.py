@@ -148,7 +148,7 @@ def exact_creep_force(
     xi_x, xi_y, phi : float
         Creepages, wheel minus rail [1, 1, 1/m].
     G, nu : float
-        Shear modulus [Pa] and Poisson's number [1] of wheel and rail.
+        Shear modulus [Pa] and Poisson's ratio [1] of wheel and rail.
     nx, ny : int
         Cells along, strips across the patch.
 

@@ -3,7 +3,7 @@
 The contact surface follows the rail: s is the length along its contour, x along the track, and the
 gap is measured along the rail's normal at each s, exactly between the profiles (no curvatures).
 Each element of the half-space carries constant pressure; all patches of the wheel are solved for
-at once and feel each other.  Left out: friction, yaw, and the difference between a curved contact
+at once and interact.  Left out: friction, yaw, and the difference between a curved contact
 surface and a half-space (it matters in the flange root, where the normal turns over the patch).
 """
 

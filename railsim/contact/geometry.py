@@ -49,7 +49,8 @@ class ContactGeometry:
     contact_y : ndarray, shape (n, 2)
         Lateral place of the contact, track axes [m].
     wheel_y : ndarray, shape (n, 2)
-        Place of the contact on the wheel from the tape circle, positive to the field side [m].
+        Lateral position of the contact on the wheel from the nominal rolling circle, positive to
+        the field side [m].
     centre_z : ndarray, shape (n,)
         Vertical displacement of the wheelset's centre, positive down [m].
     """
@@ -112,13 +113,13 @@ def contact_geometry(
     wheel, rail : Profile or (left, right)
         Profiles; a left one is given as a right one.
     radius : float or (left, right)
-        Rolling radius at the tape circle [m].
+        Rolling radius at the nominal rolling circle [m].
     gauge : float
         Distance of the gauge faces within 14 mm below the rail tops [m].
     inclination : float
         Inclination of the rails, as tangent [1].
     back_to_back : float
-        Distance of the wheel backs [m].
+        Distance of the flange backs [m].
     lateral : ndarray, shape (n,), optional
         Lateral displacements, increasing; default -10 to 10 mm in steps of 0.05 mm [m].
 

@@ -48,7 +48,7 @@ def hertz(A: ArrayLike, B: ArrayLike, N: ArrayLike, E: float, nu: float) -> Hert
     E : float
         Young's modulus of both bodies [Pa].
     nu : float
-        Poisson's number of both bodies [1].
+        Poisson's ratio of both bodies [1].
 
     Returns
     -------

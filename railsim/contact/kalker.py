@@ -8,7 +8,7 @@ along the rolling direction, `b` across) is linear in the creepages::
     M_z = -G (a b)^1.5 c23 xi_y + G (a b)^2 c33 phi
 
 with signs of force on the rail (see :mod:`railsim.contact.creep`).  The coefficients depend on
-a/b and Poisson's number only.  Kalker computed and printed them for 19 ratios and three Poisson
+a/b and Poisson's ratio only.  Kalker computed and printed them for 19 ratios and three Poisson
 numbers; outside 0.1 <= a/b <= 10 his asymptotic expressions lead on, scaled to join the table.
 
 Read `kalker_coefficients` first; `creep_tables` prepares the small table that the time loop looks
@@ -72,7 +72,7 @@ def kalker_coefficients(
     a_over_b : array_like
         Ratio of the semi-axes, along over across, > 0 [1].
     nu : float
-        Poisson's number (of both bodies), 0 <= nu <= 0.5 [1].
+        Poisson's ratio (of both bodies), 0 <= nu <= 0.5 [1].
 
     Returns
     -------
@@ -99,7 +99,7 @@ def kalker_coefficients(
     if not np.all(np.isfinite(ratio) & (ratio > 0.0)):
         raise ModelError("Kalker's coefficients need a ratio of semi-axes a/b > 0")
     if not 0.0 <= nu <= 0.5:
-        raise ModelError(f"Kalker's coefficients need Poisson's number in 0..0.5, not {nu}")
+        raise ModelError(f"Kalker's coefficients need Poisson's ratio in 0..0.5, not {nu}")
     g = np.minimum(ratio, 1.0 / ratio)
     narrow = ratio <= 1.0
     values = []
@@ -124,7 +124,7 @@ def creep_tables(nu: float = 0.28, n: int = 257) -> NDArray[np.float64]:
     Parameters
     ----------
     nu : float
-        Poisson's number [1].
+        Poisson's ratio [1].
     n : int
         Number of nodes, >= 2.
 
@@ -143,7 +143,7 @@ def creep_tables(nu: float = 0.28, n: int = 257) -> NDArray[np.float64]:
 def _interpolated(
     table: NDArray[np.float64], number: int, g: NDArray[np.float64], nu: float
 ) -> NDArray[np.float64]:
-    """Coefficient `number` of one half of the table at axis ratio g and Poisson's number nu."""
+    """Coefficient `number` of one half of the table at axis ratio g and Poisson's ratio nu."""
     at_nu = [np.interp(g, table[:, 0], table[:, 1 + 3 * number + k]) for k in range(3)]
     n0, n1, n2 = TABLE_POISSON
     weights = (

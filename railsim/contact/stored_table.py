@@ -55,7 +55,7 @@ def cached_contact_table(
     The name of the stored table is a hash of everything that enters: both profiles, all numbers,
     the grid and the generator's sources.  Tables are written under a temporary name and renamed,
     so that parallel runs never see half a table; they are memory-mapped, so that parallel runs
-    share one copy.  A table that is not, byte for byte, what was stored is built anew.
+    share one copy.  A table that is not, byte for byte, what was stored is built again.
     """
     grid = chosen_grid(grid, normal)
     numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu, centre_height)

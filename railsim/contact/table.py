@@ -148,11 +148,11 @@ class ContactTable:
     shear : float
         Lever that turns roll into lateral displacement of the wheel's foot [m].
     r0 : float
-        Rolling radius at the tape circle [m].
+        Rolling radius at the nominal rolling circle [m].
     centre_height : float
         Height of the wheelset's centre above the rail tops at z = 0 [m].
     G, nu : float
-        Shear modulus [Pa] and Poisson's number [1] of wheel and rail.
+        Shear modulus [Pa] and Poisson's ratio [1] of wheel and rail.
     description : dict
         What the table was built from, for results and messages.
     """
@@ -174,9 +174,9 @@ class ContactTable:
 def zone_windows(wheel: WheelCurve) -> Array:
     """Partition of a wheel's candidates into tread, flange root and flange.
 
-    The borders lie where the profile's angle, followed from the tape circle towards the flange,
-    passes 10 to 15 degrees (tread to root), and 70 to 90 % of the flank's greatest angle (root to
-    flange); between these places the windows change by the smoothest cubic.
+    The borders lie where the profile's angle, followed from the nominal rolling circle towards the
+    flange, passes 10 to 15 degrees (tread to root), and 70 to 90 % of the flank's greatest angle
+    (root to flange); between these positions the windows change by the smoothest cubic.
 
     Returns
     -------
@@ -276,17 +276,17 @@ def build_contact_table(
     wheel, rail : Profile
         Profiles.
     radius : float
-        Rolling radius at the tape circle [m].
+        Rolling radius at the nominal rolling circle [m].
     gauge : float
         Distance of the gauge faces within 14 mm below the rail tops [m].
     inclination : float
         Inclination of the rails, as tangent [1].
     back_to_back : float
-        Distance of the wheel backs; it places the wheels on the axle [m].
+        Distance of the flange backs; it places the wheels on the axle [m].
     tape_circle_distance : float
-        Distance of the tape circles by name [m]; recorded only.
+        Distance of the nominal rolling circles by name [m]; recorded only.
     G, nu : float
-        Shear modulus [Pa] and Poisson's number [1].
+        Shear modulus [Pa] and Poisson's ratio [1].
     centre_height : float, optional
         Height of the wheelset's centre above the rail tops at z = 0; default `radius` [m].
     normal : "hertz" or "kik-piotrowski", optional

@@ -177,7 +177,7 @@ class FileDefinition(Definition):
 
 @dataclass(frozen=True)
 class Remark:
-    """Something allowed that an engineer would still want to be told.
+    """Something allowed that an engineer would still want to know.
 
     Attributes
     ----------

@@ -12,7 +12,8 @@ from typing import Literal
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
-from railsim.definitions.elements import AxleTorque, Element
+from railsim.definitions.element_base import Element
+from railsim.definitions.given_elements import AxleTorque
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
 from railsim.definitions.offered import offers
@@ -284,7 +285,7 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
     for group, place in _places(vehicle, _Place()):
         faults += _side_faults(group, place)
         faults += _torque_faults(group, place, {body.name: body.kind for body in flat.bodies})
-    # a definition that stands several times is told of once
+    # a definition that stands several times is reported once
     return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
 

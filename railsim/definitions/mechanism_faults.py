@@ -41,7 +41,7 @@ def mechanism_faults(mechanism: Mechanism) -> list[Fault]:
 
 
 def mechanism_remarks(mechanism: Mechanism) -> list[Remark]:
-    """What a reader of a valid mechanism must be told."""
+    """What a reader of a valid mechanism must know."""
     remarks = [Remark("remarks", text) for text in mechanism.remarks]
     stated = {name for names in mechanism.provenance.values() for name in names}
     if silent := [name for name in mechanism.parameters if name not in stated]:

@@ -7,7 +7,7 @@ mirrored track gives the mirrored result: the sharpest check of signs there is.
 from typing import TypeVar
 
 from railsim.definitions.base import Vector
-from railsim.definitions.elements import Element
+from railsim.definitions.element_base import Element
 from railsim.definitions.track import (
     CantElement,
     Circle,

@@ -37,7 +37,7 @@ def apply_overrides(
     free : sequence of str
         Tables by dotted names: `initial.front.frame.y` is key `y` of body `front.frame`.
     defaults : mapping, optional
-        What holds where the source says nothing, so that `fastsim_grid.0=20` changes one of two.
+        What holds where the source gives no value, so that `fastsim_grid.0=20` changes one of two.
 
     Raises
     ------

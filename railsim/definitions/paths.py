@@ -52,7 +52,7 @@ def descend(
     create : bool
         Make tables that are missing.
     defaults : dict, optional
-        What holds where `data` says nothing: its tables and lists come into `data` when the path
+        What holds where `data` gives no value: its tables and lists come into `data` when the path
         leads through them.
 
     Raises

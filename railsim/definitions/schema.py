@@ -100,7 +100,7 @@ def _tidy(node: Any) -> Any:
 
 
 def _noise(key: str, value: Any) -> bool:
-    """Whether a keyword says nothing; a property that happens to have its name is a table."""
+    """Whether a keyword has no meaning here; a property that has its name by chance is a table."""
     if key == "title":
         return isinstance(value, str)
     return key == "discriminator" or (key == "default" and value is None)

@@ -1,4 +1,4 @@
-"""Settings files, `railsim-settings/1`: how a run is computed and what it puts out."""
+"""Settings files, `railsim-settings/1`: how a run is computed and what it outputs."""
 
 from typing import Annotated, Literal, Self
 
@@ -116,7 +116,7 @@ class LowPass(Definition):
 
 
 class Outputs(Definition):
-    """What a run puts out."""
+    """What a run outputs."""
 
     quantities: tuple[Text, ...] = ()
     """Which of the usual quantities to keep, `*` standing for any letters; by default all"""

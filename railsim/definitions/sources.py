@@ -178,7 +178,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
     Raises
     ------
-    InputError : it cannot be read, is no text or no TOML (with the line).
+    InputError : it cannot be read, is not text or not TOML (with the line).
     """
     return parse_toml(read_text(path, DEFINITION_BYTES), str(path))
 

@@ -97,7 +97,7 @@ class Material(Definition):
         nu = self.E / (2.0 * self.G) - 1.0
         if not 0.0 <= nu < 0.5:
             raise ValueError(
-                f"E/(2 G) - 1 is {nu:.3f}; Poisson's number must be from 0 to 0.5: "
+                f"E/(2 G) - 1 is {nu:.3f}; Poisson's ratio must be from 0 to 0.5: "
                 "G must be between E/3 and E/2"
             )
         return self

@@ -3,7 +3,7 @@
 Compiled code is loaded and executed.  So nothing is taken from a folder or a file that another
 user could have written, and nothing that is not, byte for byte, what was stored: every file begins
 with the length and CRC-32 of the rest.  A folder that is refused, cannot be written to or is full
-costs time, never the run; `notices` says so, once.
+costs time, never the run; `notices` reports it once.
 
 A folder that can only be read is used as it is, when it belongs to this user or to root.
 """
@@ -112,7 +112,7 @@ def stored(path: Path) -> bytes | None:
 
 def discard(path: Path) -> None:
     """Remove a damaged file of the cache, and say so."""
-    notice(f"the cache {path.parent} was damaged; what was lost is made anew")
+    notice(f"the cache {path.parent} was damaged; what was lost is made again")
     with suppress(OSError):
         path.unlink()
 
@@ -144,7 +144,7 @@ def store_file(path: Path, write: Callable[[int], None]) -> bool:
         _unwritable.add(path.parent)
         notice(
             f"the cache {path.parent} cannot be written ({error.strerror or error}); the next "
-            "run prepares itself anew"
+            "run prepares itself again"
         )
         return False
     except BaseException:

@@ -2,7 +2,7 @@
 
 Why this exists: a look-up adds 32 nodes of twelve fields, and of four of them the three gradients
 too.  Left to the compiler the sums of the gradients are scalars and the weights are worked out
-anew for each patch; here every node is one register of four fields and one of eight, and all sums
+again for each patch; here every node is one register of four fields and one of eight, and all sums
 stay in registers.  Gain: docs/performance.md.  Any processor will do: the instructions are generic
 vectors that LLVM cuts to what it has.
 
@@ -12,12 +12,11 @@ compilation is switched off; a test holds both to the same result.
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
+from railsim.kernels.registers import INT, Registers
+
 _GRADIENT, _VALUE = 4, 8  # fields with and without gradients
-_DOUBLE = ir.DoubleType()
-_INT = ir.IntType(64)
 
 
 @intrinsic
@@ -44,49 +43,21 @@ def sum_of_nodes(typingctx, values, first, row, slab, weights, tw, out, place):
     return signature, codegen
 
 
-class _Lanes:
-    """Instructions on registers of so many doubles."""
-
-    def __init__(self, builder, count):
-        self.builder = builder
-        self.kind = ir.VectorType(_DOUBLE, count)
-        self.zero = ir.Constant(self.kind, [0.0] * count)
-        self.mask = ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count)
-        signature = ir.FunctionType(self.kind, [self.kind] * 3)
-        name = f"llvm.fma.v{count}f64"
-        self.fma = cgutils.get_or_insert_function(builder.module, signature, name)
-
-    def splat(self, value):
-        first = ir.Constant(ir.IntType(32), 0)
-        single = self.builder.insert_element(self.zero, value, first)
-        return self.builder.shuffle_vector(single, self.zero, self.mask)
-
-    def pointer(self, array, index):
-        place = self.builder.gep(array, [index])
-        return self.builder.bitcast(place, ir.PointerType(self.kind))
-
-    def load(self, array, index):
-        return self.builder.load(self.pointer(array, index), align=8)
-
-    def store(self, value, array, index):
-        self.builder.store(value, self.pointer(array, index), align=8)
-
-    def add(self, a, b, total):
-        if total is None:
-            return self.builder.fmul(a, b)
-        return self.builder.call(self.fma, [a, b, total])
+def _add(registers, a, b, total):
+    """Product of two registers, added to a total where there is one."""
+    return registers.builder.fmul(a, b) if total is None else registers.fma(a, b, total)
 
 
 def _emit(builder, values, first, row, slab, weights, tw, out, place):
-    force, patch = _Lanes(builder, _GRADIENT), _Lanes(builder, _VALUE)
+    force, patch = Registers(builder, _GRADIENT), Registers(builder, _VALUE)
 
     def ahead(start, count):
-        return builder.add(start, ir.Constant(_INT, count))
+        return builder.add(start, ir.Constant(INT, count))
 
     def offset(start, stride, count):
-        return builder.add(start, builder.mul(stride, ir.Constant(_INT, count)))
+        return builder.add(start, builder.mul(stride, ir.Constant(INT, count)))
 
-    scalars = [builder.load(builder.gep(weights, [ir.Constant(_INT, i)])) for i in range(16)]
+    scalars = [builder.load(builder.gep(weights, [ir.Constant(INT, i)])) for i in range(16)]
     w = [force.splat(scalar) for scalar in scalars]
     w_patch = [patch.splat(scalar) for scalar in scalars[:4] + scalars[8:12]]
     slabs = []
@@ -98,17 +69,17 @@ def _emit(builder, values, first, row, slab, weights, tw, out, place):
             for k in range(4):
                 at = ahead(start, (_GRADIENT + _VALUE) * k)
                 node = force.load(values, at)
-                here = force.add(w[k], node, here)
-                slope = force.add(w[4 + k], node, slope)
-                there = patch.add(w_patch[k], patch.load(values, ahead(at, _GRADIENT)), there)
-            value = force.add(w[8 + j_roll], here, value)
-            slope_y = force.add(w[8 + j_roll], slope, slope_y)
-            slope_roll = force.add(w[12 + j_roll], here, slope_roll)
-            of_patch = patch.add(w_patch[4 + j_roll], there, of_patch)
+                here = _add(force, w[k], node, here)
+                slope = _add(force, w[4 + k], node, slope)
+                there = _add(patch, w_patch[k], patch.load(values, ahead(at, _GRADIENT)), there)
+            value = _add(force, w[8 + j_roll], here, value)
+            slope_y = _add(force, w[8 + j_roll], slope, slope_y)
+            slope_roll = _add(force, w[12 + j_roll], here, slope_roll)
+            of_patch = _add(patch, w_patch[4 + j_roll], there, of_patch)
         slabs.append((value, slope_y, slope_roll, of_patch))
 
-    def between(lanes, a, b):
-        return lanes.add(lanes.splat(tw), builder.fsub(b, a), a)
+    def between(registers, a, b):
+        return registers.fma(registers.splat(tw), builder.fsub(b, a), a)
 
     value, slope_y, slope_roll = (
         between(force, a, b) for a, b in zip(slabs[0][:3], slabs[1][:3], strict=True)

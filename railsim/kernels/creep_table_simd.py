@@ -13,11 +13,10 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-_LANES = 8
+from railsim.kernels.registers import INT, LANES, VECTOR, Registers
+
 _NODES = 4  # weights of a cubic B-spline in each direction
-_DOUBLES = ir.VectorType(ir.DoubleType(), _LANES)
-_FLOATS = ir.VectorType(ir.FloatType(), _LANES)
-_INT = ir.IntType(64)
+_FLOATS = ir.VectorType(ir.FloatType(), LANES)
 
 
 @intrinsic
@@ -43,18 +42,14 @@ def sum_of_rows(typingctx, table, start, strides, weights, first, sums):
 
 
 def _emit(builder, table, start, strides, weights, sums):
-    kind = ir.FunctionType(_DOUBLES, [_DOUBLES] * 3)
-    fma = cgutils.get_or_insert_function(builder.module, kind, "llvm.fma.v8f64")
-    zero = ir.Constant(_DOUBLES, [0.0] * _LANES)
-    mask = ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
+    registers = Registers(builder)
+    fma, zero = registers.fma, registers.zero
 
     def weight(number):
-        single = builder.load(builder.gep(weights, [number]))
-        filled = builder.insert_element(zero, single, ir.Constant(ir.IntType(32), 0))
-        return builder.shuffle_vector(filled, zero, mask)
+        return registers.splat(builder.load(builder.gep(weights, [number])))
 
     def constant(number):
-        return ir.Constant(_INT, number)
+        return ir.Constant(INT, number)
 
     totals = [cgutils.alloca_once_value(builder, zero) for _ in range(2)]
     inner = [weight(constant(2 * _NODES + k)) for k in range(_NODES)]
@@ -68,16 +63,14 @@ def _emit(builder, table, start, strides, weights, sums):
             for k in range(_NODES):
                 row = builder.add(place, builder.mul(strides[2], constant(k)))
                 for half in range(2):
-                    at = builder.add(row, constant(_LANES * half))
+                    at = builder.add(row, constant(LANES * half))
                     pointer = builder.bitcast(builder.gep(table, [at]), ir.PointerType(_FLOATS))
-                    values = builder.fpext(builder.load(pointer, align=4), _DOUBLES)
-                    sums_k[half] = builder.call(fma, [inner[k], values, sums_k[half]])
-            sums_j = [builder.call(fma, [middle[j], sums_k[h], sums_j[h]]) for h in range(2)]
+                    values = builder.fpext(builder.load(pointer, align=4), VECTOR)
+                    sums_k[half] = fma(inner[k], values, sums_k[half])
+            sums_j = [fma(middle[j], sums_k[h], sums_j[h]) for h in range(2)]
         outer = weight(loop.index)
         for half in range(2):
             present = builder.load(totals[half])
-            builder.store(builder.call(fma, [outer, sums_j[half], present]), totals[half])
+            builder.store(fma(outer, sums_j[half], present), totals[half])
     for half in range(2):
-        at = builder.gep(sums, [constant(_LANES * half)])
-        pointer = builder.bitcast(at, ir.PointerType(_DOUBLES))
-        builder.store(builder.load(totals[half]), pointer, align=8)
+        registers.store(builder.load(totals[half]), sums, constant(LANES * half))

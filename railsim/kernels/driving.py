@@ -1,4 +1,4 @@
-"""How the speed of travel acts on the bodies: traction, the held reference body, fixed bodies."""
+"""Effects of the speed of travel: traction, the held reference body, fixed bodies."""
 
 from railsim.kernels import compiled
 from railsim.kernels.rotation import sine_cosine
@@ -18,9 +18,8 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import OMEGA, OMEGA_S
 
-BRAKES_FULLY = (
-    0.1  # m/s; speed of the wheel's rim below which a brake's torque fades to that at rest
-)
+# speed of the wheel's circumference below which a brake's torque decreases linearly to 0 (m/s)
+BRAKES_FULLY = 0.1
 
 
 @compiled
@@ -127,7 +126,7 @@ def hold_reference(bodies, relative, acceleration, derivative):
 
 @compiled(inline=True)
 def turn_fixed(bodies, frames, speed, state):
-    """Let fixed bodies turn with their track frames: u = C^T w_F, r' = 0."""
+    """Rotate fixed bodies with their track frames: u = C^T w_F, r' = 0."""
     n = bodies.kind.shape[0]
     for k in range(bodies.fixed.shape[0]):
         b = bodies.fixed[k]
@@ -147,7 +146,7 @@ def turn_fixed(bodies, frames, speed, state):
 
 @compiled(inline=True)
 def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
-    """Keep fixed bodies where they are; what holds them is part of their accelerations.
+    """Hold fixed bodies; the forces that hold them are part of their accelerations.
 
     u' = C^T (V^2 omega_s + V' omega), `rate` being V'.
     """

@@ -16,9 +16,20 @@ force times rate.  Dampers with a series stiffness, friction pads and air spring
 states (see `internal`).
 """
 
-from math import sqrt
+from math import exp, sqrt
 
 from railsim.kernels import compiled
+from railsim.kernels.element_columns import (
+    BOTH_ENDS,
+    DAMPING_Z,
+    FRICTION,
+    ONE_SIDED,
+    PRELOAD_Z,
+    ROTATES,
+    STIFFNESS_Z,
+    link_columns,
+    mount_columns,
+)
 from railsim.kernels.internal import AIR, PAD, curve_value
 from railsim.kernels.lanes import (
     LANES,
@@ -28,23 +39,23 @@ from railsim.kernels.lanes import (
     load_rows,
     spread,
     square_root,
-    starts,
     store_lanes,
 )
-from railsim.kernels.rotation import cross, turned, turned_back
-from railsim.kernels.system import (
-    BOTH_ENDS,
-    DAMPING_Z,
-    FORCE,
-    FRICTION,
-    LINK_SIZE,
-    MOUNT_SIZE,
-    ONE_SIDED,
-    POSE_SIZE,
-    PRELOAD_Z,
-    PUSH,
-    ROTATES,
-    STIFFNESS_Z,
+from railsim.kernels.system import FORCE, MOMENT, POSE_SIZE, PUSH
+from railsim.kernels.track_frame import ATTITUDE
+from railsim.kernels.vectors import (
+    add_at,
+    by_axis,
+    cross,
+    dot,
+    matrix_at,
+    minus,
+    negative,
+    plus,
+    rotate,
+    rotate_back,
+    times,
+    vector_at,
 )
 
 
@@ -73,21 +84,32 @@ def motion_of(pose, rows):
 
 
 @compiled(inline=True)
-def gap(pose, one, two, x1, y1, z1, x2, y2, z2):
-    """Attitudes and angular velocities of both bodies, arms, distance of the points and its rate.
+def relative_motion(pose, one, two, point_1, point_2):
+    """Motion of points of body 2 against points of body 1, in global axes.
 
-    Arms a, b from the centres to the points, the vector g between the points and its rate w, all in
-    global axes.
+    Returns
+    -------
+    R1, R2, omega_1, omega_2 : attitudes and angular velocities of both bodies
+    a, b : arms from the centres of gravity to the points
+    g, w : vector from point 1 to point 2, and its rate
     """
-    R1, X1, V1, W1 = motion_of(pose, one)
-    R2, X2, V2, W2 = motion_of(pose, two)
-    ax, ay, az = turned(R1, x1, y1, z1)
-    bx, by, bz = turned(R2, x2, y2, z2)
-    ux, uy, uz = cross(W1[0], W1[1], W1[2], ax, ay, az)
-    vx, vy, vz = cross(W2[0], W2[1], W2[2], bx, by, bz)
-    g = (X2[0] - X1[0] + bx - ax, X2[1] - X1[1] + by - ay, X2[2] - X1[2] + bz - az)
-    w = (V2[0] + vx - V1[0] - ux, V2[1] + vy - V1[1] - uy, V2[2] + vz - V1[2] - uz)
-    return R1, R2, W1, W2, (ax, ay, az), (bx, by, bz), g, w
+    R1, X1, V1, omega_1 = motion_of(pose, one)
+    R2, X2, V2, omega_2 = motion_of(pose, two)
+    a, b = rotate(R1, point_1), rotate(R2, point_2)
+    g = minus(plus(minus(X2, X1), b), a)
+    w = minus(minus(plus(V2, cross(omega_2, b)), V1), cross(omega_1, a))
+    return R1, R2, omega_1, omega_2, a, b, g, w
+
+
+@compiled(inline=True)
+def push(pose, one, two, force, moment_1, moment_2, n):
+    """Add a force and a moment to `n` bodies `one`, the opposite force and a moment to `two`."""
+    zero = spread(0.0)
+    fx, fy, fz = force
+    m1, m2, m3 = moment_1
+    n1, n2, n3 = moment_2
+    to_one = (zero, zero, fx, fy, fz, m1, m2, m3)
+    add_to_pairs(pose, one, two, PUSH, to_one, (zero, zero, -fx, -fy, -fz, n1, n2, n3), n)
 
 
 @compiled(inline=True)
@@ -108,50 +130,48 @@ def link_laws(links, curves, first, n, inner, drive, laws):
         laws[2 * LANES + k] = force
 
 
+@compiled(inline=True)
+def link_law(links, curves, first, n, motion, inner, drive, laws):
+    """Direction and tension of `n` links, in lanes; `laws` keeps their elongations and rates.
+
+    ``motion``: see `relative_motion`, and the link's columns.
+    """
+    g, w, (nominal, stiffness, damping, preload) = motion
+    length = square_root(dot(g, g))
+    direction = g[0] / length, g[1] / length, g[2] / length
+    rate = dot(direction, w)
+    elongation = length - nominal
+    store_lanes(laws, 0, elongation)
+    store_lanes(laws, LANES, rate)
+    link_laws(links, curves, first, n, inner, drive, laws)
+    force = preload + stiffness * elongation + damping * rate + load_lanes(laws, 2 * LANES)
+    return direction, force
+
+
 @compiled(merge=True)
 def link_forces(links, curves, inner, drive, laws, pose):
     """Add the forces of all point-to-point elements to the bodies' rows in `pose`."""
     count = links.body.shape[0]
-    zero = spread(0.0)
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
         which = eight_from(first, count)
         one, two = end_of(links.body, 0, which), end_of(links.body, 1, which)
-        row = starts(which, LINK_SIZE)
-        x1, y1, z1, x2, y2, z2, nominal, stiffness = load_rows(links.row, row, 0, 8)
-        damping, preload = load_rows(links.row, row, 8, 2)
-        _, _, _, _, a, b, g, w = gap(pose, one, two, x1, y1, z1, x2, y2, z2)
-        length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-        nx, ny, nz = g[0] / length, g[1] / length, g[2] / length
-        rate = nx * w[0] + ny * w[1] + nz * w[2]
-        elongation = length - nominal
-        store_lanes(laws, 0, elongation)
-        store_lanes(laws, LANES, rate)
-        link_laws(links, curves, first, n, inner, drive, laws)
-        force = preload + stiffness * elongation + damping * rate + load_lanes(laws, 2 * LANES)
-        fx, fy, fz = force * nx, force * ny, force * nz
-        m1, m2, m3 = cross(a[0], a[1], a[2], fx, fy, fz)
-        n1, n2, n3 = cross(b[0], b[1], b[2], fx, fy, fz)
-        add_to_pairs(
-            pose,
-            one,
-            two,
-            PUSH,
-            (zero, zero, fx, fy, fz, m1, m2, m3),
-            (zero, zero, -fx, -fy, -fz, -n1, -n2, -n3),
-            n,
-        )
+        point_1, point_2, law = link_columns(links.row, which)
+        _, _, _, _, a, b, g, w = relative_motion(pose, one, two, point_1, point_2)
+        direction, force = link_law(links, curves, first, n, (g, w, law), inner, drive, laws)
+        f = times(force, direction)
+        push(pose, one, two, f, cross(a, f), negative(cross(b, f)), n)
 
 
 @compiled(inline=True)
-def limit_of(mounts, e, k, normal):
+def limit_of(friction, e, k, normal):
     """Largest friction force of mount `e` along axis `k` under the load `normal`."""
-    return mounts.friction[e, k, 0] + mounts.friction[e, k, 1] * normal
+    return friction[e, k, 0] + friction[e, k, 1] * normal
 
 
 @compiled(python=False)
-def grip(mounts, internal, e, normal, inner):
-    """Factor that brings the friction forces of a pad that slides in any direction to its limit.
+def grip(mounts, internal, friction, e, normal, inner):
+    """Factor that reduces the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
     wedge without mass, on a spring force F and under a smooth face at `angle` to the column,
@@ -162,7 +182,7 @@ def grip(mounts, internal, e, normal, inner):
     for k in range(3):
         m = mounts.internal[e, k]
         if m >= 0:
-            limit = limit_of(mounts, e, k, normal)
+            limit = limit_of(friction, e, k, normal)
             z = inner[m] / limit if limit > 0.0 else 0.0
             square += z * z
             skew = internal.parameter[m, 2]
@@ -171,20 +191,21 @@ def grip(mounts, internal, e, normal, inner):
 
 
 @compiled(inline=True)
-def axis_law(mounts, internal, curves, e, k, d, rate, normal, inner, drive):
+def axis_law(mounts, internal, curves, friction, e, k, motion, normal, inner, drive):
     """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
+    d, rate = motion
     force = 0.0
     if mounts.curve[e, k] >= 0:
         force += curve_value(curves, mounts.curve[e, k], d)
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
-            limit = limit_of(mounts, e, k, normal)
+            limit = limit_of(friction, e, k, normal)
             drive[m, 0], drive[m, 1] = rate, limit
             if internal.parameter[m, 1] == 0.0:
                 force += min(limit, max(-limit, inner[m]))
             elif limit > 0.0:
-                force += inner[m] * grip(mounts, internal, e, normal, inner)
+                force += inner[m] * grip(mounts, internal, friction, e, normal, inner)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
@@ -218,7 +239,7 @@ def pad_load(mounts, curves, e, z):
 
 @compiled(inline=True)
 def lifted_part(mounts, e, z, rate, normal):
-    """What takes the tension out of the spring and damper of a pad that only presses."""
+    """Force that cancels the tension of spring and damper of a pad that only presses."""
     spring = mounts.row[e, PRELOAD_Z] + mounts.row[e, STIFFNESS_Z] * z
     damper = mounts.row[e, DAMPING_Z] * rate
     if normal <= 0.0:
@@ -227,7 +248,7 @@ def lifted_part(mounts, e, z, rate, normal):
 
 
 @compiled(inline=True)
-def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
+def mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive, laws):
     """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
     for i in range(law, end):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
@@ -235,20 +256,55 @@ def mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws):
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
         normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
         laws[(6 + k) * LANES + lane] = axis_law(
-            mounts, internal, curves, e, k, d, rate, normal, inner, drive
+            mounts, internal, curves, friction, e, k, (d, rate), normal, inner, drive
         )
 
 
 @compiled(inline=True)
-def in_axes_of(R, W, g, w):
+def in_axes_of(R, omega, g, w):
     """Deflection R^T g in a body's axes, and its rate R^T (w - omega x g)."""
-    x, y, z = cross(W[0], W[1], W[2], g[0], g[1], g[2])
-    return turned_back(R, g[0], g[1], g[2]), turned_back(R, w[0] - x, w[1] - y, w[2] - z)
+    return rotate_back(R, g), rotate_back(R, minus(w, cross(omega, g)))
 
 
 @compiled(inline=True)
-def rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3):
-    """Moment on body 1 of the rotational potential tr(K_d (1 - R_1^T R_2)) and its damping."""
+def spring_damper(law, d, rate):
+    """F_0 + K d + C d', axis by axis."""
+    stiffness, damping, preload = law
+    return plus(plus(preload, by_axis(stiffness, d)), by_axis(damping, rate))
+
+
+@compiled(inline=True)
+def other_laws(mounts, internal, curves, friction, block, d, rate, inner, drive, laws):
+    """Forces of internal states and tables of a block of mounts, see `mount_laws`.
+
+    ``block``: first mount, first of `Mounts.law` and the one after the last.
+    """
+    first, law, end = block
+    zero = spread(0.0)
+    for k in range(3):
+        store_lanes(laws, k * LANES, d[k])
+        store_lanes(laws, (3 + k) * LANES, rate[k])
+        store_lanes(laws, (6 + k) * LANES, zero)
+    mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive, laws)
+    return load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
+
+
+@compiled(inline=True)
+def laws_before(law, begin, stop):
+    """End of the entries of `Mounts.law` from `begin` on that are below `stop`."""
+    end = begin
+    while end < law.shape[0] and law[end] < stop:
+        end += 1
+    return end
+
+
+@compiled(inline=True)
+def rotation_law(R1, R2, omega_1, omega_2, law):
+    """Angles, their rates and the moment on body 1 in its axes; tr(K_d (1 - R_1^T R_2)), damping.
+
+    The angles are the antisymmetric part of R_1^T R_2.
+    """
+    (k1, k2, k3), damping = law
     # off-diagonal terms of R_1^T R_2
     r12 = R1[0] * R2[1] + R1[3] * R2[4] + R1[6] * R2[7]
     r13 = R1[0] * R2[2] + R1[3] * R2[5] + R1[6] * R2[8]
@@ -256,26 +312,52 @@ def rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3):
     r23 = R1[1] * R2[2] + R1[4] * R2[5] + R1[7] * R2[8]
     r31 = R1[2] * R2[0] + R1[5] * R2[3] + R1[8] * R2[6]
     r32 = R1[2] * R2[1] + R1[5] * R2[4] + R1[8] * R2[7]
-    wx, wy, wz = turned_back(R1, W2[0] - W1[0], W2[1] - W1[1], W2[2] - W1[2])
-    return turned(
-        R1,
-        k2 * r32 - k3 * r23 + c1 * wx,
-        k3 * r13 - k1 * r31 + c2 * wy,
-        k1 * r21 - k2 * r12 + c3 * wz,
-    )
+    rate = rotate_back(R1, minus(omega_2, omega_1))
+    spring = k2 * r32 - k3 * r23, k3 * r13 - k1 * r31, k1 * r21 - k2 * r12
+    angle = 0.5 * (r32 - r23), 0.5 * (r13 - r31), 0.5 * (r21 - r12)
+    return angle, rate, plus(spring, by_axis(damping, rate))
 
 
 @compiled(merge=True)
-def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
+def friction_at_speed(mounts, internal, laws, pose, friction):
+    """Limits of pads with friction that falls: r + (1 - r) exp(-|v|/v_s) of those at rest.
+
+    v is the rate of the deflection, of a pad that slides in any direction that along all its axes
+    (Bo, Pavelescu 1982; as in the elastic pads of Canudas de Wit et al. 1995 it is not reduced by
+    the rate of the pad's own elastic deflection).
+    """
+    for i in range(mounts.falling.shape[0]):
+        e = mounts.falling[i]
+        which = eight_from(e, e + 1)
+        one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
+        point_1, point_2, _, _, _ = mount_columns(mounts.row, which)
+        R1, _, omega_1, _, _, _, g, w = relative_motion(pose, one, two, point_1, point_2)
+        _, rate = in_axes_of(R1, omega_1, g, w)
+        for k in range(3):
+            store_lanes(laws, k * LANES, rate[k])
+        for k in range(3):
+            m = mounts.internal[e, k]
+            together = m >= 0 and internal.parameter[m, 1] > 0.0
+            square = 0.0
+            for j in range(3):
+                if j == k or (together and mounts.internal[e, j] >= 0):
+                    square += laws[j * LANES] * laws[j * LANES]
+            ratio = mounts.friction[e, k, 2]
+            share = ratio + (1.0 - ratio) * exp(-sqrt(square) / mounts.friction[e, k, 3])
+            friction[e, k, 0] = share * mounts.friction[e, k, 0]
+            friction[e, k, 1] = share * mounts.friction[e, k, 1]
+
+
+@compiled(merge=True)
+def mount_forces(mounts, internal, curves, friction, inner, drive, laws, pose):
     """Add the forces of all three-axis elements to the bodies' rows in `pose`.
 
     The force acts in the axes of body 1, of a shear spring half of it in those of body 2.  The
     gradient of the potential puts the moment g x f on the body whose axes they are, besides the
-    forces +-f at the points.
+    forces +-f at the points.  ``friction``: limits at the sliding speed, see `friction_at_speed`.
     """
     count = mounts.body.shape[0]
-    zero = spread(0.0)
-    law = 0
+    end = 0
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
         which = eight_from(first, count)
@@ -283,58 +365,32 @@ def mount_forces(mounts, internal, curves, inner, drive, laws, pose):
         for e in range(first, first + n):
             both_ends |= mounts.flags[e, BOTH_ENDS]
             rotates |= mounts.flags[e, ROTATES]
-        end = law
-        while end < mounts.law.shape[0] and mounts.law[end] < 3 * (first + n):
-            end += 1
+        law, end = end, laws_before(mounts.law, end, 3 * (first + n))
         one, two = end_of(mounts.body, 0, which), end_of(mounts.body, 1, which)
-        row = starts(which, MOUNT_SIZE)
-        x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(mounts.row, row, 0, 8)
-        kx, ky, kz, cx, cy, cz, fx_0, fy_0 = load_rows(mounts.row, row, 8, 8)
-        fz_0, k1, k2, k3, c1, c2, c3 = load_rows(mounts.row, row, 16, 7)
-        R1, R2, W1, W2, a, b, g, w = gap(pose, one, two, x1, y1, z1, x2, y2, z2)
-        d, rate = in_axes_of(R1, W1, g, w)
-        tx = fx_0 + kx * d[0] + cx * rate[0]
-        ty = fy_0 + ky * d[1] + cy * rate[1]
-        tz = fz_0 + kz * d[2] + cz * rate[2]
+        point_1, point_2, share, spring, rotation = mount_columns(mounts.row, which)
+        R1, R2, omega_1, omega_2, a, b, g, w = relative_motion(pose, one, two, point_1, point_2)
+        d, rate = in_axes_of(R1, omega_1, g, w)
+        t = spring_damper(spring, d, rate)
         if law < end:
-            for k in range(3):
-                store_lanes(laws, k * LANES, d[k])
-                store_lanes(laws, (3 + k) * LANES, rate[k])
-                store_lanes(laws, (6 + k) * LANES, zero)
-            mount_laws(mounts, internal, curves, first, law, end, inner, drive, laws)
-            law = end
-            tx = tx + load_lanes(laws, 6 * LANES)
-            ty = ty + load_lanes(laws, 7 * LANES)
-            tz = tz + load_lanes(laws, 8 * LANES)
-        fx, fy, fz = turned(R1, share_1 * tx, share_1 * ty, share_1 * tz)
-        m1, m2, m3 = cross(g[0], g[1], g[2], fx, fy, fz)
-        n1, n2, n3 = spread(0.0), spread(0.0), spread(0.0)
-        if both_ends:
-            d, rate = in_axes_of(R2, W2, g, w)
-            sx, sy, sz = turned(
-                R2,
-                share_2 * (fx_0 + kx * d[0] + cx * rate[0]),
-                share_2 * (fy_0 + ky * d[1] + cy * rate[1]),
-                share_2 * (fz_0 + kz * d[2] + cz * rate[2]),
+            block = (first, law, end)
+            t = plus(
+                t,
+                other_laws(mounts, internal, curves, friction, block, d, rate, inner, drive, laws),
             )
-            n1, n2, n3 = cross(g[0], g[1], g[2], sx, sy, sz)
-            fx, fy, fz = fx + sx, fy + sy, fz + sz
+        f = rotate(R1, times(share[0], t))
+        moment_1 = cross(g, f)
+        moment_2 = spread(0.0), spread(0.0), spread(0.0)
+        if both_ends:
+            d, rate = in_axes_of(R2, omega_2, g, w)
+            f_2 = rotate(R2, times(share[1], spring_damper(spring, d, rate)))
+            moment_2 = cross(g, f_2)
+            f = plus(f, f_2)
         if rotates:
-            x, y, z = rotation_moment(R1, R2, W1, W2, k1, k2, k3, c1, c2, c3)
-            m1, m2, m3 = m1 + x, m2 + y, m3 + z
-            n1, n2, n3 = n1 - x, n2 - y, n3 - z
-        x, y, z = cross(a[0], a[1], a[2], fx, fy, fz)
-        m1, m2, m3 = m1 + x, m2 + y, m3 + z
-        x, y, z = cross(b[0], b[1], b[2], fx, fy, fz)
-        add_to_pairs(
-            pose,
-            one,
-            two,
-            PUSH,
-            (zero, zero, fx, fy, fz, m1, m2, m3),
-            (zero, zero, -fx, -fy, -fz, n1 - x, n2 - y, n3 - z),
-            n,
-        )
+            _, _, m = rotation_law(R1, R2, omega_1, omega_2, rotation)
+            m = rotate(R1, m)
+            moment_1, moment_2 = plus(moment_1, m), minus(moment_2, m)
+        moment_1, moment_2 = plus(moment_1, cross(a, f)), minus(moment_2, cross(b, f))
+        push(pose, one, two, f, moment_1, moment_2, n)
 
 
 @compiled(python=False)
@@ -359,34 +415,15 @@ def load_forces(loads, time, s, frame_offset, bodies, frames, pose):
         first, last = loads.start[e], loads.start[e + 1]
         f = bodies.frame[b]
         at = s + frame_offset[f] if loads.flags[e, 2] else time
-        c1 = load_component(loads.table, first, last, at, 1)
-        c2 = load_component(loads.table, first, last, at, 2)
-        c3 = load_component(loads.table, first, last, at, 3)
-        in_track = loads.flags[e, 1]
-        x, y, z = 0.0, 0.0, 0.0
-        for k in range(3):
-            a1 = frames[f, 3 + k * 3] if in_track else pose[b, 3 * k]
-            a2 = frames[f, 4 + k * 3] if in_track else pose[b, 3 * k + 1]
-            a3 = frames[f, 5 + k * 3] if in_track else pose[b, 3 * k + 2]
-            value = a1 * c1 + a2 * c2 + a3 * c3
-            if k == 0:
-                x = value
-            elif k == 1:
-                y = value
-            else:
-                z = value
+        given = (
+            load_component(loads.table, first, last, at, 1),
+            load_component(loads.table, first, last, at, 2),
+            load_component(loads.table, first, last, at, 3),
+        )
+        R = matrix_at(pose, b, 0)
+        v = rotate(matrix_at(frames, f, ATTITUDE), given) if loads.flags[e, 1] else rotate(R, given)
         if loads.flags[e, 0]:
-            pose[b, FORCE + 3] += x
-            pose[b, FORCE + 4] += y
-            pose[b, FORCE + 5] += z
+            add_at(pose, b, MOMENT, v)
             continue
-        p1, p2, p3 = loads.point[e, 0], loads.point[e, 1], loads.point[e, 2]
-        lx = pose[b, 0] * p1 + pose[b, 1] * p2 + pose[b, 2] * p3
-        ly = pose[b, 3] * p1 + pose[b, 4] * p2 + pose[b, 5] * p3
-        lz = pose[b, 6] * p1 + pose[b, 7] * p2 + pose[b, 8] * p3
-        pose[b, FORCE] += x
-        pose[b, FORCE + 1] += y
-        pose[b, FORCE + 2] += z
-        pose[b, FORCE + 3] += ly * z - lz * y
-        pose[b, FORCE + 4] += lz * x - lx * z
-        pose[b, FORCE + 5] += lx * y - ly * x
+        add_at(pose, b, FORCE, v)
+        add_at(pose, b, MOMENT, cross(rotate(R, vector_at(loads.point, e, 0)), v))

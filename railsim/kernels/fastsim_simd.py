@@ -20,12 +20,9 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-LANES = 8
-_DOUBLE = ir.DoubleType()
-_VECTOR = ir.VectorType(_DOUBLE, LANES)
-_VECTOR_POINTER = ir.PointerType(_VECTOR)
+from railsim.kernels.registers import DOUBLE, INT, LANES, VECTOR, Registers
+
 _BYTE = ir.IntType(8)
-_INT = ir.IntType(64)
 
 # rows of the work array that hold what depends on the grid only, see `fastsim.fastsim_workspace`
 BOUNDS, PER_L, Y_PER_L, W_SUM, W_ALONG, W_ACROSS = 9, 11, 12, 13, 14, 15
@@ -66,36 +63,25 @@ def _block_march(n_vectors):
 
 def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
     """Write the instructions; see `railsim.kernels.fastsim._march_plain` for the same in Python."""
-
-    def constant(value):
-        return ir.Constant(_VECTOR, [value] * LANES)
-
-    def function(name, *arguments):
-        kind = ir.FunctionType(_VECTOR, arguments)
-        return cgutils.get_or_insert_function(builder.module, kind, name)
-
-    fma = function("llvm.fma.v8f64", _VECTOR, _VECTOR, _VECTOR)
-    least = function("llvm.minnum.v8f64", _VECTOR, _VECTOR)
-    rsqrt14 = function("llvm.x86.avx512.rsqrt14.pd.512", _VECTOR, _VECTOR, _BYTE)
+    registers = Registers(builder)
+    constant, splat, fma = registers.constant, registers.splat, registers.fma
+    # the estimate of AVX-512: register, what stands where the mask does not, mask
+    kind = ir.FunctionType(VECTOR, [VECTOR, VECTOR, _BYTE])
+    name = "llvm.x86.avx512.rsqrt14.pd.512"
+    rsqrt14 = cgutils.get_or_insert_function(builder.module, kind, name)
     all_lanes = ir.Constant(_BYTE, -1)
-    zero, one = constant(0.0), constant(1.0)
-
-    def splat(value):
-        single = builder.insert_element(zero, value, ir.Constant(ir.IntType(32), 0))
-        mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-        return builder.shuffle_vector(single, zero, mask)
+    zero, one = registers.zero, constant(1.0)
 
     def place(row, vector):
-        offset = builder.add(builder.mul(ir.Constant(_INT, row), columns), first)
-        offset = builder.add(offset, ir.Constant(_INT, LANES * vector))
-        return builder.bitcast(builder.gep(data, [offset]), _VECTOR_POINTER)
+        offset = builder.add(builder.mul(ir.Constant(INT, row), columns), first)
+        return builder.add(offset, ir.Constant(INT, LANES * vector))
 
     def load(row, vector):
-        return builder.load(place(row, vector), align=8)
+        return registers.load(data, place(row, vector))
 
-    cell = builder.fdiv(ir.Constant(_DOUBLE, 1.0), builder.sitofp(nx, _DOUBLE))
-    two_cells = splat(builder.fmul(cell, ir.Constant(_DOUBLE, 2.0)))
-    half_first = splat(builder.fmul(cell, ir.Constant(_DOUBLE, -0.5)))
+    cell = builder.fdiv(ir.Constant(DOUBLE, 1.0), builder.sitofp(nx, DOUBLE))
+    two_cells = splat(builder.fmul(cell, ir.Constant(DOUBLE, 2.0)))
+    half_first = splat(builder.fmul(cell, ir.Constant(DOUBLE, -0.5)))
     grow_x, change, state = [], [], []
     for v in range(n_vectors):
         gx, gy, gs = load(0, v), load(1, v), load(2, v)
@@ -103,7 +89,7 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
         change.append(builder.fmul(two_cells, gs))
         grow_y = builder.fadd(gy, gs)
         # a full step from here is the half step that the first cell needs
-        half = builder.fmul(constant(0.5), builder.call(fma, [half_first, gs, grow_y]))
+        half = builder.fmul(constant(0.5), fma(half_first, gs, grow_y))
         start = (
             builder.fmul(constant(-0.5), gx),
             builder.fsub(half, grow_y),
@@ -121,14 +107,14 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
             px, py, grow_y, sum_x, sum_y, sum_m = (builder.load(slot) for slot in state[v])
             px = builder.fadd(px, grow_x[v])
             py = builder.fadd(py, grow_y)
-            square = builder.call(fma, [py, py, constant(1e-30)])
-            square = builder.call(fma, [px, px, square])
+            square = fma(py, py, constant(1e-30))
+            square = fma(px, px, square)
             r = builder.call(rsqrt14, [square, zero, all_lanes])
-            e = builder.call(fma, [builder.fneg(builder.fmul(square, r)), r, one])
+            e = fma(builder.fneg(builder.fmul(square, r)), r, one)
             f = builder.fmul(bound, r)
-            correction = builder.call(fma, [e, constant(0.375), constant(0.5)])
-            f = builder.call(fma, [builder.fmul(f, e), correction, f])
-            f = builder.call(least, [f, one])
+            correction = fma(e, constant(0.375), constant(0.5))
+            f = fma(builder.fmul(f, e), correction, f)
+            f = registers.call("minnum", f, one)
             px = builder.fmul(px, f)
             py = builder.fmul(py, f)
             sum_x = builder.fadd(sum_x, px)
@@ -139,7 +125,7 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
                 builder.store(value, slot)
     for v in range(n_vectors):
         for row, slot in zip((3, 4, 5), state[v][3:], strict=True):
-            builder.store(builder.load(slot), place(row, v), align=8)
+            registers.store(builder.load(slot), data, place(row, v))
 
 
 march_3 = _block_march(3)
@@ -177,8 +163,8 @@ def gather(typingctx, work, n, ny):
         load, row = _rows(context, builder, sig, args[0])
         terms = ((W_SUM, 3), (W_SUM, 4), (W_ALONG, 5), (W_ALONG, 4), (W_ACROSS, 3))
         with _blocks(builder, args[1]) as first:
-            zero = ir.Constant(_VECTOR, [0.0] * LANES)
-            slots = [cgutils.alloca_once(builder, _VECTOR) for _ in terms]
+            zero = Registers(builder).zero
+            slots = [cgutils.alloca_once(builder, VECTOR) for _ in terms]
             for slot in slots:
                 builder.store(zero, slot)
             with cgutils.for_range(builder, args[2]) as loop:
@@ -199,22 +185,18 @@ def _rows(context, builder, sig, work):
     """Functions that load from a row of the work array, and that point into it."""
     array = context.make_array(sig.args[0])(context, builder, work)
     columns = cgutils.unpack_tuple(builder, array.shape)[1]
-    zero = ir.Constant(_VECTOR, [0.0] * LANES)
-    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    registers = Registers(builder)
 
-    def element(k, column):
-        offset = builder.add(builder.mul(ir.Constant(_INT, k), columns), column)
-        return builder.gep(array.data, [offset])
+    def place(k, column):
+        return builder.add(builder.mul(ir.Constant(INT, k), columns), column)
 
     def row(k, column):
-        return builder.bitcast(element(k, column), _VECTOR_POINTER)
+        return registers.pointer(array.data, place(k, column))
 
     def load(k, column, splat=False):
-        if not splat:
-            return builder.load(row(k, column), align=8)
-        value = builder.load(element(k, column))
-        single = builder.insert_element(zero, value, ir.Constant(ir.IntType(32), 0))
-        return builder.shuffle_vector(single, zero, mask)
+        if splat:
+            return registers.splat(builder.load(builder.gep(array.data, [place(k, column)])))
+        return registers.load(array.data, place(k, column))
 
     return load, row
 
@@ -222,8 +204,8 @@ def _rows(context, builder, sig, work):
 @contextmanager
 def _blocks(builder, n):
     """Loop over blocks of eight patches: the number of the first one."""
-    lanes = ir.Constant(_INT, LANES)
-    count = builder.sdiv(builder.add(n, ir.Constant(_INT, LANES - 1)), lanes)
+    lanes = ir.Constant(INT, LANES)
+    count = builder.sdiv(builder.add(n, ir.Constant(INT, LANES - 1)), lanes)
     with cgutils.for_range(builder, count) as loop:
         yield builder.mul(loop.index, lanes)
 

@@ -46,7 +46,7 @@ def cell_influence(x, y, half_x, half_y, nu):
     half_x, half_y : float
         Half sides of the cell.
     nu : float
-        Poisson's number of both bodies.
+        Poisson's ratio of both bodies.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def rolling_matrices(x, y, half_x, half_y, edge, nu, middle, centre, x_middle):
     edge : ndarray, shape (n_strip,)
         x of the leading edge.
     nu : float
-        Poisson's number.
+        Poisson's ratio.
     middle, centre : ndarray, shape (3, n, n), written
         For K_xx, K_xy, K_yy; n = n_strip n_cell, strips contiguous.
     x_middle : ndarray, shape (n_strip, n_cell), written

@@ -25,12 +25,7 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 from railsim.kernels import compiled
 from railsim.kernels import lanes_plain as plain
 from railsim.kernels.compiler import define_operator
-
-LANES = 8
-_DOUBLE = ir.DoubleType()
-_VECTOR = ir.VectorType(_DOUBLE, LANES)
-_INT = ir.IntType(64)
-_INDEX = ir.IntType(32)
+from railsim.kernels.registers import INDEX, INT, LANES, VECTOR, Registers
 
 
 class LanesType(types.Type):  # type: ignore[misc]
@@ -46,20 +41,13 @@ lanes = LanesType()
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, _VECTOR)
-
-
-def _splat(builder, value):
-    undefined = ir.Constant(_VECTOR, ir.Undefined)
-    single = builder.insert_element(undefined, value, ir.Constant(_INDEX, 0))
-    zeros = ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES)
-    return builder.shuffle_vector(single, undefined, zeros)
+        super().__init__(manager, kind, VECTOR)
 
 
 def _as_lanes(context, builder, kind, value):
     if isinstance(kind, LanesType):
         return value
-    return _splat(builder, context.cast(builder, value, kind, types.float64))
+    return Registers(builder).splat(context.cast(builder, value, kind, types.float64))
 
 
 def _define(operation, instruction):
@@ -94,11 +82,7 @@ def _of_one(name):
     @intrinsic
     def function(typingctx, x):
         def codegen(context, builder, sig, args):
-            kind = ir.FunctionType(_VECTOR, [_VECTOR])
-            return builder.call(
-                cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"),
-                args,
-            )
+            return Registers(builder).call(name, *args)
 
         return lanes(lanes), codegen
 
@@ -113,16 +97,14 @@ def spread(typingctx, x):
     """One number in all lanes."""
 
     def codegen(context, builder, sig, args):
-        return _splat(builder, args[0])
+        return Registers(builder).splat(args[0])
 
     return lanes(types.float64), codegen
 
 
 def _is_beyond(builder, x, limit):
-    kind = ir.FunctionType(_VECTOR, [_VECTOR])
-    name = f"llvm.fabs.v{LANES}f64"
-    size = builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [x])
-    return builder.fcmp_unordered(">", size, _splat(builder, limit))
+    registers = Registers(builder)
+    return builder.fcmp_unordered(">", registers.call("fabs", x), registers.splat(limit))
 
 
 @intrinsic
@@ -148,7 +130,7 @@ def where_beyond(typingctx, x, limit, beyond, within):
 
 def _pointer(context, builder, kind, array, place):
     data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [place]), ir.PointerType(_VECTOR))
+    return Registers(builder).pointer(data, place)
 
 
 def _mask(count):
@@ -160,10 +142,10 @@ def _load(builder, pointer, count):
     if count == LANES:
         return builder.load(pointer, align=8)
     bits = ir.VectorType(ir.IntType(1), LANES)
-    kind = ir.FunctionType(_VECTOR, [ir.PointerType(_VECTOR), _INDEX, bits, _VECTOR])
+    kind = ir.FunctionType(VECTOR, [ir.PointerType(VECTOR), INDEX, bits, VECTOR])
     load = cgutils.get_or_insert_function(builder.module, kind, "llvm.masked.load.v8f64.p0")
-    zero = ir.Constant(_VECTOR, [0.0] * LANES)
-    return builder.call(load, [pointer, ir.Constant(_INDEX, 8), _mask(count), zero])
+    zero = Registers(builder).zero
+    return builder.call(load, [pointer, ir.Constant(INDEX, 8), _mask(count), zero])
 
 
 def _store(builder, value, pointer, count):
@@ -171,9 +153,9 @@ def _store(builder, value, pointer, count):
         builder.store(value, pointer, align=8)
         return
     bits = ir.VectorType(ir.IntType(1), LANES)
-    kind = ir.FunctionType(ir.VoidType(), [_VECTOR, ir.PointerType(_VECTOR), _INDEX, bits])
+    kind = ir.FunctionType(ir.VoidType(), [VECTOR, ir.PointerType(VECTOR), INDEX, bits])
     store = cgutils.get_or_insert_function(builder.module, kind, "llvm.masked.store.v8f64.p0")
-    builder.call(store, [value, pointer, ir.Constant(_INDEX, 8), _mask(count)])
+    builder.call(store, [value, pointer, ir.Constant(INDEX, 8), _mask(count)])
 
 
 def _turned(builder, rows):
@@ -186,7 +168,7 @@ def _turned(builder, rows):
                 a, b = these[k], these[k + distance]
                 for place, mask in ((k, first), (k + distance, second)):
                     mixed[place] = builder.shuffle_vector(
-                        a, b, ir.Constant(ir.VectorType(_INDEX, LANES), mask)
+                        a, b, ir.Constant(ir.VectorType(INDEX, LANES), mask)
                     )
         return mixed
 
@@ -224,7 +206,7 @@ def load_rows(typingctx, array, rows, column, count):
 
 def _back(builder, values):
     columns = cgutils.unpack_tuple(builder, values)
-    zero = ir.Constant(_VECTOR, [0.0] * LANES)
+    zero = Registers(builder).zero
     return len(columns), _turned(builder, columns + [zero] * (LANES - len(columns)))
 
 
@@ -252,7 +234,7 @@ def add_rows(typingctx, array, rows, column, values, n):
         for k, (place, row) in enumerate(
             zip(_places(builder, args[1], column), turned, strict=True)
         ):
-            there = builder.icmp_signed(">", args[4], ir.Constant(_INT, k))
+            there = builder.icmp_signed(">", args[4], ir.Constant(INT, k))
             with builder.if_then(there, likely=True):
                 pointer = _pointer(context, builder, sig.args[0], args[0], place)
                 total = builder.fadd(_load(builder, pointer, count), row)
@@ -277,7 +259,7 @@ def add_to_pairs(typingctx, array, one, two, column, to_one, to_two, n):
             for rows, values in ((args[1], args[4]), (args[2], args[5]))
         ]
         for k, pair in enumerate(zip(*ends, strict=True)):
-            there = builder.icmp_signed(">", args[6], ir.Constant(_INT, k))
+            there = builder.icmp_signed(">", args[6], ir.Constant(INT, k))
             with builder.if_then(there, likely=True):
                 for place, row in pair:
                     pointer = _pointer(context, builder, sig.args[0], args[0], place)

@@ -31,7 +31,13 @@ from railsim.kernels.driving import (
     speed_change,
     turn_fixed,
 )
-from railsim.kernels.elements import link_forces, load_forces, mount_forces
+from railsim.kernels.elements import (
+    friction_at_speed,
+    link_forces,
+    load_forces,
+    motion_of,
+    mount_forces,
+)
 from railsim.kernels.internal import internal_rate
 from railsim.kernels.lanes import (
     LANES,
@@ -43,18 +49,18 @@ from railsim.kernels.lanes import (
     starts,
     store_rows,
 )
-from railsim.kernels.rotation import product, sine_cosine_lanes, turned, turned_back
+from railsim.kernels.rotation import sine_cosine_lanes
 from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
     AS_GIVEN,
     MOST_CORRECTIONS,
-    correct_support,
     evaluations,
     locate_support,
     settle_rates,
     support_rates,
 )
+from railsim.kernels.support_step import correct_support
 from railsim.kernels.system import (
     BODY_SIZE,
     COS_ROLL,
@@ -70,7 +76,27 @@ from railsim.kernels.system import (
     Y_0,
     Z_0,
 )
-from railsim.kernels.track_frame import ATTITUDE, FRAME_SIZE, OMEGA, cell_of, track_frames
+from railsim.kernels.track_frame import (
+    ATTITUDE,
+    FRAME_SIZE,
+    OMEGA,
+    cell_of,
+    frame_columns,
+    track_frames,
+)
+from railsim.kernels.vectors import (
+    add_at,
+    by_axis,
+    cross,
+    dot,
+    minus,
+    plus,
+    product,
+    rotate,
+    rotate_back,
+    times,
+    vector_at,
+)
 from railsim.kernels.wheel_rail import wheel_rail
 
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
@@ -93,14 +119,23 @@ def locate_frames(track, offset, origin, s, frames, cell, cell_u):
 
 
 @compiled(inline=True)
-def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, w1, w2, w3):
+def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, omega):
     """Rates of roll, pitch, yaw from the angular velocity relative to the frame, body axes.
 
     A wheelset's axes do not turn with its pitch: 0 and 1 stand for its sine and cosine.
     """
-    about_x = cos_pitch * w1 + sin_pitch * w3
-    yaw_rate = (cos_pitch * w3 - sin_pitch * w1) / cos_roll
-    return about_x, w2 - yaw_rate * sin_roll, yaw_rate
+    about_x = cos_pitch * omega[0] + sin_pitch * omega[2]
+    yaw_rate = (cos_pitch * omega[2] - sin_pitch * omega[0]) / cos_roll
+    return about_x, omega[1] - yaw_rate * sin_roll, yaw_rate
+
+
+@compiled(inline=True)
+def store_motion(pose, place, R, X, V, omega):
+    """Attitude, position, velocity and angular velocity of eight bodies; no force, no moment."""
+    zero = spread(0.0)
+    store_rows(pose, place, 0, R[:8])
+    store_rows(pose, place, 8, (R[8], X[0], X[1], X[2], V[0], V[1], V[2], omega[0]))
+    store_rows(pose, place, 16, (omega[1], omega[2], zero, zero, zero, zero, zero, zero))
 
 
 @compiled(merge=True)
@@ -111,10 +146,8 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
     until the accelerations are known.  Forces and moments in `pose` are set to zero.
     """
     n = bodies.kind.shape[0]
-    zero = spread(0.0)
     for first in range(0, bodies.whole.shape[0], LANES):
         own = eight(bodies.whole, first)
-        frame = starts(eight_of(bodies.frame, own), FRAME_SIZE)
         x, y, z, roll, pitch, yaw = load_rows(state, starts(own, 6), 0, 6)
         _, _, _, _, y_0, z_0, radius, spins = load_rows(bodies.row, starts(own, BODY_SIZE), 0, 8)
         sr, cr = sine_cosine_lanes(roll)
@@ -134,27 +167,25 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
         )
         store_rows(relative, starts(own, RELATIVE_SIZE), 0, C[:8])
         store_rows(relative, starts(own, RELATIVE_SIZE), 8, (C[8], sr, cr, sp, cp))
-        x_f, y_f, z_f, a0, a1, a2, a3, a4 = load_rows(frames, frame, 0, 8)
-        a5, a6, a7, a8, f1, f2, f3 = load_rows(frames, frame, 8, 7)
-        A = (a0, a1, a2, a3, a4, a5, a6, a7, a8)
+        origin, A, turn, _ = frame_columns(frames, starts(eight_of(bodies.frame, own), FRAME_SIZE))
         R = product(A, C)
-        f1, f2, f3 = speed * f1, speed * f2, speed * f3
+        frame_omega = times(speed, turn)
         vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
-        g1, g2, g3 = turned_back(C, f1, f2, f3)
-        r1, r2, r3 = euler_rates(sr, cr, sp, cp, u1 - g1, u2 - g2, u3 - g3)
+        turning = rotate_back(C, frame_omega)
+        r1, r2, r3 = euler_rates(sr, cr, sp, cp, minus((u1, u2, u3), turning))
         # elements sit on the axleboxes, which do not spin
-        u2 = u2 + spins * (g2 + r3 * sr - u2)
+        u2 = u2 + spins * (turning[1] + r3 * sr - u2)
         store_rows(rates, starts(own, RATES_SIZE), 3, (r1, r2 + spins * (speed / radius), r3))
-        w1, w2, w3 = turned(R, u1, u2, u3)
-        y, z = y + y_0, z + z_0
-        px, py, pz = turned(A, x, y, z)
-        vx, vy, vz = turned(
-            A, speed + f2 * z - f3 * y + vx, f3 * x - f1 * z + vy, f1 * y - f2 * x + vz
+        r = x, y + y_0, z + z_0
+        v = plus((speed + vx, vy, vz), cross(frame_omega, r))
+        store_motion(
+            pose,
+            starts(own, POSE_SIZE),
+            R,
+            plus(origin, rotate(A, r)),
+            rotate(A, v),
+            rotate(R, (u1, u2, u3)),
         )
-        place = starts(own, POSE_SIZE)
-        store_rows(pose, place, 0, R[:8])
-        store_rows(pose, place, 8, (R[8], x_f + px, y_f + py, z_f + pz, vx, vy, vz, w1))
-        store_rows(pose, place, 16, (w2, w3, zero, zero, zero, zero, zero, zero))
     axlebox_kinematics(bodies, state, pose, rates)
 
 
@@ -162,36 +193,26 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
 def axlebox_kinematics(bodies, state, pose, rates):
     """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
     n = bodies.kind.shape[0]
-    zero = spread(0.0)
     for first in range(0, bodies.axleboxes.shape[0], LANES):
         own = eight(bodies.axleboxes, first)
         carrier = starts(eight_of(bodies.parent, own), POSE_SIZE)
         s, c = sine_cosine_lanes(load_rows(state, starts(own, 6), 4, 1)[0])
         rate = load_rows(state, starts(own, 6), 6 * n + 4, 1)[0]
         store_rows(rates, starts(own, RATES_SIZE), 4, (rate,))
-        r0, r1, r2, r3, r4, r5, r6, r7 = load_rows(pose, carrier, 0, 8)
-        r8, x, y, z, vx, vy, vz, w1 = load_rows(pose, carrier, 8, 8)
-        w2, w3 = load_rows(pose, carrier, 16, 2)
-        place = starts(own, POSE_SIZE)
-        store_rows(
-            pose,
-            place,
-            0,
-            (
-                c * r0 - s * r2,
-                r1,
-                s * r0 + c * r2,
-                c * r3 - s * r5,
-                r4,
-                s * r3 + c * r5,
-                c * r6 - s * r8,
-                r7,
-            ),
+        R, X, V, omega = motion_of(pose, carrier)
+        turned = (
+            c * R[0] - s * R[2],
+            R[1],
+            s * R[0] + c * R[2],
+            c * R[3] - s * R[5],
+            R[4],
+            s * R[3] + c * R[5],
+            c * R[6] - s * R[8],
+            R[7],
+            s * R[6] + c * R[8],
         )
-        store_rows(pose, place, 8, (s * r6 + c * r8, x, y, z, vx, vy, vz, w1 + r1 * rate))
-        store_rows(
-            pose, place, 16, (w2 + r4 * rate, w3 + r7 * rate, zero, zero, zero, zero, zero, zero)
-        )
+        omega = plus(omega, times(rate, (R[1], R[4], R[7])))
+        store_motion(pose, starts(own, POSE_SIZE), turned, X, V, omega)
 
 
 @compiled(merge=True)
@@ -209,24 +230,22 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
         b = axles[w]
         f = bodies.frame[b]
         sr, cr = C[b, SIN_ROLL], C[b, COS_ROLL]
-        m2 = (
-            pose[b, MOMENT] * pose[b, 1]
-            + pose[b, MOMENT + 1] * pose[b, 4]
-            + pose[b, MOMENT + 2] * pose[b, 7]
-        )
+        axle = pose[b, 1], pose[b, 4], pose[b, 7]
+        m2 = dot(vector_at(pose, b, MOMENT), axle)
         about_normal = m2 * sr / cr
         turn = (C[b, 1] * frames[f, OMEGA] + C[b, 4] * frames[f, OMEGA + 1]) / (cr * cr)
         y = state[6 * b + 1] + bodies.row[b, Y_0]
         z = state[6 * b + 2] + bodies.row[b, Z_0]
         along = m2 * turn / (1.0 + frames[f, OMEGA + 1] * z - frames[f, OMEGA + 2] * y)
-        for k in range(3):
-            pose[b, MOMENT + k] += about_normal * pose[b, 3 * k + 2] - m2 * pose[b, 3 * k + 1]
-            pose[b, FORCE + k] += along * frames[f, ATTITUDE + 3 * k]
+        normal = pose[b, 2], pose[b, 5], pose[b, 8]
+        track = frames[f, ATTITUDE], frames[f, ATTITUDE + 3], frames[f, ATTITUDE + 6]
+        add_at(pose, b, MOMENT, minus(times(about_normal, normal), times(m2, axle)))
+        add_at(pose, b, FORCE, times(along, track))
 
 
 @compiled(inline=True)
 def axlebox_dynamics(bodies, pose, rates, derivative):
-    """Pitch accelerations of the axleboxes; everything else they hand to their wheelsets."""
+    """Pitch accelerations of the axleboxes; all other forces and moments act on their wheelsets."""
     n = bodies.kind.shape[0]
     zero = spread(0.0)
     count = bodies.axleboxes.shape[0]
@@ -236,14 +255,10 @@ def axlebox_dynamics(bodies, pose, rates, derivative):
         inertia = load_rows(bodies.row, starts(own, BODY_SIZE), I_2, 1)[0]
         f1, f2, f3, m1, m2, m3 = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
         _, r1, _, _, r4, _, _, r7 = load_rows(pose, carrier, 0, 8)
-        moment = m1 * r1 + m2 * r4 + m3 * r7
-        add_rows(
-            pose,
-            carrier,
-            PUSH,
-            (zero, zero, f1, f2, f3, m1 - moment * r1, m2 - moment * r4, m3 - moment * r7),
-            count - first,
-        )
+        axle = r1, r4, r7
+        moment = dot((m1, m2, m3), axle)
+        m1, m2, m3 = minus((m1, m2, m3), times(moment, axle))
+        add_rows(pose, carrier, PUSH, (zero, zero, f1, f2, f3, m1, m2, m3), count - first)
         rate = load_rows(rates, starts(own, RATES_SIZE), 4, 1)[0]
         acceleration = moment / inertia
         store_rows(derivative, starts(own, 6), 0, (zero, zero, zero, zero, rate, zero))
@@ -262,46 +277,44 @@ def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, 
     square, twice = speed * speed, 2.0 * speed
     for first in range(0, bodies.whole.shape[0], LANES):
         own = eight(bodies.whole, first)
-        frame = starts(eight_of(bodies.frame, own), FRAME_SIZE)
         mass, i1, i2, i3, y_0, z_0, radius, spins = load_rows(
             bodies.row, starts(own, BODY_SIZE), 0, 8
         )
         vx, vy, vz, u1, u2, u3 = load_rows(state, starts(own, 6), 6 * n, 6)
         roll_rate, pitch_rate, yaw_rate = load_rows(rates, starts(own, RATES_SIZE), 3, 3)
         store_rows(derivative, starts(own, 6), 0, (vx, vy, vz, roll_rate, pitch_rate, yaw_rate))
-        _, _, _, a0, a1, a2, a3, a4 = load_rows(frames, frame, 0, 8)
-        a5, a6, a7, a8, w1, w2, w3, e1 = load_rows(frames, frame, 8, 8)
-        e2, e3 = load_rows(frames, frame, 16, 2)
-        c0, c1, c2, c3, c4, c5, c6, c7 = load_rows(relative, starts(own, RELATIVE_SIZE), 0, 8)
-        c8 = load_rows(relative, starts(own, RELATIVE_SIZE), 8, 1)[0]
-        C = (c0, c1, c2, c3, c4, c5, c6, c7, c8)
+        _, A, omega, omega_s = frame_columns(
+            frames, starts(eight_of(bodies.frame, own), FRAME_SIZE)
+        )
+        C = load_rows(relative, starts(own, RELATIVE_SIZE), 0, 8) + load_rows(
+            relative, starts(own, RELATIVE_SIZE), 8, 1
+        )
         fx, fy, fz, mx, my, mz = load_rows(pose, starts(own, POSE_SIZE), FORCE, 6)
         px, py, pz, qx, qy, qz = load_rows(rail_force, starts(own, RATES_SIZE), 0, 6)
         # force and moment in track axes, moment in body axes
-        A = (a0, a1, a2, a3, a4, a5, a6, a7, a8)
-        fx, fy, fz = turned_back(A, fx, fy, fz)
-        mx, my, mz = turned_back(A, mx, my, mz)
-        m1, m2, m3 = turned_back(C, mx + qx, my + qy, mz + qz)
+        force = plus(rotate_back(A, (fx, fy, fz)), (px, py, pz))
+        m = rotate_back(C, plus(rotate_back(A, (mx, my, mz)), (qx, qy, qz)))
         # gravity points along global z: the third row of A
-        ax = (fx + px) / mass + gravity * a6
-        ay = (fy + py) / mass + gravity * a7
-        az = (fz + pz) / mass + gravity * a8
+        a = plus(
+            (force[0] / mass, force[1] / mass, force[2] / mass), times(gravity, (A[6], A[7], A[8]))
+        )
         # a wheelset's axes do not spin: take its own rotation out again
         o2 = u2 - spins * (pitch_rate - speed / radius)
-        h1, h2, h3 = i1 * u1, i2 * u2, i3 * u3
-        d1 = (m1 - o2 * h3 + u3 * h2) / i1
-        d2 = (m2 - u3 * h1 + u1 * h3) / i2
-        d3 = (m3 - u1 * h2 + o2 * h1) / i3
-        b1, b2, b3 = turned_back(C, ax, ay, az)
+        h1, h2, h3 = by_axis((i1, i2, i3), (u1, u2, u3))
+        d1 = (m[0] - o2 * h3 + u3 * h2) / i1
+        d2 = (m[1] - u3 * h1 + u1 * h3) / i2
+        d3 = (m[2] - u1 * h2 + o2 * h1) / i3
+        b1, b2, b3 = rotate_back(C, a)
         store_rows(rates, starts(own, RATES_SIZE), 0, (b1, b2, b3, d1, d2, d3))
         # relative acceleration in the moving frame
         x, y, z = load_rows(state, starts(own, 6), 0, 3)
-        y, z = y + y_0, z + z_0
-        wr = w1 * x + w2 * y + w3 * z
-        ww = w1 * w1 + w2 * w2 + w3 * w3
-        ax = ax - square * (w1 * wr - ww * x + e2 * z - e3 * y) - twice * (w2 * vz - w3 * vy)
-        ay = ay - square * (w3 + w2 * wr - ww * y + e3 * x - e1 * z) - twice * (w3 * vx - w1 * vz)
-        az = az - square * (w3 * wr - w2 - ww * z + e1 * y - e2 * x) - twice * (w1 * vy - w2 * vx)
+        r = x, y + y_0, z + z_0
+        centripetal = minus(times(dot(omega, r), omega), times(dot(omega, omega), r))
+        along = spread(0.0), omega[2], -omega[1]  # omega x e_x, of the frame's own acceleration
+        moving = plus(plus(centripetal, along), cross(omega_s, r))
+        ax, ay, az = minus(
+            minus(a, times(square, moving)), times(twice, cross(omega, (vx, vy, vz)))
+        )
         store_rows(derivative, starts(own, 6), 6 * n, (ax, ay, az, d1, d2, d3))
 
 
@@ -317,7 +330,7 @@ def right_hand_side(system, work, state, derivative):
 def right_hand_sides(system, work, states, derivatives):
     """Derivatives of several states, one a row, as for difference quotients.
 
-    A call from Python takes a `System` apart, which lasts longer than an evaluation.  Status,
+    A call from Python unpacks a `System`, which takes longer than an evaluation.  Status,
     wheelset and number of patches are those of the last state, or of the first that is not
     `RUNNING`.
     """
@@ -395,17 +408,18 @@ def mechanics(system, work, state, derivative, rails):
     kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
-    link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
+    mounts, laws, pose = system.mounts, work.laws, work.pose
+    link_forces(system.links, system.curves, inner, work.drive, laws, pose)
+    if mounts.falling.shape[0] > 0:
+        friction_at_speed(mounts, system.internal, laws, pose, work.friction)
     mount_forces(
-        system.mounts, system.internal, system.curves, inner, work.drive, work.laws, work.pose
+        mounts, system.internal, system.curves, work.friction, inner, work.drive, laws, pose
     )
-    hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, work.pose)
+    hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, pose)
     if system.loads.body.shape[0] > 0:
-        load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, work.pose)
+        load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, pose)
     if system.drives.body.shape[0] > 0:
-        add_axle_torques(
-            system.drives, time, s, system.frame_offset, bodies, speed, state, work.pose
-        )
+        add_axle_torques(system.drives, time, s, system.frame_offset, bodies, speed, state, pose)
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     left = evaluations(system, state, rails)

@@ -1,7 +1,4 @@
-"""Sine and cosine of the small angles that vehicles and tracks turn through; rotations in lanes.
-
-Matrices are tuples of nine, row by row.
-"""
+"""Sine and cosine of the small angles that vehicles and tracks turn through."""
 
 from math import cos, sin
 
@@ -59,45 +56,3 @@ def sine_cosine_lanes(x):
     if any_beyond(x, SMALL):
         s, c = where_beyond(x, SMALL, sine(x), s), where_beyond(x, SMALL, cosine(x), c)
     return s, c
-
-
-@compiled(inline=True)
-def turned(R, x, y, z):
-    """R times the vector (x, y, z)."""
-    return (
-        R[0] * x + R[1] * y + R[2] * z,
-        R[3] * x + R[4] * y + R[5] * z,
-        R[6] * x + R[7] * y + R[8] * z,
-    )
-
-
-@compiled(inline=True)
-def turned_back(R, x, y, z):
-    """R transposed times the vector (x, y, z)."""
-    return (
-        R[0] * x + R[3] * y + R[6] * z,
-        R[1] * x + R[4] * y + R[7] * z,
-        R[2] * x + R[5] * y + R[8] * z,
-    )
-
-
-@compiled(inline=True)
-def cross(ax, ay, az, bx, by, bz):
-    """Vector product a x b."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-
-
-@compiled(inline=True)
-def product(A, C):
-    """Matrix product A C."""
-    return (
-        A[0] * C[0] + A[1] * C[3] + A[2] * C[6],
-        A[0] * C[1] + A[1] * C[4] + A[2] * C[7],
-        A[0] * C[2] + A[1] * C[5] + A[2] * C[8],
-        A[3] * C[0] + A[4] * C[3] + A[5] * C[6],
-        A[3] * C[1] + A[4] * C[4] + A[5] * C[7],
-        A[3] * C[2] + A[4] * C[5] + A[5] * C[8],
-        A[6] * C[0] + A[7] * C[3] + A[8] * C[6],
-        A[6] * C[1] + A[7] * C[4] + A[8] * C[7],
-        A[6] * C[2] + A[7] * C[5] + A[8] * C[8],
-    )

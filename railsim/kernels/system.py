@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from railsim.kernels.element_columns import FRICTION, LINK_COLUMNS, MOUNT_COLUMNS, ONE_SIDED
 from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
 from railsim.kernels.track_frame import TrackTables
@@ -37,26 +38,6 @@ N_SCALARS = 4  # last step, t, s, V at the end of the state
 # columns of Bodies.row
 MASS, I_1, I_2, I_3, Y_0, Z_0, RADIUS, SPINS = range(8)
 BODY_SIZE = 8
-
-# columns of Links.row, see there
-LENGTH, STIFFNESS, DAMPING, PRELOAD = range(6, 10)
-LINK_SIZE = 16  # whole cache lines
-
-# columns of Mounts.row, see there
-SHARE_1, SHARE_2, STIFFNESS_X, DAMPING_X, PRELOAD_X, ROTATION_X, ROTATION_DAMPING_X = (
-    6,
-    7,
-    8,
-    11,
-    14,
-    17,
-    20,
-)
-STIFFNESS_Z, DAMPING_Z, PRELOAD_Z = STIFFNESS_X + 2, DAMPING_X + 2, PRELOAD_X + 2
-MOUNT_SIZE = 24
-# columns of Mounts.flags
-TRANSLATES, BOTH_ENDS, ROTATES, FRICTION = range(4)
-ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and never pull
 
 # columns of Drives.row
 BRAKES, OVER_DISTANCE, SLIP_BEGIN, SLIP_END = range(4)
@@ -161,9 +142,7 @@ class Links(NamedTuple):
     Attributes
     ----------
     body : int64[e, 2]        the two bodies
-    row : float64[e, LINK_SIZE]   attachment points in body axes from the centres of gravity [m],
-                              nominal length [m], stiffness [N/m], parallel damping [N s/m],
-                              preload [N]
+    row : float64[e, LINK_SIZE]   see `element_columns.LINK_COLUMNS`
     internal : int64[e]       internal state, else -1
     curve : int64[e, 2]       tables of force over elongation and over its rate, else -1
     """
@@ -181,12 +160,13 @@ class Links(NamedTuple):
     @property
     def length(self) -> np.ndarray:
         """Nominal lengths [m]."""
-        return self.row[:, LENGTH]
+        return self.row[:, LINK_COLUMNS["length"].start]
 
     @property
     def spring(self) -> np.ndarray:
         """Stiffness [N/m], parallel damping [N s/m], preload [N], shape (e, 3)."""
-        return self.row[:, STIFFNESS : PRELOAD + 1]
+        first, last = LINK_COLUMNS["stiffness"], LINK_COLUMNS["preload"]
+        return self.row[:, first.start : last.stop]
 
 
 class Mounts(NamedTuple):
@@ -195,17 +175,16 @@ class Mounts(NamedTuple):
     Attributes
     ----------
     body : int64[e, 2]
-    row : float64[e, MOUNT_SIZE]   points in body axes, coincident in the nominal position [m];
-                                 share of the force in the axes of body 1 and 2; stiffness [N/m],
-                                 damping [N s/m], preload [N] along three axes; K_d of the
-                                 rotational potential tr(K_d (1 - R)) [N m], its damping [N m s]
-    friction : float64[e, 3, 2]  limit of a friction pad: constant [N], share of the vertical
-                                 spring force [1]
+    row : float64[e, MOUNT_SIZE]   see `element_columns.MOUNT_COLUMNS`
+    friction : float64[e, 3, 4]  limit of a friction pad along each axis: constant [N], share of the
+                                 vertical spring force [1]; its fall with the sliding speed: ratio
+                                 of sliding to static friction [1], Stribeck speed [m/s]
     internal : int64[e, 3]       internal states, else -1
     curve : int64[e, 3]          tables of force over deflection, else -1
     flags : int64[e, 4]          1 if: translational part, axes of both bodies (shear), rotational
                                  part, friction pads (`ONE_SIDED` where they may lift)
     law : int64[l]               see `mount_laws`
+    falling : int64[f]           mounts whose friction falls with the sliding speed
     """
 
     body: np.ndarray
@@ -215,6 +194,7 @@ class Mounts(NamedTuple):
     curve: np.ndarray
     flags: np.ndarray
     law: np.ndarray
+    falling: np.ndarray
 
     @property
     def point(self) -> np.ndarray:
@@ -224,27 +204,27 @@ class Mounts(NamedTuple):
     @property
     def stiffness(self) -> np.ndarray:
         """Stiffnesses, shape (e, 3) [N/m]."""
-        return self.row[:, STIFFNESS_X : STIFFNESS_X + 3]
+        return self.row[:, MOUNT_COLUMNS["stiffness"]]
 
     @property
     def damping(self) -> np.ndarray:
         """Dampings, shape (e, 3) [N s/m]."""
-        return self.row[:, DAMPING_X : DAMPING_X + 3]
+        return self.row[:, MOUNT_COLUMNS["damping"]]
 
     @property
     def preload(self) -> np.ndarray:
         """Preloads, shape (e, 3) [N]."""
-        return self.row[:, PRELOAD_X : PRELOAD_X + 3]
+        return self.row[:, MOUNT_COLUMNS["preload"]]
 
     @property
     def rotation(self) -> np.ndarray:
         """K_d of the rotational potential, shape (e, 3) [N m]."""
-        return self.row[:, ROTATION_X : ROTATION_X + 3]
+        return self.row[:, MOUNT_COLUMNS["rotation"]]
 
     @property
     def rotation_damping(self) -> np.ndarray:
         """Dampings about the axes, shape (e, 3) [N m s]."""
-        return self.row[:, ROTATION_DAMPING_X : ROTATION_DAMPING_X + 3]
+        return self.row[:, MOUNT_COLUMNS["rotation_damping"]]
 
 
 def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np.ndarray:
@@ -252,6 +232,11 @@ def mount_laws(internal: np.ndarray, curve: np.ndarray, flags: np.ndarray) -> np
     has_law = (internal >= 0) | (curve >= 0)
     has_law[:, 2] |= flags[:, FRICTION] == ONE_SIDED
     return np.flatnonzero(has_law)
+
+
+def falling_friction(friction: np.ndarray) -> np.ndarray:
+    """Mounts whose friction falls with the sliding speed."""
+    return np.flatnonzero((friction[:, :, 2] < 1.0).any(axis=1))
 
 
 class Curves(NamedTuple):
@@ -375,6 +360,7 @@ class Work(NamedTuple):
     rail_force : float64[n, 6]  contact force and moment on a wheelset, track axes
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
+    friction : float64[e, 3, 2]  limits of the pads of mounts, see `elements.friction_at_speed`
     laws : float64[9 * LANES]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
@@ -415,6 +401,7 @@ class Work(NamedTuple):
     rail_force: np.ndarray
     acceleration: np.ndarray
     drive: np.ndarray
+    friction: np.ndarray
     laws: np.ndarray
     decay: np.ndarray
     contact_jacobian: np.ndarray

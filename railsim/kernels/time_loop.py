@@ -28,14 +28,12 @@ from railsim.kernels.internal import (
 )
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
-from railsim.kernels.support import (
-    AFTER_STEP,
-    BALANCED,
+from railsim.kernels.support import AFTER_STEP, BALANCED, support_rates
+from railsim.kernels.support_step import (
     note_wheelsets,
     remember_track,
     step_compliance,
     step_support,
-    support_rates,
 )
 from railsim.kernels.system import (
     AXLEBOX,
@@ -51,6 +49,7 @@ from railsim.kernels.system import (
     WHEELSET,
 )
 from railsim.kernels.track_frame import OMEGA_S
+from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector_at
 from railsim.kernels.vibration import high_pass, watch
 
 FAST, RK4 = range(2)
@@ -286,13 +285,13 @@ def step_fast(system, work, state, derivative, decay, h):
         d3 = (h + shift) * rate[q + 5] - (0.5 * h + shift) * before[q + 5]
         if kind < AXLEBOX:  # rigid bodies and wheelsets; fixed ones do not turn in their frames
             # the angles are those against the frame, whose own turn changes over the step
-            f = bodies.frame[b]
-            e1, e2, e3 = frames[f, OMEGA_S], frames[f, OMEGA_S + 1], frames[f, OMEGA_S + 2]
-            d1 -= half * (C[b, 0] * e1 + C[b, 3] * e2 + C[b, 6] * e3)
-            d2 -= half * (C[b, 1] * e1 + C[b, 4] * e2 + C[b, 7] * e3)
-            d3 -= half * (C[b, 2] * e1 + C[b, 5] * e2 + C[b, 8] * e3)
+            turn = rotate_back(matrix_at(C, b, 0), vector_at(frames, bodies.frame[b], OMEGA_S))
             d1, d2, d3 = euler_rates(
-                C[b, SIN_ROLL], C[b, COS_ROLL], C[b, SIN_PITCH], C[b, COS_PITCH], d1, d2, d3
+                C[b, SIN_ROLL],
+                C[b, COS_ROLL],
+                C[b, SIN_PITCH],
+                C[b, COS_PITCH],
+                minus((d1, d2, d3), times(half, turn)),
             )
         for k in range(3):
             state[q + k] += h * (
@@ -401,7 +400,7 @@ def all_finite(state):
 
 @compiled
 def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chunk):
-    """Advance by some steps of length `h` [s], recording states on the way.
+    """Advance by some steps of length `h` [s], recording states.
 
     Parameters
     ----------

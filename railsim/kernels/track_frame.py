@@ -54,6 +54,15 @@ class TrackTables(NamedTuple):
     has_irregularity: int
 
 
+@compiled(inline=True)
+def frame_columns(frames, place):
+    """Of eight frames: origin, attitude A, rate of turn per metre, its derivative over s."""
+    x, y, z, a0, a1, a2, a3, a4 = load_rows(frames, place, 0, 8)
+    a5, a6, a7, a8, w1, w2, w3, e1 = load_rows(frames, place, 8, 8)
+    e2, e3 = load_rows(frames, place, 16, 2)
+    return (x, y, z), (a0, a1, a2, a3, a4, a5, a6, a7, a8), (w1, w2, w3), (e1, e2, e3)
+
+
 @compiled
 def cell_of(track, s):
     """Cell index of arc length `s`, -1 outside the table, and the distance into the cell [m]."""

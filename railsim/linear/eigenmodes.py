@@ -27,7 +27,7 @@ SEARCHED = (0.3, 40.0)  # Hz, where hunting and the yaw and roll of frames are l
 SLOWEST = 1e-3  # Hz; below it a mode is no oscillation
 SAME = 0.6  # pairing of neighbouring modes that needs no look in between
 UNRELATED = 0.1  # pairing below which two modes are not the same
-EQUAL = 0.02  # relative distance of eigenvalues that cannot be told apart
+EQUAL = 0.02  # relative distance of eigenvalues that cannot be distinguished
 MOST_HALVINGS = 3
 
 

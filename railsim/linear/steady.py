@@ -274,7 +274,7 @@ def led(
     start : float64[n_state]
         State at share 0.
     smallest : float
-        Step at which the way ends for want of convergence.
+        Step at which the path ends for lack of convergence.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Cams of several arcs: where a roller goes from one to the next, and every arc by itself.
 
 Tangent arcs touch, so that equal positions are a double root (ill-conditioned) and equal rates a
-simple one: the change is where the rates agree, and the gap that is left there is told.
+simple one: the change is where the rates agree, and the gap that is left there is reported.
 """
 
 from dataclasses import dataclass, replace

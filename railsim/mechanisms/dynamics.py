@@ -224,7 +224,7 @@ def free_motion(
     if not found.success:
         fault = Fault(model.definition.name, "release", "the motion has no solution", found.message)
         raise InputError([fault])
-    generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is told here
+    generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is reported here
     return FreeMotion(found.t, found.y[0], found.y[1], found.status == 1)
 
 

@@ -2,7 +2,7 @@
 
 Each start runs sequential least-squares programming (D. Kraft, A software package for sequential
 quadratic programming, DFVLR-FB 88-28, 1988; scipy's SLSQP) in coordinates in which the Gauss-Newton
-matrix of the sum of squares is the unit matrix, set anew until nothing improves: the quasi-Newton
+matrix of the sum of squares is the unit matrix, set again until nothing improves: the quasi-Newton
 updates then begin with the right curvature.
 """
 

@@ -12,36 +12,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.elements import (
+from railsim.definitions.element_base import Element, two_sided
+from railsim.definitions.flatten import FlatBody, FlatElement
+from railsim.definitions.friction_elements import Friction, SideBearer, SlidingFriction, Wedge
+from railsim.definitions.given_elements import AppliedForce, AxleTorque, Brake, Traction
+from railsim.definitions.spring_elements import (
     Airspring,
-    AppliedForce,
-    AxleTorque,
-    Brake,
     BumpStop,
     Bushing,
-    Element,
-    Friction,
     RollBar,
     ShearSpring,
-    SideBearer,
     SpringDamper,
-    Traction,
-    Wedge,
-    two_sided,
 )
-from railsim.definitions.flatten import FlatBody, FlatElement
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned_zeros
-from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
-from railsim.kernels.system import (
+from railsim.kernels.element_columns import (
+    LINK_COLUMNS,
     LINK_SIZE,
+    MOUNT_COLUMNS,
     MOUNT_SIZE,
     ONE_SIDED,
+)
+from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
+from railsim.kernels.system import (
     Curves,
     Drives,
     Links,
     Loads,
     Mounts,
+    falling_friction,
     mount_laws,
 )
 
@@ -51,23 +50,7 @@ Triple = tuple[float, float, float]
 
 _NOTHING: Triple = (0.0, 0.0, 0.0)
 _NONE = (-1, -1, -1)
-
-
-def vertical_support(law: Element) -> float:
-    """Static stiffness with which an element carries weight [N/m]; a link's along its line."""
-    if isinstance(law, SpringDamper):
-        if law.spring_table is None:
-            return law.stiffness
-        rows = np.array(two_sided(law.spring_table))
-        return float(np.max(np.diff(rows[:, 1]) / np.diff(rows[:, 0])))
-    if isinstance(law, Bushing | ShearSpring | Friction | Wedge):
-        return law.stiffness[2]
-    if isinstance(law, SideBearer):
-        return law.stiffness
-    if isinstance(law, Airspring):
-        both = law.bellows_stiffness + law.reservoir_stiffness
-        return law.area_stiffness + law.bellows_stiffness * law.reservoir_stiffness / both
-    return 0.0
+_STEADY = (0.0, 0.0, 1.0, 1.0)  # friction that does not fall with the speed
 
 
 def rotation_potential(stiffness: Sequence[float]) -> Triple:
@@ -138,9 +121,11 @@ class ElementArrays:
             {
                 "name": element.name,
                 "body": self._pair(element),
-                "point": self._levers(element, point1, point2),
+                **self._levers(element, point1, point2),
                 "length": float(np.linalg.norm(point2 - point1)),
-                "spring": (law.stiffness, 0.0 if in_series else law.damping, preload),
+                "stiffness": law.stiffness,
+                "damping": 0.0 if in_series else law.damping,
+                "preload": preload,
                 "internal": internal,
                 "curve": (self._curve(law.spring_table), -1 if in_series else damper_curve),
             }
@@ -153,13 +138,13 @@ class ElementArrays:
         row: dict[str, Any] = {
             "name": element.name,
             "body": self._pair(element),
-            "point": self._levers(element, place, place),
+            **self._levers(element, place, place),
             "stiffness": _NOTHING,
             "damping": _NOTHING,
             "preload": _NOTHING,
             "rotation": _NOTHING,
             "rotation_damping": _NOTHING,
-            "friction": np.zeros((3, 2)),
+            "friction": np.tile(_STEADY, (3, 1)),
             "internal": _NONE,
             "curve": _NONE,
             "flags": (1, 0, 0, 0),
@@ -221,7 +206,8 @@ class ElementArrays:
         raise ModelError(f"no force law for an element of type '{type(law).__name__}'")
 
     def _friction(self, law: Friction) -> dict[str, Any]:
-        limits = np.stack((law.friction_force, law.friction_coefficient), axis=1)
+        limits = _friction_limits(law)
+        limits[:, :2] = np.stack((law.friction_force, law.friction_coefficient), axis=1)
         return {
             "stiffness": law.stiffness,
             "damping": law.damping,
@@ -234,7 +220,7 @@ class ElementArrays:
         }
 
     def _side_bearer(self, law: SideBearer) -> dict[str, Any]:
-        limits = np.zeros((3, 2))
+        limits = _friction_limits(law)
         limits[:2, 1] = law.friction_coefficient
         load = -law.stiffness * law.clearance if law.preload == 0.0 else law.preload
         return {
@@ -248,7 +234,7 @@ class ElementArrays:
         }
 
     def _wedge(self, law: Wedge) -> dict[str, Any]:
-        limits = np.zeros((3, 2))
+        limits = np.tile(_STEADY, (3, 1))
         limits[1:, 1] = law.share
         return {
             "stiffness": law.stiffness,
@@ -263,7 +249,7 @@ class ElementArrays:
         self, stiffness: Triple, limits: Floats, *, together: bool = True, skew: float = 0.0
     ) -> Triple:
         """Internal states of the friction forces along the axes that have a limit."""
-        axes = [k for k in range(3) if np.any(limits[k] > 0.0)]
+        axes = [k for k in range(3) if np.any(limits[k, :2] > 0.0)]
         together = together and len(axes) > 1
         found = [-1, -1, -1]
         for k in axes:
@@ -306,9 +292,9 @@ class ElementArrays:
     def _pair(self, element: FlatElement) -> tuple[int, int]:
         return self._number(element.body1), self._number(element.body2)
 
-    def _levers(self, element: FlatElement, point1: Floats, point2: Floats) -> Floats:
+    def _levers(self, element: FlatElement, point1: Floats, point2: Floats) -> dict[str, Floats]:
         centre1, centre2 = self._centre(element.body1), self._centre(element.body2)
-        return np.array([point1 - centre1, point2 - centre2])
+        return {"point_1": point1 - centre1, "point_2": point2 - centre2}
 
     def _centre(self, name: str) -> Floats:
         # an axlebox turns about its axle: its levers count from the wheelset's centre
@@ -334,7 +320,7 @@ class ElementArrays:
         rows = self.link_rows
         return Links(
             body=_column(rows, "body", (2,), np.int64),
-            row=_table(rows, ("point", "length", "spring"), LINK_SIZE),
+            row=_table(rows, LINK_COLUMNS, LINK_SIZE),
             internal=_column(rows, "internal", (), np.int64),
             curve=_column(rows, "curve", (2,), np.int64),
         )
@@ -342,26 +328,19 @@ class ElementArrays:
     def mounts(self) -> Mounts:
         """Arrays of all three-axis elements."""
         rows = self.mount_rows
-        floats = (
-            "point",
-            "share",
-            "stiffness",
-            "damping",
-            "preload",
-            "rotation",
-            "rotation_damping",
-        )
         internal = _column(rows, "internal", (3,), np.int64)
         curve = _column(rows, "curve", (3,), np.int64)
+        friction = _column(rows, "friction", (3, 4))
         flags = _column(rows, "flags", (4,), np.int64)
         return Mounts(
             body=_column(rows, "body", (2,), np.int64),
-            row=_table(rows, floats, MOUNT_SIZE),
-            friction=_column(rows, "friction", (3, 2)),
+            row=_table(rows, MOUNT_COLUMNS, MOUNT_SIZE),
+            friction=friction,
             internal=internal,
             curve=curve,
             flags=flags,
             law=mount_laws(internal, curve, flags),
+            falling=falling_friction(friction),
         )
 
     def loads(self) -> Loads:
@@ -406,6 +385,11 @@ class ElementArrays:
         )
 
 
+def _friction_limits(law: SlidingFriction) -> Floats:
+    """Rows of `Mounts.friction` without limits yet, with the fall of friction with the speed."""
+    return np.tile((0.0, 0.0, law.sliding_ratio, law.stribeck_speed or 1.0), (3, 1))
+
+
 def _kind_of_mount(row: dict[str, Any]) -> tuple[bool, ...]:
     has_law = max(*row["internal"], *row["curve"]) >= 0
     return (not has_law, *(bool(flag) for flag in row["flags"][1:3]))
@@ -420,12 +404,12 @@ def _starts(tables: Sequence[Floats]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum([len(table) for table in tables])]).astype(np.int64)
 
 
-def _table(rows: list[dict[str, Any]], keys: Sequence[str], size: int) -> Floats:
-    """Values of all keys side by side, one row an element."""
-    values = [np.concatenate([np.ravel(row[key]) for key in keys]) for row in rows]
+def _table(rows: list[dict[str, Any]], columns: Mapping[str, slice], size: int) -> Floats:
+    """Values of all names in their columns, one row an element."""
     table = aligned_zeros((len(rows), size))
-    if rows:
-        table[:, : len(values[0])] = values
+    for row, values in zip(table, rows, strict=True):
+        for name, place in columns.items():
+            row[place] = values[name]
     return table
 
 

@@ -13,21 +13,12 @@ from scipy.linalg import eigh
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Remark
-from railsim.definitions.elements import (
-    Airspring,
-    Bushing,
-    Element,
-    Friction,
-    ShearSpring,
-    SideBearer,
-    SpringDamper,
-    Wedge,
-)
 from railsim.definitions.flatten import FlatElement, FlatVehicle, flatten
+from railsim.definitions.friction_elements import Friction, SideBearer, Wedge
+from railsim.definitions.spring_elements import Airspring, Bushing, ShearSpring, SpringDamper
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import ModelError
 from railsim.model.assembly import Model, without_rails
-from railsim.model.element_arrays import vertical_support
 from railsim.model.preloads import static_shares
 
 Floats = NDArray[np.float64]
@@ -138,8 +129,8 @@ def _network(flat: FlatVehicle, names: Sequence[str]) -> tuple[Floats, Floats]:
     place = {name: k for k, name in enumerate(names)}
     matrices = np.zeros((2, len(names), len(names)))
     for element in flat.elements:
-        values = np.array([_upright(element) * vertical_support(element.definition), 0.0])
-        values[1] = _upright(element) * _vertical_damping(element.definition)
+        values = np.array([_upright(element) * element.definition.vertical_stiffness, 0.0])
+        values[1] = _upright(element) * element.definition.vertical_damping
         ends = [place[body] for body in (element.body1, element.body2) if body in place]
         for i in ends:
             for j in ends:
@@ -153,19 +144,6 @@ def _upright(element: FlatElement) -> float:
         return 1.0
     way = np.array(element.point2) - np.array(element.point1)
     return float(way[2] ** 2 / (way @ way))
-
-
-def _vertical_damping(law: Element) -> float:
-    """Damping coefficient at small velocities [N s/m]; with a spring in series it acts less."""
-    if isinstance(law, Bushing):
-        return law.damping[2] if law.series_stiffness[2] == 0.0 else 0.0
-    if isinstance(law, ShearSpring | Friction | Wedge):
-        return law.damping[2]
-    if isinstance(law, SideBearer):
-        return law.damping
-    if isinstance(law, SpringDamper) and law.series_stiffness == 0.0:
-        return law.damping
-    return 0.0
 
 
 # supports -----------------------------------------------------------------------------------------
@@ -238,7 +216,7 @@ def _other_loads(supports: Iterable[_Support]) -> list[Remark]:
                 names.setdefault(text, []).append(support.element.name)
         free = getattr(law, "free_length", None)
         if free is not None:
-            compression = support.load / vertical_support(law)
+            compression = support.load / law.vertical_stiffness
             if compression > SPRING_TRAVEL * free:
                 text = (
                     f"is compressed by {1e3 * compression:.3g} of {1e3 * free:.3g} mm at rest: "

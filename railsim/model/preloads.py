@@ -10,7 +10,6 @@ from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.system import AXLEBOX, RIGID, Links, Mounts, System
 from railsim.model.assembly import Model
-from railsim.model.element_arrays import vertical_support
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]
@@ -118,7 +117,7 @@ def _carried_by_levelled_springs(model: Model) -> set[int]:
     on: dict[str, list[bool]] = {}
     for element in model.flat.elements:
         law = element.definition
-        if vertical_support(law) > 0.0 and getattr(law, "preload", 0.0) != 0.0:
+        if law.vertical_stiffness > 0.0 and getattr(law, "preload", 0.0) != 0.0:
             for body in (element.body1, element.body2):
                 on.setdefault(body, []).append(bool(getattr(law, "levelling", False)))
     return {model.index.bodies.index(name) for name, kinds in on.items() if all(kinds)}
@@ -176,7 +175,7 @@ def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[tuple[s
     With `known_lengths` also those whose preload follows from their lengths.
     """
     auto = {
-        element.name: vertical_support(element.definition)
+        element.name: element.definition.vertical_stiffness
         for element in model.flat.elements
         if getattr(element.definition, "preload", None) == "auto"
         or (known_lengths and getattr(element.definition, "has_free_length", False))

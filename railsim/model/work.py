@@ -8,8 +8,8 @@ from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
-from railsim.kernels.lanes import LANES
 from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.registers import LANES
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
 from railsim.kernels.system import (
     AXLEBOX,
@@ -52,6 +52,7 @@ def work_arrays(system: System) -> Work:
         rail_force=aligned_zeros((n, RATES_SIZE)),
         acceleration=aligned_zeros((n, RATES_SIZE)),
         drive=aligned_zeros((len(system.internal.kind), 2)),
+        friction=np.ascontiguousarray(system.mounts.friction[:, :, :2]),
         laws=aligned_zeros(9 * LANES),
         decay=aligned_zeros(len(system.internal.kind)),
         contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),

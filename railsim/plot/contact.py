@@ -5,7 +5,6 @@ mm, degrees, MPa.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +17,7 @@ from railsim.contact.curves import inclined_to_track, rail_curve, tape_circle_pl
 from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
+from railsim.contact.summary import Pair
 from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, styled
 from railsim.profiles.profile import Profile
 from railsim.text import unformatted
@@ -31,24 +31,6 @@ ZONE_COLOURS = {"tread": DISTINCT[0], "flange root": DISTINCT[2], "flange": DIST
 TABLE_LINES = ("-", "--")
 LIFT = 14.0
 """Height at which the wheel is drawn above its rail [mm]."""
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Wheel and rail of one side with what places them.
-
-    Attributes
-    ----------
-    wheel, rail : Profile
-    gauge, inclination, back_to_back : float
-        As `railsim.contact.contact_geometry` [m], [1], [m].
-    """
-
-    wheel: Profile
-    rail: Profile
-    gauge: float
-    inclination: float
-    back_to_back: float
 
 
 def profiles_figure(geometry: ContactGeometry, pairs: Sequence[Pair]) -> Figure:

@@ -4,7 +4,6 @@ Seen as the wheel looks at the rail from above: forward is up, right is right.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,54 +13,16 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from railsim.contact.creep import creep_force
-from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
-from railsim.contact.kalker import kalker_coefficients
+from railsim.contact.creep_curves import CASES, Patch, exact_force
+from railsim.contact.exact_creep import ExactCreepForce
 from railsim.definitions.creep_law import CREEP_LAWS, CreepLawName
 from railsim.plot.style import DISTINCT, Picture, styled
 
 Array = NDArray[np.float64]
 
 LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
-CASES = {
-    "longitudinal": (1.0, 0.0, 0.0),
-    "lateral": (0.0, 1.0, 0.0),
-    "spin": (0.0, 0.0, 1.0),
-    "lateral and spin, same sign": (0.0, 1.0, 1.0),
-    "lateral and spin, opposed": (0.0, 1.0, -0.5),
-    "longitudinal and spin": (1.0, 0.0, 1.0),
-}
-"""Directions of the normalised creepages (x, y, spin) whose curves are drawn."""
-
 LARGEST = 5.0
 """End of the axis of normalised creepage."""
-
-
-class Patch(NamedTuple):
-    """A loaded contact ellipse.
-
-    Attributes
-    ----------
-    a, b : float
-        Semi-axes along and across the rail [m].
-    N, mu : float
-        Normal force [N], friction coefficient [1].
-    G, nu : float
-        Shear modulus [Pa], Poisson's number [1].
-    """
-
-    a: float
-    b: float
-    N: float
-    mu: float
-    G: float = 82e9
-    nu: float = 0.28
-
-    def creepages(self, normalised: Sequence[float] | Array) -> tuple[float, float, float]:
-        """Creepages whose forces in linear theory are the given multiples of mu N."""
-        c11, c22, c23, _ = (float(c) for c in kalker_coefficients(self.a / self.b, self.nu))
-        unit = self.mu * self.N / (self.G * self.a * self.b)
-        x, y, spin = (float(value) for value in normalised)
-        return unit * x / c11, unit * y / c22, unit * spin / (c23 * float(np.sqrt(self.a * self.b)))
 
 
 def creep_curves_figure(
@@ -119,7 +80,7 @@ def _draw_curves(
     laws: Sequence[CreepLawName],
     grid: tuple[int, int],
 ) -> None:
-    unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+    unit = patch.unit_creepages(direction)
     x, y, spin = unit[:, None] * scale
     for law in laws:
         force = creep_force(
@@ -139,7 +100,7 @@ def _draw_curves(
 
 
 def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: int) -> None:
-    unit = np.array(patch.creepages(direction)) / np.linalg.norm(direction)
+    unit = patch.unit_creepages(direction)
     sizes = np.linspace(0.0, 1.0, count + 1)[1:] ** 1.5 * LARGEST
     forces = np.array([exact_force(patch, s * unit)[:2] for s in sizes])
     label = "full theory"
@@ -154,14 +115,6 @@ def _draw_exact(panel: Axes, patch: Patch, direction: Sequence[float], count: in
                 clip_on=False,
             )  # fmt: skip
             label = "_"
-
-
-def exact_force(patch: Patch, creepages: Sequence[float] | Array) -> ExactCreepForce:
-    """Full theory for a patch and its creepages (x, y, spin) [1, 1, 1/m]."""
-    x, y, spin = (float(value) for value in creepages)
-    return exact_creep_force(
-        patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu
-    )  # fmt: skip
 
 
 def _name_components(panel: Axes) -> None:

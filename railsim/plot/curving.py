@@ -17,7 +17,10 @@ LEFT, RIGHT = 0, 1
 MAPS = 3  # maps of wear side by side at most
 NUMBERS = 80  # fields of a map in which numbers can be read
 EXAGGERATED = 30.0  # angles of attack and displacements of the drawn wheelsets
-HALF, WHEEL = 0.75, 0.46  # m, half the distance of the tape circles, radius of a wheel, as drawn
+HALF, WHEEL = (
+    0.75,
+    0.46,
+)  # m, half the distance of the nominal rolling circles, radius of a wheel, as drawn
 WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 
 

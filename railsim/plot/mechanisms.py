@@ -1,7 +1,7 @@
 """Pictures of a mechanism: drawing, kinematics, ratios, forces, pressures, motion, search.
 
 Every function takes results of `railsim.mechanisms` and returns a figure in the field's habits: mm,
-degrees, N, MPa.  Lines are told apart without colour too.
+degrees, N, MPa.  Lines can be distinguished without colour too.
 """
 
 from collections.abc import Mapping, Sequence

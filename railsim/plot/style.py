@@ -1,8 +1,8 @@
 """What all pictures share: fonts, colours, the shading of curves, and saving.
 
-Colours are told apart with colour-blind eyes too (Okabe and Ito, "Color universal design", 2008):
-a bogie has a hue, its leading wheelset the dark shade, the left side a solid and the right side a
-dashed line.
+Colours can be distinguished by colour-blind readers too (Okabe and Ito, "Color universal design",
+2008): a bogie has a hue, its leading wheelset the dark shade, the left side a solid and the right
+side a dashed line.
 """
 
 import warnings

@@ -3,8 +3,8 @@
 Frames, the same for the right wheel and the right rail (z always points down at the contact):
 
 wheel
-    y from the tape circle, positive to the field side, flange negative; z outwards from the
-    axle, so that the rolling radius is ``radius + z``.
+    y from the nominal rolling circle, positive to the field side, flange negative; z outwards from
+    the axle, so that the rolling radius is ``radius + z``.
 rail
     y positive to the field side, gauge side negative; z down, crown at z = 0.
 
@@ -23,7 +23,7 @@ from railsim.text import printable
 Kind = Literal["wheel", "rail"]
 
 FLANGE_BACK = -0.070
-"""Lateral place of the wheel back from the tape circle [m] (EN 13715: 70 mm)."""
+"""Lateral place of the flange back from the nominal rolling circle [m] (EN 13715: 70 mm)."""
 
 
 @dataclass(frozen=True, eq=False)

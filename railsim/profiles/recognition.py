@@ -1,9 +1,9 @@
 """From the points of a file to a profile: recognise, report, put right, or refuse.
 
-Whatever can be told from the shape alone is told and put right with a note: millimetres against
-metres, points out of order, z up instead of down, mirrored, origin at the wheel back, a rail that
-already leans, double points, single outliers, measuring noise.  What cannot be told is refused
-with the line and a remedy: holes, vertical steps, a rail given as wheel, too few points.
+What can be recognised from the shape alone is corrected with a note: millimetres instead of metres,
+points out of order, z up instead of down, mirrored, origin at the flange back, a rail that is
+already inclined, duplicate points, single outliers, measuring noise.  What cannot be recognised is
+refused with the line and a remedy: gaps, vertical steps, a rail given as wheel, too few points.
 
 The shape of a wheel: a tread at least 30 mm wide and a flange, the highest place of the contour
 seen from the rail, within its first half and round (the contour turns back behind it).  The shape
@@ -264,7 +264,7 @@ def _rail_like(work: Points) -> bool:
 
 
 def _place_wheel(work: Points) -> None:
-    """Origin at the tape circle; from the wheel back where the file has it there."""
+    """Origin at the nominal rolling circle; from the flange back where the file has it there."""
     tip = int(np.argmax(work.z))
     before = work.y[: tip + 1]
     back = float(before.min())
@@ -274,23 +274,24 @@ def _place_wheel(work: Points) -> None:
     if not -0.066 < place < -0.045:
         if not has_back:
             raise work.fail(
-                f"the flange's tip lies at y = {1e3 * place:.1f} mm and the wheel back is missing",
-                "give y from the tape circle (70 mm from the wheel back, tip near -55 mm)",
+                f"the flange's tip lies at y = {1e3 * place:.1f} mm and the flange back is missing",
+                "give y from the nominal rolling circle: flange back at -70 mm, tip near -55 mm",
             )
         shift = FLANGE_BACK - back
         work.y = work.y + shift
         work.notes.append(
-            f"origin moved by {1e3 * shift:.2f} mm to the tape circle, 70 mm from the wheel back"
+            f"origin moved by {1e3 * shift:.2f} mm to the nominal rolling circle, "
+            "70 mm from the flange back"
         )
     if not work.y.min() < -0.02 < 0.02 < work.y.max():
         raise work.fail(
             f"covers y from {1e3 * work.y.min():.1f} to {1e3 * work.y.max():.1f} mm only",
-            "the tread is needed from the flange to 20 mm outside of the tape circle",
+            "the tread is needed from the flange to 20 mm outside of the nominal rolling circle",
         )
     y, z = _function_part(work.y, work.z, 0.0)
     level = float(np.interp(0.0, y, z))
     if abs(level) > 1e-5:
-        work.notes.append(f"z moved by {-1e3 * level:.3f} mm: zero at the tape circle")
+        work.notes.append(f"z moved by {-1e3 * level:.3f} mm: zero at the nominal rolling circle")
     work.z = work.z - level
 
 

@@ -106,7 +106,7 @@ class Result:
         self._track: Track | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what `pickle` makes the result anew from: all arrays, read if need be."""
+        """Return what `pickle` restores the result from: all arrays, read if necessary."""
         parts = (
             {name: np.asarray(array) for name, array in self._arrays.items()},
             dict(self._quantities),

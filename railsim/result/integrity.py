@@ -9,7 +9,7 @@ Three nets, from coarse to fine:
   programs (``h5repack``), which drop the seal;
 - the checksum of every chunk (HDF5's filter ``fletcher32``), which every HDF5 reader looks at.
 
-They find accidents, not forgery: whoever changes a file on purpose can compute them anew.
+They find accidents, not forgery: whoever changes a file on purpose can compute them again.
 """
 
 import hashlib

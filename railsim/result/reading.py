@@ -2,8 +2,8 @@
 
 A file is checked against its seal before HDF5 sees it (`railsim.result.integrity`), and against its
 digest where the seal is missing.  Then every link, type, shape and attribute is looked at before
-anything is read: a file from somebody else can lead to no other file, and takes no more memory than
-it has bytes on the disk.  Arrays are read when they are first asked for.
+anything is read: a file from somebody else cannot point to another file, and takes no more memory
+than it has bytes on the disk.  Arrays are read when they are first asked for.
 """
 
 import math

@@ -3,7 +3,7 @@
 - `run`: `simulate`, the course of a run on one page
 - `conditions`, `preparation`, `ending`: its inputs checked, its model and state, its result
 - `together`: `simulate_together`, several runs in one call of the time loop
-- `told`: the finished fraction, as it is told on the way
+- `told`: the finished fraction, as it is reported during the run
 - `advance`: the time loop, chunk by chunk
 - `pace`: step and output interval at any speed; `flange`: the step judged in flange contact
 - `run_in`: the state in which a run starts, also in curves; `settling`: run-ins

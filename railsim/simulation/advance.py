@@ -90,7 +90,7 @@ class Run:
     Attributes
     ----------
     prepared, plan, sink : Preparation, OutputPlan, Sink
-        Where it begins and ends, what it puts out and where to.
+        Where it begins and ends, what it outputs and where.
     state : float64[n_state]
         Where it is.
     fresh : bool

@@ -1,6 +1,6 @@
 """Several vehicles on one track as one system: many runs per compiled call.
 
-The vehicles share time, place and speed and do not feel each other; each has its own bodies,
+The vehicles share time, place and speed and do not interact; each has its own bodies,
 elements and wheels.  In the time loop FASTSIM then marches the strips of all their wheels side by
 side, and what a call or an evaluation costs by itself is spent once.
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.aligned import aligned
+from railsim.kernels.element_columns import BOTH_ENDS, ROTATES
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.status import (
     DERAILED,
@@ -30,14 +31,13 @@ from railsim.kernels.status import (
 )
 from railsim.kernels.support import SUPPORT_SIZE
 from railsim.kernels.system import (
-    BOTH_ENDS,
     N_SCALARS,
-    ROTATES,
     Bodies,
     Contact,
     Curves,
     Mounts,
     System,
+    falling_friction,
     mount_laws,
 )
 from railsim.kernels.time_loop import Recorder
@@ -213,9 +213,16 @@ def _joined_mounts(systems: Sequence[System], **shifts: Ints) -> Mounts:
     joint = _joined([system.mounts for system in systems], **shifts)
     order = _order_of_mounts(systems)
     joint = joint._replace(
-        **{name: aligned(getattr(joint, name)[order]) for name in joint._fields if name != "law"}
+        **{
+            name: aligned(getattr(joint, name)[order])
+            for name in joint._fields
+            if name not in ("law", "falling")
+        }
     )
-    return joint._replace(law=mount_laws(joint.internal, joint.curve, joint.flags))
+    return joint._replace(
+        law=mount_laws(joint.internal, joint.curve, joint.flags),
+        falling=falling_friction(joint.friction),
+    )
 
 
 def _order_of_mounts(systems: Sequence[System]) -> Ints:

@@ -163,7 +163,7 @@ def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
 
 
 class OutputPlan:
-    """What a run puts out: which elements, patches and track quantities beyond the usual ones.
+    """What a run outputs: which elements, patches and track quantities beyond the usual ones.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ class Pace:
                         "settings",
                         "step",
                         f"found {given:g} s",
-                        f"a whole part of the output interval {interval:g} s",
+                        f"an integer fraction of the output interval {interval:g} s",
                     )
                 ]
             )

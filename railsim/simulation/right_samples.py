@@ -1,4 +1,4 @@
-"""Samples that fold nothing back: how fast the loop puts out where a low pass is asked for."""
+"""Samples that fold nothing back: how often the loop outputs where a low pass is asked for."""
 
 import math
 
@@ -19,7 +19,7 @@ def instants_for_each(settings: Settings) -> int:
 
 
 def sampled(settings: Settings) -> Settings:
-    """Settings with the rate at which the loop itself puts out."""
+    """Settings with the rate of the loop's own output."""
     every = instants_for_each(settings)
     if every == 1:
         return settings

@@ -45,7 +45,7 @@ def simulate_together(
     Parameters
     ----------
     vehicles : sequence of Vehicle
-        Such as one vehicle with different parameters; they do not feel each other.
+        Such as one vehicle with different parameters; they do not interact.
     sinks : sequence of Sink, optional
         One for each vehicle.
 

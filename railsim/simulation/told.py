@@ -1,4 +1,4 @@
-"""The finished fraction of runs, as it is told on the way."""
+"""The finished fraction of runs, as it is reported during the run."""
 
 import math
 from collections.abc import Callable

@@ -88,7 +88,7 @@ class Arm:
     bush : float or ndarray
         Torsional stiffness of the hinge's bush [N m/rad].
     nu : float
-        Poisson's number of the springs.
+        Poisson's ratio of the springs.
     coils : tuple of Coil
         The springs; the first one's deflection is the nest's.
     form : {"grossi", "energy"}

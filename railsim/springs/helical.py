@@ -77,7 +77,7 @@ def active_coils(G: ArrayLike, d: ArrayLike, D: ArrayLike, K_V: ArrayLike) -> Va
 
 
 def poisson_number(E: ArrayLike, G: ArrayLike) -> Values:
-    """Poisson's number of an isotropic material, `nu = E / (2 G) - 1`."""
+    """Poisson's ratio of an isotropic material, `nu = E / (2 G) - 1`."""
     return np.asarray(E) / (2.0 * np.asarray(G)) - 1.0
 
 
@@ -93,7 +93,7 @@ def beam_rigidities(K_V: ArrayLike, D: ArrayLike, height: ArrayLike, nu: ArrayLi
     D, height : float or ndarray
         Mean coil diameter, height under load `H_s` [m].
     nu : float or ndarray
-        Poisson's number.
+        Poisson's ratio.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def beam_lateral_stiffness(
     dz : float or ndarray
         Vertical deflection, 0 <= dz < H0 [m].
     nu : float or ndarray
-        Poisson's number.
+        Poisson's ratio.
 
     Returns
     -------
@@ -276,7 +276,7 @@ def buckling_deflection(
     H0, D : float or ndarray
         Free height and mean coil diameter [m].
     nu : float or ndarray
-        Poisson's number; `G/E = 1/(2 (1 + nu))`.
+        Poisson's ratio; `G/E = 1/(2 (1 + nu))`.
     seating : float or ndarray
         Seating coefficient of EN 13906-1: 0.5 both seats held; 0.7 one held, one hinged; 1 both
         hinged, or parallel with one free to move sideways; 2 one held, one free.

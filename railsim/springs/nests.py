@@ -47,7 +47,7 @@ class Task:
     wires : ndarray
         Wire diameters to choose from [m].
     nu : float
-        Poisson's number.
+        Poisson's ratio.
     gap : float
         Deflection of the outer spring at which the inner one starts to work [m].
     height_difference : float

@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
 MOST_ITERATIONS = 20
-SLOW = 0.3  # ratio of two changes from which on the matrix is formed anew
+SLOW = 0.3  # ratio of two changes from which on the matrix is formed again
 QUICK = 8  # iterations after which the next step may be longer
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients

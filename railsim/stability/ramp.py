@@ -258,7 +258,7 @@ def diagram(
 
 
 def _disturbed(motion: Motion, up: Diagram, state: Floats, speed: float) -> Floats:
-    """The carried state, or where it rests anew one that is slightly disturbed."""
+    """The carried state, or where it rests again one that is slightly disturbed."""
     if up.amplitude and up.amplitude[-1] < SMALL:
         return motion.rest(speed, SMALL)
     return state

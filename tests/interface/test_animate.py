@@ -44,7 +44,7 @@ def test_scene_holds_the_vehicle_and_its_way(result):
 
 
 def test_wheels_stand_on_their_rails(result):
-    """Nominal place: the tread near the tape circle touches the rail's top within 0.2 mm."""
+    """At rest the tread near the nominal rolling circle touches the rail's top within 0.2 mm."""
     scene = result_scene(result, frames=5)
     for section in scene.sections:
         y = np.abs(section["wheel_y"])

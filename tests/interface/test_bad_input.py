@@ -223,7 +223,10 @@ def test_wrong_measured_track_is_told(tmp_path, capsys, monkeypatch, csv, words)
         ),
         (["--set", "settings.initial.carbdy.y=0.1"], "initial.carbdy: no such body; did you mean"),
         (["--set", "settings.drive.mode=fast"], "drive.mode: 'fast'; must be 'constant'"),
-        (["--set", "settings.step=0.0007"], "step: found 0.0007 s; a whole part of the output"),
+        (
+            ["--set", "settings.step=0.0007"],
+            "step: found 0.0007 s; an integer fraction of the output",
+        ),
         (["--set", "track.irregularities.0.seed=2"], "no member '0' in irregularities"),
         (["--set", "settings.step=1e-12"], "settings.step: 1e-12; must be greater than or equal"),
         (["--set", "settings.step=5"], "settings.step: 5; must be less than or equal to 0.1"),

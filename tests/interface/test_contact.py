@@ -47,7 +47,7 @@ def test_json_has_the_names_units_and_signs_of_the_interface(capsys):
     assert np.all(lists["contact_angle_left"] > 0)
     assert np.all(lists["contact_y_left"] < -0.7)
     assert np.all(lists["contact_y_right"] > 0.7)
-    assert np.all(lists["wheel_y_right"][right] < 0)  # between tape circle and flange
+    assert np.all(lists["wheel_y_right"][right] < 0)  # between nominal rolling circle and flange
     assert np.all(lists["roll"][right] < 0)  # the right side is lifted
     conicity = {row["amplitude"]: row["value"] for row in data["equivalent_conicity"]}
     assert conicity[0.003] == pytest.approx(0.177, abs=0.002)  # PHYSICS.md: about 0.18
@@ -149,7 +149,8 @@ def test_creep_has_a_row_for_each_law_direction_and_size(capsys):
     places = {(row["case"], row["size"]) for row in rows}
     assert len(rows) == len(places) * len(LAWS)
     sizes = np.array([np.hypot(row["T_x"], row["T_y"]) for row in rows])
-    assert (sizes < 1.016).all()  # 10 x 10 cells exceed mu N by up to 1.6 %
+    # midpoint sums of the elliptic bound over 10 x 10 cells exceed mu N by 1.48 %
+    assert (sizes < 1.0148).all()
     assert cli.main(["contact", "--creep"]) == 0
     printed = capsys.readouterr().out
     assert "Creep force over mu N" in printed

@@ -1,4 +1,4 @@
-"""``railsim info``: what files hold, in a screenful."""
+"""``railsim info``: what files hold, on one screen."""
 
 import json
 import math

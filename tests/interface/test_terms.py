@@ -1,4 +1,4 @@
-"""Unwanted phrases of docs/terms.md occur nowhere in manual, README, changelog, examples, help."""
+"""Unwanted phrases of docs/terms.md occur in no page, help text, message, docstring or comment."""
 
 import re
 from pathlib import Path
@@ -11,6 +11,8 @@ ROOT = Path(__file__).parents[2]
 TERMS = ROOT / "docs" / "terms.md"
 # entries of decisions are not rewritten
 OTHERS = {TERMS, ROOT / "docs" / "decisions.md"}
+# parts of the package whose words are still to be gone through
+LATER = ("assessment", "report", "studies")
 
 
 def unwanted():
@@ -32,6 +34,12 @@ def help_texts(command, context):
 def texts():
     pages = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"]
     pages += sorted({*(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*.py")} - OTHERS)
+    package = ROOT / "railsim"
+    pages += [
+        source
+        for source in sorted(package.rglob("*.py"))
+        if source.relative_to(package).parts[0] not in LATER
+    ]
     for page in pages:
         yield str(page.relative_to(ROOT)), page.read_text("utf-8")
     yield from help_texts(command_line, click.Context(command_line, info_name="railsim"))

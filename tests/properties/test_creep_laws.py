@@ -24,8 +24,8 @@ def patch(ratio):
 @given(ratio=ratios, xi_x=creepages, xi_y=creepages, phi=spins)
 def test_force_never_exceeds_friction(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)
-    # the bound summed over 10 x 10 cells exceeds mu N by up to 1.6 %
-    assert np.hypot(force.T_x, force.T_y) <= 0.4 * 60e3 * 1.016
+    # midpoint sums of the elliptic bound over 10 x 10 cells exceed mu N by 1.48 %
+    assert np.hypot(force.T_x, force.T_y) <= 0.4 * 60e3 * 1.0148
 
 
 @law

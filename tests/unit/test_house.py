@@ -10,8 +10,6 @@ PACKAGE = Path(railsim.__file__).parent
 PARAMETERS, FUNCTION, MODULE = 10, 80, 500
 # beyond a limit, with the reason
 LARGER = {
-    "definitions/elements.py": "to be divided",
-    "kernels/support.py": "to be divided",
     "notation.py": "the table of quantities",
 }
 # public functions that take the numbers of one patch or pair of profiles

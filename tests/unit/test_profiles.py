@@ -110,8 +110,8 @@ def changed_wheel(how):
         "reversed": (y[::-1], z[::-1]),
         "shuffled": tuple(np.array([y, z])[:, rng.permutation(y.size)]),
         "double points": (np.repeat(y, 2), np.repeat(z, 2)),
-        "origin at the wheel back": (back, z),
-        "origin at the wheel back, z up": (back, -z),
+        "origin at the flange back": (back, z),
+        "origin at the flange back, z up": (back, -z),
         "z from the flange tip": (y, z - z.max()),
         "one outlier": (y, z + 5.0 * (np.arange(y.size) == 400)),
     }[how]
@@ -126,9 +126,9 @@ def changed_wheel(how):
         ("reversed", None),
         ("shuffled", "not in order"),
         ("double points", "double points"),
-        ("origin at the wheel back", "tape circle, 70 mm from the wheel back"),
-        ("origin at the wheel back, z up", "tape circle"),
-        ("z from the flange tip", "zero at the tape circle"),
+        ("origin at the flange back", "nominal rolling circle, 70 mm from the flange back"),
+        ("origin at the flange back, z up", "nominal rolling circle"),
+        ("z from the flange tip", "zero at the nominal rolling circle"),
         ("one outlier", "outliers left out"),
     ],
 )
@@ -136,7 +136,7 @@ def test_wheel_is_put_right_and_the_note_says_so(tmp_path, how, note):
     path = written(tmp_path, "wheel.csv", csv_mm(*changed_wheel(how)))
     profile = load_profile(path, "wheel")
     assert note is None or any(note in line for line in profile.notes), profile.notes
-    # sorting by y confuses the nearly vertical wheel back, nothing that touches the rail
+    # sorting by y confuses the nearly vertical flange back, nothing that touches the rail
     assert same_contact(profile, "S1002") < (5e-6 if how == "one outlier" else 1.5e-6)
 
 

@@ -13,6 +13,8 @@ from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.kernels import creep as kernel
 
+# midpoint sums of FaStrip's elliptic bound over 10 x 10 cells, over mu N; FASTSIM's parabola 1.0065
+CELLS = 1.0148
 A, B, N, MU, G = 5e-3, 3e-3, 70e3, 0.35, 82e9
 PATCH = {"a": A, "b": B, "N": N, "mu": MU}
 laws = pytest.mark.parametrize("law", LAWS)
@@ -99,7 +101,7 @@ def test_numbers_of_the_creep_laws_are_those_of_the_kernels():
 def test_vanishing_load_gives_vanishing_force(law, mu_N):
     force = creep_force(a=A, b=B, N=mu_N, mu=1.0, xi_x=1e-3, xi_y=-1e-3, phi=0.5, law=law)
     assert np.isfinite(force).all()
-    assert np.hypot(force.T_x, force.T_y) <= 1.017 * mu_N
+    assert np.hypot(force.T_x, force.T_y) <= CELLS * mu_N
 
 
 @laws
@@ -110,7 +112,7 @@ def test_extreme_ellipses_give_finite_forces_within_friction(law, ratio):
     for xi in ((1e-3, 0.0, 0.0), (0.0, 1e-3, 0.2), (1e-3, -1e-3, 3.0), (0.0, 0.0, 50.0)):
         force = creep_force(a, b, N, MU, *xi, law=law)
         assert np.isfinite(force).all()
-        assert np.hypot(force.T_x, force.T_y) < 1.017 * MU * N
+        assert np.hypot(force.T_x, force.T_y) < CELLS * MU * N
 
 
 @laws

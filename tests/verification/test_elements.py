@@ -95,6 +95,29 @@ def test_a_sticking_pad_is_a_spring_without_loss_and_does_not_creep():
     assert np.ptp(held) == 0.0
 
 
+@pytest.mark.parametrize("speed", [1e-5, 0.02, 1.0])
+@pytest.mark.parametrize("kind", ["friction", "side_bearer", "centre_plate"])
+def test_steady_sliding_takes_the_friction_of_its_speed(kind, speed):
+    """L (r + (1 - r) exp(-v/v_s)), in an oblique direction too (Bo, Pavelescu 1982)."""
+    mu, N, r, v_s = 0.3, 5e4, 0.4, 0.05
+    falls = {"sliding_ratio": r, "stribeck_speed": v_s}
+    law = {
+        "side_bearer": pressed(N, mu, **falls),
+        "friction": {
+            "kind": kind,
+            "friction_force": [mu * N, mu * N, 0.0],
+            "stick_stiffness": [2e7, 2e7, 0.0],
+            **falls,
+        },
+        "centre_plate": {**pressed(N, mu, **falls), "kind": kind, "radius": 0.2},
+    }[kind]
+    direction = np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
+    time = np.linspace(0.0, 0.01 / speed, 40)
+    path = Rig(**law).path(time, lambda t: speed * t * direction, lambda t: speed * direction)
+    steady = mu * N * (r + (1.0 - r) * np.exp(-speed / v_s))
+    assert path[-1, :2] == pytest.approx(steady * direction[:2], rel=1e-9)
+
+
 # sliding in any direction -------------------------------------------------------------------------
 
 

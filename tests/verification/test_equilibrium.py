@@ -77,7 +77,7 @@ def test_message_names_the_elements_that_alternate(monkeypatch):
 
 
 def hollow(depth, width=0.05):
-    """S1002 with a hollow of the tread, one wave of 1 - cos about the tape circle."""
+    """S1002 with a hollow of the tread, one wave of 1 - cos about the nominal rolling circle."""
     new = load_profile("S1002", kind="wheel")
     y = np.linspace(np.min(new.y), np.max(new.y), 2001)
     u = np.clip(2.0 * y / width, -1.0, 1.0)

@@ -1,0 +1,95 @@
+"""Creep forces of one patch by every creep law, over normalised creepages."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact.creep import LAWS, creep_force
+from railsim.contact.exact_creep import ExactCreepForce, exact_creep_force
+from railsim.contact.kalker import kalker_coefficients
+
+Array = NDArray[np.float64]
+
+CASES = {
+    "longitudinal": (1.0, 0.0, 0.0),
+    "lateral": (0.0, 1.0, 0.0),
+    "spin": (0.0, 0.0, 1.0),
+    "lateral and spin, same sign": (0.0, 1.0, 1.0),
+    "lateral and spin, opposed": (0.0, 1.0, -0.5),
+    "longitudinal and spin": (1.0, 0.0, 1.0),
+}
+"""Directions of the normalised creepages (x, y, spin)."""
+
+SIZES = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0)
+"""Magnitudes of the normalised creepage in the table of `forces_by_law`."""
+
+
+class Patch(NamedTuple):
+    """A loaded contact ellipse.
+
+    Attributes
+    ----------
+    a, b : float
+        Semi-axes along and across the rail [m].
+    N, mu : float
+        Normal force [N], friction coefficient [1].
+    G, nu : float
+        Shear modulus [Pa], Poisson's ratio [1].
+    """
+
+    a: float
+    b: float
+    N: float
+    mu: float
+    G: float = 82e9
+    nu: float = 0.28
+
+    def creepages(self, normalised: Sequence[float] | Array) -> tuple[float, float, float]:
+        """Creepages whose forces in linear theory are the given multiples of mu N."""
+        c11, c22, c23, _ = (float(c) for c in kalker_coefficients(self.a / self.b, self.nu))
+        unit = self.mu * self.N / (self.G * self.a * self.b)
+        x, y, spin = (float(value) for value in normalised)
+        return unit * x / c11, unit * y / c22, unit * spin / (c23 * float(np.sqrt(self.a * self.b)))
+
+    def unit_creepages(self, direction: Sequence[float]) -> Array:
+        """Creepages of magnitude 1, normalised, in a direction such as those of `CASES`."""
+        return np.array(self.creepages(direction)) / float(np.linalg.norm(direction))
+
+
+def forces_by_law(patch: Patch) -> list[dict[str, Any]]:
+    """Creep forces of all laws for all directions and sizes, over mu N (moment: times size)."""
+    rows = []
+    size = float(np.sqrt(patch.a * patch.b))
+    bound = patch.mu * patch.N
+    for case, direction in CASES.items():
+        unit = patch.unit_creepages(direction)
+        for scale in SIZES:
+            xi_x, xi_y, phi = (float(value) for value in scale * unit)
+            for law in LAWS:
+                force = creep_force(
+                    patch.a, patch.b, patch.N, patch.mu, xi_x, xi_y, phi, patch.G, patch.nu, law
+                )
+                rows.append(
+                    {
+                        "case": case,
+                        "size": scale,
+                        "xi_x": xi_x,
+                        "xi_y": xi_y,
+                        "phi": phi,
+                        "law": law,
+                        "T_x": float(force.T_x) / bound,
+                        "T_y": float(force.T_y) / bound,
+                        "M_z": float(force.M_z) / (bound * size),
+                    }
+                )
+    return rows
+
+
+def exact_force(patch: Patch, creepages: Sequence[float] | Array) -> ExactCreepForce:
+    """Full theory for a patch and its creepages (x, y, spin) [1, 1, 1/m]."""
+    x, y, spin = (float(value) for value in creepages)
+    return exact_creep_force(
+        patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu
+    )  # fmt: skip

@@ -1,0 +1,229 @@
+"""What all force elements of a vehicle file have in common: bodies, points, sides, preloads."""
+
+from abc import abstractmethod
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+from pydantic import AfterValidator, model_validator
+
+from railsim.definitions.base import (
+    Definition,
+    Finite,
+    NonNegativeVector,
+    Positive,
+    Text,
+    Vector,
+    rising,
+)
+
+Signs = tuple[float, float, float]
+Rows = tuple[tuple[float, float], ...]
+
+
+def _characteristic(rows: Rows) -> Rows:
+    if len(rows) < 2:
+        raise ValueError("a table needs two rows at least")
+    if not rising(rows):
+        raise ValueError("the first column must increase from row to row")
+    if any(after[1] < before[1] for before, after in pairwise(rows)):
+        raise ValueError("the force must not fall from row to row (negative stiffness or damping)")
+    return rows
+
+
+def _through_zero(rows: Rows) -> Rows:
+    first, last = rows[0][0], rows[-1][0]
+    if first > 0.0 or last <= 0.0:
+        raise ValueError("the first column must begin at 0 (same in both directions) or below 0")
+    if first == 0.0 and rows[0][1] != 0.0:
+        raise ValueError(
+            "a table that begins at 0 must begin with force 0 (same in both directions)"
+        )
+    return rows
+
+
+Characteristic = Annotated[
+    tuple[tuple[Finite, Finite], ...],
+    AfterValidator(_characteristic),
+    AfterValidator(_through_zero),
+]
+
+
+def two_sided(rows: Rows) -> Rows:
+    """Return the table with its mirror image when it begins at zero.
+
+    Examples
+    --------
+    >>> two_sided(((0.0, 0.0), (0.1, 5.0)))
+    ((-0.1, -5.0), (0.0, 0.0), (0.1, 5.0))
+    """
+    if rows[0][0] < 0.0:
+        return rows
+    return tuple((-x, -force) for x, force in reversed(rows[1:])) + tuple(rows)
+
+
+def times(vector: tuple[float, float, float], signs: Signs) -> tuple[float, float, float]:
+    """Return a vector with the signs of a mirrored place."""
+    return (vector[0] * signs[0], vector[1] * signs[1], vector[2] * signs[2])
+
+
+class Element(Definition):
+    """What all force elements have in common."""
+
+    bodies: tuple[Text, ...]
+    """Names of the bodies, found from the innermost assembly outwards"""
+
+    def end_points(self) -> tuple[Vector, Vector] | None:
+        """Points on body 1 and body 2 as written [m]; None where the element has none."""
+        return None
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the element in a mirrored place; `signs` holds -1 for each reversed axis."""
+        return self
+
+    def parts(self) -> list[tuple[str, Vector, "Element"]]:
+        """Elements of which this one consists: suffix of the name, place from its point [m]."""
+        return []
+
+    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+        """Return the element with the preload that follows from its free length, if it has one.
+
+        `point1` and `point2`: its ends in the nominal position, vehicle axes [m].
+        """
+        return self
+
+    @property
+    @abstractmethod
+    def vertical_stiffness(self) -> float:
+        """Static stiffness with which it carries weight [N/m]; a link's along its line."""
+
+    @property
+    @abstractmethod
+    def vertical_damping(self) -> float:
+        """Damping at small velocities in parallel with it [N s/m], 0 behind a spring in series."""
+
+
+class CarriesNoWeight(Definition):
+    """An element that does not carry its bodies."""
+
+    @property
+    def vertical_stiffness(self) -> float:
+        """None [N/m]."""
+        return 0.0
+
+    @property
+    def vertical_damping(self) -> float:
+        """None [N s/m]."""
+        return 0.0
+
+
+class PairElement(Element):
+    """An element between two bodies."""
+
+    bodies: tuple[Text, Text]
+    """Names of body 1 and body 2, found from the innermost assembly outwards"""
+
+
+class SidedElement(PairElement):
+    """An element that may stand on both sides."""
+
+    sides: Literal["both"] | None = None
+    """`both`: given on the right (y > 0), copied to the left; the names get `.right` and `.left`"""
+
+
+class PointElement(SidedElement):
+    """An element between two points, or at one point that belongs to both bodies."""
+
+    point: Vector | None = None
+    """The common point of both bodies [m]; either this or `points`"""
+    points: tuple[Vector, Vector] | None = None
+    """Point on body 1 and point on body 2 [m]"""
+
+    @model_validator(mode="after")
+    def _one_way_of_giving_points(self) -> Self:
+        if (self.point is None) == (self.points is None):
+            raise ValueError("either 'point' or 'points' is needed")
+        return self
+
+    def end_points(self) -> tuple[Vector, Vector]:
+        """Points on body 1 and body 2 as written [m]."""
+        if self.points is not None:
+            return self.points
+        assert self.point is not None  # by the validator above
+        return self.point, self.point
+
+
+class FreeLength(Definition):
+    """A spring whose preload follows from its length."""
+
+    free_length: Positive | None = None
+    """Length without load [m]; the preload follows from it and from the nominal length"""
+    load_at_length: tuple[Positive, Positive] | None = None
+    """Load and length at which it was measured [N, m], instead of `free_length`; compression"""
+
+    @property
+    def has_free_length(self) -> bool:
+        """Whether the preload follows from a length."""
+        return self.free_length is not None or self.load_at_length is not None
+
+    def compression(self, stiffness: float, length: float) -> float:
+        """Force of compression at a length [N], spring of this `stiffness` [N/m]."""
+        if self.free_length is not None:
+            return stiffness * (self.free_length - length)
+        assert self.load_at_length is not None  # by `has_free_length`
+        load, at = self.load_at_length
+        return load + stiffness * (at - length)
+
+    @model_validator(mode="after")
+    def _one_origin_of_the_preload(self) -> Self:
+        if self.free_length is not None and self.load_at_length is not None:
+            raise ValueError("either 'free_length' or 'load_at_length', not both")
+        given = vars(self).get("preload", 0.0) not in ("auto", 0.0)
+        if self.has_free_length and given:  # defaults stand in the files that results carry
+            raise ValueError("either 'preload' or a length, not both")
+        return self
+
+
+class PreloadAlongAxes(Definition):
+    """An element with a preload along the axes of body 1."""
+
+    if TYPE_CHECKING:  # the field of its kinds
+        preload: Literal["auto"] | Vector
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the element in a mirrored place: the preload turns with the axes."""
+        if self.preload == "auto":
+            return self
+        return self.model_copy(update={"preload": times(self.preload, signs)})
+
+
+class VerticalSpring(PreloadAlongAxes, FreeLength):
+    """A spring along z between two seats."""
+
+    if TYPE_CHECKING:  # the fields of its kinds
+        stiffness: NonNegativeVector
+        damping: NonNegativeVector
+        points: tuple[Vector, Vector] | None
+
+    @property
+    def vertical_stiffness(self) -> float:
+        """Stiffness along z [N/m]."""
+        return self.stiffness[2]
+
+    @property
+    def vertical_damping(self) -> float:
+        """Damping along z [N s/m]."""
+        return self.damping[2]
+
+    @model_validator(mode="after")
+    def _length_needs_seats(self) -> Self:
+        if self.has_free_length and (self.points is None or self.stiffness[2] == 0.0):
+            raise ValueError("a free length needs 'points' at two heights and a stiffness along z")
+        return self
+
+    def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
+        """Return the spring with the preload of its length: compression pushes the seats apart."""
+        if not self.has_free_length:
+            return self
+        force = self.compression(self.stiffness[2], abs(point2[2] - point1[2]))
+        up = -1.0 if point1[2] < point2[2] else 1.0
+        return self.model_copy(update={"preload": (0.0, 0.0, up * force)})

@@ -1,0 +1,264 @@
+"""Elements with dry friction of a vehicle file: pads, side bearers, centre plates, wedges."""
+
+from math import cos, pi, sin, sqrt, tan
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import (
+    AutoOrVector,
+    Definition,
+    NonNegative,
+    NonNegativeVector,
+    Positive,
+    Vector,
+)
+from railsim.definitions.element_base import (
+    Element,
+    PairElement,
+    PointElement,
+    Rows,
+    VerticalSpring,
+)
+
+
+class SlidingFriction(Definition):
+    """Dry friction that may fall with the speed: r + (1 - r) exp(-|v|/v_s) times that at rest.
+
+    Source: Bo, Pavelescu (1982), The friction-speed relation and its influence on the critical
+    velocity of stick-slip motion, Wear 82, 277-289.
+    """
+
+    sliding_ratio: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1.0)] = 1.0
+    """Friction at high sliding speed over that at rest [1]; 1: it does not fall"""
+    stribeck_speed: Positive | None = None
+    """Sliding speed at which the difference has fallen to 1/e of itself [m/s]"""
+
+    @model_validator(mode="after")
+    def _ratio_with_speed(self) -> Self:
+        if (self.sliding_ratio < 1.0) != (self.stribeck_speed is not None):
+            raise ValueError("a 'sliding_ratio' below 1 and 'stribeck_speed' belong together")
+        return self
+
+
+class Friction(SlidingFriction, VerticalSpring, PointElement):
+    """Dry friction along the axes of body 1, with a spring in parallel: leaf spring, friction pad.
+
+    The largest friction force along an axis is friction_force + friction_coefficient N, with N the
+    vertical spring force of this element in the direction of its preload, 0 where it is gone.  The
+    friction forces along all axes are one vector within the ellipse of these limits, or each has a
+    limit of its own; below it the pad sticks elastically.
+    """
+
+    kind: Literal["friction"]
+    friction_force: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Constant part of the largest friction force along x, y, z [N]"""
+    friction_coefficient: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Part that grows with the vertical spring force, along x, y, z [1]"""
+    stick_stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Stiffness of the sticking pad along x, y, z, needed where there is friction [N/m]"""
+    friction_limit: Literal["circle", "axes"] = "circle"
+    """`circle`: one contact slides in any direction, its force within a circle (an ellipse where
+    the limits differ); `axes`: contacts of their own along each axis"""
+    stiffness: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Stiffness of the parallel spring along x, y, z [N/m]"""
+    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Damping along x, y, z [N s/m]"""
+    preload: AutoOrVector = "auto"
+    """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+
+    @model_validator(mode="after")
+    def _friction_needs_a_sticking_stiffness(self) -> Self:
+        limits = zip(self.friction_force, self.friction_coefficient, strict=True)
+        slides = [force > 0.0 or coefficient > 0.0 for force, coefficient in limits]
+        if not any(slides):
+            raise ValueError("no friction: 'friction_force' or 'friction_coefficient' is needed")
+        for axis, sliding, sticking in zip("xyz", slides, self.stick_stiffness, strict=True):
+            if sliding and sticking == 0.0:
+                raise ValueError(f"friction along {axis} needs 'stick_stiffness' along {axis}")
+        return self
+
+
+class SideBearer(SlidingFriction, PointElement):
+    """A sliding pad on which body 2 rests on body 1: pressure without tension, friction in x and y.
+
+    The friction force has any direction in the plane and at most mu N; where the pad lifts there is
+    none.
+    """
+
+    kind: Literal["side_bearer"]
+    stiffness: Positive
+    """Vertical stiffness [N/m]"""
+    damping: NonNegative = 0.0
+    """Vertical damping while it carries [N s/m]"""
+    preload: Annotated[Literal["auto"] | NonNegative, Field(union_mode="left_to_right")] = 0.0
+    """Compression in the nominal position [N], or `auto`: from the equilibrium"""
+    clearance: NonNegative = 0.0
+    """Vertical clearance in the nominal position [m]"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction [1]"""
+    stick_stiffness: Positive
+    """Horizontal stiffness of the sticking pad [N/m]"""
+    stop_travel: Positive | None = None
+    """Further compression after which a solid stop carries [m]"""
+    stop_stiffness: Positive | None = None
+    """Stiffness of the solid stop beside that of the pad [N/m]"""
+
+    @model_validator(mode="after")
+    def _one_nominal_state(self) -> Self:
+        if self.clearance > 0.0 and self.preload != 0.0:
+            raise ValueError("either 'preload' or 'clearance', not both")
+        if (self.stop_travel is None) != (self.stop_stiffness is None):
+            raise ValueError("'stop_travel' and 'stop_stiffness' belong together")
+        return self
+
+    @property
+    def vertical_stiffness(self) -> float:
+        """Stiffness of what carries [N/m]."""
+        return self.stiffness
+
+    @property
+    def vertical_damping(self) -> float:
+        """Damping while it carries [N s/m]."""
+        return self.damping
+
+    @property
+    def stop_table(self) -> Rows | None:
+        """Force of the solid stop over the travel of body 2, zero above it."""
+        if self.stop_travel is None or self.stop_stiffness is None:
+            return None
+        first = self.stop_travel + self.clearance
+        return ((-1.0, 0.0), (first, 0.0), (first + 1.0, self.stop_stiffness))
+
+
+class CentrePlate(SlidingFriction, PairElement):
+    """Flat plate (ring) of body 2 that turns and slides on a bowl of body 1.
+
+    The pressure is that of an elastic layer without tension; it follows a tilted body 2 to the
+    edge.  Eight pads at the nodes of Gauss's rule carry it: under even pressure the yaw moment of
+    friction is exactly 2/3 mu N (R^3 - r^3)/(R^2 - r^2), the tilting stiffness k (R^2 + r^2)/4.
+    """
+
+    kind: Literal["centre_plate"]
+    point: Vector
+    """Centre of the contact surface [m]"""
+    radius: Positive
+    """Outer radius R of the contact surface [m]"""
+    inner_radius: NonNegative = 0.0
+    """Inner radius r of the contact surface, 0 for a disc [m]"""
+    stiffness: Positive
+    """Vertical stiffness of the whole plate [N/m]"""
+    damping: NonNegative = 0.0
+    """Vertical damping of the whole plate while it carries [N s/m]"""
+    preload: Annotated[Literal["auto"] | NonNegative, Field(union_mode="left_to_right")] = "auto"
+    """Compression in the nominal position [N], or `auto`: from the equilibrium"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction [1]"""
+    stick_stiffness: Positive
+    """Horizontal stiffness of the whole sticking plate [N/m]"""
+
+    @model_validator(mode="after")
+    def _a_ring(self) -> Self:
+        if self.inner_radius >= self.radius:
+            raise ValueError("'inner_radius' must be smaller than 'radius'")
+        return self
+
+    @property
+    def vertical_stiffness(self) -> float:
+        """Stiffness of what carries [N/m]."""
+        return self.stiffness
+
+    @property
+    def vertical_damping(self) -> float:
+        """Damping while it carries [N s/m]."""
+        return self.damping
+
+    def end_points(self) -> tuple[Vector, Vector]:
+        """Centre of the contact surface on both bodies [m]."""
+        return self.point, self.point
+
+    def parts(self) -> list[tuple[str, Vector, Element]]:
+        """Pads that carry the plate: suffix of the name, place from the centre [m], pad."""
+        found: list[tuple[str, Vector, Element]] = []
+        rule = _gauss_on_ring(self.inner_radius, self.radius)
+        for ring, (radius, share) in enumerate(rule):
+            for quarter in range(4):
+                angle = 0.5 * pi * quarter + 0.25 * pi * ring
+                pad = SideBearer(
+                    kind="side_bearer",
+                    bodies=self.bodies,
+                    point=(0.0, 0.0, 0.0),
+                    stiffness=0.25 * share * self.stiffness,
+                    damping=0.25 * share * self.damping,
+                    preload="auto" if self.preload == "auto" else 0.25 * share * self.preload,
+                    friction_coefficient=self.friction_coefficient,
+                    stick_stiffness=0.25 * share * self.stick_stiffness,
+                    sliding_ratio=self.sliding_ratio,
+                    stribeck_speed=self.stribeck_speed,
+                )
+                place = (radius * cos(angle), radius * sin(angle), 0.0)
+                found.append((f"pad_{4 * ring + quarter + 1}", place, pad))
+        return found
+
+
+def _gauss_on_ring(inner: float, outer: float) -> list[tuple[float, float]]:
+    """Two radii and shares of the area that integrate r^0 to r^3 over a ring exactly.
+
+    The radii are the zeros of r^2 - a r + b, orthogonal to 1 and r with the weight r dr.
+
+    Examples
+    --------
+    >>> [(round(r, 4), round(share, 4)) for r, share in _gauss_on_ring(0.0, 1.0)]
+    [(0.3551, 0.3639), (0.8449, 0.6361)]
+    """
+    m0, m1, m2, m3 = (
+        2.0 / (k + 2) * (outer ** (k + 2) - inner ** (k + 2)) / (outer**2 - inner**2)
+        for k in range(4)
+    )
+    # int (r^2 - a r + b) r^j r dr = 0 for j = 0, 1
+    a = (m3 * m0 - m1 * m2) / (m2 * m0 - m1 * m1)
+    b = (a * m1 - m2) / m0
+    half = sqrt(0.25 * a * a - b)
+    near, far = 0.5 * a - half, 0.5 * a + half
+    share = (m1 - near) / (far - near)
+    return [(near, 1.0 - share), (far, share)]
+
+
+class Wedge(VerticalSpring, PointElement):
+    """Friction wedges of one side of a three-piece bogie, on their springs.
+
+    Body 1 is the side frame, body 2 the bolster, whose inclined faces rest on the wedges; the wedge
+    springs stand on the side frame (variable friction).  Without mass and with a smooth inclined
+    face the force on the column is N = (F + T_z)/tan(angle), with F the spring force and T_z the
+    friction that holds the wedge up: mu N is larger on the way down than on the way up.
+    """
+
+    kind: Literal["wedge"]
+    stiffness: NonNegativeVector
+    """Stiffness of the wedge springs of one side along x, y, z [N/m]"""
+    damping: NonNegativeVector = (0.0, 0.0, 0.0)
+    """Damping along x, y, z [N s/m]"""
+    preload: AutoOrVector = "auto"
+    """Spring force on body 1 in the nominal position along x, y, z [N], or `auto`"""
+    angle: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, lt=1.5)]
+    """Angle between the inclined face and the column's face [rad]"""
+    friction_coefficient: NonNegative
+    """Coefficient of friction on the column [1]"""
+    stick_stiffness: tuple[Positive, Positive]
+    """Stiffness of the sticking wedges along y and z [N/m]"""
+
+    @model_validator(mode="after")
+    def _wedge_slides(self) -> Self:
+        if self.friction_coefficient >= tan(self.angle):
+            raise ValueError(
+                "the wedge locks itself: 'friction_coefficient' must be smaller than tan(angle) = "
+                f"{tan(self.angle):.3g}"
+            )
+        if self.stiffness[2] == 0.0:
+            raise ValueError("the wedges need springs: 'stiffness' along z")
+        return self
+
+    @property
+    def share(self) -> float:
+        """Friction over spring force while the wedge slides level: mu/tan(angle)."""
+        return self.friction_coefficient / tan(self.angle)

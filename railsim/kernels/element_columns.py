@@ -1,0 +1,78 @@
+"""Columns of the rows of elements, defined once for assembly, time loop and outputs.
+
+The tables of names fix the order; `link_columns` and `mount_columns` read them for eight elements.
+"""
+
+from railsim.kernels import compiled
+from railsim.kernels.lanes import load_rows, starts
+
+
+def _places(columns: dict[str, int]) -> dict[str, slice]:
+    """Columns of each name, side by side in this order."""
+    places, first = {}, 0
+    for name, count in columns.items():
+        places[name] = slice(first, first + count)
+        first += count
+    return places
+
+
+LINK_COLUMNS = _places(
+    {
+        "point_1": 3,  # attachment points in body axes from the centres of gravity (m)
+        "point_2": 3,
+        "length": 1,  # nominal (m)
+        "stiffness": 1,  # N/m
+        "damping": 1,  # parallel to the spring (N s/m)
+        "preload": 1,  # N
+    }
+)
+LINK_SIZE = 16  # whole cache lines
+
+MOUNT_COLUMNS = _places(
+    {
+        "point_1": 3,  # points in body axes, coincident in the nominal position (m)
+        "point_2": 3,
+        "share": 2,  # of the force in the axes of body 1 and of body 2 (1)
+        "stiffness": 3,  # N/m
+        "damping": 3,  # N s/m
+        "preload": 3,  # N
+        "rotation": 3,  # K_d of the rotational potential tr(K_d (1 - R)) (N m)
+        "rotation_damping": 3,  # N m s
+    }
+)
+MOUNT_SIZE = 24
+STIFFNESS_Z, DAMPING_Z, PRELOAD_Z = (
+    MOUNT_COLUMNS[name].start + 2 for name in ("stiffness", "damping", "preload")
+)
+
+# columns of Mounts.flags
+TRANSLATES, BOTH_ENDS, ROTATES, FRICTION = range(4)
+ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and never pull
+
+
+@compiled(inline=True)
+def link_columns(row, which):
+    """Points, then nominal length, stiffness, damping and preload of eight links."""
+    place = starts(which, LINK_SIZE)
+    x1, y1, z1, x2, y2, z2, length, stiffness = load_rows(row, place, 0, 8)
+    damping, preload = load_rows(row, place, 8, 2)
+    return (x1, y1, z1), (x2, y2, z2), (length, stiffness, damping, preload)
+
+
+@compiled(inline=True)
+def mount_columns(row, which):
+    """Points, shares, then stiffness, damping and preload, then those of rotation, of eight mounts.
+
+    Each in the order of `MOUNT_COLUMNS`.
+    """
+    place = starts(which, MOUNT_SIZE)
+    x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(row, place, 0, 8)
+    kx, ky, kz, cx, cy, cz, fx, fy = load_rows(row, place, 8, 8)
+    fz, k1, k2, k3, c1, c2, c3 = load_rows(row, place, 16, 7)
+    return (
+        (x1, y1, z1),
+        (x2, y2, z2),
+        (share_1, share_2),
+        ((kx, ky, kz), (cx, cy, cz), (fx, fy, fz)),
+        ((k1, k2, k3), (c1, c2, c3)),
+    )

@@ -1,0 +1,246 @@
+"""Steps of the fast scheme for the moving track model of `support`.
+
+The contact makes the track stiff: a rail of 60 kg on a contact of 1.2 GN/m vibrates at 700 Hz, and
+creep forces damp it at 20 000 1/s.  `step_support` takes all of it implicitly by the two-step
+backward differentiation formula (Curtiss and Hirschfelder 1952; L-stable, order two), linearised
+once a step about the last evaluation, with the wheelset's motion over the step already known:
+
+    r = (u_1 - u_0)/h,  u_1' = 3/2 r - 1/2 r_0,  u_1'' = 3/2 (u_1' - u_0')/h - 1/2 s_0
+
+r_0 and s_0 are the mean rate and the mean acceleration of the step before; the state keeps them, so
+that the step may change.  The forces themselves are always those of the contact at (q, u): the
+linearisation affects only the change of u within one step.
+"""
+
+from railsim.kernels import compiled
+from railsim.kernels.rails import (
+    ASIDE,
+    MIDDLE_Y,
+    MIDDLE_Z,
+    RAIL_SLOPE,
+    ROLL,
+    ROLL_SLOPE,
+    SLOPE_Z,
+    locate_displaced,
+)
+from railsim.kernels.support import (
+    ACCELERATION,
+    BEFORE,
+    C_PAD_Y,
+    C_PAD_Z,
+    D_Y_ROLL,
+    D_Y_SLIP,
+    D_Y_Y,
+    D_Y_Z,
+    D_Z_ROLL,
+    D_Z_SLIP,
+    D_Z_Y,
+    D_Z_Z,
+    DOF,
+    F_Y,
+    F_Z,
+    K_PAD_Y,
+    K_PAD_Z,
+    K_Y_ROLL,
+    K_Y_Y,
+    K_Y_Z,
+    K_Z_ROLL,
+    K_Z_Y,
+    K_Z_Z,
+    M_RAIL,
+    MEAN_CHANGE,
+    MEAN_RATE,
+    MOTION,
+    RATE,
+    SETTLED,
+    STRETCH,
+    SUPPORT_SIZE,
+    imbalance,
+    mass_of,
+    solve_track,
+    support_begin,
+    track_forces,
+)
+from railsim.kernels.system import Z_0
+from railsim.kernels.track_frame import cell_of
+
+
+@compiled(inline=True)
+def step_compliance(support, h, out):
+    """Velocity of a rail per force over a step `h`, lateral and vertical, the sleeper held."""
+    row = support.row
+    mass = 2.25 / h * row[M_RAIL]
+    out[0] = 1.0 / (mass + 1.5 * row[C_PAD_Y] + h * row[K_PAD_Y])
+    out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
+
+
+@compiled(merge=True)
+def remember_track(system, work, state):
+    """Initialise the memory of `step_support` from `state`."""
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        for k in range(DOF):
+            state[first + MEAN_RATE + k] = state[first + RATE + k]
+            state[first + MEAN_CHANGE + k] = 0.0
+            state[first + ACCELERATION + k] = 0.0
+
+
+@compiled(merge=True)
+def note_wheelsets(system, work, state):
+    """Store the positions of the wheelsets in the planes of their rails before a step."""
+    for w in range(work.support.shape[0]):
+        note_wheelset(system, work, state, w)
+
+
+@compiled(merge=True)
+def note_wheelset(system, work, state, w):
+    """Motion of a wheelset in the plane of its rails into its row of `work.support_step`.
+
+    Lateral and vertical place, roll and their rates, distances of the rails from their places.  The
+    lateral rate is that of the material (slip); to first order in the roll of the plane.
+    """
+    n = system.bodies.kind.shape[0]
+    b = system.contact.body[w]
+    track, plane, speed = work.support_step[w], work.plane, state[-1]
+    height = system.bodies.row[b, Z_0]
+    q = 6 * b
+    v = 6 * n + q
+    turn = speed * plane[w, ROLL_SLOPE]
+    track[MOTION] = state[q + 1] - plane[w, MIDDLE_Y] + height * plane[w, ROLL]
+    track[MOTION + 1] = state[q + 2] - plane[w, MIDDLE_Z]
+    track[MOTION + 2] = state[q + 3] - plane[w, ROLL]
+    track[MOTION + 3] = state[v + 1] + height * turn
+    track[MOTION + 4] = state[v + 2] - speed * plane[w, SLOPE_Z]
+    track[MOTION + 5] = state[v + 3] - turn
+    track[MOTION + 6] = work.rail[w, 0, ASIDE]
+    track[MOTION + 7] = work.rail[w, 1, ASIDE]
+    track[MOTION + 8] = speed * (work.rail[w, 0, RAIL_SLOPE] - state[q + 5])
+    track[MOTION + 9] = speed * (work.rail[w, 1, RAIL_SLOPE] - state[q + 5])
+
+
+@compiled(merge=True)
+def step_support(system, work, state, h):
+    """Advance the track under all wheelsets by `h`; bodies, place and speed are those after it."""
+    support = system.support
+    row, before = support.row, work.above
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        b = system.contact.body[w]
+        track = work.support_step[w]
+        for k in range(10):
+            before[k] = track[MOTION + k]
+        if system.track.has_irregularity:
+            f = system.bodies.frame[b]
+            cell, cell_u = cell_of(system.track, state[-2] + system.frame_offset[f])
+            if cell >= 0:
+                locate_displaced(system.track.rail, cell, cell_u, w, work.plane, work.rail)
+        note_wheelset(system, work, state, w)
+        z, roll = track[MOTION + 1] - before[1], track[MOTION + 2] - before[2]
+        y_rate, z_rate = track[MOTION + 3] - before[3], track[MOTION + 4] - before[4]
+        roll_rate = track[MOTION + 5] - before[5]
+        for k in range(DOF):
+            track[k] = 0.0
+        # what is known of -(C u' + K u) after the step
+        track_forces(support, track, state, first, 1.0, 0.0, track, -1.0)
+        track_forces(support, track, state, first + MEAN_RATE, 0.0, 1.0, track, 0.5)
+        for k in range(DOF):
+            track[k] += mass_of(row, k) * (
+                1.5 / h * (state[first + RATE + k] + 0.5 * state[first + MEAN_RATE + k])
+                + 0.5 * state[first + MEAN_CHANGE + k]
+            )
+        for side in range(2):
+            contact = work.support[w, side]
+            i = first + 2 * side
+            y = track[MOTION] - before[0] - (track[MOTION + 6 + side] - before[6 + side])
+            slip = track[MOTION + 8 + side] - before[8 + side]
+            v_y = y_rate + state[i + RATE] + 0.5 * state[i + MEAN_RATE]
+            v_z = z_rate + state[i + RATE + 1] + 0.5 * state[i + MEAN_RATE + 1]
+            track[2 * side] += (
+                contact[F_Y]
+                + contact[K_Y_Y] * y
+                + contact[K_Y_Z] * z
+                + contact[K_Y_ROLL] * roll
+                + contact[D_Y_Y] * v_y
+                + contact[D_Y_Z] * v_z
+                + contact[D_Y_ROLL] * roll_rate
+                + contact[D_Y_SLIP] * slip
+            )
+            track[2 * side + 1] += (
+                contact[F_Z]
+                + contact[K_Z_Y] * y
+                + contact[K_Z_Z] * z
+                + contact[K_Z_ROLL] * roll
+                + contact[D_Z_Y] * v_y
+                + contact[D_Z_Z] * v_z
+                + contact[D_Z_ROLL] * roll_rate
+                + contact[D_Z_SLIP] * slip
+            )
+        solve_track(support, track, work.support[w], 2.25 / h, 1.5, h)
+        for k in range(DOF):
+            rate = 1.5 * track[k] - 0.5 * state[first + MEAN_RATE + k]
+            state[first + k] += h * track[k]
+            change = (rate - state[first + RATE + k]) / h
+            state[first + ACCELERATION + k] = 1.5 * change - 0.5 * state[first + MEAN_CHANGE + k]
+            state[first + MEAN_CHANGE + k] = change
+            state[first + RATE + k] = rate
+            state[first + MEAN_RATE + k] = track[k]
+
+
+@compiled(inline=True)
+def stretch_correction(track, i, stretch, first_time):
+    """Multiply the imbalance of one rail so that the next correction does what the last missed.
+
+    The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
+    dominates, convergence as with the secant.
+    """
+    y, z = track[i], track[i + 1]
+    if first_time:
+        track[stretch] = 1.0
+    else:
+        d_y, d_z = y - track[BEFORE + i], z - track[BEFORE + i + 1]
+        square = d_y * d_y + d_z * d_z
+        if square > 0.0:
+            share = -(track[BEFORE + i] * d_y + track[BEFORE + i + 1] * d_z) / square
+            track[stretch] = min(3.0, max(0.3, share * track[stretch]))
+    track[BEFORE + i], track[BEFORE + i + 1] = y, z
+    track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
+
+
+@compiled(merge=True)
+def correct_support(system, work, state, first_time):
+    """One Newton step for the rails after a step of the fast scheme.
+
+    `step_support` foresees the forces by the slopes of one evaluation.  Where the contact moves
+    over a curved profile or begins to slide, the forces in the new position differ from those, and
+    without a correction the scheme has order one.  The rails' accelerations of the state are
+    those of the forces foreseen, so that the imbalance F - M u'' - C u' - K u is the difference.
+
+    Returns
+    -------
+    bool : whether a wheelset's forces differed by more than `SETTLED` of the static wheel load; its
+        rails have moved then, and the forces are to be evaluated again.
+    """
+    h = state[-4]
+    moved = False
+    for w in range(work.support.shape[0]):
+        first = support_begin(system) + SUPPORT_SIZE * w
+        imbalance(system, work, state, w)
+        track = work.support_step[w]
+        worst = 0.0
+        for k in range(DOF):
+            track[k] -= mass_of(system.support.row, k) * state[first + ACCELERATION + k]
+            worst = max(worst, abs(track[k]))
+        if worst < SETTLED * system.contact.load[w]:
+            continue
+        moved = True
+        for side in range(2):
+            stretch_correction(track, 2 * side, STRETCH + side, first_time)
+        solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
+        for k in range(DOF):
+            r = track[k]
+            state[first + k] += h * r
+            state[first + RATE + k] += 1.5 * r
+            state[first + MEAN_RATE + k] += r
+            state[first + MEAN_CHANGE + k] += 1.5 / h * r
+            state[first + ACCELERATION + k] += 2.25 / h * r
+    return moved
