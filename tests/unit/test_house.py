@@ -9,9 +9,7 @@ import railsim
 PACKAGE = Path(railsim.__file__).parent
 PARAMETERS, FUNCTION, MODULE = 10, 80, 500
 # beyond a limit, with the reason
-LARGER = {
-    "notation.py": "the table of quantities",
-}
+LARGER = {"notation.py": "the table of quantities"}
 # public functions that take the numbers of one patch or pair of profiles
 MORE_PARAMETERS = {"creep_force", "exact_creep_force"}
 
