@@ -53,6 +53,7 @@ def test_json_has_the_names_units_and_signs_of_the_interface(capsys):
     assert conicity[0.003] == pytest.approx(0.177, abs=0.002)  # PHYSICS.md: about 0.18
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_pictures_and_tables_are_written_and_kept(tmp_path, capsys):
     out = tmp_path / "contact"
     arguments = ["contact", "--rail", "54E1", "--out", str(out)]
@@ -99,6 +100,7 @@ def test_left_and_right_may_differ(tmp_path, capsys):
     assert data["delta_r"][i] == pytest.approx(0.001, abs=5e-5)
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_what_was_put_right_in_a_file_is_told(tmp_path, capsys):
     profile = load_profile("S1002")
     path = tmp_path / "wheel.csv"
@@ -179,6 +181,7 @@ def test_creep_table_is_built_from_the_rows_that_are_there(tmp_path, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.further
 def test_creep_pictures_are_written(tmp_path, capsys):
     out = tmp_path / "creep"
     assert cli.main(["contact", "--creep", "--out", str(out), "--quiet"]) == 0

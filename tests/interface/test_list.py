@@ -31,6 +31,7 @@ def test_unknown_kind_is_refused(capsys):
     assert "vehicles" in capsys.readouterr().err
 
 
+@pytest.mark.further
 def test_list_draws_every_track(tmp_path, capsys):
     assert main(["list", "tracks", "--draw", str(tmp_path / "pictures")]) == 0
     assert (tmp_path / "pictures" / "turnout_190_1in9.png").stat().st_size > 1000

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 import pytest
 from example_result import ROOT, feed
+from selection import points
 from started import started
 
 import railsim
@@ -491,7 +492,7 @@ def begun(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("everyone", [False, True], ids=["parent only", "whole group"])
-@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+@points(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)], always=(0,))
 def test_interrupt_leaves_only_whole_files(tmp_path, everyone, name, status):
     process = begun(tmp_path)
     (os.killpg if everyone else os.kill)(process.pid, getattr(signal, name))
@@ -588,7 +589,7 @@ def test_killed_worker_costs_nothing_but_time(tmp_path):
             "--set",
             "settings.step=1e-4",
             "--until",
-            "200",
+            "60",
             "--workers",
             "2",
         ]

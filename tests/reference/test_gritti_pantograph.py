@@ -9,6 +9,7 @@ of that list: half a unit of the printed digit, or of the second computation.
 
 import numpy as np
 import pytest
+from selection import points
 
 from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism import Mechanism
@@ -235,8 +236,10 @@ def test_a20_cam_reconstructed(lifts):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("lift", "seed"), [*((lift, seed) for lift in (1, 2, 3) for seed in (1, 2, 3)), (5, 2)]
+@points(
+    ("lift", "seed"),
+    [*((lift, seed) for lift in (1, 2, 3) for seed in (1, 2, 3)), (5, 2)],
+    always=(0, 3, 6),
 )
 def test_no_seed_ends_above_the_published_design_reconstructed(lift, seed):
     # lift 4: A21, lift 5 from three seeds: A22; the first start is the published design itself
@@ -250,7 +253,7 @@ def test_no_seed_ends_above_the_published_design_reconstructed(lift, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@points("seed", [1, 2, 3], always=(0,))
 def test_lifts_2_and_3_are_found_without_their_published_parameters_reconstructed(seed):
     for lift, optimum in ((2, 0.2823), (3, 0.2183)):
         starts = optimise(load_mechanism(f"atr95_lift_{lift}"), starts=5, seed=seed).starts
@@ -259,7 +262,7 @@ def test_lifts_2_and_3_are_found_without_their_published_parameters_reconstructe
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@points("seed", [1, 2, 3], always=(1,))
 def test_a21_better_lift_4_from_every_seed_new(seed):
     found = optimise(load_mechanism("atr95_lift_4"), starts=20, seed=seed)
     assert found.feasible
@@ -312,7 +315,7 @@ def test_weighted_objectives_add_up_new():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@points("seed", [1, 2, 3], always=(1,))
 def test_a22_lift_5_that_fits_its_cylinder_from_every_seed_new(seed):
     fits = load_mechanism("atr95_lift_5", [*TO_WORK, "optimise.min_length=0.440"])
     found = optimise(fits, starts=2, seed=seed)

@@ -2,14 +2,16 @@
 
 import pytest
 from dynamics import changed, load_track, load_vehicle
+from selection import points
 
 from railsim import simulate
 
 
 @pytest.mark.usefixtures("small_contact_tables")
-@pytest.mark.parametrize(
+@points(
     ("gauge", "back_to_back", "widening"),
     [(1.455, 1.360, 0.0), (1.435, 1.345, 0.0), (1.435, 1.360, 0.015)],
+    always=(2,),
 )
 def test_coach_runs_in_a_curve_with_more_clearance(gauge, back_to_back, widening):
     """Its leading wheelset lies farther out by half of the clearance that is added."""

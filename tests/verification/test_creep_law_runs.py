@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from dynamics import Settings, evaluate, load_track, load_vehicle
 from rig import DATA, test_vehicle
+from selection import points
 
 from railsim import cli
 from railsim.contact.creep import LAWS, creep_force
@@ -19,6 +20,7 @@ from railsim.simulation import preparation, prepare, simulate
 SPEED = 20.0
 MIDDLE = 390.0  # m, of the circular curve
 laws = pytest.mark.parametrize("law", LAWS)
+some_laws = points("law", LAWS, always=(1, 3))
 
 
 def settings(law, **more):
@@ -105,7 +107,7 @@ def test_straight_track_stays_at_rest(law, bogie):
     assert np.abs(result.wheelset_lateral).max() < 1e-6
 
 
-@laws
+@some_laws
 def test_friction_that_falls_by_nothing_or_at_once(law, coach):
     """decay = 0 is friction as it is, to the last bit; decay without bound is rest times it."""
     track = curve(friction=0.5)
@@ -121,7 +123,7 @@ def test_friction_that_falls_by_nothing_or_at_once(law, coach):
     np.testing.assert_allclose(fallen.Y, less.Y, atol=1.0)
 
 
-@laws
+@some_laws
 def test_third_body_softens_and_keeps_the_friction(law, coach):
     """The curve imposes the leading wheelset's creepages: softer contact, smaller force."""
     stiff = in_curve(coach, law)

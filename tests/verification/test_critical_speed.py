@@ -4,6 +4,7 @@ import cooperrider
 import numpy as np
 import pytest
 from dynamics import load_track, load_vehicle
+from selection import points
 
 from railsim.linear.modes import modes
 from railsim.stability.critical_speed import critical_speed
@@ -40,8 +41,10 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "kind"), [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")]
+@points(
+    ("name", "kind"),
+    [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")],
+    always=(0,),
 )
 def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
     """Non-linear critical speed by ramp, bifurcation and continuation within 0.5 m/s.
@@ -65,8 +68,10 @@ def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
     assert float(branches.amplitude.max()) > 1e-3
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"), [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")]
+@points(
+    ("name", "kind"),
+    [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")],
+    always=(1,),
 )
 def test_a_diagram_alone_tells_how_hunting_begins(name, kind):
     """As continuation does; the hysteresis of the Flexicoil coach, 0.2 m/s, lies between steps."""

@@ -8,6 +8,7 @@ those of many, hence `ROUND_OFF`.
 import numpy as np
 import pytest
 from rig import test_vehicle
+from selection import points
 
 from railsim import load_track, load_vehicle, simulate, simulate_together
 from railsim.definitions.settings import Settings
@@ -95,7 +96,7 @@ def test_vehicles_with_memory_on_irregular_rails():
     assert_each_is_alone(vehicles, track, speed=25.0, start=100.0, duration=2.0, settings=settings)
 
 
-@pytest.mark.parametrize("law", ["table", "fastrip", "polach", "linear"])
+@points("law", ["table", "fastrip", "polach", "linear"], always=(2,))
 def test_every_patch_has_its_own_creep_force(law):
     settings = Settings(creep_law=law)
     assert_each_is_alone(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.linalg import eigh
+from selection import points
 
 import railsim
 from railsim.definitions.flatten import flatten
@@ -106,8 +107,10 @@ def test_mass_is_the_sum_of_the_source(name):
     assert 1e-3 * mass(flatten(load_vehicle(name))) == pytest.approx(MASSES[name], abs=0.05)
 
 
-@pytest.mark.parametrize(
-    "name", [n for n in library_files("vehicle") if not n.startswith(FRICTION)]
+@points(
+    "name",
+    [n for n in library_files("vehicle") if not n.startswith(FRICTION)],
+    always=(0, 4, 9, 13),
 )
 def test_stable_at_110_per_cent_of_the_admissible_speed(name):
     """S1002 on 60E1 1:40, friction 0.4, lateral amplitudes of 3 mm: every oscillation decays."""

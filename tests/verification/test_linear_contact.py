@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dynamics import changed, load_track, load_vehicle
 from rig import test_vehicle
+from selection import points
 
 from railsim.contact import table
 from railsim.contact.table import TableGrid
@@ -70,7 +71,7 @@ def coned():
     return prepared
 
 
-@pytest.mark.parametrize("contact", [Contact(), Contact("harmonic", 3e-3)])
+@points("contact", [Contact(), Contact("harmonic", 3e-3)], always=(1,))
 def test_critical_speed_of_the_benchmark_coach_on_cones(coned, contact):
     """L8: 99.0 m/s and 2.96 Hz computed independently, 5 %; on cones at any amplitude."""
     lost = loss_of_stability(coned(contact).linearised, 60.0, 130.0, points=4)
@@ -138,7 +139,7 @@ AMPLITUDE = 5e-6  # m
 
 
 @pytest.mark.parametrize("name", ["coach_manchester", "coach_flexicoil"])
-@pytest.mark.parametrize("below", [1.0, 3.0, 6.0])
+@points("below", [1.0, 3.0, 6.0], always=(2,))
 def test_a_run_from_the_modes_own_shape_decays_with_its_damping(name, below):
     """L9: hunting, started with its shape, loses what the eigenvalue says.
 

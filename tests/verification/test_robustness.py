@@ -5,6 +5,7 @@ All 280 are run by ``python docs/generate_robustness.py grid``.
 
 import pytest
 from robustness import CASES, peaks, run, ways
+from selection import points
 
 # every thirteenth case: both coaches, all radii, frictions and cant deficiencies
 CHOSEN = CASES[2:260:13]
@@ -12,14 +13,14 @@ REFERRED = CHOSEN[::5]  # compared with the reference scheme as well
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CHOSEN, ids=lambda case: "-".join(map(str, case)))
+@points("case", CHOSEN, always=(0, 7, 11, 18), ids=lambda case: "-".join(map(str, case)))
 def test_step_and_contact_damping_move_no_peak(case):
     differences, _ = ways(case)
     assert max(differences) < 1.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", REFERRED, ids=lambda case: "-".join(map(str, case)))
+@points("case", REFERRED, always=(2,), ids=lambda case: "-".join(map(str, case)))
 def test_the_reference_scheme_moves_no_peak(case):
     differences, _ = ways(case, reference=True)
     assert max(differences) < 1.0

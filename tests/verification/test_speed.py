@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from dynamics import Settings, load_track, load_vehicle
 from rig import test_vehicle
+from selection import points
 
 import railsim
 from railsim.errors import Fault, InputError
@@ -173,7 +174,7 @@ def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(stra
     np.testing.assert_allclose(here.Y, way.Y[rows], atol=0.01 * np.max(np.abs(way.Y)))
 
 
-@pytest.mark.parametrize("speed", [2.0, 6.0])
+@points("speed", [2.0, 6.0], always=(1,))
 def test_start_in_a_curve_at_walking_speed_is_the_state_on_the_way(speed):
     """All wheelsets are in the curve by then: 0.2 % of the largest load, wheel by wheel.
 

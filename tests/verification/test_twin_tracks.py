@@ -8,6 +8,7 @@ axes of Y and Q as cant does.
 import numpy as np
 import pytest
 from dynamics import Settings, load_vehicle
+from selection import points
 from twin_tracks import Wave, alignment, cross_level, differences, level, runs, widening
 
 SPEED = 20.0  # m/s
@@ -35,23 +36,23 @@ def assert_same(coach, tracks, length, settings=EXACT, **more):
     assert max(found.values()) < tolerance(length), found
 
 
-@pytest.mark.parametrize(("length", "height"), LATERAL)
+@points(("length", "height"), LATERAL, always=(1, 3))
 def test_alignment_is_a_wave_of_the_plan(coach, length, height):
     assert_same(coach, alignment(Wave(length, height)), length)
 
 
-@pytest.mark.parametrize(("length", "height"), LATERAL)
+@points(("length", "height"), LATERAL, always=(3,))
 def test_alignment_is_a_wave_of_the_plan_in_a_curve(coach, length, height):
     """In free running: a constant speed along one line is none along the other."""
     assert_same(coach, alignment(Wave(length, height), R300, 0.10), length, FREE)
 
 
-@pytest.mark.parametrize(("length", "height"), HEIGHT)
+@points(("length", "height"), HEIGHT, always=(2,))
 def test_longitudinal_level_is_a_wave_of_the_gradient(coach, length, height):
     assert_same(coach, level(Wave(length, height)), length, FREE)
 
 
-@pytest.mark.parametrize(("length", "height"), HEIGHT)
+@points(("length", "height"), HEIGHT, always=(2,))
 def test_longitudinal_level_is_a_wave_of_the_gradient_in_a_curve(coach, length, height):
     """Q and the vertical acceleration; Y on the guiding flange differs by up to 40 N of 35 kN."""
     one, two = runs(coach, level(Wave(length, height), R300), SPEED, settings=FREE)
@@ -60,7 +61,7 @@ def test_longitudinal_level_is_a_wave_of_the_gradient_in_a_curve(coach, length, 
     assert np.max(np.abs(one.Y - two.Y)) < 60.0
 
 
-@pytest.mark.parametrize(("length", "height"), HEIGHT)
+@points(("length", "height"), HEIGHT, always=(2,))
 @pytest.mark.parametrize(("curvature", "cant"), [(0.0, 0.0), (R300, 0.10)])
 def test_cross_level_is_a_wave_of_the_cant(coach, length, height, curvature, cant):
     assert_same(coach, cross_level(Wave(length, height), curvature, cant), length)
