@@ -6,13 +6,21 @@ static equilibrium finds ride height, roll and pitch.
 """
 
 from collections.abc import Iterator
-from typing import Any, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from railsim.definitions.base import Definition, Name, Positive, PositiveVector, Text, Vector
 from railsim.errors import Fault, nearest
 
+DESIGN = "design"  # the load of the vehicle's own numbers, as a load case is called
+
+
+def _case(name: str) -> str | None:
+    return None if name == DESIGN else name
+
+
+LoadName = Annotated[Text, AfterValidator(_case)]
 V = TypeVar("V", bound=Definition)  # a vehicle, which is built on this module
 
 
@@ -80,8 +88,11 @@ def load_faults(vehicle: Any) -> list[Fault]:
         for name, load in vehicle.loads.items()
         for fault in _unknown(vehicle, load, f"loads.{name}")
     ]
+    if DESIGN in vehicle.loads:
+        found = "the load of the vehicle's own numbers is called so"
+        faults.append(Fault("", f"loads.{DESIGN}", found, "another name"))
     if vehicle.load is not None and vehicle.load not in vehicle.loads:
-        allowed = nearest(vehicle.load, list(vehicle.loads)) if vehicle.loads else "none defined"
+        allowed = nearest(vehicle.load, [DESIGN, *vehicle.loads])
         faults.append(Fault("", "load", f"no load case '{vehicle.load}'", allowed))
     return faults
 

@@ -23,7 +23,7 @@ from railsim.definitions.base import (
     Vector,
 )
 from railsim.definitions.elements import AnyElement
-from railsim.definitions.loads import LoadCase
+from railsim.definitions.loads import LoadCase, LoadName
 from railsim.definitions.offered import offered
 from railsim.drawn import Drawn
 
@@ -137,8 +137,8 @@ class Vehicle(FileDefinition, Drawn):
     """What the vehicle is called in tables and plots"""
     source: Text | None = None
     """Where the numbers come from"""
-    load: Text | None = None
-    """Load case in force; by default the design load, the numbers of the bodies themselves"""
+    load: LoadName | None = None
+    """Load case in force; `design`, the default: the numbers of the bodies themselves"""
     loads: dict[Name, LoadCase] = Field(default_factory=dict)
     """Load cases by name"""
     reference: Text | None = None

@@ -165,3 +165,30 @@ def test_a_wrong_load_case_is_refused_with_its_key(tmp_path, text, message):
 def test_length_and_preload_together_are_refused():
     with pytest.raises(ValueError, match="not both"):
         wagon({"free_length": 0.34, "preload": [0.0, 0.0, 1.0]})
+
+
+def test_wagon_on_y25_bogies_stands_tare_and_laden_where_its_springs_carry_it(straight):
+    """From the springs alone: per axlebox 1.0 MN/m (free 260 mm) and 1.6 MN/m (free 234 mm)."""
+
+    def heights(load):
+        vehicle = load_vehicle("wagon_y25").replace(load=load)
+        balance = equilibrium(assemble(vehicle, straight, load_settings()), 1.0)
+        names = balance.model.index.bodies
+        z = dict(zip(names, balance.state[2 : 6 * len(names) : 6], strict=True))
+        return z["front.frame"] - z["front.outer.wheelset"], z["carbody"] - z["front.frame"]
+
+    frame, carbody = heights(None)
+    assert heights("design") == (
+        frame,
+        carbody,
+    )  # its own numbers, as a study over loads names them
+    tare, laden = ((mass + 2 * 2100.0) / 8 * GRAVITY for mass in (12200.0, 80200.0))
+    nominal = 0.260 - 0.2399
+    assert tare < 1.0e6 * 0.026  # the inner springs are free
+    assert frame == pytest.approx(tare / 1.0e6 - nominal, abs=1e-7)
+    sunk, lower = heights("laden")
+    compression = (laden + 1.6e6 * 0.026) / (1.0e6 + 1.6e6)
+    assert sunk == pytest.approx(compression - nominal, rel=1e-5)  # 35.7 mm
+    # centre bowl and side bearers of a bogie
+    carried = 2 * 50e6 + 2 * 0.55e6
+    assert lower - carbody == pytest.approx(34000.0 * GRAVITY / carried, rel=1e-4)  # 3.3 mm
