@@ -168,5 +168,8 @@ def _lines(vehicle: str, ways: "list[Route]", rows: "list[dict[str, float | None
             "" if conicity is None else f"{conicity:.3f}",
         ])  # fmt: skip
     header = ["distance (km)", "worn area (mm2)", "deepest (mm)", "at y (mm)", "conicity at 3 mm"]
-    note = "Pearce and Sherratt (1991), mean of all wheels; y from the tape circle, flange negative"
+    note = (
+        "Pearce and Sherratt (1991), mean of all wheels; "
+        "y from the nominal rolling circle, flange negative"
+    )
     return [vehicle, f"  {shares}", f"  {note}", "", *table(header, cells, numbers=0)]

@@ -150,8 +150,8 @@ def wear_rows(
     -------
     list of dict
         The new wheel, then the wheel after each step: `distance` [m], `area` [m2], `deepest` [m]
-        and its position `deepest_y` from the tape circle [m], all since the beginning, and
-        `equivalent_conicity` at 3 mm (EN 15302), None where there is none.
+        and its position `deepest_y` from the nominal rolling circle [m], all since the beginning,
+        and `equivalent_conicity` at 3 mm (EN 15302), None where there is none.
     """
     if not found:
         return []

@@ -63,8 +63,8 @@ def test_several_runs_in_one_call_are_timed_together(found):
         assert record["real_time_best"] >= record["real_time"] > 0.0
 
 
-def test_json_and_tables_hold_what_was_found(monkeypatch, capsys):
-    monkeypatch.setattr(report, "QUICK", TINY)
+def test_json_and_tables_hold_what_was_found(found, monkeypatch, capsys):
+    monkeypatch.setattr(report, "benchmark", lambda _plan, _progress: found)
     assert main(["bench", "--quick", "--json", "--quiet"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert {"hardware", "versions", "runs", "parts", "fastsim", "ensembles"} <= set(data)

@@ -131,6 +131,7 @@ def test_map_over_any_key_of_the_files(capsys, tmp_path):
     assert (folder / "critical_speed.png").stat().st_size > 1000
 
 
+@pytest.mark.usefixtures("small_contact_tables")
 def test_conicity_over_amplitude_stands_beside_the_critical_speed(capsys):
     """On given cones it is gamma (b0 + R gamma)/(b0 - r0 gamma) at all amplitudes but the largest.
 

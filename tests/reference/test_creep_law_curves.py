@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from creep_curves import creep_curves
+from selection import points
 
 from railsim.contact.creep import LAWS, creep_force
 
@@ -90,7 +91,7 @@ def generate():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
+@points(
     ("name", "maker"),
     [
         ("creep_laws", "laws_table"),
@@ -98,6 +99,7 @@ def generate():
         ("fastsim", "fastsim_table"),
         ("law_curving", "curving_table"),
     ],
+    always=(0, 1, 2),
 )
 def test_tables_of_the_page_on_creep_are_up_to_date(generate, reference_dir, name, maker):
     page = generate.PAGE.read_text("utf-8")

@@ -52,6 +52,7 @@ def test_hardest_point_on_other_grids(curves, n):
 
 
 @pytest.mark.slow
+@pytest.mark.further
 def test_every_point_within_a_hundredth(curves):
     force, moment = worst_errors(curves, range(curves.case.size))
     assert force < 0.01

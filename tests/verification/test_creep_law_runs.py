@@ -217,8 +217,7 @@ def test_ellipses_beyond_the_range_are_counted_and_told(law, bogie, long_patches
     assert np.isfinite(result.Q).all()
     facts = result.attributes
     assert facts["patches_out_of_range"] == facts["patches_evaluated"] > 0
-    (remark,) = result.remarks
-    assert "range of a/b" in remark
+    (remark,) = [remark for remark in result.remarks if "range of a/b" in remark]
     assert remark in caplog.text
 
 

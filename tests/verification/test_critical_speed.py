@@ -44,7 +44,7 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
 @points(
     ("name", "kind"),
     [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")],
-    always=(0,),
+    always=(),
 )
 def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
     """Non-linear critical speed by ramp, bifurcation and continuation within 0.5 m/s.

@@ -19,7 +19,6 @@ from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.definitions.sources import library_files, shipped_folder
 from railsim.model.assembly import assemble
-from railsim.model.element_arrays import vertical_support
 from railsim.model.equilibrium import equilibrium
 from railsim.studies.combine import combinations
 from railsim.track.alignment import Alignment
@@ -64,7 +63,7 @@ def vertical_modes(flat):
         # the bush of a trailing arm turns and carries nothing; links along a line are not vertical
         if "bush" in element.name or element.definition.kind == "spring_damper":
             continue
-        k = vertical_support(element.definition)
+        k = element.definition.vertical_stiffness
         row = np.zeros(len(M))
         for name, sign, point in (
             (element.body1, 1.0, element.point1),

@@ -79,9 +79,10 @@ def test_critical_speed_of_the_benchmark_coach_on_cones(coned, contact):
     assert lost.modes[0].frequencies[0] == pytest.approx(2.96, rel=0.05)
 
 
-@pytest.mark.parametrize(
+@points(
     ("name", "cones", "allowed"),
     [("benchmark_vehicle1", True, 0.01), ("coach_manchester", False, 0.02)],
+    always=(),
 )
 def test_half_the_spacing_of_the_contact_table_keeps_the_tangent_critical_speed(
     name, cones, allowed, monkeypatch
