@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from railsim.plot.style import Picture, styled
 from railsim.profiles import Profile
 
-SHOWN = (-0.045, 0.035)  # m from the tape circle
+SHOWN = (-0.045, 0.035)  # m from the nominal rolling circle
 
 
 def wear_figure(
@@ -47,7 +47,7 @@ def wear_figure(
             )  # fmt: skip
         depth.set_xlim(1e3 * SHOWN[0], 1e3 * SHOWN[1])
         depth.set_ylim(bottom=0.0)
-        depth.set_xlabel("y from the tape circle, flange negative (mm)")
+        depth.set_xlabel("y from the nominal rolling circle, flange negative (mm)")
         depth.set_ylabel("worn off in z (mm)")
         depth.legend()
         values = [row["equivalent_conicity"] for row in rows]
