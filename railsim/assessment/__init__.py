@@ -1,24 +1,24 @@
-"""Assessment: results to estimates against limits and to a verdict.
+"""Assessment of results: estimates, limits, verdict.
 
 =====================  =====================================================================
 `assess.py`            `assess`: all runs of a vehicle to one `Assessment`
-`record.py`            what is read of a result: equal steps, fine enough, part by part
-`sections.py`          test sections and zones from the track under a run
+`record.py`            a result read as a measured record, part by part
+`sections.py`          test sections and zones of the track that a run covers
 `en14363.py`           filters and section values of EN 14363 and UIC 518
 `statistics.py`        one- and two-dimensional estimates
 `verdict.py`           estimates against limits, zones, verdict
-`track_quality.py`     standard deviations of the rails under the run
+`track_quality.py`     standard deviations of the track irregularities along a run
 `weighting.py`         frequency weightings Wb, Wc, Wd, Wk
 `comfort.py`           EN 12299, ISO 2631-1, P_CT, P_DE
 `sperling.py`          Sperling's index
-`comfort_report.py`    comfort at all points of a run
+`comfort_report.py`    comfort at all measuring points of a run
 `wear.py`              laws of wear and rolling contact fatigue
 `wear_report.py`       wear and fatigue at all wheels of a run
 `safety.py`            Nadal, climb distance, overturning
 `safety_report.py`     the same over a run
 =====================  =====================================================================
 
-It reads results only and runs nothing.  Limits are data files, ``limits/*.toml``.
+The package only reads results; it starts no runs.  Limits are data files, ``limits/*.toml``.
 Begin reading in `assess.py`.
 """
 

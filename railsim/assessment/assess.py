@@ -1,4 +1,4 @@
-"""`assess`: results to verdicts. The one function that the command line and studies call."""
+"""`assess`: results against limits; the function that the command line and studies call."""
 
 import hashlib
 import math
@@ -35,7 +35,7 @@ ZONES = ("1", "2", "3", "4")
 
 @dataclass(frozen=True)
 class Quality:
-    """Track quality under one section [m] and its class after UIC 518."""
+    """Track quality of one section [m] and its class after UIC 518."""
 
     run: str
     begin: float
@@ -59,17 +59,17 @@ class Assessment:
     verdict : str
         ``pass``, ``fail``, ``incomplete`` or ``derailed``; empty where the standard has none.
     reasons : tuple of str
-        Why it is not a pass.
+        Reasons why it is not a pass.
     zones : tuple of ZoneReport
     quality : tuple of Quality
     comfort : dict
-        Points by run.
+        Comfort at the measuring points, by run.
     wear : dict
-        Wheels by run.
+        Wear of the wheels, by run.
     safety : dict
         `SafetyReport` by run.
     remarks : tuple of str
-        What a reader must know.
+        Notes for the reader.
     limits : RunningLimits or ComfortLimits or None
     """
 
@@ -93,7 +93,7 @@ class Assessment:
 
     @property
     def worst(self) -> tuple[Assessed, ...]:
-        """Of every zone and quantity the place with the largest share of its limit."""
+        """For each zone and quantity, the value with the largest share of its limit."""
         found: list[Assessed] = []
         for zone in self.zones:
             by_name: dict[str, Assessed] = {}
@@ -105,7 +105,7 @@ class Assessment:
         return tuple(found)
 
     def record(self) -> dict[str, object]:
-        """Return it as plain numbers and strings, SI."""
+        """Return the assessment as plain numbers and strings, SI."""
         limits = self.limits
         comfort = {}
         if isinstance(limits, ComfortLimits):
@@ -143,20 +143,20 @@ def assess(
     Parameters
     ----------
     results : mapping of str to Result, or Result
-        Runs by what they are called; all runs of a vehicle are assessed together.
+        Results by the names of their runs; all runs of a vehicle are assessed together.
     standard : {'en14363', 'uic518', 'comfort', 'wear', 'safety'}
     limits : str or Path, optional
         Limits file, or name of a shipped one; by default that of the standard.
     service : Service, optional
-        Replaces the vehicles' service tables.
+        Used in place of the vehicles' service tables.
     method : {'normal', 'simplified'}
-        With wheel forces, or with accelerations only.
+        Measuring method: with wheel forces, or with accelerations only.
     causal : bool
-        Filters of EN 14363 as amplifiers have them, instead of without phase.
+        Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
     coarse : bool
-        Take also results below 1000 samples a second that were not low-passed.
+        Accept results with fewer than 1000 samples per second that were not low-pass filtered.
     all_sections : bool
-        Count also sections outside the conditions of their zones.
+        Include sections outside the conditions of their zones.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def assess(
     Raises
     ------
     InputError
-        Results that lack what is needed, are too coarse or too short.
+        A result lacks a quantity, is sampled too coarsely or is too short.
 
     Examples
     --------
@@ -270,7 +270,7 @@ def _quality(
 def _verdict(
     reports: Sequence[ZoneReport], sections: Sequence[TestSection], derailed: Mapping[str, Result]
 ) -> tuple[str, list[str]]:
-    """Verdict and why it is not a pass."""
+    """Verdict, and the reasons why it is not a pass."""
     why = [f"{name}: {result.status}, {result.attributes.get('status_reason', '')}"
            for name, result in derailed.items()]  # fmt: skip
     failed = False
@@ -308,7 +308,7 @@ def _other(
     vehicle = next(iter(runs.values())).vehicle().name
     records = {name: Record(result, name, coarse=coarse) for name, result in runs.items()}
     remarks = [remark for record in records.values() for remark in record.remarks()]
-    remarks += [f"{name}: {r.status}, only the part before it is assessed"
+    remarks += [f"{name}: {r.status}, only the part before that is assessed"
                 for name, r in runs.items() if r.status != "complete"]  # fmt: skip
     names = tuple(runs)
     if standard == "wear":

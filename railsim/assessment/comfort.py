@@ -1,14 +1,15 @@
-"""Ride comfort from accelerations on the car body's floor: EN 12299 and ISO 2631-1.
+"""Ride comfort from accelerations on the floor of the car body: EN 12299 and ISO 2631-1.
 
-Mean comfort (EN 12299): weighted accelerations, root mean squares over 5 s, of these the 50 or 95 %
-values over 60 blocks.  Comfort on curve transitions P_CT and on discrete events P_DE: from lateral
-acceleration, its change within 1 s and the roll velocity, without phase below 2 Hz.
+Mean comfort (EN 12299): weighted accelerations, root mean squares over 5 s, and their 50 or 95 %
+percentiles over 60 blocks.  Comfort on curve transitions P_CT and on discrete events P_DE: from the
+lateral acceleration, its change within 1 s and the roll velocity, after a zero-phase low-pass
+filter of 2 Hz.
 
-Lateral accelerations are what an accelerometer reads: without the part of gravity.
+Lateral accelerations are accelerometer readings: they include the component of gravity.
 
 Sources: EN 12299:2009 (replaced by EN 12299:2024) and ISO 2631-1:1997; formulas and constants of
-P_CT and P_DE recalled (equal to the older form in per cent of g), of the others read in re-entries.
-None has been compared with the printed standards.
+P_CT and P_DE recalled (equal to the older form in per cent of g), the others from secondary
+sources.  None has been compared with the printed standards.
 """
 
 import math
@@ -25,7 +26,7 @@ BLOCKS = 60
 
 
 def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
-    """Root mean squares of whole blocks one behind the other.
+    """Root mean squares of consecutive complete blocks.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def block_rms(a: Floats, rate: float, length: float = BLOCK) -> Floats:
 
 @dataclass(frozen=True)
 class MeanComfort:
-    """Mean comfort of one point.
+    """Mean comfort at one measuring point.
 
     Attributes
     ----------
@@ -57,7 +58,7 @@ class MeanComfort:
     continuous : float64[block, 3]
         Continuous comfort: the root mean squares over 5 s with Wd, Wd, Wb along x, y, z [m/s2].
     blocks : int
-        Number of blocks of 5 s; the standard wants 60.
+        Number of blocks of 5 s; the standard requires 60.
     """
 
     N_MV: float
@@ -74,8 +75,8 @@ def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
     N_VA = 4 azP95 + 2 sqrt(ayA95^2 + azA95^2) + 4 axD95;
     N_VD = 3 sqrt(16 axP50^2 + 4 ayP50^2 + azP50^2) + 5 ayP95.
 
-    The accelerations of the seat's surface (A) and back (D) are taken as those of the floor: there
-    is no seat in the model.
+    The accelerations of the seat surface (A) and back (D) are those of the floor: the model has no
+    seat.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ def en12299_mean_comfort(a: Floats, rate: float) -> MeanComfort:
     Returns
     -------
     MeanComfort
-        With nan where the record is shorter than a block.
+        Values are nan where the record is shorter than a block.
     """
     floor, back = weighted_for_comfort(a, rate)
     return mean_comfort(block_rms(floor, rate), block_rms(back, rate))
@@ -170,7 +171,7 @@ def iso2631_vibration(a: Floats, rate: float) -> Vibration:
 
 
 def running_mean(x: Floats, rate: float, length: float) -> Floats:
-    """Means over `length` [s], one for each position of the window within the record.
+    """Running means over `length` [s], for each position of the window within the record.
 
     The record is linear between its samples; value i is the mean from sample i on.
     """
@@ -239,9 +240,9 @@ class TransitionComfort:
     Attributes
     ----------
     begin, end : float
-        When the point is at its beginning and end [s].
+        Times at which the measuring point passes its beginning and end [s].
     acceleration, jerk, roll_rate : float
-        What P_CT is made of [m/s2], [m/s3], [deg/s].
+        Arguments of P_CT [m/s2], [m/s3], [deg/s].
     standing, seated : float
         P_CT [%].
     """
@@ -258,11 +259,11 @@ class TransitionComfort:
 def transition_comfort(
     time: Floats, lateral: Floats, roll_rate: Floats, begin: float, end: float
 ) -> TransitionComfort | None:
-    """P_CT of a transition passed between two times.
+    """P_CT of a transition that is passed between two times.
 
-    The acceleration is the largest 1 s mean from the beginning to 1.6 s after the end, the jerk the
-    largest difference of two such means 1 s apart from 1 s before the beginning on, both after a
-    low pass of 2 Hz; the roll velocity the largest 1 s mean within the transition.
+    The acceleration is the largest 1 s mean from the beginning to 1.6 s after the end; the jerk is
+    the largest difference of two such means 1 s apart, from 1 s before the beginning; both after a
+    low-pass filter of 2 Hz.  The roll velocity is the largest 1 s mean within the transition.
 
     Parameters
     ----------
@@ -276,7 +277,7 @@ def transition_comfort(
     Returns
     -------
     TransitionComfort or None
-        None where the record does not reach from 2 s before to 2.1 s behind.
+        None where the record does not extend from 2 s before to 2.1 s after the transition.
     """
     if time[0] > begin - 2.0 or time[-1] < end + 2.1:
         return None
@@ -301,14 +302,14 @@ def transition_comfort(
 
 
 def event_comfort(lateral: Floats, rate: float) -> dict[str, float]:
-    """Largest P_DE of a record by posture [%]: over all windows of 2 s, below 2 Hz."""
+    """Largest P_DE of a record by posture [%]: all windows of 2 s, low-pass filter of 2 Hz."""
     low = low_passed(lateral, rate, 2.0)
     size = round(2.0 * rate)
     if len(low) <= size:
         return dict.fromkeys(EVENT, math.nan)
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    # windows centred on each sample; those that reach beyond the ends are left out
+    # windows centred on each sample; those that extend beyond the ends are omitted
     half = size // 2
     whole = slice(half, len(low) - half)
     spread = maximum_filter1d(low, 2 * half + 1)[whole] - minimum_filter1d(low, 2 * half + 1)[whole]

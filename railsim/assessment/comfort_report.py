@@ -1,4 +1,4 @@
-"""Comfort at every point of the car body's floor of a run, read part by part."""
+"""Comfort at every measuring point on the floor of the car body, read part by part."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.errors import Fault, InputError
 from railsim.result.filters import Floats
 
-MARGIN = 16.0  # s around a part, for the weightings' lower limit of 0.4 Hz
+MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz of the weightings
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class PointComfort:
     events: dict[str, float]
 
     def record(self, limits: ComfortLimits) -> dict[str, object]:
-        """Return it as plain numbers and strings, SI but for the indices in per cent."""
+        """Return the values as plain numbers and strings, SI, percentages in per cent."""
         continuous = self.mean.continuous
         return {
             "place": self.sensor,
@@ -79,23 +79,23 @@ class PointComfort:
 
 
 def class_of(classes: Classes, value: float) -> str:
-    """Name of the class that a value falls into; empty for nan."""
+    """Name of the class of a value; empty for nan."""
     if np.isnan(value):
         return ""
     return next((name for end, name in classes.values if value < end), classes.above)
 
 
 def comfort_report(record: Record) -> list[PointComfort]:
-    """Comfort at all points but those on bogie frames.
+    """Comfort at all measuring points except those on bogie frames.
 
     Parameters
     ----------
     record : Record
-        Run with readings of sensors, or the motion of the bodies.
+        Run with sensor readings, or with the motion of the bodies.
 
     Raises
     ------
-    InputError : there are none, or the run is shorter than one block of 5 s.
+    InputError : there are no measuring points, or the run is shorter than one block of 5 s.
     """
     names = [name for name in record.sensors if not name.startswith("frame_")]
     if not names:
@@ -110,7 +110,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
         for column, into in zip(columns, gathered, strict=True):
             into.add(a[:, column], counted, record.rate)
     if not gathered[0].blocks:
-        allowed = "5 s at least after the first 3 s"
+        allowed = "at least 5 s after the first 3 s"
         raise InputError([Fault(record.name, "time", "too short for one block of 5 s", allowed)])
     transitions = _transitions(record, columns)
     return [
@@ -128,7 +128,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
 
 
 class _Gathered:
-    """Sums and blocks of one point over the parts of a run."""
+    """Sums and blocks of one measuring point over the parts of a run."""
 
     def __init__(self) -> None:
         self.blocks: list[Floats] = []
@@ -139,7 +139,7 @@ class _Gathered:
         self.count = 0
 
     def add(self, a: Floats, counted: slice, rate: float) -> None:
-        """Take a part: accelerations with margins, and which of them count."""
+        """Add a part: accelerations with margins, and which of them count."""
         floor, back = weighted_for_comfort(a, rate)
         blocks = block_rms(floor[counted], rate)
         if len(blocks):
@@ -179,6 +179,6 @@ def _transitions(record: Record, columns: list[int]) -> list[list[TransitionComf
 
 
 def short_of_blocks(points: list[PointComfort]) -> str:
-    """Sentence where there are fewer blocks than the standard wants; empty if not."""
+    """Sentence if there are fewer blocks than the standard requires; otherwise empty."""
     blocks = points[0].mean.blocks
-    return "" if blocks >= BLOCKS else f"{blocks} blocks of 5 s, EN 12299 wants {BLOCKS}"
+    return "" if blocks >= BLOCKS else f"{blocks} blocks of 5 s, EN 12299 requires {BLOCKS}"

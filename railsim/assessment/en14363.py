@@ -1,6 +1,6 @@
 """Running tests after EN 14363 (2016 with A2:2022) and UIC 518: section values of a run.
 
-Filters and section values (order 4, without phase by default):
+Filters and section values (order 4, zero phase by default):
 
 ====================================  ================  ==============  =====================
 quantity                              filter            then            value of a section
@@ -15,11 +15,12 @@ quantity                              filter            then            value of
 ``instability``                       f0 +- 2 Hz        rms over 100 m  largest
 ====================================  ================  ==============  =====================
 
-Y/Q: both are filtered, divided, then averaged; where the filtered Q <= 0 the wheel is lifted, and
-the metres are reported.  Signs: in curves a force outwards and an acceleration of a curve taken too
-fast are positive; the outer wheel counts; left and right curves are pooled.  On straight track both
-percentiles of a signed quantity are values.  A window of 2 m lies within its section; that of the
-instability is as long as the section where this is shorter than 100 m.
+Y/Q: both forces are filtered, divided, then averaged.  Where the filtered Q <= 0 the wheel is
+lifted; the length over which it is lifted is reported.  Signs: in curves an outward force is
+positive, and so is the lateral acceleration with cant deficiency; the outer wheel is assessed; left
+and right curves are pooled.  On straight track both percentiles of a signed quantity are values.
+A window of 2 m lies within its section; the window of the instability has the length of the section
+where this is shorter than 100 m.
 """
 
 import math
@@ -38,10 +39,10 @@ MEAN, STEP = 2.0, 0.5  # m
 RIDE = (0.4, 10.0)  # Hz
 SAFETY_Y, SAFETY_Z, FRAME = 6.0, (0.4, 4.0), 10.0  # Hz
 HALF_BAND, LOWEST = 2.0, 0.4  # Hz, of the instability filter
-HUNTING = (0.4, 20.0)  # Hz, where the dominant frequency is looked for
+HUNTING = (0.4, 20.0)  # Hz, range of the dominant frequency
 RMS_LENGTH, RMS_STEP = 100.0, 10.0  # m
-MARGIN = 16.0  # s around a part, for the filter of 0.4 Hz
-LONGEST = 60.0  # s of sections that are evaluated at once
+MARGIN = 16.0  # s on either side of a part, for the filter of 0.4 Hz
+LONGEST = 60.0  # s, duration of the sections that are evaluated together
 
 Key = tuple[str, str]
 
@@ -54,9 +55,10 @@ class SectionValues:
     ----------
     section : TestSection
     values : dict
-        By quantity and place, one or two values (both percentiles on straight track) [SI].
+        By quantity and wheelset, wheel or sensor: one value, or both percentiles on straight track
+        [SI].
     lifted : dict
-        Metres without load by wheel.
+        Length without load by wheel [m].
     frequencies : dict
         Dominant frequency of the track shifting force by wheelset [Hz].
     """
@@ -70,7 +72,7 @@ class SectionValues:
 def section_values(
     record: Record, sections: Sequence[TestSection], *, causal: bool = False
 ) -> list[SectionValues]:
-    """Values of all given sections of a run.
+    """Values of the given sections of a run.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def section_values(
     sections : sequence of TestSection
         In the order of the track.
     causal : bool
-        Filters as amplifiers have them, instead of without phase.
+        Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
     """
     needed = ["Q", "Y", "wheelset_distance"]
     record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
@@ -96,7 +98,7 @@ def section_values(
 
 
 def _stretches(sections: Sequence[TestSection]) -> list[list[TestSection]]:
-    """Neighbouring sections that are read and filtered at once."""
+    """Neighbouring sections that are read and filtered together."""
     groups: list[list[TestSection]] = []
     for section in sections:
         last = groups[-1] if groups else None
@@ -135,7 +137,7 @@ class _Part:
         self._accelerations(record, rows, inner)
 
     def _near(self, record: Record, begin: float, end: float, rows: slice) -> slice:
-        """Rows of this part with a margin that is enough for 20 Hz."""
+        """Rows of this part with a margin that suffices for 20 Hz."""
         near = record.rows_between(begin, end, 0.5)
         return slice(near.start - rows.start, near.stop - rows.start)
 
@@ -167,13 +169,13 @@ def _between(s: Floats, begin: float, end: float) -> slice:
 
 
 def _around(s: Floats, begin: float, end: float) -> slice:
-    """Rows from the last before `begin` to the first behind `end`, for means over distance."""
+    """Rows from the last before `begin` to the first after `end`, for means over distance."""
     inside = _between(s, begin, end)
     return slice(max(0, inside.start - 1), min(len(s), inside.stop + 1))
 
 
 def _signed(values: Floats, sign: int, percentiles: Sequence[float] = (LOW, HIGH)) -> list[float]:
-    """Values of a signed quantity: outwards in curves, both ways on straight track."""
+    """Values of a signed quantity: outwards in curves, both signs on straight track."""
     if sign:
         return [float(np.percentile(sign * values, HIGH))]
     low, high = np.percentile(values, percentiles)
@@ -204,7 +206,7 @@ def _forces(part: _Part, found: SectionValues) -> None:
 def _quotient(
     part: _Part, found: SectionValues, w: int, side: int, centres: Floats, wheel: str
 ) -> None:
-    """Y/Q of one wheel: its 2 m means, and the metres without load."""
+    """Y/Q of one wheel: 2 m means, and the length without load [m]."""
     s = part.s_forces[:, w]
     around = _around(s, found.section.begin, found.section.end)
     Q, Y, s = part.Q[around, w, side], part.Y[around, w, side], s[around]
@@ -256,9 +258,9 @@ def _instability(part: _Part, found: SectionValues) -> None:
 
 
 def dominant_frequency(x: Floats, rate: float) -> float:
-    """Frequency of the largest part of a record's spectrum between 0.4 and 20 Hz [Hz].
+    """Frequency of the largest spectral component between 0.4 and 20 Hz [Hz].
 
-    Hann window over the whole record, four times as many points as the record has.
+    Hann window over the whole record, zero-padded to four times its length.
     """
     n = len(x)
     power = np.abs(np.fft.rfft((x - np.mean(x)) * np.hanning(n), 4 * n)) ** 2

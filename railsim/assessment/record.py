@@ -1,6 +1,6 @@
-"""What an assessment reads of a result: equal time steps, fine enough, with what it needs.
+"""A result as a measured record: equal time steps, sampled finely enough, quantities complete.
 
-A result is read part by part: a record of 100 km needs no more memory than one of a kilometre.
+A result is read part by part: a record of 100 km needs no more memory than one of 1 km.
 """
 
 import math
@@ -15,10 +15,10 @@ from railsim.result.filters import Floats
 from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment
 
-FINE_ENOUGH = 1000.0  # samples a second of instantaneous values
-START = 3.0  # s after the start that are left out
+FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
+START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
-PIECE = 60.0  # s that are read at once where nothing else says so
+PIECE = 60.0  # s that are read at once by default
 
 
 class Record:
@@ -28,13 +28,13 @@ class Record:
     ----------
     result : Result
     name : str
-        What the user knows it by, for messages.
+        Name of the run in messages.
     coarse : bool
-        Take also what is sampled too coarsely.
+        Accept a result that is sampled too coarsely.
 
     Raises
     ------
-    InputError : unequal time steps, too few samples a second, too short.
+    InputError : unequal time steps, too few samples per second, too short.
     """
 
     def __init__(self, result: Result, name: str, *, coarse: bool = False) -> None:
@@ -43,7 +43,7 @@ class Record:
         steps = np.diff(self.time)
         if len(steps) < 10:
             raise self.fault("time", f"{len(self.time)} instants", "a longer run")
-        # the last step of a run is shorter where its end falls between two outputs
+        # the last step of a run is shorter if the run ends between two outputs
         self.rows = len(self.time) - 1
         step = float(np.median(steps))
         self.rate = 1.0 / step
@@ -54,13 +54,13 @@ class Record:
         self.coarse = self.low_pass is None and self.rate < FINE_ENOUGH * (1.0 - 1e-3)
         if self.coarse and not coarse:
             allowed = (
-                f"{FINE_ENOUGH:g} at least (settings.output_rate=1000), or values low-passed by "
-                "the run (settings.outputs.low_pass); --coarse assesses it all the same"
+                f"at least {FINE_ENOUGH:g} (settings.output_rate=1000), or values low-pass "
+                "filtered by the run (settings.outputs.low_pass); --coarse assesses it nevertheless"
             )
-            raise self.fault("time", f"{self.rate:.4g} samples a second", allowed)
+            raise self.fault("time", f"{self.rate:.4g} samples per second", allowed)
 
     def fault(self, key: str, found: str, allowed: str) -> InputError:
-        """Return the error that something about the result is not what it must be."""
+        """Return the error for a property of the result that is not admissible."""
         return InputError([Fault(self.name, key, found, allowed)])
 
     def need(self, names: Sequence[str], output: str) -> None:
@@ -68,7 +68,7 @@ class Record:
 
         Raises
         ------
-        InputError : some of `names` are missing; says that `output` has to be asked for.
+        InputError : some of `names` are missing; the message names the `output` to request.
         """
         missing = [name for name in names if name not in self.result]
         if missing:
@@ -84,12 +84,12 @@ class Record:
 
     @cached_property
     def offsets(self) -> Floats:
-        """Arc length of each wheelset beyond that of the reference body [m]."""
+        """Arc length of each wheelset relative to the reference body [m]."""
         return np.asarray(self.result.part("wheelset_distance", slice(0, 1))[0] - self.distance[0])
 
     @cached_property
     def sensors(self) -> Mapping[str, Sensor]:
-        """Sensors whose readings can be had, by name."""
+        """Sensors whose readings are available, by name."""
         known = sensors(self.result.vehicle())
         if "sensor_acceleration" in self.result:
             return {n: known[n] for n in self.result.coordinates["sensor"] if n in known}
@@ -97,7 +97,7 @@ class Record:
         return {name: sensor for name, sensor in known.items() if sensor.body in bodies}
 
     def place(self, sensor: str) -> float:
-        """Arc length of a sensor beyond that of the reference body [m]."""
+        """Arc length of a sensor relative to the reference body [m]."""
         return self.sensors[sensor].offset + self.sensors[sensor].arm[0]
 
     def readings(self, rows: slice) -> tuple[Floats, Floats]:
@@ -113,7 +113,7 @@ class Record:
         return readings(self.sensors, motion, self.result.bodies, self.alignment, speed)
 
     def covered(self) -> tuple[float, float]:
-        """Arc lengths between which every place was recorded after the start [m]."""
+        """Range of arc length that the whole vehicle covered after the start [m]."""
         places = [*self.offsets, *(self.place(name) for name in self.sensors)]
         ahead, behind = max(0.0, *places), min(0.0, *places)
         first = int(np.searchsorted(self.time, self.time[0] + START))
@@ -130,7 +130,7 @@ class Record:
         )
 
     def rows_between(self, begin: float, end: float, margin: float) -> slice:
-        """Rows in which any place is between two arc lengths, and `margin` seconds around."""
+        """Rows in which any part of the vehicle is between two arc lengths, with a margin [s]."""
         places = [0.0, *self.offsets, *(self.place(name) for name in self.sensors)]
         extra = math.ceil(margin * self.rate)
         first = int(np.searchsorted(self.distance, begin - max(places))) - extra
@@ -149,11 +149,11 @@ class Record:
         return found
 
     def remarks(self) -> list[str]:
-        """What a reader of the assessment must know about the record."""
+        """Notes on the record for the reader of the assessment."""
         found = list(self.result.remarks)
         if self.coarse:
             found.append(
-                f"{self.name}: {self.rate:.4g} samples a second are too few for instantaneous "
-                "values: what the filters would have taken out may be folded into the result"
+                f"{self.name}: {self.rate:.4g} samples per second are too few for instantaneous "
+                "values: components above half this rate may be aliased into the result"
             )
         return found

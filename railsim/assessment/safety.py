@@ -1,4 +1,4 @@
-"""Safety against derailment and overturning from single numbers and records.
+"""Safety against derailment and overturning: formulas for single values and records.
 
 Nadal (1896): a wheel climbs where Y/Q exceeds (tan b - mu)/(1 + mu tan b), b the flange angle.
 """
@@ -34,8 +34,8 @@ def nadal(flange_angle: float, mu: float) -> float:
 def flange_angle(profile: Profile) -> float:
     """Largest angle of a wheel profile on its flange [rad].
 
-    The slope of the profile over a millimetre of its length, so that single rounded points of a
-    measured profile do not count as an angle.
+    Slope of the profile over a length of 1 mm, so that rounding of single points of a measured
+    profile does not count as an angle.
     """
     y, z = np.asarray(profile.y), np.asarray(profile.z)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
@@ -43,7 +43,7 @@ def flange_angle(profile: Profile) -> float:
     py, pz = np.interp(at, along, y), np.interp(at, along, z)
     span = 4  # of 0.25 mm
     angles = np.arctan2(np.abs(pz[span:] - pz[:-span]), np.abs(py[span:] - py[:-span]))
-    # the flange's back is as steep as can be: the flange lies between its tip and the tread
+    # the flange back is vertical: search between the tip of the flange and the tread
     tip = int(np.argmax(pz))
     middle = 0.5 * (at[span:] + at[:-span])
     order = np.argsort(y)
@@ -54,16 +54,16 @@ def flange_angle(profile: Profile) -> float:
 
 @dataclass(frozen=True)
 class Climb:
-    """Longest stretch over which one wheel's Y/Q exceeds a limit.
+    """Longest distance over which Y/Q of one wheel exceeds a limit.
 
     Attributes
     ----------
     length : float
-        Its length [m]; 0 where the limit is not exceeded.
+        Length [m]; 0 where the limit is not exceeded.
     begin : float
-        Where it begins [m].
+        Position of its beginning [m].
     rise : float
-        Largest rise of the wheel over its rail since the beginning of the stretch [m].
+        Largest rise of the wheel above its rail since this position [m].
     """
 
     length: float
@@ -72,20 +72,20 @@ class Climb:
 
 
 def climb_distance(s: Floats, Y_over_Q: Floats, limit: float, height: Floats) -> Climb:
-    """Longest stretch with Y/Q of one wheel above a limit, unfiltered.
+    """Longest distance with Y/Q of one wheel above a limit, unfiltered.
 
     A wheel without load (nan) counts as above the limit.
 
     Parameters
     ----------
     s : float64[time]
-        Distance of the wheel, increasing [m].
+        Position of the wheel, increasing [m].
     Y_over_Q : float64[time]
         Derailment quotient of one wheel [1].
     limit : float
-        Such as that of Nadal [1].
+        For example Nadal's limit [1].
     height : float64[time]
-        Height of the wheel over its rail [m].
+        Height of the wheel above its rail [m].
 
     Examples
     --------

@@ -9,23 +9,23 @@ from railsim.assessment.safety import climb_distance, flange_angle, nadal, overt
 from railsim.definitions.flatten import flatten
 from railsim.notation import SIDES
 
-HALF_BASE = 0.75  # m, from the middle of the axle to a wheel's tape circle
+HALF_BASE = 0.75  # m, from the middle of the axle to the nominal rolling circle
 
 
 @dataclass(frozen=True)
 class WheelSafety:
-    """Nadal's limit and the climb of one wheel.
+    """Nadal's limit and climb distance of one wheel.
 
     Attributes
     ----------
     place : str
         Wheelset, from 1, and side.
     limit : float
-        Nadal's limit of Y/Q with the profile's largest angle and the track's friction [1].
+        Nadal's limit of Y/Q for the flange angle of the profile and the friction of the track [1].
     Y_over_Q : float
-        Largest quotient, unfiltered [1]; nan where the wheel was without load.
+        Largest derailment quotient, unfiltered [1]; nan where the wheel was without load.
     climb_distance, climb_begin, rise : float
-        Longest stretch above the limit, where it begins, rise of the wheel on it [m].
+        Longest distance above the limit, position of its beginning, rise of the wheel on it [m].
     """
 
     place: str
@@ -97,9 +97,9 @@ def safety_report(record: Record) -> SafetyReport:
 
 
 def _height(record: Record, w: int, side: int) -> np.ndarray:
-    """Height of a wheel over its rail, from the wheelset's place and roll [m].
+    """Height of a wheel above its rail, from position and roll of the wheelset [m].
 
-    Against the rails' irregularities where the result has them.
+    Relative to the irregularities of the rails where the result has them.
     """
     result = record.result
     if "body_position" not in result:

@@ -1,8 +1,8 @@
-"""Test sections found from the track under a run.
+"""Test sections of the track that a run covers.
 
-A section is a full length of one plan element of constant curvature and constant cant, away from
-the rounded kinks; transitions are apart.  Its zone follows from its radius; sections outside a
-zone's conditions are kept with the reason why they do not count.
+A section is a full section length within an alignment element of constant curvature and constant
+cant, clear of the rounded kinks; transitions are not included.  Its zone follows from its radius;
+sections outside the conditions of their zones are listed with the reason why they do not count.
 """
 
 import math
@@ -19,7 +19,7 @@ from railsim.definitions.vehicle import Service
 
 @dataclass(frozen=True)
 class TestSection:
-    """A section of the track that a run passed.
+    """A section of the track that a run covers.
 
     Attributes
     ----------
@@ -30,11 +30,11 @@ class TestSection:
     radius : float
         Signed radius, infinite on straight track [m].
     cant_deficiency : float
-        Signed so that a curve taken too fast is positive [m].
+        Positive where the cant is too small for the speed [m].
     speed : float
-        Speed in its middle [m/s].
+        Speed in the middle of the section [m/s].
     reason : str
-        Why it does not count; empty if it does.
+        Reason why the section does not count; empty if it counts.
     """
 
     __test__ = False  # pytest: not a test
@@ -80,7 +80,7 @@ def track_sections(
     covered: tuple[float, float],
     speed_at: Callable[[float], float],
 ) -> list[TestSection]:
-    """All full sections of the part of a track that a run covered.
+    """All full sections of the part of a track that a run covers.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ def track_sections(
     service : Service
         Admissible speed and cant deficiency.
     covered : (float, float)
-        Arc lengths between which all places of the vehicle were recorded [m].
+        Range of arc length that the whole vehicle covered [m].
     speed_at : callable
-        Arc length to speed [m/s].
+        Speed at an arc length [m/s].
     """
     found: list[TestSection] = []
     for begin, end, radius, cant in _constant(track):
@@ -140,7 +140,7 @@ def _constant(track: Track) -> list[tuple[float, float, float, float]]:
 
 
 def _joined(sections: Sequence[Section]) -> list[Section]:
-    """Sections of constant value; neighbours of one value are one."""
+    """Sections of constant value; neighbours of equal value are joined."""
     constant: list[Section] = []
     for section in sections:
         if section.slope != 0.0:
@@ -163,7 +163,7 @@ def _inner(section: Section, rounding: float) -> tuple[float, float]:
 def zone_of(radius: float, deficiency: float, limits: RunningLimits) -> str:
     """Zone of a radius; empty where there is none.
 
-    Very large radii with little cant deficiency belong to zone 1.
+    Very large radii with small cant deficiency belong to zone 1.
     """
     straight = next((n for n, z in limits.zones.items() if z.radius is None), "")
     if math.isinf(radius):
@@ -181,23 +181,23 @@ def section_length(zone: Zone, speed: float) -> float:
 
 
 def _outside(zone: Zone, radius: float, deficiency: float, speed: float, service: Service) -> str:
-    """Why a section is outside its zone's conditions; empty if it is not."""
+    """Reason why a section is outside the conditions of its zone; empty if it is not."""
     low, high = zone.cant_deficiency
     unit = 1.0 if zone.radius is None else service.cant_deficiency
     reasons = []
     if not low * unit - 1e-6 <= deficiency <= high * unit + 1e-6:
         reasons.append(
-            f"cant deficiency {1e3 * deficiency:.0f} mm, wanted {1e3 * low * unit:.0f} to "
+            f"cant deficiency {1e3 * deficiency:.0f} mm, required {1e3 * low * unit:.0f} to "
             f"{1e3 * high * unit:.0f} mm"
         )
     if zone.speed is not None:
         slow, fast = (share * service.admissible_speed for share in zone.speed)
         if not slow - 1e-6 <= speed <= fast + 1e-6:
-            reasons.append(f"speed {speed:.1f} m/s, wanted {slow:.1f} to {fast:.1f} m/s")
+            reasons.append(f"speed {speed:.1f} m/s, required {slow:.1f} to {fast:.1f} m/s")
     return "; ".join(reasons)
 
 
 def reasons(sections: Sequence[TestSection]) -> list[str]:
-    """Sentences on sections that do not count, equal ones together."""
+    """Sentences on sections that do not count, grouped by reason."""
     counted = Counter(section.reason for section in sections if section.reason)
-    return [f"{n} section{'s' * (n > 1)} left out: {why}" for why, n in counted.items()]
+    return [f"{n} section{'s' * (n > 1)} omitted: {why}" for why, n in counted.items()]

@@ -4,12 +4,11 @@ Wz = (100 sqrt(2) a_w)^0.3 with the root mean square a_w [m/s2] of the accelerat
 
     B(f) = k sqrt((1.911 f^2 + (0.25 f^2)^2) / ((1 - 0.277 f^2)^2 + (1.563 f - 0.0368 f^3)^2)),
 
-k 0.588 vertical, 0.735 lateral.  The index was made for amplitudes in cm/s2: sqrt(2) a_w is that of
-a tone.  Several tones add as the 20/3rd powers of their indices do, which is the same as adding
-their squares in a_w.
+k = 0.588 vertical, 0.735 lateral.  The index is defined with the amplitude of a harmonic vibration
+in cm/s2, which is 100 sqrt(2) a_w.  For several frequencies the powers 20/3 of the indices are
+added, which is equivalent to adding the squares of a_w.
 
-2: good; 2.5: limit of freight and passenger comfort ...: see the handbook; the classes are recalled
-and not printed as a verdict.
+Classes, such as 2 for good, are recalled and not used for a verdict; see the handbook.
 """
 
 from typing import Literal
@@ -20,7 +19,7 @@ from railsim.result.filters import Floats
 
 FACTOR = {"vertical": 0.588, "lateral": 0.735}
 BAND = (0.5, 30.0)
-"""Frequencies that count [Hz]."""
+"""Frequency range of the index [Hz]."""
 Direction = Literal["vertical", "lateral"]
 
 
@@ -54,7 +53,7 @@ def sperling_index(a: Floats, rate: float, direction: Direction) -> float:
 def sperling_mean_square(a: Floats, rate: float, direction: Direction) -> float:
     """Mean square of the weighted acceleration of a record from 0.5 to 30 Hz [m2/s4]."""
     n = len(a)
-    power = np.abs(np.fft.rfft(a - np.mean(a)) / n) ** 2  # half the mean square of each tone
+    power = np.abs(np.fft.rfft(a - np.mean(a)) / n) ** 2  # half the mean square of each component
     f = np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64)
     counted = (f >= BAND[0]) & (f <= BAND[1])
     return float(2.0 * np.sum(power[counted] * sperling_gain(f[counted], direction) ** 2))

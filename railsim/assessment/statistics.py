@@ -1,7 +1,7 @@
 """Estimates of largest values from samples of sections (EN 14363, annex on statistics).
 
-One-dimensional: mean + k s.  Two-dimensional: straight line over an influence such as the cant
-deficiency, with the upper bound of a further observation at the target condition.
+One-dimensional: mean + k s.  Two-dimensional: linear regression over an influencing quantity such
+as the cant deficiency, with the upper prediction bound at the target condition.
 """
 
 import math
@@ -22,10 +22,10 @@ class Estimate:
     N : int
         Number of values.
     mean, deviation : float
-        Mean and standard deviation (N - 1) of the values; of the two-dimensional method the line at
-        the target and the standard error about the line.
+        Mean and standard deviation (N - 1) of the values; in the two-dimensional method the value
+        of the regression line at the target and the standard error of the regression.
     value : float
-        The estimate; nan where there are too few values.
+        Estimate; nan where there are too few values.
     method : {'one', 'two'}
         Dimensions.
     """
@@ -45,7 +45,8 @@ def one_dimensional(x: Floats, k: float) -> Estimate:
     x : float64[section]
         Values.
     k : float
-        Factor of the standard deviation: 3 safety, 2.2 loading and ride, 0 quasi-static.
+        Factor of the standard deviation: 3 for safety, 2.2 for track loading and ride
+        characteristics, 0 for quasi-static quantities.
 
     Examples
     --------
@@ -69,11 +70,11 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     Parameters
     ----------
     x, y : float64[section]
-        Influence, such as the cant deficiency, and values.
+        Influencing quantity, such as the cant deficiency, and values.
     x0 : float
-        Target of the influence.
+        Target value of the influencing quantity.
     probability : float
-        P, 0.99 safety, 0.95 else; 0.5 gives the line itself.
+        P: 0.99 for safety, otherwise 0.95; 0.5 gives the regression line itself.
 
     Examples
     --------

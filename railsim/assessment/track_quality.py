@@ -1,7 +1,7 @@
-"""Geometric quality of the rails under a run: standard deviations of alignment and level.
+"""Track geometry quality along a run: standard deviations of alignment and longitudinal level.
 
-Order 4 Butterworth band pass without phase over wavelengths D1 = 3 to 25 m, D2 = 25 to 70 m,
-D3 = 70 to 150 m (EN 13848-1; EN 14363 annex M); per section, the worse of the two rails.
+Zero-phase Butterworth band-pass filter of order 4 over the wavelengths D1 = 3 to 25 m, D2 = 25 to
+70 m, D3 = 70 to 150 m (EN 13848-1; EN 14363 annex M); per section, the worse of the two rails.
 """
 
 import math
@@ -14,10 +14,10 @@ from railsim.track.irregularity import displacement
 
 RANGES = {"D1": (3.0, 25.0), "D2": (25.0, 70.0), "D3": (70.0, 150.0)}
 SPACING = 0.25  # m
-AT_ONCE = 20_000  # places that are evaluated at once, for the memory of long tracks
+AT_ONCE = 20_000  # positions that are evaluated at once, to limit the memory for long tracks
 
 # UIC 518 (2009): speed up to [km/h], QN1 and QN2 of alignment and level, standard deviations [mm],
-# from public re-entries
+# from secondary sources
 QN = (
     (80.0, (1.5, 1.8), (2.3, 2.6)),
     (120.0, (1.2, 1.5), (1.8, 2.1)),
@@ -36,13 +36,13 @@ TL90 = (
 
 
 class TrackQuality:
-    """Standard deviations over any stretch of a track.
+    """Standard deviations over any part of a track.
 
     Parameters
     ----------
     track : Track
     begin, end : float
-        Part of the track that is looked at [m].
+        Part of the track that is evaluated [m].
     ranges : sequence of str
         Of `RANGES`.
     """

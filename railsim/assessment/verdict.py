@@ -1,7 +1,7 @@
-"""From section values to estimates against limits, zone by zone, and to a verdict.
+"""Estimates from section values, compared with limits zone by zone, and the verdict.
 
 A verdict is never a pass by default: too few sections or missing zones make it ``incomplete``, a
-run that derailed ``derailed``.
+derailed run makes it ``derailed``.
 """
 
 import math
@@ -20,8 +20,8 @@ from railsim.definitions.vehicle import Service, Vehicle
 from railsim.result.filters import Floats
 
 WELL_SPREAD = 0.1
-"""Range of the cant deficiency, of the admissible one, from which the two-dimensional method is
-taken."""
+"""Range of the cant deficiency, as a share of the admissible one, from which the two-dimensional
+method is used."""
 PASS, FAIL, INCOMPLETE, DERAILED = "pass", "fail", "incomplete", "derailed"
 
 
@@ -34,13 +34,13 @@ class Rule:
     name : str
         Key in the limits and in the section values.
     kind : str
-        Class of the statistics; ``largest``: no estimate, the largest value counts.
+        Type of the statistics; ``largest``: no estimate, the largest value is assessed.
     methods : tuple of str
         ``normal``, with wheel forces, and ``simplified``, with accelerations.
     words, unit : str
-        For tables: what it is, shown unit.
+        Name and unit in tables.
     scale : float
-        Shown value = value times `scale`.
+        Factor from SI to the unit in tables.
     """
 
     name: str
@@ -72,7 +72,7 @@ RULES = (
 
 @dataclass(frozen=True)
 class Assessed:
-    """Estimate of one quantity at one place against its limit.
+    """Estimate of one quantity at one wheelset, wheel or sensor, and its limit.
 
     Attributes
     ----------
@@ -83,9 +83,9 @@ class Assessed:
     limit : float
         [SI]
     source : str
-        Where the limit comes from.
+        Source of the limit.
     checked : bool
-        Whether somebody has compared it with the printed standard.
+        Whether the limit has been compared with the printed standard.
     """
 
     rule: Rule
@@ -119,7 +119,7 @@ class Assessed:
 
 @dataclass(frozen=True)
 class ZoneReport:
-    """A zone: its sections, its quantities, what is missing.
+    """A zone: sections, quantities, missing conditions.
 
     Attributes
     ----------
@@ -127,12 +127,12 @@ class ZoneReport:
     values : tuple of SectionValues
         Sections that count.
     sections : tuple of TestSection
-        All sections of the zone, those that do not count too.
+        All sections of the zone, including those that do not count.
     rows : tuple of Assessed
     needed : int
-        Number of sections that the standard wants.
+        Number of sections that the standard requires.
     notes : tuple of str
-        What a reader must know.
+        Notes for the reader.
     complete : bool
         Whether the conditions of the standard are met.
     """
@@ -171,7 +171,7 @@ def zone_reports(
     Q0: Floats,
     method: str,
 ) -> list[ZoneReport]:
-    """Assess all zones of which there are sections.
+    """Assess all zones that have sections.
 
     Parameters
     ----------
@@ -214,11 +214,11 @@ def _notes(
     notes = reasons(sections)
     complete = len(values) >= wanted.sections
     if not complete:
-        notes.append(f"{len(values)} sections, the standard wants {wanted.sections}")
+        notes.append(f"{len(values)} sections, the standard requires {wanted.sections}")
     ends = wanted.mean_radius
     if values and ends is not None and not ends[0] <= radius <= ends[1]:
         complete = False
-        notes.append(f"mean radius {radius:.0f} m, wanted {ends[0]:.0f} to {ends[1]:.0f} m")
+        notes.append(f"mean radius {radius:.0f} m, required {ends[0]:.0f} to {ends[1]:.0f} m")
     lifted: dict[str, float] = defaultdict(float)
     for value in values:
         for wheel, metres in value.lifted.items():
@@ -278,7 +278,7 @@ def _estimate(
 def _high_friction(
     values: Sequence[SectionValues], place: str, guiding: Floats, limits: RunningLimits
 ) -> Floats:
-    """Guiding forces corrected where Y/Q of the inner wheel shows high friction."""
+    """Guiding forces, corrected where Y/Q of the inner wheel indicates high friction."""
     law = limits.high_friction
     if law is None:
         return guiding
@@ -336,7 +336,7 @@ def _limits(
 
 
 def _bogie_mass(vehicle: Vehicle, wheelset: int) -> float:
-    """Mass of the frame above a wheelset (counted from 1) and of all wheelsets near to it [kg]."""
+    """Mass of the frame above a wheelset (from 1) and of the wheelsets nearest to it [kg]."""
     flat = flatten(vehicle)
     wheelsets = flat.of_kind("wheelset")
     frames = [b for b in flat.of_kind("body") if b.name != flat.reference]

@@ -1,7 +1,7 @@
 """Wear and rolling contact fatigue from the wear number and the forces of the patches.
 
-Laws of single numbers, each with its source; `assessment/wear_table.py` applies them to results.
-The wear number T_gamma = T_x xi_x + T_y xi_y [N] is the energy lost per metre; spin is left out.
+Laws for single values, each with its source; `assessment/wear_report.py` applies them to results.
+The wear number T_gamma = T_x xi_x + T_y xi_y [N] is the energy dissipated per metre, without spin.
 """
 
 import math
@@ -12,14 +12,14 @@ import numpy as np
 from railsim.result.filters import Floats
 
 YIELD_IN_SHEAR = 300e6
-"""Yield stress in shear k of rail steel unless told otherwise [Pa]."""
+"""Yield stress in shear k of rail steel, default value [Pa]."""
 
 
 def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
-    """Area worn off a wheel's profile per distance (Pearce and Sherratt 1991, Wear 144; recalled).
+    """Worn area of a wheel profile per distance (Pearce and Sherratt 1991, Wear 144; recalled).
 
     In mm2/km, D in mm: 0.25 T/D below 100 N, 25/D to 200 N, (1.19 T - 154)/D above.  The last
-    branch begins at 84/D: the law jumps at 200 N.
+    branch begins at 84/D: the law is discontinuous at 200 N.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
 
 
 def usfd(T_gamma_over_A: Floats) -> Floats:
-    """Mass worn off a wheel, R8T on 900A (University of Sheffield; Braghin et al. 2006, Wear 261).
+    """Mass loss of a wheel, R8T on 900A (University of Sheffield; Braghin et al. 2006, Wear 261).
 
     In ug/(m mm2) over x = T_gamma/A in N/mm2: 5.3 x to 10.4; 55.0 to 77.2; 55.0 + 61.9 (x - 77.2).
 
@@ -57,7 +57,7 @@ def usfd(T_gamma_over_A: Floats) -> Floats:
     Returns
     -------
     ndarray
-        Mass lost per metre rolled and square metre of patch [kg/m/m2].
+        Mass loss per metre rolled and square metre of contact patch [kg/m/m2].
 
     Examples
     --------
@@ -71,15 +71,15 @@ def usfd(T_gamma_over_A: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class WholeLifeRailModel:
-    """Fatigue damage of a rail per axle that passes (Burstow 2004, RSSB T115), R220 rail.
+    """Fatigue damage of a rail per passing axle (Burstow 2004, RSSB T115), R220 rail.
 
-    0 up to `threshold`, straight to 10e-6 at 65 N, straight to 0 at 175 N, negative beyond on the
-    same line: there wear is faster than cracks.
+    Zero up to `threshold`, linear to 10e-6 at 65 N, linear to 0 at 175 N and, on the same line,
+    negative above: there wear is faster than crack growth.
 
     Attributes
     ----------
     threshold : float
-        Wear number below which nothing happens [N]: 15 (recalled), 20 in a later use.
+        Wear number below which there is no damage [N]: 15 (recalled), 20 in later use.
     """
 
     threshold: float = 15.0
@@ -88,7 +88,7 @@ class WholeLifeRailModel:
     damage: float = 10e-6
 
     def __call__(self, T_gamma: Floats) -> Floats:
-        """Damage of one pass [1].
+        """Damage of one passing axle [1].
 
         Examples
         --------
@@ -125,17 +125,17 @@ def surface_fatigue_index(
 
 
 def shakedown_limit(mu_u: Floats) -> Floats:
-    """Elastic shakedown limit p0/k over the utilised friction, as the shakedown map draws it.
+    """Elastic shakedown limit p0/k over the utilised friction, as in the shakedown map.
 
-    The smaller of 4 (yield below the surface: line contact without friction) and 1/mu_u (on the
-    surface; Johnson 1989).
+    The smaller of 4 (yield below the surface: line contact without friction) and 1/mu_u (yield at
+    the surface; Johnson 1989).
     """
     mu = np.asarray(mu_u, dtype=np.float64)
     return np.minimum(4.0, 1.0 / np.maximum(mu, 1e-9))
 
 
 def mean_damage(T_gamma: Floats, counted: Floats, model: WholeLifeRailModel) -> float:
-    """Mean over time of the damage of one pass where `counted`, zero elsewhere [1]."""
+    """Mean over time of the damage of one passing axle, zero where not `counted` [1]."""
     if not np.size(T_gamma):
         return math.nan
     return float(np.mean(np.where(counted, model(T_gamma), 0.0)))

@@ -1,8 +1,9 @@
-"""Depth of wear over a wheel's profile, and the profile after some distance.
+"""Depth of wear over a wheel profile, and the worn profile after a distance.
 
-Each instant's worn area (Pearce and Sherratt 1991) is shared among the wheel's patches by their
-tangential forces and spread over each as a half ellipse across, at the patch's place on the
-profile.  The wheel stays round: the depth is that of the whole circumference.
+At each instant the worn area (Pearce and Sherratt 1991) is divided among the contact patches of the
+wheel in proportion to their tangential forces; across each patch it is distributed as a half
+ellipse, at the position of the patch on the profile.  The wheel stays round: the depth is uniform
+over the circumference.
 """
 
 import numpy as np
@@ -16,23 +17,23 @@ from railsim.result import Result
 from railsim.result.filters import Floats
 
 SPACING = 0.25e-3  # m
-RANGE = (-0.070, 0.070)  # m from the tape circle
+RANGE = (-0.070, 0.070)  # m from the nominal rolling circle
 SMOOTHING = 2e-3  # m, width of the smoothing of the worn profile
-ROUNDING = 0.1  # largest share of the worn area that the profile's points may miss
+ROUNDING = 0.1  # largest share of the worn area that the points of the profile may miss
 WORN = " worn"
-DEEPEST = 1e-3  # m, of one step: beyond it the wear would have moved elsewhere meanwhile
+DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the profile meanwhile
 NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", "patch_T_x",
           "patch_T_y", "wheelset_roll")  # fmt: skip
 
 
 def grid() -> Floats:
-    """Places on the profile from the tape circle, field side positive [m]."""
+    """Positions on the profile from the nominal rolling circle, positive to the field side [m]."""
     count = round((RANGE[1] - RANGE[0]) / SPACING)
     return np.asarray(RANGE[0] + SPACING * (np.arange(count) + 0.5), dtype=np.float64)
 
 
 def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
-    """Depth worn off a wheel's profile per distance, over `grid`.
+    """Depth of wear of a wheel profile per distance, over `grid`.
 
     Parameters
     ----------
@@ -43,13 +44,13 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
 
     Returns
     -------
-    float64[place]
-        Mean depth per metre of way, in the direction of the profile's z [m/m].  Its integral over
-        the grid is the worn area per distance.
+    float64[position]
+        Mean depth per metre run, in the direction z of the profile [m/m].  Its integral over the
+        grid is the worn area per distance.
 
     Raises
     ------
-    InputError : the result lacks something.
+    InputError : the result lacks a quantity.
     """
     missing = [name for name in NEEDED if name not in result]
     if missing:
@@ -66,7 +67,7 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
     total = forces.sum(axis=-1, keepdims=True)
     shares = np.where(total > 0.0, forces / np.where(total > 0.0, total, 1.0), 0.0)
     roll = result["wheelset_roll"][:, wheelset, None]
-    # back into the axes of the wheelset
+    # to the axes of the wheelset
     across = result["patch_y"][at] + roll * result["patch_z"][at]
     places = (-1.0, 1.0)[side] * across - tape
     widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))
@@ -74,23 +75,23 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
 
 
 def spread(places: Floats, widths: Floats, areas: Floats) -> Floats:
-    """Half ellipses of given areas over `grid`, added up.
+    """Sum of half ellipses of given areas over `grid`.
 
     Parameters
     ----------
     places, widths, areas : ndarray, one shape
-        Middles, half widths [m] and areas [m2].
+        Centres, half widths [m] and areas [m2].
 
     Returns
     -------
-    float64[place]
-        Heights [m], exact in their integral over each cell.
+    float64[position]
+        Heights [m], whose integral over each cell is exact.
     """
     counted = areas > 0.0
     y, b, A = places[counted], np.maximum(widths[counted], 1e-5), areas[counted]
     edges = np.concatenate([grid() - 0.5 * SPACING, [RANGE[1]]])
     inside = np.zeros(len(edges))
-    for start in range(0, len(y), 2000):  # in parts: not every patch beside every place at once
+    for start in range(0, len(y), 2000):  # in parts, to limit the memory
         part = slice(start, start + 2000)
         u = np.clip((edges[:, None] - y[part]) / b[part], -1.0, 1.0)
         share = 0.5 + (u * np.sqrt(1.0 - u**2) + np.arcsin(u)) / np.pi
@@ -99,13 +100,13 @@ def spread(places: Floats, widths: Floats, areas: Floats) -> Floats:
 
 
 def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
-    """Profile after some distance at a constant rate of wear.
+    """Profile after a distance at a constant rate of wear.
 
     Parameters
     ----------
     profile : Profile
         A wheel.
-    depth : float64[place]
+    depth : float64[position]
         Depth per distance over `grid` [m/m].
     distance : float
         [m]
@@ -113,17 +114,17 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     Returns
     -------
     Profile
-        Smoothed over 2 mm; the area that it loses is that of `depth` times `distance`.
+        The depth is smoothed over 2 mm; the worn area is that of `depth` times `distance`.
 
     Raises
     ------
-    InputError : the wear is deeper than 1 mm; the profile's points are too far apart to show it.
+    InputError : the wear is deeper than 1 mm; the points of the profile are too far apart.
     """
     worn = depth * distance
     deepest = float(np.max(worn))
     if deepest > DEEPEST:
         allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / deepest:.3g} km"
-        found = f"{1e-3 * distance:g} km wear off {1e3 * deepest:.3g} mm"
+        found = f"{1e-3 * distance:g} km wear {1e3 * deepest:.3g} mm deep"
         raise InputError([Fault("wear", "step", found, allowed)])
     kernel = np.exp(-0.5 * ((np.arange(-24, 25) * SPACING) / (0.5 * SMOOTHING)) ** 2)
     smooth = np.convolve(worn, kernel / kernel.sum(), mode="same")
@@ -132,8 +133,8 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     area, kept = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, y))
     if area > 0.0:
         if abs(kept / area - 1.0) > ROUNDING:
-            found = f"its points hold {100.0 * kept / area:.0f} % of the worn area"
-            raise InputError([Fault(profile.name, "points", found, "points 1 mm apart at most")])
+            found = f"its points resolve {100.0 * kept / area:.0f} % of the worn area"
+            raise InputError([Fault(profile.name, "points", found, "points at most 1 mm apart")])
         lost *= area / kept
     words = f"worn by {1e6 * area:.2f} mm2"
     name = f"{profile.name.removesuffix(WORN)}{WORN}"

@@ -16,7 +16,7 @@ from railsim.definitions.flatten import flatten
 from railsim.notation import SIDES
 from railsim.result.filters import Floats, StreamingPercentiles
 
-CELL = 0.5  # N, first width of the cells that percentiles of the wear number are counted in
+CELL = 0.5  # N, initial bin width for the percentiles of the wear number
 PATCHES = ("patch_N", "patch_a", "patch_b", "patch_T_x", "patch_T_y")
 
 
@@ -33,17 +33,18 @@ class WheelWear:
     percentiles : dict
         Of the wear number over time [N], by per cent.
     bound : float
-        No percentile is further than this from one of the whole record [N].
+        Largest deviation of a percentile from that of the whole record [N].
     pearce_sherratt : float
-        Worn area of the wheel's profile per distance [m2/m].
+        Worn area of the wheel profile per distance [m2/m].
     usfd : float or None
-        Worn area of the wheel's profile per distance [m2/m]; None without contact patches.
+        Worn area of the wheel profile per distance [m2/m]; None without contact patches.
     rail_damage : float
-        Whole Life Rail Model, mean over the distance, forces on the rail against travel only [1].
+        Whole Life Rail Model, mean over the distance; only forces on the rail against the direction
+        of travel count [1].
     fatigue_index : float or None
         Largest FI_surf [1]; None without contact patches.
     utilised_friction, pressure_ratio : float or None
-        T/N and p0/k of that patch, its place on the shakedown map [1]; None likewise.
+        T/N and p0/k of that patch, its coordinates in the shakedown map [1]; None likewise.
     """
 
     place: str
@@ -80,7 +81,7 @@ def wear_report(
         Run with `T_gamma`, `xi_x`; with `contact_patches` also USFD and the fatigue index.
     model : WholeLifeRailModel, optional
     all_forces : bool
-        Count also where the force on the rail points forwards.
+        Include forces on the rail in the direction of travel.
     yield_in_shear : float
         k [Pa].
     """
@@ -91,7 +92,7 @@ def wear_report(
     shape = radii.shape
     streams = [[StreamingPercentiles(CELL) for _ in SIDES] for _ in radii]
     sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "damage", "usfd")}
-    # largest index of each wheel, with the place of its patch on the shakedown map
+    # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
     patches = all(name in record.result for name in PATCHES)
     way = np.gradient(record.distance)
@@ -143,7 +144,7 @@ def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
     safe = np.where(loaded, N, 1.0)
     index = surface_fatigue_index(np.hypot(T_x, T_y), safe, a, b, k)
     ratio = np.hypot(T_x, T_y) / safe
-    # k/p0 is what the index lacks of T/N
+    # k/p0 is T/N less the index
     pressure = 1.0 / np.where(loaded & (ratio > index), ratio - index, np.inf)
     index = np.where(loaded, index, -np.inf)
     all_of = np.stack([index, ratio, pressure]).transpose(0, 2, 3, 1, 4)
@@ -154,5 +155,5 @@ def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
 
 
 def _area_per_distance(mass_per_metre: float, radius: float) -> float:
-    """Area worn off the profile per distance: mass per metre over density and circumference."""
+    """Worn area of the profile per distance: mass per metre over density and circumference."""
     return float(mass_per_metre / (DENSITY * 2.0 * np.pi * radius))

@@ -1,4 +1,4 @@
-"""Frequency weightings of vibration: analogue responses at any frequency.
+"""Frequency weightings of vibration: analogue frequency responses.
 
 Each is a product of (w = 2 pi f, s = i w):
 
@@ -6,8 +6,8 @@ Each is a product of (w = 2 pi f, s = i w):
 - transition     (w4^2/w3)(s + w3)/(s^2 + s w4/Q2 + w4^2)
 - upward step    K (s^2/w5^2 + s/(Q3 w5) + 1)/(s^2/w6^2 + s/(Q4 w6) + 1)
 
-Records are weighted in the frequency domain: a bilinear filter at 200 samples a second would be
-15 % off at 40 Hz.
+Records are weighted in the frequency domain: a bilinear filter at 200 samples per second would be
+15 % in error at 40 Hz.
 
 Sources: form ISO 2631-1:1997 annex A; parameters of Wb, Wc, Wd EN 12299, those of Wk recalled and
 equal to ISO 2631-1:1997 table 3 within 0.15 % from 0.1 to 400 Hz.  None has been compared with the
@@ -36,7 +36,7 @@ class Weighting:
     f1, f2 : float
         Band limits [Hz].
     f3, f4, Q2 : float
-        Transition from acceleration to velocity proportionality [Hz, Hz, 1].
+        Transition from acceleration-proportional to velocity-proportional [Hz, Hz, 1].
     f5, Q3, f6, Q4 : float
         Upward step [Hz, 1, Hz, 1]; f5 infinite: none.
     K : float

@@ -186,7 +186,7 @@ def _status(arguments: list[str]) -> int:
 
 
 def _told(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int:
-    """Print what went wrong for programs too, where they asked for it; return the status."""
+    """Print the error, as JSON if requested; return the status."""
     if "--json" in arguments:
         print_json({"exit_status": status, **words})
     return status
@@ -199,7 +199,7 @@ def _cache_notices() -> list[str]:
 
 
 def _called(arguments: list[str]) -> int:
-    """Call a command; where it goes wrong after a lost interrupt, that is the reason."""
+    """Call a command; if it fails after a lost interrupt, the interrupt is the reason."""
     try:
         status = _invoked(arguments)
     except Exception:

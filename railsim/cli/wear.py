@@ -1,4 +1,4 @@
-"""``railsim wear``: wheel profile over the distance run, with the worn profile run again."""
+"""``railsim wear``: wheel profile over the distance run, with updates of the worn profile."""
 
 import json
 from typing import TYPE_CHECKING
@@ -40,7 +40,7 @@ MOST_STEPS = 1000
 @click.option("--distance", required=True, type=float, metavar="KM", help="Distance to run in km.")
 @click.option(
     "--step", required=True, type=float, metavar="KM",
-    help="Distance in km after which the worn profile is put back into the simulation.",
+    help="Distance in km between two updates of the wheel profile.",
 )  # fmt: skip
 @click.option("--out", metavar="DIR", help="Folder for wear.json, wear.png and the profiles.")
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
@@ -62,11 +62,11 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Wear the wheels of a vehicle on a mix of tracks, and run again with the worn profile.
+    """Compute the wear of the wheels of a vehicle on several tracks, updating the profile.
 
     Each step runs every track once with the wheel profile of the step, averages the wear of all
-    wheels and takes it off the profile.  With --out finished steps are kept: the same command goes
-    on after them, and one with a longer distance and --overwrite too.
+    wheels and subtracts it from the profile.  With --out finished steps are kept: the same command
+    continues after them, and so does one with a longer distance and --overwrite.
 
     \b
     Example:
@@ -168,8 +168,6 @@ def _lines(vehicle: str, ways: "list[Route]", rows: "list[dict[str, float | None
             "" if conicity is None else f"{conicity:.3f}",
         ])  # fmt: skip
     header = ["distance (km)", "worn area (mm2)", "deepest (mm)", "at y (mm)", "conicity at 3 mm"]
-    note = (
-        "Pearce and Sherratt (1991), mean of all wheels; "
-        "y from the nominal rolling circle, flange negative"
-    )
+    note = "Pearce and Sherratt (1991), mean of all wheels; y from the nominal rolling circle, "
+    note += "negative towards the flange"
     return [vehicle, f"  {shares}", f"  {note}", "", *table(header, cells, numbers=0)]

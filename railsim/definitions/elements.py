@@ -1,4 +1,4 @@
-"""Force elements of a vehicle file, told apart by their key `kind`.
+"""Force elements of a vehicle file, distinguished by their key `kind`.
 
 A force element acts between two bodies, named in the order [body 1, body 2].  Its parameters are
 those of the element as written (on the right for `sides = "both"`); `mirrored` gives the copy on

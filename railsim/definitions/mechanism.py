@@ -297,7 +297,7 @@ class Mechanism(FileDefinition):
     source: Text | None = None
     """Where it comes from"""
     remarks: tuple[Text, ...] = ()
-    """What a reader must know about its numbers"""
+    """Remarks on its numbers"""
     parameters: dict[Name, QuantityOrAuto] = Field(default_factory=dict)
     """Numbers that may be varied, in SI and rad, or expressions of others"""
     derived: dict[Name, Quantity] = Field(default_factory=dict)

@@ -41,7 +41,7 @@ def mechanism_faults(mechanism: Mechanism) -> list[Fault]:
 
 
 def mechanism_remarks(mechanism: Mechanism) -> list[Remark]:
-    """What a reader of a valid mechanism must know."""
+    """Remarks on a valid mechanism."""
     remarks = [Remark("remarks", text) for text in mechanism.remarks]
     stated = {name for names in mechanism.provenance.values() for name in names}
     if silent := [name for name in mechanism.parameters if name not in stated]:
@@ -349,7 +349,7 @@ def _table_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> list
 
 
 def _unit_faults(mechanism: Mechanism) -> list[Fault]:
-    """Parameters that look like millimetres or degrees: told where something is wrong."""
+    """Parameters that look like millimetres or degrees: named if there is a fault."""
     limits = {"m": (LARGEST, "lengths in metres"), "rad": (MOST_TURNED, "angles in radians")}
     found = []
     for name, value in mechanism.parameters.items():

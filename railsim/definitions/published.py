@@ -54,6 +54,6 @@ class Published(FileDefinition):
     speed: Positive
     """Speed [m/s]"""
     notes: tuple[Text, ...] = ()
-    """What a reader must know, one sentence each"""
+    """Remarks for the reader, one sentence each"""
     values: Annotated[tuple[PublishedValue, ...], Field(min_length=1)]
     """What is printed"""

@@ -101,7 +101,7 @@ class Modes(Drawn):
     modes : tuple of Mode
         By rising |lambda|, or in the order of the root locus.
     remarks : tuple of str
-        What a reader must know.
+        Remarks for the reader.
     parameter : tuple of str and float, or None
         Key and value of another parameter than the speed.
     """

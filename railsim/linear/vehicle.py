@@ -153,7 +153,7 @@ class LinearVehicle:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader of the results must know."""
+        """Remarks for the reader of the results."""
         found = list(self._remarks)
         pads = np.flatnonzero(self.model.system.internal.kind == PAD)
         if len(pads):

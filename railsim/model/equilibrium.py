@@ -58,7 +58,7 @@ class Equilibrium:
     residual : float
         Largest remaining acceleration [m/s2, rad/s2].
     remarks : tuple of str
-        What a reader of results must know.
+        Remarks for the reader of results.
     """
 
     model: Model

@@ -17,7 +17,7 @@ from railsim.result.data import Array
 from railsim.text import unformatted
 
 LEADING = tuple(f"{name}:1" for name in STUDY)
-"""What is drawn unless told otherwise: the leading wheelset."""
+"""Default quantities of comparisons: those of the leading wheelset."""
 
 
 def overlay(

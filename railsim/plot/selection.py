@@ -17,7 +17,7 @@ from railsim.result.data import Array
 MOST_LINES = 24
 
 STUDY = ("dQ_over_Q0", "sum_Y", "Y_over_Q", "wheelset_roll", "wheelset_lateral", "wheelset_yaw")
-"""What is drawn unless told otherwise."""
+"""Default quantities of plots."""
 
 LIMITS = {"Y_over_Q": (0.8, "EN 14363: 0.8"), "dQ_over_Q0": (-0.6, "EN 14363: −60 %")}
 """EN 14363 (2016): derailment quotient, on-track tests; wheel unloading, twisted track [SI]."""

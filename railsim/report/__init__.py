@@ -1,7 +1,7 @@
 """Self-contained pages about results.
 
 ===============  =======================================================================
-`runs.py`        runs and studies: what was run, against limits, curves, spread
+`runs.py`        runs and studies: inputs, comparison with limits, curves, spread
 `springs.py`     a trailing-arm suspension: inputs, load cases, checks, pictures
 `mechanisms.py`  a planar linkage: player, results, search, pictures, animation
 ===============  =======================================================================

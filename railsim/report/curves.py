@@ -1,8 +1,9 @@
-"""Time histories of several runs, thinned for a page: what the plots of a report are fed with.
+"""Time histories of several runs, thinned for the plots of a page.
 
-Runs over the same plan of track share their horizontal axis, the distance, cut into equal cells.
-Of each cell the smallest and the largest value are kept, in the order in which they occur: no peak
-is lost.  Values are stored as 16-bit integers between a quantity's smallest and largest value.
+Runs over the same alignment share their horizontal axis, the distance, divided into equal cells.
+The smallest and the largest value of each cell are kept, in the order in which they occur, so that
+no peak is lost.  Values are stored as 16-bit integers between the smallest and the largest value of
+a quantity.
 """
 
 from base64 import b64encode
@@ -22,13 +23,13 @@ Floats = NDArray[np.float64]
 
 CELLS = 800  # of the horizontal axis
 MOST_VALUES = 4_000_000  # of all curves of a page, 2 bytes each
-MISSING = 65535  # stands for no value
+MISSING = 65535  # code for no value
 STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
 
 
 @dataclass(frozen=True)
 class Group:
-    """Runs over the same plan of track.
+    """Runs over the same alignment.
 
     Attributes
     ----------
@@ -43,7 +44,7 @@ class Group:
 
 
 def groups(results: Mapping[str, Result]) -> list[Group]:
-    """Put results over the same plan of track together; runs without instants are left out."""
+    """Group results by alignment; runs without instants are omitted."""
     found: dict[tuple[Any, ...], Group] = {}
     for name, result in results.items():
         if len(result["time"]) < 2:
@@ -110,7 +111,7 @@ def _sections(result: Result) -> list[dict[str, Any]]:
 def _quantity(
     results: Mapping[str, Result], name: str, over: str, edges: Floats, wheelsets: int
 ) -> dict[str, Any] | None:
-    """Return one quantity of all runs, shown units; None where no run has it."""
+    """Return one quantity of all runs in the units of plots; None where no run has it."""
     having = [result for result in results.values() if name in result]
     if not having:
         return None
@@ -147,7 +148,7 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
     Parameters
     ----------
     axis : float64[n]
-        Where the values are, not decreasing.
+        Positions of the values, not decreasing.
     values : float64[n, m]
         nan where there is none.
     edges : float64[cells + 1]
@@ -156,8 +157,7 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
     Returns
     -------
     float64[2 cells, m]
-        In a cell that holds no instant between two others the values there, interpolated; nan
-        outside of the run.
+        In a cell without instants, interpolated values; nan outside the run.
     """
     cells = len(edges) - 1
     starts = np.searchsorted(axis, edges)
@@ -183,7 +183,7 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
 
 
 def coded(values: Floats) -> tuple[float, float, str]:
-    """Return smallest and largest value, and all values as base64 of 16-bit integers between."""
+    """Return smallest and largest value, and all values as 16-bit integers between, in base64."""
     there = np.isfinite(values)
     low = float(values[there].min()) if there.any() else 0.0
     high = float(values[there].max()) if there.any() else 0.0
@@ -194,7 +194,7 @@ def coded(values: Floats) -> tuple[float, float, str]:
 
 
 def cells_of(found: Sequence[Group]) -> int:
-    """Return how fine the curves of all groups may be so that the page stays small."""
+    """Return the number of cells of all curves for which the page stays small."""
     lines = sum(
         len(group.results) * max(len(r.wheelsets) for r in group.results.values()) * 9
         for group in found

@@ -1,6 +1,6 @@
-"""Vehicles and tracks as small drawings within a page (SVG), in the page's own colours.
+"""Vehicles and tracks as small drawings within a page (SVG), in the colours of the page.
 
-The figures of `railsim.plot` show more and take a second each; a page has one for each vehicle.
+The figures of `railsim.plot` show more and take a second each; a page has one drawing per vehicle.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.track.alignment import Alignment
 
-MARGIN = 0.9  # m around a vehicle
+MARGIN = 0.9  # m, margin around a vehicle
 POINTS = 400  # of a line over the track
 COLOURS = 8  # classes k0 to k7 of the page
 
@@ -24,10 +24,10 @@ SIDE, TOP = (0, 2), (0, 1)
 
 
 def vehicle_svg(vehicle: Vehicle) -> str:
-    """Draw a vehicle from the right side and from above, to scale, the leading end to the right.
+    """Draw a vehicle to scale from the right and from above, the leading end to the right.
 
-    Wheels are circles or lines, centres of gravity crosses, elements lines between their points;
-    the colours of the kinds of elements are named by `element_kinds`.
+    Wheels are circles or lines, centres of gravity are crosses, elements are lines between their
+    points; `element_kinds` returns the kinds of elements in the order of their colours.
     """
     flat = flatten(vehicle)
     kinds = element_kinds(vehicle)
@@ -111,7 +111,7 @@ def _line(points: Sequence[Vector], view: View, name: str, title: str = "") -> s
 
 
 def track_svg(track: Track) -> str:
-    """Draw curvature and cant of a track over its length, curves shaded and named."""
+    """Draw curvature and cant of a track over its length, curves shaded and labelled."""
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, POINTS + 1)
     width, height = 1000.0, 78.0

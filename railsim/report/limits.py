@@ -1,4 +1,4 @@
-"""Values of runs against the limits of standards, as tables that say what each limit is."""
+"""Tables of the values of runs with the limits of standards and the meaning of each limit."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -11,15 +11,15 @@ from railsim.report.tables import Cell, Table
 from railsim.result import Result
 from railsim.text import printable
 
-# What a limit is a limit of, by the quantity's key in the limits file.
+# Meaning of each limit, by the key of the quantity in the limits file.
 MEANING = {
-    "sum_Y": "shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static load of the axle "
+    "sum_Y": "shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static axle load "
     "(Prud'homme)",
-    "Y_over_Q": "climbing of the flange, of the outer wheel",
-    "instability": "hunting: half of the limit of the track shifting force",
-    "Q": "load of the track: 90 kN + Q0, at most a value by speed",
-    "Q_qst": "steady load of the outer rail in curves",
-    "Y_qst": "steady guiding force on the outer rail, by the mean radius of the sections",
+    "Y_over_Q": "flange climbing of the outer wheel",
+    "instability": "instability: half of the limit of the track shifting force",
+    "Q": "track loading: 90 kN + Q0, at most a value that depends on the speed",
+    "Q_qst": "quasi-static vertical wheel force on the outer rail in curves",
+    "Y_qst": "quasi-static guiding force on the outer rail, by the mean radius of the sections",
     "body_y_safety": "lateral acceleration of the body, safety",
     "body_z_safety": "vertical acceleration of the body, safety",
     "frame_y": "lateral acceleration of the bogie frame, by its mass",
@@ -27,7 +27,7 @@ MEANING = {
     "body_z": "vertical acceleration of the body, ride",
     "body_y_rms": "lateral acceleration of the body, ride, rms",
     "body_z_rms": "vertical acceleration of the body, ride, rms",
-    "body_y_qst": "steady lateral acceleration of the body in curves",
+    "body_y_qst": "quasi-static lateral acceleration of the body in curves",
 }
 NADAL = (
     "Nadal's limit (tan gamma - mu)/(1 + mu tan gamma), gamma the flange angle of the profile, mu "
@@ -36,22 +36,23 @@ NADAL = (
     "without load."
 )
 NOTE = (
-    "Estimate as the standard forms it from the sections that there are (mean + k s), below it the "
-    "share of the limit and the place nearest to it; of a single section its own value. Trust of "
-    "the limits: [P] printed in a source that was read, [R] recalled{unchecked}."
+    "Estimate according to the standard from the available sections (mean + k s), below it the "
+    "share of the limit and the wheelset, wheel or sensor nearest to it; for a single section its "
+    "own value. Reliability of the limits: [P] printed in a source that was read, [R] "
+    "recalled{unchecked}."
 )
 UNCHECKED = "; none has been compared with the printed standard"
-MOST = 64  # runs that are assessed; more take long
+MOST = 64  # runs that are assessed; more would take long
 
 
 def limit_tables(results: Mapping[str, Result]) -> tuple[list[Table], list[str], list[str]]:
-    """Return tables of runs against limits, remarks on them, and what is exceeded.
+    """Return tables of runs with their limits, remarks on them, and limits exceeded.
 
-    EN 14363 as far as the runs go, all full sections counted; Nadal's limit for each run.
+    EN 14363 as far as the runs cover its zones, with all full sections; Nadal's limit for each run.
     """
     runs = {name: result for name, result in results.items() if len(result["time"])}
     if len(runs) > MOST:
-        return [], [f"{len(runs)} runs are not held against limits, {MOST} at most are."], []
+        return [], [f"{len(runs)} runs are not compared with limits; at most {MOST} runs are."], []
     running, remarks = _assessed(runs, "en14363")
     derailment, more = _assessed(runs, "safety")
     tables, exceeded = _zones(running)
@@ -63,7 +64,7 @@ def limit_tables(results: Mapping[str, Result]) -> tuple[list[Table], list[str],
 
 
 def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessment], list[str]]:
-    """Assess vehicle by vehicle: what one of them lacks leaves the others alone."""
+    """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
     groups: dict[str, dict[str, Result]] = {}
     for name, result in runs.items():
         groups.setdefault(str(result.attributes["vehicle_toml"]), {})[name] = result
@@ -84,7 +85,7 @@ def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessmen
 
 
 def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
-    """Return remarks as sentences, those that say the same of several runs once."""
+    """Return remarks as sentences, equal remarks on several runs once."""
     by_text: dict[str, list[str]] = {}
     for remark in remarks:
         name, _, text = remark.partition(": ")
@@ -99,7 +100,7 @@ def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
 
 
 def _zones(assessments: Sequence[Assessment]) -> tuple[list[Table], list[str]]:
-    """Return a table for each zone, the vehicles side by side, and what is exceeded."""
+    """Return a table for each zone, the vehicles side by side, and the limits exceeded."""
     tables: list[Table] = []
     exceeded: list[str] = []
     names = list(dict.fromkeys(zone.zone for one in assessments for zone in one.zones))
@@ -141,7 +142,7 @@ def _zones(assessments: Sequence[Assessment]) -> tuple[list[Table], list[str]]:
 
 
 def _value(row: Assessed) -> float:
-    """Return the estimate; of a single section, which has none, its own value."""
+    """Return the estimate; for a single section, which has none, its own value."""
     return row.estimate.value if row.estimate.value == row.estimate.value else row.estimate.mean
 
 
@@ -150,7 +151,7 @@ def _share(row: Assessed) -> float:
 
 
 def _nearest(rows: Sequence[Assessed]) -> dict[str, Assessed]:
-    """Return by quantity the place that is nearest to its limit."""
+    """Return, by quantity, the wheelset, wheel or sensor that is nearest to its limit."""
     found: dict[str, Assessed] = {}
     for row in rows:
         before = found.get(row.rule.name)

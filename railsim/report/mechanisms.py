@@ -1,6 +1,6 @@
-"""One self-contained page about a mechanism: player, inputs with provenance, results, pictures.
+"""A self-contained page about a mechanism: player, inputs with sources, results, pictures.
 
-`figures` draws everything that the results allow, `page` writes it down, `animation` makes a GIF,
+`figures` draws all pictures of the results, `page` returns the page, `animation` a GIF and
 `positions` a table of all positions.
 """
 
@@ -44,16 +44,16 @@ METHOD = (
     "Body coordinates and constraints of the joints, Newton's method with continuation along the "
     "driver; derivatives from the constraints' Jacobian. Forces by virtual work, reactions by "
     "Lagrange's multipliers. Angles of the tables are folded to 0 to 90 degrees.",
-    "The table of parameters says where every number is from: printed in the source, derived from "
-    "printed numbers alone, reconstructed (it agrees with what is printed but is not the only "
-    "value that does), new (our choice), optimised, or set by the caller. A result is only as "
-    "certain as the least certain of its parameters.",
+    "The table of parameters states the origin of every number: printed in the source, derived "
+    "from printed numbers alone, reconstructed (agrees with what is printed, but is not unique), "
+    "new (our choice), optimised, or set by the caller. A result is only as certain as the least "
+    "certain of its parameters.",
 )
 
 
 @dataclass(frozen=True)
 class Collected:
-    """What the page is about.
+    """Results on the page.
 
     Attributes
     ----------
@@ -113,20 +113,20 @@ CAPTIONS = {
     "angles": "Transmission angles folded to 90 degrees, pressure angles of cams; zone shaded.",
     "cam": "Rate on the arcs of the cam with the transitions; thin: each arc beyond its part.",
     "ratio_force": "Ratio and force over length and height; zone shaded, work height dashed.",
-    "pressure": "Pressure that holds the mechanism.",
-    "contact": "Static contact force at constant pressure; a full circle is a stable rest.",
-    "carpet": "Carpet of the air spring with the load of the mechanism.",
+    "pressure": "Pressure for equilibrium of the mechanism.",
+    "contact": "Static contact force at constant pressure; a full circle is a stable equilibrium.",
+    "carpet": "Carpet plot of the air spring with the load of the mechanism.",
     "gas_springs": "Length and force of the gas springs.",
-    "cases": "Force of the unknown in all cases.",
+    "cases": "Unknown force in all cases.",
     "time": "The motion in time.",
     "comparison": "The mechanisms side by side over the height.",
-    "comparison_zone": "The same in the zone, and below it the differences from the first.",
-    "search": "Objective at the end of every start of the search.",
+    "comparison_zone": "The same within the zone; below, the differences from the first.",
+    "search": "Objective at the end of the search from each starting point.",
 }
 
 
 def figures(collected: Collected) -> dict[str, Figure]:
-    """Draw all pictures, by the names of their files."""
+    """Draw all pictures; returned by the names of their files."""
     result = collected.result
     definition, output = result.definition, result.output
     with styled():
@@ -198,7 +198,7 @@ def positions(result: Analysis) -> bytes:
 
 
 def animation(result: Analysis) -> bytes:
-    """The mechanism moving to its end and back, as the bytes of a GIF file."""
+    """The motion of the mechanism to its end and back, as the bytes of a GIF file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
@@ -222,7 +222,7 @@ def animation(result: Analysis) -> bytes:
         title = axes.set_title(_told(result, motion.s[0]))
         moving: list[Any] = [*made, title]
         for artist in moving:
-            artist.set_animated(True)  # left out of what stays
+            artist.set_animated(True)  # excluded from the background
         canvas.draw()  # type: ignore[no-untyped-call]
         still = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
         for k in range(GIF_FRAMES):
@@ -246,7 +246,7 @@ def _told(result: Analysis, s: float) -> str:
 
 
 def player(result: Analysis) -> dict[str, Any]:
-    """What the page's player needs: lines as SVG coordinates in mm, y downwards."""
+    """Data of the player: lines as SVG coordinates in mm, y downwards."""
     model = result.model
     motion = solve(model, np.linspace(model.start, model.end, FRAMES))
     drawn = drawing.lines(motion)
@@ -286,7 +286,7 @@ def player(result: Analysis) -> dict[str, Any]:
 
 
 def _sentences(result: Analysis, s: Any) -> list[str]:
-    """What the player says at each of its positions."""
+    """Text of the player at each position."""
     names = [n for n in ("height", "force") if n in result.output]
     order = np.argsort(result.output["travel"])
     known = {n: np.interp(s, result.output["travel"][order], result.output[n][order])
@@ -302,12 +302,12 @@ def _sentences(result: Analysis, s: Any) -> list[str]:
 
 
 def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
-    """Write the page.
+    """Return the page as HTML.
 
     Parameters
     ----------
     collected : Collected
-        What to write about.
+        Results.
     drawn : mapping of str to bytes
         PNG pictures by the names of `figures`.
     """
@@ -379,13 +379,13 @@ def _table(
 def _results(result: Analysis, drawn: Mapping[str, bytes]) -> Section:
     shown = [_table(tables.upright(tables.position_table(result)))]
     if (published := tables.published_table(result))[1]:
-        shown.append(_table(published, "Printed in the source, and ours"))
+        shown.append(_table(published, "Printed in the source, and computed"))
     if made := checks(result):
         failed = frozenset(i for i, check in enumerate(made) if not check.ok)
         header, rows = tables.check_table(made)
         noted = [[*row, check.note] for row, check in zip(rows, made, strict=True)]
         words = frozenset({0, 5})
-        shown.append(_table(([*header, "what it compares"], noted), words=words, failed=failed))
+        shown.append(_table(([*header, "comparison"], noted), words=words, failed=failed))
     return Section("Results", tables.sentences(result), shown, _shown(drawn, "drawing", "path"))
 
 
@@ -416,6 +416,6 @@ def _comparison(comparison: Comparison, drawn: Mapping[str, bytes]) -> Section:
 def _tolerances(found: Sequence[Scatter]) -> Section:
     text = (
         "First order. Random: root of the sum of squares of the single deviations; worst case: "
-        "sum of their amounts."
+        "sum of their magnitudes."
     )
     return Section("Tolerances", [text], [_table(tables.scatter_table(found))])

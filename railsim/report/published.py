@@ -1,4 +1,4 @@
-"""Published values beside those of a run: same vehicle, same track, same speed."""
+"""Published values and those of a run with the same vehicle, track and speed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ from railsim.result import Result
 
 @dataclass(frozen=True)
 class Beside:
-    """A published value and that of a run.
+    """A published value and the value of a run.
 
     Attributes
     ----------
     study : Published
-        Where it was published.
+        Publication.
     value : PublishedValue
-        What was published.
+        Published value with its conditions.
     run : str
         Name of the run.
     rails : str
@@ -45,10 +45,10 @@ class Beside:
 
 
 def beside_published(results: Mapping[str, Result]) -> list[Beside]:
-    """Return every published value that the runs can be held against.
+    """Return every published value that the runs can be compared with.
 
-    A run is taken where vehicle and speed are those of the publication and the track differs in
-    the support of its rails at most: what the rails of a publication are like is rarely known.
+    A run is compared if vehicle and speed are those of the publication and its track differs at
+    most in the support of the rails, which publications rarely specify.
     """
     studies = [load_published(name) for name in shipped_names("published")]
     return [row for study in studies for row in _of_study(study, results)]
@@ -75,7 +75,7 @@ def _of_study(study: Published, results: Mapping[str, Result]) -> Sequence[Besid
 
 
 def reading(result: Result, value: PublishedValue) -> float | None:
-    """Return a published quantity as a result has it [SI]; None where it has not got there."""
+    """Return a published quantity from a result [SI]; None if the run ends before it."""
     if value.quantity not in result or value.wheelset > len(result.wheelsets):
         return None
     array = result[value.quantity][:, value.wheelset - 1]
@@ -85,7 +85,7 @@ def reading(result: Result, value: PublishedValue) -> float | None:
         return float(np.nanmax(array))
     if value.read == "smallest":
         return float(np.nanmin(array))
-    # from the start of the track: the run may have begun further on
+    # from the start of the track: the run may have begun at a later position
     time = result["time"] + result["distance"][0] / result.speed
     if not time[0] <= value.read <= time[-1]:
         return None

@@ -1,7 +1,7 @@
-"""One self-contained page about runs: what was run, values against limits, curves, spread.
+"""A self-contained page about runs: inputs, values and limits, curves, spread.
 
-`page` puts it together from the records of the runs and the results of those whose curves are
-shown.  Nothing on the page comes from elsewhere; its plots are drawn by uPlot (`vendor/`).
+`page` composes it from the records of all runs and the results of those whose curves are shown.
+The page loads no other files; its plots are drawn by uPlot (`vendor/`).
 """
 
 import json
@@ -29,12 +29,12 @@ from railsim.version import __version__
 
 Record = Mapping[str, Any]
 MOST_ROWS = 300  # of a table on the page
-MOST_DIFFERENCES = 40  # keys in which vehicles differ
+MOST_DIFFERENCES = 40  # keys in which the vehicles differ
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing of the page; `kinds` are named in its colours."""
+    """A drawing of the page; `kinds` are the labels of its colours."""
 
     title: str
     words: str
@@ -53,9 +53,9 @@ class Section:
     drawings : list of Drawing
     tables : list of Table
     plots : list of str
-        Plots that its script draws: the number of a group of curves, or ``spread``.
+        Plots that the script of the page draws: the number of a group of curves, or ``spread``.
     details : list of Table
-        Tables that unfold.
+        Tables that are folded at first.
     """
 
     id: str
@@ -73,19 +73,19 @@ def page(
     results: Mapping[str, Result],
     remarks: Sequence[str] = (),
 ) -> str:
-    """Write the page.
+    """Return the page as HTML.
 
     Parameters
     ----------
     title : str
-        What the runs are about.
+        Title of the page.
     records : sequence of mapping
-        One for each run, as `railsim.result.facts.run_facts` with ``name`` and ``labels``; also of
-        runs that failed or wait.
+        One for each run, as `railsim.result.facts.run_facts` with ``name`` and ``labels``,
+        including runs that failed or have not been done.
     results : mapping of str to Result
-        Those runs, by name, whose curves and values against limits are shown.
+        Results, by the names of their runs, whose curves and comparison with limits are shown.
     remarks : sequence of str
-        What else a reader must know.
+        Further notes for the reader.
     """
     found = groups(results)
     cells = cells_of(found)
@@ -97,7 +97,7 @@ def page(
     if limits or limit_remarks:
         told = Table(["remark"], [[remark] for remark in limit_remarks], "Remarks on these values")
         details = [told] if limit_remarks else []
-        sections.append(Section("limits", "Against limits", tables=limits, details=details))
+        sections.append(Section("limits", "Comparison with limits", tables=limits, details=details))
     if spread := _spread(records, data):
         sections.append(spread)
     if published := _published(results):
@@ -110,7 +110,7 @@ def page(
         "verdict": _verdict(records, exceeded),
         "sections": [section for section in sections if section],
         "foot": f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
-        "Numbers in the units of the field; files and the Python interface are SI.",
+        "Values in customary units; files and the Python interface use SI units.",
     }
     folder = files("railsim.report")
 
@@ -171,7 +171,7 @@ def _verdict(records: Sequence[Record], exceeded: Sequence[str]) -> list[dict[st
 
 
 def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
-    """Peaks of the shown runs side by side, where and when."""
+    """Peaks of the shown runs side by side, with position and time."""
     shown = [record for record in _done(records) if record["name"] in results]
     rows: dict[tuple[str, str], list[Cell]] = {}
     for number, record in enumerate(shown):
@@ -189,8 +189,8 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
         ["", *(printable(str(record["name"])) for record in shown)],
         [row + [""] * (1 + len(shown) - len(row)) for row in rows.values()],
     )
-    texts = ["Largest magnitudes over all steps of the runs after their starts, with their "
-             "signs; wheelsets count from the leading end."]  # fmt: skip
+    texts = ["Largest magnitudes over all steps after the start of the run, with their "
+             "signs; wheelsets are numbered from the leading end."]  # fmt: skip
     if len(shown) < len(_done(records)):
         texts.append(f"{len(shown)} of {len(_done(records))} runs, those with the largest values; "
                      "all others are in the spread and in the study's summary.csv.")  # fmt: skip
@@ -250,14 +250,14 @@ def _published(results: Mapping[str, Result]) -> Section | None:
             )
         first = own[0].study
         note = f"{first.program}: {first.source}. {' '.join(first.notes)}"
-        header = ["run", "", "read", "published", "here", "difference", "rails here"]
+        header = ["run", "", "read", "published", "here", "difference", "rails of the run"]
         words = frozenset({0, 1, 2, 6})
         tables.append(Table(header, cells, first.name, words=words, note=note))
-    return Section("published", "Beside published values", tables=tables)
+    return Section("published", "Comparison with published values", tables=tables)
 
 
 def _what_was_run(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
-    section = Section("inputs", "What was run")
+    section = Section("inputs", "Inputs")
     label = {record["name"]: record["labels"] for record in records}
     vehicles: dict[str, Any] = {}
     tracks: dict[str, list[Track]] = {}
@@ -313,7 +313,7 @@ def _differences(vehicles: Mapping[str, Any]) -> Table:
     return Table(
         ["key", *map(printable, vehicles)],
         [[printable(cell) for cell in row] for row in rows[:MOST_DIFFERENCES]],
-        "In what the vehicles differ (SI)",
+        "Differences between the vehicles (SI)",
         words=frozenset(range(len(vehicles) + 1)),
         note=f"{more} more keys differ." if more > 0 else "",
     )
@@ -329,7 +329,7 @@ def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
 
 
 def _settings(results: Mapping[str, Result]) -> Table:
-    """Return how the runs were computed; beside it what differs from the default."""
+    """Return a table of the settings of the runs, with differences from the default."""
     usual = dict(_flat(Settings().model_dump()))
     found: dict[str, dict[str, None]] = {}
     for result in results.values():
@@ -344,7 +344,7 @@ def _settings(results: Mapping[str, Result]) -> Table:
         if key in always or changed:
             rows.append([key, ", ".join(values), "changed" if changed else ""])
     words = frozenset({0, 1, 2})
-    return Table(["setting", "value", ""], rows, "How it was computed", words=words)
+    return Table(["setting", "value", ""], rows, "Method of computation", words=words)
 
 
 def _runs(records: Sequence[Record]) -> Table:
@@ -379,7 +379,7 @@ def _number(value: Any) -> str:
 
 
 def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
-    """Runs that did not end well, and remarks, equal ones once."""
+    """Runs that failed or ended early, and remarks, equal ones once."""
     section = Section("remarks", "Failures and remarks", list(map(printable, more)))
     rows = [
         [printable(str(record["name"])), str(record["status"]),
@@ -393,13 +393,13 @@ def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
             Table(
                 ["run", "status", "reason"],
                 rows[:MOST_ROWS],
-                f"{len(rows)} of {len(records)} runs without an end as asked for",
+                f"{len(rows)} of {len(records)} runs did not reach the requested end",
                 words=frozenset({0, 1, 2}),
                 note=f"{left} more are in summary.csv." if left > 0 else "",
             )
         )
     else:
-        section.texts.append("Every run came to its end.")
+        section.texts.append("All runs reached the requested end.")
     said: dict[str, list[str]] = {}
     for record in records:
         for remark in record.get("remarks", ()):
@@ -413,7 +413,7 @@ def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
             Table(
                 ["remark", "runs"],
                 cells,
-                "What a reader must know",
+                "Remarks",
                 words=frozenset({0, 1}),
                 note=f"{len(said) - MOST_ROWS} more are in summary.csv."
                 if len(said) > MOST_ROWS

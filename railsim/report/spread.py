@@ -1,4 +1,4 @@
-"""How the values of a study spread over what was varied: columns for the page and its table."""
+"""Spread of the values of a study over the varied parameters: columns of the page and its table."""
 
 from collections.abc import Mapping, Sequence
 from statistics import median
@@ -14,7 +14,7 @@ LEAST = 3  # runs, for a spread
 
 
 def parameters(records: Sequence[Record]) -> dict[str, list[Any]]:
-    """Return what differs between runs, numbers as numbers, by its name.
+    """Return the parameters that differ between runs, by name, numbers as numbers.
 
     Examples
     --------
@@ -39,9 +39,9 @@ def _numbers(values: Sequence[Any]) -> list[Any]:
 
 
 def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
-    """Return the values of all runs, in the units of printed tables, by what they are.
+    """Return the values of all runs in the units of printed tables, by the keys of quantities.
 
-    Each has ``words``, ``unit`` and ``values``, None where a run has none.
+    Each column has ``words``, ``unit`` and ``values``, None where a run has no value.
     """
     found: dict[str, dict[str, Any]] = {}
     for number, record in enumerate(records):
@@ -64,7 +64,7 @@ def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
 
 
 def _own(name: str, number: int) -> dict[str, Any]:
-    """A column of an analysis or of an own function, in SI."""
+    """A column of an analysis or of a user function, in SI."""
     return {"words": printable(name), "unit": unit_of_number(name), "values": [None] * number}
 
 
@@ -73,12 +73,12 @@ def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
     for peak in record.get("peaks", ()):
         if peak["quantity"] in QUANTITIES and peak["value"] is not None:
             quantity = QUANTITIES[peak["quantity"]]
-            # a peak is told by its magnitude: mirrored curves count alike
+            # peaks by magnitude, so that mirrored curves give equal values
             value = abs(peak["value"]) if peak["kind"] == "abs" else peak["value"]
             words = f"{quantity.long_name}, {WORDS[peak['kind']]}"
             rows.append((f"{quantity.name}_{peak['kind']}", words, quantity, value))
     for number, curve in enumerate(record.get("mid_curves", ()), start=1):
-        # records of earlier versions have the middle of the curve alone
+        # records of earlier versions have only the value at the middle of the curve
         steady, where = curve.get("largest_medians"), "full curve"
         if steady is None:
             steady, where = curve["largest"], "middle of curve"
@@ -91,7 +91,7 @@ def _values(record: Record) -> list[tuple[str, str, Quantity, float]]:
 
 
 def spread_rows(records: Sequence[Record]) -> list[list[str]]:
-    """Return smallest, median and largest value of each quantity, with the runs they belong to."""
+    """Return smallest, median and largest value of each quantity, with their runs."""
     rows = []
     for column in columns(records).values():
         pairs = [(v, i) for i, v in enumerate(column["values"]) if v is not None]
@@ -113,10 +113,10 @@ def spread_rows(records: Sequence[Record]) -> list[list[str]]:
 
 
 def worst_runs(records: Sequence[Record], most: int) -> list[str]:
-    """Return the names of at most `most` runs whose curves tell most, those of large values.
+    """Return the names of at most `most` runs, those with the largest values.
 
-    All runs where there are no more; else the largest of one quantity after the other, then the
-    second largest, in the order of the runs.
+    All runs if there are no more; otherwise the runs with the largest value of each quantity in
+    turn, then those with the second largest, and so on; in the order of the runs.
     """
     names = [str(record["name"]) for record in records]
     if len(names) <= most:

@@ -1,6 +1,6 @@
-"""One self-contained page about a trailing-arm suspension: inputs, results, checks, pictures.
+"""A self-contained page about a trailing-arm suspension: inputs, results, checks, pictures.
 
-`collected` computes everything that the file allows, `figures` draws it, `page` writes it down.
+`collected` computes all results that the file allows, `figures` draws them, `page` returns HTML.
 """
 
 import re
@@ -41,12 +41,12 @@ METHOD = (
     "Vertical stiffness after EN 13906-1; lateral and tilting stiffness of the loaded coil column "
     "after Krettek and Sobczak with the factors of Grossi (2025), ch. 2; equilibrium of the arm "
     "about its hinge, converged to round-off. The system stiffness is load over deflection; the "
-    "rate of small movements is the slope of the load over the rise of the axle, which the running "
-    "vehicle feels.",
-    "Solid height for hot coiled springs with closed and ground ends; stress of the solid spring "
-    "without, fatigue stress with the factor for the curvature of the wire and the lateral load; "
-    "the fatigue margin is the allowable over the actual upper stress at the same lower stress. "
-    "Buckling after EN 13906-1, which is where the lateral stiffness of the column vanishes.",
+    "tangent stiffness, which governs vibrations, is the slope of the load over the rise of the "
+    "axle.",
+    "Solid height for hot coiled springs with closed and ground ends. The stress at solid height "
+    "is without, the fatigue stress with the factor for the curvature of the wire and the lateral "
+    "load; the fatigue margin is the ratio of allowable to actual upper stress at the same lower "
+    "stress. Buckling after EN 13906-1, where the lateral stiffness of the column vanishes.",
 )
 FORMS = {
     "grossi": 'Moment of the nest in the form of the reference (equilibrium = "grossi").',
@@ -57,19 +57,19 @@ FORMS = {
 
 @dataclass(frozen=True)
 class Collected:
-    """Everything about a suspension that its file allows to compute.
+    """All results for a suspension that its file allows.
 
     Attributes
     ----------
     suspension : TrailingArmSuspension
-        The file's content.
+        Content of the file.
     verification : Verification
         Load cases and checks.
     design, fatigue, ride_heights, search : optional
-        Results of the other tables; None where the file has none, or where the design has no
-        physical solution (`remarks` says so).
+        Results of the other tables; None where the file has no such table, or where the design has
+        no physical solution (with a remark).
     remarks : tuple of str
-        What could not be computed, and why.
+        What could not be computed, with reasons.
     """
 
     suspension: TrailingArmSuspension
@@ -112,7 +112,7 @@ class Section:
 
 
 def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" = None) -> Collected:
-    """Compute everything that a suspension file allows.
+    """Compute all results that a suspension file allows.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def collected(suspension: TrailingArmSuspension, search: "SearchResult | None" =
 
 
 def figures(results: Collected) -> dict[str, Figure]:
-    """Draw all pictures, by the names of their files."""
+    """Draw all pictures; returned by the names of their files."""
     suspension = results.suspension
     with styled():
         drawn = {
@@ -166,12 +166,11 @@ def as_png(figure: Figure) -> bytes:
 
 
 def page(results: Collected, drawn: Mapping[str, bytes]) -> str:
-    """Write the page.
+    """Return the page as HTML.
 
     Parameters
     ----------
     results : Collected
-        What to write about.
     drawn : mapping of str to bytes
         PNG pictures by the names of `figures`.
     """
@@ -224,19 +223,19 @@ def _inputs(suspension: TrailingArmSuspension) -> Section:
         ["seat above the axle / mm", *(f"{h * 1e3:.6g}" for h in suspension.seat_heights)],
     ]
     if suspension.inner is not None:
-        rows.append(["starts to work at / mm", "0", f"{suspension.engagement * 1e3:.6g}"])
+        rows.append(["engages at / mm", "0", f"{suspension.engagement * 1e3:.6g}"])
     general = [
         ["arm length / mm", f"{arm.length * 1e3:.6g}"],
-        ["bush / (Nm/rad)", f"{arm.bush_torsional_stiffness:.6g}"],
+        ["bushing / (Nm/rad)", f"{arm.bush_torsional_stiffness:.6g}"],
         ["shear modulus / GPa", f"{material.G * 1e-9:.6g}"],
         ["Young's modulus / GPa", f"{material.E * 1e-9:.6g}"],
         ["mounting load / kN", f"{suspension.mounting.load * 1e-3:.6g}"],
-        ["wanted there / mm", f"{suspension.mounting.deflection * 1e3:.6g}"],
+        ["deflection under it / mm", f"{suspension.mounting.deflection * 1e3:.6g}"],
     ]
     if suspension.target is not None:
         general += [
             ["target load / kN", f"{suspension.target.load * 1e-3:.6g}"],
-            ["wanted there / mm", f"{suspension.target.deflection * 1e3:.6g}"],
+            ["deflection under it / mm", f"{suspension.target.deflection * 1e3:.6g}"],
         ]
     return Section(
         "Inputs", tables=[Table(["spring", *names], rows), Table(["arm and loads", ""], general)]
@@ -256,7 +255,7 @@ def _design(
         [name, f"{K_V * 1e-3:.3f}", "-" if n is None else f"{n:.4f}"]
         for name, K_V, n in zip(result.names, result.K_V, result.n, strict=True)
     ]
-    table = Table(["spring", "K_V / (N/mm)", "n for the wire given"], rows)
+    table = Table(["spring", "K_V / (N/mm)", "n for the given wire"], rows)
     caption = "Active coils over the wire diameter for the designed stiffnesses."
     return Section("Design", [text], [table], _picture(drawn, "coils", caption))
 
@@ -274,7 +273,7 @@ def _checks(result: Verification) -> Section:
     header, rows = check_table(result.checks)
     rows = [[*row, check.note] for row, check in zip(rows, result.checks, strict=True)]
     failed = frozenset(i for i, check in enumerate(result.checks) if not check.ok)
-    shown = _typeset(([*header, "what it compares"], rows), words=frozenset({0, 5}), failed=failed)
+    shown = _typeset(([*header, "comparison"], rows), words=frozenset({0, 5}), failed=failed)
     return Section("Checks", [], [shown])
 
 
@@ -297,11 +296,12 @@ def _fatigue(
 
 def _ride_heights(results: Sequence[RideHeight], drawn: Mapping[str, bytes]) -> Section:
     text = (
-        "Height of the bogie frame above the axle against the nominal nest, when springs and bush "
-        "deviate within their tolerances. Random: root of the sum of squares of the single "
-        "deviations. Worst case: all at their limits, combined as badly as possible."
+        "Deviation of the height of the bogie frame above the axle from the nominal value when "
+        "springs and bushing deviate within their tolerances. Random: root of the sum of squares "
+        "of the single deviations. Worst case: all at their limits in the least favourable "
+        "combination."
     )
-    caption = "What each tolerance does to the ride height, and the range under every load."
+    caption = "Influence of each tolerance on the ride height, and the range under every load."
     return Section(
         "Scatter of the ride height",
         [text],
@@ -312,13 +312,13 @@ def _ride_heights(results: Sequence[RideHeight], drawn: Mapping[str, bytes]) -> 
 
 def _search(result: "SearchResult", drawn: Mapping[str, bytes]) -> Section:
     text = (
-        f"{result.tried} nests tried, {result.feasible} of them within all limits before any was "
-        f"refined; ranked by {result.objective}. Dimensions are rounded to what is made, limits "
-        "are those that hold each optimum in place."
+        f"{result.tried} nests tried, {result.feasible} of them within all limits before "
+        f"refinement; ranked by {result.objective}. Dimensions are rounded to manufactured sizes; "
+        "the limits listed are those active at each optimum."
     )
     caption = "Mass and fatigue margin of the nests; the numbers are the ranks of the table."
     table = _typeset(search_table(result), words=frozenset({7}))
-    return Section("Nests that fit", [text], [table], _picture(drawn, "search", caption))
+    return Section("Feasible nests", [text], [table], _picture(drawn, "search", caption))
 
 
 def _or_dash(value: float | None, scale: float) -> str:
@@ -328,7 +328,7 @@ def _or_dash(value: float | None, scale: float) -> str:
 def _typeset(
     texts: Texts, words: frozenset[int] = frozenset({0}), failed: frozenset[int] = frozenset()
 ) -> Table:
-    """A table of the page from one in ASCII, with true signs."""
+    """A table of the page from one in ASCII, with typographic signs."""
 
     def typeset(cell: str) -> str:
         cell = cell.replace("+-", "± ").replace(" x ", " × ")

@@ -256,7 +256,7 @@ class Result:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader must know, one sentence each; see `railsim.simulation.remarks`."""
+        """Remarks for the reader, one sentence each; see `railsim.simulation.remarks`."""
         return tuple(str(self._attributes.get("remarks", "")).splitlines())
 
     def vehicle(self) -> "Vehicle":

@@ -25,7 +25,7 @@ PEAK_QUANTITIES = (
     "wheelset_yaw",
     "T_gamma",
 )
-"""What peak tables list unless told otherwise."""
+"""Default quantities of peak tables."""
 
 LOW_PASS = 20.0
 """Low pass of forces in EN 14363 [Hz]."""

@@ -244,7 +244,7 @@ class Hdf5Sink(SinkContext):
 
 @contextmanager
 def _told_of_file(path: Path) -> Iterator[None]:
-    """Let what goes wrong with the disk be reported in one line; HDF5 reports it in many."""
+    """Report a disk error in one line; HDF5 reports it in many."""
     try:
         yield
     except (OSError, RuntimeError) as error:

@@ -11,7 +11,7 @@
 - `ensemble`: several vehicles as one system
 - `outputs`: from raw records to the quantities of a result
 - `right_samples`: low-pass filter before storage
-- `remarks`: what a reader of a result must know
+- `remarks`: remarks for the reader of a result
 - `check_step`: a run compared with itself at half its step
 """
 

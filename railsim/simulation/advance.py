@@ -64,7 +64,7 @@ class Preparation:
     fresh : bool
         Whether nothing was before the initial state.
     remarks : tuple of str
-        What a reader must know.
+        Remarks for the reader.
     """
 
     model: Model
@@ -117,9 +117,9 @@ class Run:
     together : int
         Most runs that have shared a call with it, itself included.
     error : Exception or None
-        What went wrong with its output.
+        Error in writing its output.
     remarks : list of str
-        What a reader of its result must know, see `railsim.simulation.remarks`.
+        Remarks for the reader of its result, see `railsim.simulation.remarks`.
     """
 
     prepared: Preparation
@@ -157,7 +157,7 @@ def advance(
     runs : sequence of Run
         Of the same track, start and end, and of these settings.
     progress : callable, optional
-        Called with the finished fraction of all of them now and then.
+        Called repeatedly with the finished fraction of all runs.
     """
     whole = {run: run.prepared.left(run.state) for run in runs}
     done = dict.fromkeys(whole, 0.0)

@@ -22,7 +22,7 @@ def half_step(result: Result, *, progress: Callable[[float], None] | None = None
     result : Result
         A run; it stays as it is.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
 
     Returns
     -------

@@ -59,7 +59,7 @@ def in_flange_contact(
     step : float
         Step of the fast scheme, stable on straight track [s].
     progress : callable, optional
-        Called now and then with the time that has been simulated, and that is to be [s].
+        Called repeatedly with the time simulated so far and the time to simulate [s].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Remarks on a run: what a reader of its result must know, one sentence each.
+"""Remarks on a run for the reader of its result, one sentence each.
 
 `status` says how a run ended; remarks say what to keep in mind when its numbers are used.  The root
 attribute ``remarks`` holds them, one a line; tables, summaries and comparisons repeat them.  A

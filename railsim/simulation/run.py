@@ -60,7 +60,7 @@ def simulate(
     sink : Sink, optional
         Receives the output as it comes; by default it is kept in memory.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
     resume : Result or float64[n_state], optional

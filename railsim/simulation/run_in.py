@@ -76,7 +76,7 @@ def start_state(
     step, scheme : float, int
         Time step [s] and scheme of the run.
     progress : callable, optional
-        Called now and then with the time that has been simulated, and that is to be [s].
+        Called repeatedly with the time simulated so far and the time to simulate [s].
     remark : callable, optional
         Where it is given, the vehicle is in its steady state in a curve; called with a sentence
         where it is not.

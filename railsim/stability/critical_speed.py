@@ -59,7 +59,7 @@ class CriticalSpeed(Drawn):
     conicity_over_amplitude : dict or None
         Equivalent conicity of the leading wheelset, see `railsim.stability.conicity`.
     remarks : list of str
-        What a reader must know.
+        Remarks for the reader.
     """
 
     contact: Contact
@@ -155,7 +155,7 @@ def critical_speed(
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
 
     Returns
     -------

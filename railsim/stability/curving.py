@@ -80,7 +80,7 @@ class Curving(Drawn):
     wheelset_position : tuple of float
         Places of the wheelsets along the vehicle, against its reference body [m].
     remarks : tuple of str
-        What a reader must know.
+        Remarks for the reader.
     """
 
     radius: Floats
@@ -192,7 +192,7 @@ def curving(
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
 
     Returns
     -------

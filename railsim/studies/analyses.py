@@ -1,7 +1,7 @@
-"""The analyses of a case: what a study computes beside, or in place of, a run in the time domain.
+"""The analyses of a case: computed in addition to, or in place of, a run in the time domain.
 
-Each gives numbers by names, which become columns of ``summary.csv``: those of an analysis that the
-study calls ``curve`` begin with ``curve.``.
+Each returns numbers by name, which become columns of ``summary.csv``; the names of an analysis
+called ``curve`` in the study begin with ``curve.``.
 """
 
 import math
@@ -31,11 +31,11 @@ def analysed(case: Case, result: Result | None) -> Numbers:
     ----------
     case : Case
     result : Result or None
-        Its run, where one of its analyses needs one.
+        Result of its run, if one of its analyses needs one.
 
     Raises
     ------
-    InputError, ModelError : an analysis goes wrong, with its name.
+    InputError, ModelError : an analysis fails; the message names it.
     """
     found: Numbers = {}
     for name, analysis in case.analyses.items():
@@ -50,7 +50,7 @@ def _nothing_more(case: Case, analysis: RunAnalysis, result: Result | None) -> N
 
 
 def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Numbers:
-    """Largest share of each limit; comfort, wear and safety by their own numbers."""
+    """Largest share of each limit; values of comfort, wear and safety."""
     from railsim.assessment import assess
 
     assert result is not None  # a case with this analysis has a run
@@ -85,7 +85,7 @@ def _largest(record: Mapping[str, Any], standard: str) -> Numbers:
 
 
 def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a table by their names, those of tables in it after the table's."""
+    """Yield the numbers of a table by name; names in nested tables are prefixed."""
     for key, value in row.items():
         if isinstance(value, Mapping):
             yield from _numbers(value, f"{before}{key}_")
@@ -106,7 +106,7 @@ def _modes(case: Case, analysis: ModesAnalysis, result: Result | None) -> Number
 
 
 def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result | None) -> Numbers:
-    """Critical speeds by method; the end of the search where it hunts at none, or at all speeds."""
+    """Critical speeds by method; an end of the search where it hunts at no speed, or at all."""
     from railsim.stability.critical_speed import critical_speed
 
     found = critical_speed(
@@ -134,7 +134,7 @@ def _contact(analysis: ModesAnalysis | CriticalSpeedAnalysis) -> dict[str, Any]:
 
 
 def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Numbers:
-    """Largest magnitudes over the wheels or wheelsets, and the wear numbers' sum."""
+    """Largest magnitudes over the wheels or wheelsets, and the sum of the wear numbers."""
     import numpy as np
 
     from railsim.cant import cant_deficiency
@@ -155,7 +155,7 @@ def _curving(case: Case, analysis: CurvingAnalysis, result: Result | None) -> Nu
         raise ModelError(f"no steady state on a radius of {analysis.radius:g} m")
     names = ("Q", "Y", "Y_over_Q", "dQ_over_Q0", "sum_Y", "attack", "lateral", "car_roll")
     numbers = {name: float(np.max(np.abs(getattr(found, name)))) for name in names}
-    numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards it derails nothing
+    numbers["Y_over_Q"] = float(np.max(found.Y_over_Q))  # inwards: no derailment
     return {
         **numbers,
         "sum_abs_Y": float(np.max(np.abs(found.Y).sum(axis=-1))),

@@ -1,7 +1,7 @@
 """A scenario for vehicles: all its runs as one job, and the assessment at the end.
 
-It is carried out as a study is: with its journal, index and summary, and a run whose file is there
-with the same inputs is not computed again.
+It is carried out as a study: with journal, index and summary, and a run whose file exists with the
+same inputs is not computed again.
 """
 
 import os
@@ -29,7 +29,7 @@ from railsim.version import __version__
 
 @dataclass(frozen=True)
 class Campaign:
-    """What a campaign left in its folder.
+    """Results of a campaign in its folder.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Campaign:
     results : dict
         Results by the names of their runs.
     computed : int
-        Number of runs that were computed now; the others were there.
+        Number of runs that were computed by this call; the others existed.
     """
 
     folder: Path
@@ -71,27 +71,27 @@ def campaign(
     vehicles : sequence of str or Path, or a single one
         Files, or names of shipped ones; each needs a service table.
     out : str or Path
-        Folder; made if need be.  Results with the same inputs are not computed again.
+        Folder, created if it does not exist.  Results with the same inputs are not computed again.
     assignments : sequence of str
         ``key.path=value`` for all runs, after those of the scenario.
     workers : int, optional
         Processes; by default one for each core.
     scheduler : str, optional
-        Address of a dask scheduler whose workers do the runs instead.
+        Address of a dask scheduler whose workers carry out the runs instead.
     resume : bool
-        Go on with what is in the folder: runs whose inputs have changed are computed again.
+        Continue the campaign in the folder: runs whose inputs have changed are computed again.
     overwrite : bool
         Compute everything again.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
     on_record : callable, optional
-        Called with the record of every run that is done.
+        Called with the record of every finished run.
     on_remark : callable, optional
-        Called with every sentence on what was found in the folder.
+        Called with every remark on files found in the folder.
 
     Raises
     ------
-    InputError : everything that is wrong in the inputs; files in the folder of other inputs.
+    InputError : all faults of the inputs; files in the folder that belong to other inputs.
     RailsimError : a run failed; the others are kept.
     """
     names = [vehicles] if isinstance(vehicles, str | Path) else list(vehicles)
@@ -101,7 +101,7 @@ def campaign(
     cases = scenario_cases(plan, names, assignments)
     inputs = {
         "railsim_version": __version__,
-        "folder": os.path.relpath(Path.cwd(), folder),  # where names of files begin
+        "folder": os.path.relpath(Path.cwd(), folder),  # folder that relative file names refer to
         "scenario": str(scenario),
         "vehicles": [str(vehicle) for vehicle in names],
         "tracks": [],
@@ -122,7 +122,7 @@ def campaign(
 
 
 class _Cases:
-    """Cases that are loaded, as `carry_out` wants them."""
+    """Loaded cases in the form that `carry_out` takes."""
 
     def __init__(self, cases: Sequence[Case]) -> None:
         self._cases = {case.name: case for case in cases}
@@ -145,7 +145,7 @@ def scenario_cases(
 
     Raises
     ------
-    InputError : everything that is wrong in any of them.
+    InputError : all faults of all runs.
     """
     faults: list[Fault] = []
     cases: list[Case] = []
@@ -181,7 +181,7 @@ def scenario_cases(
 
 
 def part_speed(speed: Speed, service: Service) -> float:
-    """Speed of a part for a vehicle [m/s]; V^2 = g R (h + I)/2b0 from the cant deficiency."""
+    """Speed of a vehicle in a part [m/s]; V^2 = g R (h + I)/2b0 from the cant deficiency."""
     if speed.fixed is not None:
         return speed.fixed
     if speed.admissible is not None:

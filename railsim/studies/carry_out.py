@@ -1,4 +1,4 @@
-"""`carry_out`: the runs of a study or a campaign that are not done, with its folder's journal."""
+"""`carry_out`: computes the missing runs of a study or a campaign, with the journal."""
 
 import errno
 import logging
@@ -27,8 +27,8 @@ from railsim.studies.state import Runs, State
 from railsim.studies.summary import read_index, write_index
 
 _LOG = logging.getLogger(__name__)
-MANY = 10_000  # runs from which on an index that is up to date is not made once more
-# after one of these no other run could be written either
+MANY = 10_000  # number of runs from which an index that is up to date is not written again
+# errors after which no other run could be written either
 NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
 
 
@@ -50,20 +50,20 @@ def carry_out(
     on_record: Callable[[Record], None] | None = None,
     on_remark: Callable[[str], None] | None = None,
 ) -> Outcome:
-    """Do the runs of a study or a campaign that are not done, with the journal of its folder.
+    """Compute the missing runs of a study or a campaign, with the journal of its folder.
 
     Parameters
     ----------
     plan : Runs
-        What is to be done.
+        Runs of the study.
     inputs : mapping
-        What was asked for, as the journal and the index keep it, see `Inputs`.
+        Inputs as stored in the journal and the index, see `Inputs`.
     longest_first : bool
-        Begin with the longest runs, so that no core is left with one of them at the end.
+        Begin with the longest runs, to balance the load of the cores.
     own : str, optional
-        Function of own quantities, see `railsim.studies.own`.
+        Function for user-defined quantities, see `railsim.studies.own`.
     keep : Keep
-        What is kept of each result.
+        Parts of each result that are kept.
 
     Others as in `study`.
     """
@@ -159,8 +159,8 @@ def _refuse_another_study(
     differing = [name for name, value in asked.items() if there.get(name, value) != value]
     if differing:
         found = f"{folder} holds a study with other " + ", ".join(differing)
-        allowed = "--resume goes on with these inputs, --overwrite computes everything; or another"
-        raise InputError([Fault("--out", "", found, f"{allowed} --out")])
+        allowed = "--resume continues with these inputs, --overwrite computes everything; "
+        raise InputError([Fault("--out", "", found, f"{allowed}or another --out")])
 
 
 def _is_newer(one: Path, other: Path) -> bool:

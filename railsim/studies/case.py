@@ -1,4 +1,4 @@
-"""A case: all that one run depends on."""
+"""A case: all inputs of one run."""
 
 import hashlib
 import json
@@ -34,9 +34,9 @@ class Case:
         End of the run: time from its start [s] or distance [m]; the end of the track's plan if
         neither.
     labels : mapping of str to str or float
-        What tells the case apart: ``vehicle``, ``track``, ``speed`` and the keys of a grid.
+        Labels of the case: ``vehicle``, ``track``, ``speed`` and the keys of a grid.
     analyses : mapping of str to Analysis
-        What is computed, by names; a run where there is none.
+        Analyses by name; without analyses, a run is computed.
     """
 
     name: str
@@ -52,15 +52,15 @@ class Case:
 
     @property
     def file_name(self) -> str:
-        """Name of the result file; empty where there is no run in the time domain."""
+        """Name of the result file; empty if there is no run in the time domain."""
         return f"{self.name}.h5" if needs_run(self.analyses) else ""
 
     @cached_property
     def key(self) -> str:
-        """Hash of everything that the numbers of the run depend on.
+        """Hash of everything that the results of the run depend on.
 
-        Definitions with their defaults, the points of the profiles and the version of railsim;
-        neither the name nor the labels, nor what is computed from the run afterwards.
+        Definitions with their defaults, the points of the profiles and the version of railsim; not
+        the name, the labels or the analyses of the finished run.
         """
         inputs = {
             "railsim": __version__,
@@ -84,9 +84,9 @@ class Case:
         return {name for _, name, _ in used}
 
 
-@lru_cache(1000)  # of some files, for 100 000 runs
+@lru_cache(1000)  # few files in up to 100 000 runs
 def short_name(path: str | Path) -> str:
-    """Return what a file is called in the names of runs: its name without folder and ending."""
+    """Return the name of a file in the names of runs: without folder and ending."""
     return Path(path).name.removesuffix(".toml")
 
 

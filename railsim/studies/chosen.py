@@ -51,7 +51,7 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     overrides : sequence of str
         ``key.path=value`` with the file's own keys.
     folder : Path
-        Where the new file is to lie: the other one's path counts from there.
+        Folder of the new file; the path to the original is relative to it.
     """
     from railsim.definitions.loading import FORMATS
     from railsim.definitions.vehicle import Vehicle
@@ -71,7 +71,7 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
 
 
 def _difference(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a table has to say to become another one by `extends`.
+    """Return the entries that turn one table into another by `extends`.
 
     Examples
     --------

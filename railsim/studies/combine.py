@@ -1,4 +1,4 @@
-"""From lists and grids to cases, with every fault of all of them at once."""
+"""From lists and grids to cases; all faults are reported together."""
 
 import math
 import os
@@ -26,7 +26,7 @@ from railsim.studies.rows import PERMITTED, made_rows
 from railsim.units import ALLOWED
 
 T = TypeVar("T", bound=FileDefinition)
-LONGEST_NAME = 250  # bytes of a file's name, ending included; file systems allow 255
+LONGEST_NAME = 250  # bytes of a file name with its ending; file systems allow 255
 KINDS: dict[Any, str] = {load_vehicle: "vehicle", load_track: "track", load_settings: "settings"}
 
 
@@ -41,7 +41,7 @@ def load_case(
     until: float | None = None,
     assignments: Sequence[str] = (),
 ) -> Case:
-    """Load what one run needs.
+    """Load the inputs of one run.
 
     Parameters
     ----------
@@ -93,27 +93,27 @@ def combinations(
 
 
 class Plan:
-    """All points of a study, and the way from a point to its case.
+    """All points of a study; loads the case of a point.
 
     Parameters
     ----------
     vehicles, tracks, speeds : sequences
-        What is combined, vehicles outermost.  The speed `PERMITTED` is the lower of the vehicle's
-        admissible speed and the track's speed.
+        Inputs to combine, vehicles outermost.  The speed `PERMITTED` is the lower of the admissible
+        speed of the vehicle and the speed of the track.
     grid : mapping of str to sequence of str, optional
-        Values, written as in a file, of further keys.
+        Values of further keys, written as in a file.
     settings, start, duration, until, assignments
         As in `load_case`, for all runs.
     linked : sequence of mappings
-        Keys whose values go together, as `grid`; ``speed`` is that of the run.
+        Keys whose values vary together, as `grid`; ``speed`` is the speed of the run.
     sample : Sample, optional
         Random values of further keys.
     told : str
-        What else the record of a run depends on.
+        Further inputs that the record of a run depends on.
     analyses : mapping of str to Analysis, optional
-        What is computed at each point; a run where there is none.
+        Analyses at each point; without analyses, a run is computed.
     workers : int
-        Processes that will do the runs, for the time that a refused study would take.
+        Processes for the runs, to estimate the time that a refused study would take.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Plan:
 
     Raises
     ------
-    InputError : there is no combination, or there are too many.
+    InputError : there is no combination, or there are too many combinations.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class Plan:
         )
         common = self._split(assignments)
         rows = made_rows(grid, linked, sample)
-        # one and the same for all vehicles, tracks and speeds
+        # the same for all vehicles, tracks and speeds
         own = [self._own(common, row.values) for row in rows]
         fingerprint = Fingerprints()
         with_run = needs_run(self._analyses)
@@ -202,7 +202,7 @@ class Plan:
                 )
 
     def cases(self, points: Sequence[Point]) -> list[Case]:
-        """Load what the runs of some points need.
+        """Load the inputs of the runs of some points.
 
         Raises
         ------
@@ -275,7 +275,7 @@ class Plan:
         service = self._loaded(load_vehicle, vehicle, overrides["vehicle"])
         line = self._loaded(load_track, track, overrides["track"])
         if service is None or line is None:
-            return None  # reported by now
+            return None  # already reported
         allowed = f"needed for the speed '{PERMITTED}'"
         if service.service is None:
             self._tell([Fault(str(vehicle), "service.admissible_speed", "missing", allowed)])
@@ -296,7 +296,7 @@ class Plan:
             return None
 
     def _simulated_time(self, track: str | Path, speed: float | str | None) -> float:
-        """Guess how long a run is [s]: that of the first track and speed."""
+        """Estimate the duration of a run [s] from the first track and speed."""
         if self._duration is not None:
             return self._duration
         try:
@@ -308,7 +308,7 @@ class Plan:
 
 
 def _as_written(fault: Fault, kind: str, grid: Grid) -> Fault:
-    """Return the fault of an assignment with its key and option as they were given."""
+    """Return the fault of an assignment with its key and option as given."""
     if fault.file != OVERRIDE:
         return fault
     key = f"{kind}.{fault.key}"
@@ -327,7 +327,7 @@ def _range_faults(
 
 
 def name_faults(points: Sequence[Point]) -> list[Fault]:
-    """Return what is wrong with the names of runs: two of a name, or too long for a file."""
+    """Return the faults of the names of runs: equal names, or names too long for a file."""
     counts = Counter(point.name for point in points)
     faults = [
         Fault("study", name, f"{count} runs of this name", "give files with different names")
@@ -344,7 +344,7 @@ def name_faults(points: Sequence[Point]) -> list[Fault]:
 def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
     """Return the key and the values of ``key.path=a,b,c`` or ``key.path=first:last:number``.
 
-    Commas within brackets do not part values.
+    Commas within brackets do not separate values.
 
     Examples
     --------
@@ -355,7 +355,7 @@ def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
 
     Raises
     ------
-    InputError : it is nothing of the kind.
+    InputError : the text has neither form.
     """
     key, equals, written = text.partition("=")
     values = [value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written)]

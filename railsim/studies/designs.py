@@ -1,4 +1,4 @@
-"""Designs of an optimisation: values of the variables through a study, and what came of them."""
+"""Designs of an optimisation: values of the variables, evaluated by a study."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,7 +27,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Design:
-    """Values of the variables, and what came of them.
+    """Values of the variables, objectives and constraints.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class Design:
     variables : dict of str to float
         By their paths [SI].
     objectives : tuple of float
-        In the order of the definition [SI]; NaN where a run has no such value.
+        In the order of the definition [SI]; NaN if a run has no such value.
     constraints : tuple of float
-        Worst value of each constraint's quantity [SI].
+        Worst value of the quantity of each constraint [SI].
     feasible : bool
-        Whether all values are there and all constraints kept.
+        Whether all values exist and all constraints are met.
     reason : str
-        Why there are no values.
+        Reason why there are no values.
     """
 
     number: int
@@ -54,14 +54,14 @@ class Design:
 
 
 class Evaluation:
-    """Designs through a study; what a search calls.
+    """Evaluation of designs by a study, as called by a search.
 
     Attributes
     ----------
     rows : list of tuple of str
         Values of the variables of all designs, as written.
     asked : list of int
-        For each point that the search has asked for, the number of its row.
+        For each point that the search has requested, the number of its row.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Evaluation:
         return list(self.wanted.variables.items())
 
     def __call__(self, points: Floats) -> Values:
-        """Compute designs, and return the values of all that were asked for."""
+        """Compute designs, and return the values of all designs requested so far."""
         known = {row: number for number, row in enumerate(self.rows)}
         for point in points:
             row = tuple(
@@ -189,7 +189,7 @@ def share_of(variable: Variable, value: float) -> float:
 
 
 def signs_of(wanted: Optimise) -> NDArray[np.float64]:
-    """Return 1 for each objective that is to be small, -1 for one that is to be large."""
+    """Return 1 for each objective to minimise, -1 for each to maximise."""
     return np.array([1.0 if one.goal == "minimise" else -1.0 for one in wanted.objectives])
 
 
@@ -197,7 +197,7 @@ Rows = Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]
 
 
 def _values(one: Value, rows: Rows) -> list[float]:
-    """Return a quantity in the runs that count, NaN where a run lacks it."""
+    """Return a quantity of the selected runs, NaN where a run lacks it."""
     found = []
     for labels, cells in rows:
         if not all(_alike(labels.get(key), value) for key, value in one.where.items()):
@@ -209,7 +209,7 @@ def _values(one: Value, rows: Rows) -> list[float]:
 
 
 def _alike(label: object, wanted: object) -> bool:
-    """Whether a label, a text in a grid, is a value."""
+    """Whether a label, a text in a grid, equals a value."""
     try:
         return label == wanted or float(str(label)) == float(str(wanted))
     except ValueError:
@@ -226,7 +226,7 @@ def _objective(one: Objective, rows: Rows) -> float:
 
 
 def _constraint(one: Constraint, rows: Rows) -> tuple[float, float]:
-    """Return the worst value, and by how much of the limit it is beyond it, negative within."""
+    """Return the worst value, and its relative excess over the limit, negative within it."""
     found = (math.nan, math.nan)
     for value in _values(one, rows):
         if math.isnan(value):
@@ -258,19 +258,19 @@ def _check_quantities(wanted: Optimise, outcome: Outcome) -> None:
                 found = f"no run has '{one.quantity}'"
                 faults.append(Fault(INPUTS, f"{key}.quantity", found, nearest(one.quantity, known)))
             elif not _values(one, rows):
-                faults.append(Fault(INPUTS, f"{key}.where", "no run is like this", ""))
+                faults.append(Fault(INPUTS, f"{key}.where", "no run has these labels", ""))
     if faults:
         raise InputError(faults)
 
 
 def name_of(one: Value) -> str:
-    """Return what a value is called: its quantity, with the runs that count."""
+    """Return the name of a value: its quantity, with the selected runs."""
     where = ", ".join(f"{key}={value}" for key, value in one.where.items())
     name = f"|{one.quantity}|" if one.magnitude else one.quantity
     return f"{name} at {where}" if where else name
 
 
 def with_unit(one: Value) -> str:
-    """Return what a value is called, with its unit."""
+    """Return the name of a value with its unit."""
     unit = unit_of(one.quantity)
     return f"{name_of(one)} ({unit})" if unit else name_of(one)

@@ -1,9 +1,9 @@
 """Jobs over the cores of this machine, or over a dask cluster.
 
-Jobs come in batches, whose runs share a call; a batch mostly holds one job.  A job that goes wrong
-becomes a record that says so; the others go on.  On Ctrl-C running jobs are told to stop and leave
-nothing behind; a process that does not answer, because it is compiling, is ended after a moment.
-Processes whose study is no more end by themselves.
+Jobs come in batches, whose runs share a call; most batches hold one job.  A failed job becomes a
+record with the reason; the others continue.  On Ctrl-C running jobs are requested to stop and leave
+no files behind; a process that does not respond, because it is compiling, is terminated after a
+moment.  Processes whose study has ended terminate by themselves.
 """
 
 import math
@@ -40,30 +40,30 @@ from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import analysed_record, failed_record, finished_record, stopped_record
 from railsim.threads import one_thread_each
 
-GRACE = 3.0  # seconds that running jobs have to stop by themselves
-POLL = 0.2  # seconds between looks at the progress
+GRACE = 3.0  # seconds that running jobs have to stop
+POLL = 0.2  # seconds between updates of the progress
 
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
 class Job:
-    """A case and where its files go.
+    """A case and the paths of its files.
 
     Attributes
     ----------
     case : Case
-        What to run.
+        Case to run.
     path : Path
         Result file; an existing one is replaced.
     picture : Path or None
         Figure of the result.
     own : str or None
-        Function of own quantities, see `railsim.studies.own`.
+        Function for user-defined quantities, see `railsim.studies.own`.
     keep : Keep
-        What is kept of the result.
+        Parts of the result that are kept.
     there : bool
-        Whether the run is there, and only its analyses are to be done.
+        Whether the run exists, and only its analyses are to be computed.
     """
 
     case: Case
@@ -82,14 +82,14 @@ class Stopped(Exception):
 
 
 def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
-    """Put jobs that can share a call into batches.
+    """Group jobs that can share a call into batches.
 
     Parameters
     ----------
     together : int
-        Most jobs of a batch.
+        Largest number of jobs in a batch.
     workers : int
-        No batch is larger than a worker's share of all jobs: none is to wait for another.
+        No batch is larger than the share of one worker in all jobs, so that no worker is idle.
     """
     size = min(together, math.ceil(len(jobs) / workers))
     alone: list[Job] = []
@@ -113,7 +113,7 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
 
 
 def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
-    """Do the jobs of a batch and return their records, whether they went well or not."""
+    """Carry out the jobs of a batch and return their records, whether they succeed or fail."""
     found: list[Result | Exception]
     if not batch[0].case.file_name:
         return [_analysed(job) for job in batch]
@@ -135,23 +135,23 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
         raise
     except Exception as error:
         found = [error] * len(batch)
-    found.reverse()  # each result is let go of with its record: it holds what was read of its file
+    found.reverse()  # each result is released after its record: it holds data read from its file
     return [_record(job, found.pop()) for job in batch]
 
 
 def _file(job: Job) -> Path | None:
-    """Return the result file of a job; None where nothing but its summary is kept."""
+    """Return the result file of a job; None if only its summary is kept."""
     return None if job.keep.summary else job.path
 
 
 def _quantities(job: Job) -> Collection[str] | None:
-    """Return the quantities that a job's record is taken from; None for all."""
+    """Return the quantities that the record of a job needs; None for all."""
     wants_all = job.own is not None or job.case.analyses or job.picture is not None
     return None if wants_all or not job.keep.summary else OF_FACTS
 
 
 def _there(job: Job) -> Record | None:
-    """Return the record of a run that is there; None where its file lacks what is wanted of it."""
+    """Return the record of an existing run; None if its file lacks required quantities."""
     try:
         return finished_record(job.case, open_result(job.path), job.own)
     except RailsimError:
@@ -163,7 +163,7 @@ def _analysed(job: Job) -> Record:
     begin = time.process_time()
     try:
         quantities = analysed(job.case, None)
-    except ModelError as error:  # what the model has no answer to is an answer, given once
+    except ModelError as error:  # no solution: a result too, not computed again
         return stopped_record(job.case, str(error))
     except RailsimError as error:
         return failed_record(job.case, str(error))
@@ -174,7 +174,7 @@ def _analysed(job: Job) -> Record:
 
 
 def _record(job: Job, outcome: Result | Exception) -> Record:
-    """Draw the result of a job, and return its record or that of what went wrong."""
+    """Draw the result of a job, and return its record, or the record of a failure."""
     try:
         if isinstance(outcome, Exception):
             raise outcome
@@ -197,7 +197,7 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
 
 
 def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:
-    """Do batches one after the other."""
+    """Carry out batches one after the other."""
     shares = _shares(batches)
     for index, batch in enumerate(batches):
 
@@ -208,13 +208,13 @@ def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Re
 
 
 def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> Iterator[Record]:
-    """Do batches on several cores; records come as the batches end.
+    """Carry out batches on several cores; records are returned as the batches end.
 
-    Where the time loop has to be compiled, the first batch begins alone: the others find it done,
-    and no two processes compile the same on cores and memory that they share.
+    If the time loop has to be compiled, the first batch starts alone, so that it is compiled only
+    once.
 
-    A process that dies (killed, for want of memory for instance) takes its pool with it; what was
-    under way begins again in a new one.  A batch whose process has died twice is given up.
+    When a process dies (for instance killed for lack of memory), its pool ends with it; unfinished
+    batches start again in a new pool.  A batch whose process has died twice is abandoned.
     """
     shares = _shares(batches)
     todo = dict.fromkeys(range(len(batches)))
@@ -232,17 +232,17 @@ def in_processes(batches: Sequence[Batch], workers: int, progress: Progress) -> 
         deaths.update(pool.lost)
         for index in [index for index in todo if deaths[index] > 1]:
             del todo[index]
-            reason = "its process died twice, perhaps for want of memory"
+            reason = "its process died twice, perhaps for lack of memory"
             yield from [failed_record(job.case, reason) for job in batches[index]]
 
 
 class _Pool:
-    """One pool of processes, to its end or to the death of one of them.
+    """One pool of processes, until all batches are done or a process dies.
 
     Attributes
     ----------
     lost : set of int
-        Batches that were under way in a process that died.
+        Batches that were running in a process that died.
     """
 
     def __init__(self, batches: Sequence[Batch], indices: Sequence[int], workers: int) -> None:
@@ -261,7 +261,7 @@ class _Pool:
 
     def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
         new = set()
-        with signals_later(), one_thread_each():  # the processes inherit it
+        with signals_later(), one_thread_each():  # inherited by the processes
             for index in indices:
                 future = self._pool.submit(_work, index, self._batches[index])
                 self._index_of[future] = index
@@ -304,12 +304,12 @@ class _Pool:
         finally:
             self._pool.shutdown(wait=True, cancel_futures=True)
             for folder in {job.path.parent for batch in self._batches for job in batch}:
-                sweep(folder)  # what a process that was killed has left
+                sweep(folder)  # left by a process that was killed
         if broken:
             self.lost = self._lost(done)
 
     def _lost(self, done: set[int]) -> set[int]:
-        """Return the batches of the process that died by itself; the pool has ended the others."""
+        """Return the batches of the process that died; the pool has terminated the others."""
         for process in self._processes:
             process.join(GRACE)
         ended = (None, 0, -signal.SIGTERM)
@@ -325,7 +325,7 @@ def _shares(batches: Sequence[Batch]) -> list[float]:
 
 
 def is_compiled() -> bool:
-    """Whether the time loop is there, compiled; also where compiled code is not kept."""
+    """Whether the compiled time loop is available; true also if compiled code is not kept."""
     kept = getattr(time_loop, "stats", None)  # None: the compiler is switched off
     folder = kept.cache_path if kept else None
     return folder is None or any(Path(folder).glob("time_loop.time_loop-*.nbc"))
@@ -352,11 +352,11 @@ def cluster(address: str) -> Any:
 
 
 def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:
-    """Do batches on the workers of a dask cluster.
+    """Carry out batches on the workers of a dask cluster.
 
-    A worker that sees the study's folder writes into it; from others the files come back with the
-    records.  What a worker that died was doing begins again on another one; a batch whose workers
-    have died several times (dask's ``allowed-failures``) is given up.
+    A worker with access to the folder of the study writes into it; other workers return the files
+    with the records.  A batch of a worker that died starts again on another one; a batch whose
+    workers have died several times (``allowed-failures`` of dask) is abandoned.
     """
     from distributed import as_completed
 
@@ -377,7 +377,7 @@ def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Ite
 
 @contextmanager
 def _marks(folders: set[Path]) -> Iterator[str]:
-    """Give the name of a file that stands in each folder within the block, for who sees it."""
+    """Yield the name of a file that exists in each folder within the block, to test access."""
     mark = f".railsim-{secrets.token_hex(8)}"
     try:
         for folder in folders:
@@ -389,13 +389,13 @@ def _marks(folders: set[Path]) -> Iterator[str]:
 
 
 def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, bytes]]:
-    """Do the jobs of a batch on a machine that may not see the study's folder.
+    """Carry out the jobs of a batch on a machine that may lack access to the folder of the study.
 
     Returns
     -------
     records : list of Record
     files : dict of str to bytes
-        What the jobs have written, where the folder is not seen here.
+        Files written by the jobs, if the folder is not accessible.
     """
     if all((job.path.parent / mark).is_file() for job in batch):
         return perform(batch), {}
@@ -413,7 +413,7 @@ def perform_there(batch: Batch, mark: str) -> tuple[list[Record], dict[str, byte
 
 
 def _taken(future: Any, batch: Batch) -> list[Record]:
-    """Return the records of a batch of the cluster, its files written."""
+    """Return the records of a batch of the cluster after writing its files."""
     folder = batch[0].path.parent
     try:
         records, files = future.result()
@@ -438,7 +438,7 @@ def _outcome(future: Any, batch: Batch) -> list[Record]:
     return records
 
 
-# what a worker process knows: the progress and the process of all jobs, and whether to stop
+# shared with worker processes: progress and process of all jobs, and whether to stop
 _shared: Any = None
 
 
@@ -450,7 +450,7 @@ def _begin(fractions: Any, holders: Any, stop: Any) -> None:
 
 
 def _end_with_parent(stop: Any) -> None:
-    """Wait until the study's process is gone, however that came; then stop as on Ctrl-C."""
+    """Wait until the process of the study has ended, for any reason; then stop as on Ctrl-C."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -473,7 +473,7 @@ def _work(index: int, batch: Batch) -> list[Record]:
 
 
 def _end(processes: set[BaseProcess]) -> None:
-    """Wait a moment for processes to end and end the rest."""
+    """Wait a moment for processes to end, and terminate the rest."""
     with signals_later():
         for process in processes:
             process.join(GRACE / max(1, len(processes)))

@@ -1,6 +1,6 @@
-"""Pareto fronts: which designs no other one betters, and how good a front is.
+"""Pareto fronts: non-dominated designs, and the volume that a front dominates.
 
-All objectives are to be small; a caller turns the sign of those that are to be large.
+All objectives are minimised; callers change the sign of objectives to maximise.
 """
 
 import numpy as np
@@ -10,9 +10,9 @@ Floats = NDArray[np.float64]
 
 
 def non_dominated(values: Floats) -> NDArray[np.bool_]:
-    """Return which rows no other row betters: none is as small in all columns and smaller in one.
+    """Return which rows are not dominated: no other is as small in all columns, smaller in one.
 
-    Of equal rows the first counts; rows with NaN are dominated.
+    Of equal rows only the first is non-dominated; rows with NaN are dominated.
 
     Examples
     --------
@@ -21,7 +21,7 @@ def non_dominated(values: Floats) -> NDArray[np.bool_]:
     """
     found = np.zeros(len(values), dtype=np.bool_)
     front = np.empty((0, values.shape[1]))
-    for i in np.lexsort(values.T[::-1]):  # only rows before it can better a row
+    for i in np.lexsort(values.T[::-1]):  # a row can only be dominated by rows before it
         row = values[i]
         if not np.isnan(row).any() and not (front <= row).all(axis=1).any():
             found[i] = True
@@ -32,9 +32,9 @@ def non_dominated(values: Floats) -> NDArray[np.bool_]:
 def hypervolume(values: Floats, reference: Floats) -> float:
     """Return the volume between a front and a reference point (Zitzler and Thiele 1999).
 
-    The part of the space of objectives that at least one row dominates and that dominates the
-    reference.  Sliced along the last objective; the time grows with the number of rows to the
-    number of objectives.
+    The part of the objective space that at least one row dominates and that dominates the
+    reference point.  Computed in slices along the last objective; the time grows with the number of
+    rows to the power of the number of objectives.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def hypervolume(values: Floats, reference: Floats) -> float:
 
 
 def knee(front: Floats) -> int:
-    """Return the row nearest to the best of each objective, each measured by its range.
+    """Return the row nearest to the best value of each objective, scaled by its range.
 
     Examples
     --------

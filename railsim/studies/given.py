@@ -1,7 +1,7 @@
-"""What a study is given in Python: files, names of shipped ones, or definitions.
+"""Inputs of a study in Python: files, names of shipped ones, or definitions.
 
-A definition is written into ``inputs/`` of the study's folder, so that the study can be resumed,
-sent to other machines and read without the script that made it.
+A definition is written to ``inputs/`` in the folder of the study, so that the study can be
+continued, sent to other machines and read without the script.
 """
 
 import re
@@ -16,7 +16,7 @@ INPUTS = "inputs"
 
 
 def as_files(given: Sequence[Any], folder: Path) -> list[str | Path]:
-    """Return files in place of definitions, written where they are not there yet."""
+    """Return files in place of definitions, written if they do not exist."""
     found: list[str | Path] = []
     taken: dict[str, str] = {}
     for one in given:
@@ -40,7 +40,7 @@ def as_files(given: Sequence[Any], folder: Path) -> list[str | Path]:
 
 
 def _slug(name: str) -> str:
-    """Return a name as that of a file.
+    """Return a name in a form suitable for a file.
 
     Examples
     --------

@@ -1,11 +1,11 @@
-"""The journal of a study: one line for every run that is done, appended when it is.
+"""The journal of a study: one line for every finished run, appended when the run ends.
 
-Nothing that stands in it is ever rewritten, so that a run costs the same after ten as after a
-hundred thousand others, and a process that is killed loses the line that it was writing at most.
-Each line holds the CRC-32 of the rest, a *head* with what is needed to go on, and a *body*, the
-whole record, both as JSON and parted by tabs; a damaged line is left out, and its run looked at
-anew.  The first line of a session holds the inputs of the study.  A study that is under way holds
-a lock on the file.
+Lines are never rewritten, so that the cost per run does not grow with the number of runs, and a
+process that is killed loses at most the line that it was writing.
+Each line holds the CRC-32 of the rest, a *head* with the data needed to continue the study, and a
+*body*, the whole record; both are JSON, separated by tabs.  A damaged line is ignored, and its run
+is examined again.  The first line of a session holds the inputs of the study.  A running study
+holds a lock on the file.
 
 Opening 100 000 runs reads the heads only; a record is read when it is asked for.
 """
@@ -24,24 +24,24 @@ from railsim.errors import Fault, InputError
 JOURNAL = "study.journal"
 FORMAT = "railsim-study-journal/1"
 
-RECORD = {"name", "file", "labels", "status"}  # what every record has
+RECORD = {"name", "file", "labels", "status"}  # keys of every record
 
 Record = dict[str, Any]
 
 
 class Entry(NamedTuple):
-    """What the journal knows of a run without reading its record.
+    """Data of a run that are available without reading its record.
 
     Attributes
     ----------
     name, status : str
         Name of the run, and how it ended: as in its result, or ``failed``.
     key : str
-        Hash of what the run was asked for, see `railsim.studies.points`.
+        Hash of the inputs of the run, see `railsim.studies.points`.
     size, changed : int
         Size of its result file [bytes] and time of its last change [ns]; 0 without a file.
     offset, length : int
-        Where its record stands in the journal [bytes].
+        Position and length of its record in the journal [bytes].
     """
 
     name: str
@@ -53,13 +53,13 @@ class Entry(NamedTuple):
     length: int
 
     def is_of(self, file: os.stat_result | None) -> bool:
-        """Whether a file is as it was when the run ended."""
+        """Whether a file is unchanged since the run ended."""
         found = (0, 0) if file is None else (file.st_size, file.st_mtime_ns)
         return found == (self.size, self.changed)
 
 
 class Journal:
-    """The journal of a folder, open for reading and appending; it is locked for others.
+    """The journal of a folder, open for reading and appending; locked for other processes.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ class Journal:
     entries : dict of str to Entry
         The last entry of every run, by its name.
     inputs : mapping or None
-        Inputs of the study when it was started last; None in a new journal.
+        Inputs of the study at its last start; None in a new journal.
     damaged : int
-        Lines that could not be read.
+        Number of lines that could not be read.
 
     Raises
     ------
@@ -129,19 +129,19 @@ class Journal:
         self.entries[entry.name] = entry
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Delete all entries."""
         os.ftruncate(self._handle, 0)
         self.entries.clear()
         self.inputs, self._end = None, 0
 
     def begin(self, inputs: Mapping[str, Any]) -> None:
-        """Write the inputs of the study, unless they are those of the last time."""
+        """Write the inputs of the study if they differ from those of its last start."""
         if self.inputs != inputs:
             self._line({"format": FORMAT}, _json(inputs))
             self.inputs = inputs
 
     def add(self, record: Record, key: str, file: os.stat_result | None) -> Entry:
-        """Append the record of a run; it is on the disk when this returns."""
+        """Append the record of a run; it is on disk when the function returns."""
         facts = {
             "name": record["name"],
             "status": record["status"],
@@ -163,7 +163,7 @@ class Journal:
         return place
 
     def _append(self, data: bytes) -> None:
-        """Append all of it or nothing: half a line would be the beginning of the next one."""
+        """Append the whole line or nothing: half a line would corrupt the next one."""
         try:
             written = os.write(self._handle, data)
             while written < len(data):
@@ -178,7 +178,7 @@ class Journal:
         return os.pread(self._handle, entry.length, entry.offset)
 
     def close(self) -> None:
-        """Close the file and let go of the lock; may be repeated."""
+        """Close the file and release the lock; may be called repeatedly."""
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
@@ -196,14 +196,14 @@ class Journal:
 
 
 class Records(Sequence[Record]):
-    """Records of runs, each read from the journal when it is asked for.
+    """Records of runs, each read from the journal on access.
 
     Parameters
     ----------
     path : Path
         The journal.
     entries : sequence of Entry or Record
-        Where each record stands, or the record itself of a run that has not been done.
+        Entry of each record, or the record itself of a run that has not been done.
     """
 
     def __init__(self, path: Path, entries: Sequence[Entry | Record]) -> None:
@@ -259,14 +259,14 @@ class Records(Sequence[Record]):
                     str(self._path),
                     name,
                     f"a record that cannot be used ({error})",
-                    "remove the journal: results that are there are kept",
+                    "remove the journal: existing results are kept",
                 )
                 raise InputError([fault]) from None
             yield record
 
 
 def _json(data: Any) -> bytes:
-    """Return data as JSON in a line; numbers that JSON lacks become null."""
+    """Return data as one line of JSON; infinite and undefined numbers become null."""
     try:
         return json.dumps(data, allow_nan=False).encode()
     except ValueError:

@@ -1,4 +1,4 @@
-"""What a study keeps of each result: all of it, chosen quantities, or the summary only."""
+"""Parts of each result that a study keeps: all, selected quantities, or the summary only."""
 
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -15,12 +15,12 @@ ALWAYS = ("time", "distance", "Q0")
 
 @dataclass(frozen=True)
 class Keep:
-    """What is kept of a result.
+    """Parts of a result that are kept.
 
     Attributes
     ----------
     quantities : tuple of str or None
-        Names of quantities, ``*`` standing for any letters; None for all.
+        Names of quantities, with ``*`` for any characters; None for all.
     summary : bool
         Keep no file at all.
     storage : Storage
@@ -32,9 +32,9 @@ class Keep:
     storage: Storage = PLAIN
 
     def applied(self, path: Path, result: Result) -> str:
-        """Make the result's file what is kept of it; return its name, empty where there is none."""
+        """Reduce a result file to the parts kept; return its name, empty without a file."""
         if self.summary:
-            path.unlink(missing_ok=True)  # a run before kept it
+            path.unlink(missing_ok=True)  # kept by an earlier run
             return ""
         if self.quantities is not None or self.storage != PLAIN:
             write(result, path, overwrite=True, names=self._names(result), storage=self.storage)
@@ -53,11 +53,11 @@ EVERYTHING = Keep()
 
 
 def parse_keep(given: str, *, compress: bool = False, single: bool = False) -> Keep:
-    """Return what ``all``, ``summary`` or a list of quantities asks for.
+    """Parse ``all``, ``summary`` or a list of quantities.
 
     Raises
     ------
-    InputError : a quantity that there is not.
+    InputError : an unknown quantity.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Records of finished work as JSON with a CRC-32: what was damaged meanwhile is not believed."""
+"""Records of finished work as JSON with a CRC-32, so that damaged records are recognised."""
 
 import json
 import zlib
@@ -12,7 +12,7 @@ Record = dict[str, Any]
 
 
 def keep(path: Path, record: Record) -> None:
-    """Write a record; its folder is made if it is missing."""
+    """Write a record; its folder is created if it does not exist."""
     make_folder(path.parent)
     with whole_file(path) as partial:
         text = json.dumps({"crc32": _crc(record), "record": record})
@@ -20,11 +20,11 @@ def keep(path: Path, record: Record) -> None:
 
 
 def read_kept(path: Path) -> Record:
-    """Return a kept record.
+    """Return a stored record.
 
     Raises
     ------
-    InputError : it cannot be read, or is not as it was written.
+    InputError : the record cannot be read, or is damaged.
     """
     text = read_text(path, TABLE_BYTES)
     try:
@@ -33,11 +33,11 @@ def read_kept(path: Path) -> Record:
     except (ValueError, TypeError, KeyError, RecursionError):
         whole = False
     if not whole:
-        raise InputError([Fault(str(path), "", "not as it was written", "")])
+        raise InputError([Fault(str(path), "", "the record is damaged", "")])
     record: Record = kept["record"]
     return record
 
 
 def _crc(record: Any) -> str:
-    # what is read is written again in the same words: order and all digits of numbers are kept
+    # writing reproduces what was read: order and all digits of numbers are kept
     return f"{zlib.crc32(json.dumps(record).encode()):08x}"

@@ -1,8 +1,8 @@
-"""`optimise`: parameters of vehicles against objectives and constraints.
+"""`optimise`: optimisation of vehicle parameters with objectives and constraints.
 
-Every design is a row of linked values of a study, so that its runs go through the study's executor
-and stand in its journal: an optimisation that is started again proposes the same designs, and finds
-them done.  Begin reading in `optimise`; `search.py` proposes designs.
+Every design is a row of linked values of a study, so that its runs are carried out and recorded by
+the study: an optimisation that is started again proposes the same designs and finds their runs in
+the journal.  Begin reading in `optimise`; `search.py` proposes designs.
 """
 
 import csv
@@ -37,13 +37,13 @@ from railsim.studies.search import Task, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 from railsim.studies.summary import unit_of
 
-NEAR_BOUND = 0.01  # share of a range or a limit within which it counts as reached
+NEAR_BOUND = 0.01  # tolerance, as a share of a range or a limit, within which it counts as reached
 INPUT_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
 class Optimisation:
-    """What an optimisation found.
+    """Result of an optimisation.
 
     Attributes
     ----------
@@ -51,21 +51,21 @@ class Optimisation:
         Holds ``designs.csv``, ``optimise.json``, pictures, the chosen vehicles, and the study of
         all runs.
     definition : Optimise
-        What was sought.
+        Variables, objectives and constraints.
     designs : tuple of Design
-        All that were computed.
+        All computed designs.
     front : tuple of Design
-        Feasible designs that no other betters, by the first objective.
+        Feasible non-dominated designs, in the order of the first objective.
     chosen : Design or None
-        One of the front; None where no design is feasible.
+        A design of the front; None if no design is feasible.
     active : tuple of str
-        Limits and bounds that the chosen design reaches, a phrase each.
+        Limits and bounds that the chosen design reaches, one phrase each.
     sensitivities : tuple of Sensitivity
-        Of all objectives and constraints.
+        Sensitivities of all objectives and constraints.
     vehicles : tuple of Path
         Files of the chosen design.
     computed : int
-        Runs that were computed now.
+        Number of runs that were computed by this call.
     """
 
     folder: Path
@@ -124,19 +124,19 @@ def optimise(
     progress: Progress | None = None,
     on_remark: Callable[[str], None] | None = None,
 ) -> Optimisation:
-    """Seek the best compromises of a vehicle's parameters.
+    """Find the best compromises for the parameters of a vehicle.
 
     Parameters
     ----------
     file : str, Path or Study
         Study file with a table ``optimise``, or name of a shipped one.
     out : str or Path
-        Folder; what is done there is not computed again.
+        Folder; existing designs in it are not computed again.
     method, evaluations, seed : optional
-        In place of the file's.
+        Replace those of the file.
     choose : int, optional
-        Number of the design that is written as a vehicle; by default that of the front which is
-        nearest to the best of each objective, measured by the front's ranges.
+        Number of the design that is written as a vehicle; by default the design of the front that
+        is nearest to the best value of each objective, scaled by the ranges of the front.
     workers, scheduler
         As in `railsim.study`.
     resume : bool
@@ -153,7 +153,7 @@ def optimise(
     Raises
     ------
     InputError
-        Everything that is wrong in the inputs; a quantity that the runs do not have.
+        All faults of the inputs; a quantity that the runs do not have.
     """
     definition = file if isinstance(file, Study) else load_study(file)
     if definition.optimise is None:
@@ -195,16 +195,16 @@ def _changed(wanted: Optimise, changes: Mapping[str, Any]) -> Optimise:
 
 
 def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: bool) -> None:
-    """Refuse a folder with another optimisation; note this one."""
+    """Refuse a folder with another optimisation; record this one."""
     assert definition.optimise is not None
-    free = ("method", "evaluations", "seed", "batch")  # these may change: known designs stay known
+    free = ("method", "evaluations", "seed", "batch")  # these may change: known designs stay valid
     data = definition.model_dump(mode="json", exclude_none=True)
     data["optimise"] = {k: v for k, v in data["optimise"].items() if k not in free}
     text = tomli_w.dumps(data)
     path = folder / INPUTS
     if is_file(path) and read_text(path, INPUT_BYTES) != text and not (resume or overwrite):
         allowed = (
-            "--resume uses what still holds, --overwrite computes everything; or another --out"
+            "--resume uses what is still valid, --overwrite computes everything; or another --out"
         )
         raise InputError([Fault("--out", str(folder), "holds another optimisation", allowed)])
     make_folder(folder)
@@ -213,7 +213,7 @@ def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: b
 
 
 def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
-    """Find front, choice and sensitivities, and write the files."""
+    """Determine front, chosen design and sensitivities, and write the files."""
     wanted, designs = evaluation.wanted, evaluation.designs
     signs = signs_of(wanted)
     feasible = [design for design in designs if design.feasible]

@@ -1,4 +1,4 @@
-"""`Outcome`: what a study left in its folder, and its summary as a table or an array."""
+"""`Outcome`: results of a study in its folder, and its summary as a table or an array."""
 
 import math
 from contextlib import suppress
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a study left in its folder.
+    """Results of a study in its folder.
 
     Attributes
     ----------
     folder : Path
         Holds the result files, ``summary.csv`` and ``study.json``.
     records : sequence of dict
-        One for every run, in the order of the combinations; read when asked for.
+        One for every run, in the order of the combinations; read on access.
     computed : int
-        Number of runs that were computed now; the others were there.
+        Number of runs that were computed by this call; the others existed.
     """
 
     folder: Path
@@ -44,7 +44,7 @@ class Outcome:
         return self.records.with_status(but=("complete", "failed"))
 
     def results(self) -> dict[str, Result]:
-        """Return the results by the names of their runs; arrays are read when asked for."""
+        """Return the results by the names of their runs; arrays are read on access."""
         return {
             record["name"]: open_result(self.folder / record["file"])
             for record in self.records
@@ -52,7 +52,7 @@ class Outcome:
         }
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """Return the summary, one row a run, as a `pandas.DataFrame` [SI].
+        """Return the summary, one row per run, as a `pandas.DataFrame` [SI].
 
         Raises
         ------
@@ -75,8 +75,8 @@ class Outcome:
     def to_xarray(self) -> "xarray.Dataset":
         """Return the numbers of the summary as an `xarray.Dataset` with the grid as dimensions.
 
-        Dimensions are what differs between the runs; where these are no full grid, as with a
-        sample, the dimension is ``run``.  Each variable has its ``units``.
+        Dimensions are the parameters that differ between the runs; if these do not form a full
+        grid, as in a sample, the dimension is ``run``.  Each variable has its ``units``.
 
         Raises
         ------

@@ -1,7 +1,7 @@
-"""Own quantities of a study: a Python function that is given each result.
+"""User-defined quantities of a study: a Python function that is called with each result.
 
-The function is named by its file, ``FILE.py:FUNCTION``; it is loaded in each process of the study.
-It returns numbers by their names.
+The function is given by its file, ``FILE.py:FUNCTION``, and loaded in each process of the study.
+It returns numbers by name.
 """
 
 import hashlib
@@ -24,11 +24,11 @@ Function = Callable[[Result], Mapping[str, float]]
 
 
 def named(function: "str | Function | None") -> str | None:
-    """Return the name ``FILE.py:FUNCTION`` of a function with the file's whole path.
+    """Return the name ``FILE.py:FUNCTION`` of a function with the full path of the file.
 
     Raises
     ------
-    InputError : there is no such file or function, or the function has no file of its own.
+    InputError : there is no such file or function, or the function is not defined in a file.
     """
     if function is None:
         return None
@@ -39,7 +39,7 @@ def named(function: "str | Function | None") -> str | None:
         except TypeError:
             file = ""
         if not name.isidentifier() or not Path(file).is_file():
-            found = f"{function!r} is no function of a module's own"
+            found = f"{function!r} is not a function of a module"
             raise InputError([Fault(OPTION, "", found, "a function defined in a file")])
         return f"{Path(file).resolve()}:{name}"
     file, _, name = function.rpartition(":")
@@ -51,18 +51,18 @@ def named(function: "str | Function | None") -> str | None:
 
 
 def fingerprint(name: str | None) -> str:
-    """Return a hash of the file of a function, empty where there is none."""
+    """Return a hash of the file of a function, empty if there is no function."""
     if name is None:
         return ""
     return hashlib.sha256(read_bytes(name.rpartition(":")[0], TABLE_BYTES)).hexdigest() + name
 
 
 def own_quantities(name: str | None, result: Result) -> dict[str, float]:
-    """Return what the function says of a result; nothing where there is no function.
+    """Return the values of the function for a result; none if there is no function.
 
     Raises
     ------
-    RailsimError : it goes wrong, or returns something else than numbers by their names.
+    RailsimError : the function fails, or does not return numbers by name.
     """
     if name is None:
         return {}
@@ -75,7 +75,7 @@ def own_quantities(name: str | None, result: Result) -> dict[str, float]:
 
 def _checked_name(key: object) -> str:
     if not isinstance(key, str) or not key.isprintable() or not key:
-        raise TypeError(f"the name {key!r} is no text")
+        raise TypeError(f"the name {key!r} is not a text")
     return key
 
 

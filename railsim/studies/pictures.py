@@ -1,4 +1,4 @@
-"""The pictures of a study: every run, and the vehicles against each other."""
+"""The pictures of a study: every run, and comparisons of the vehicles."""
 
 from railsim.plot.histories import histories
 from railsim.plot.overlay import overlay
@@ -7,9 +7,9 @@ from railsim.studies.outcome import Outcome
 
 
 def draw(outcome: Outcome) -> None:
-    """Draw the runs that have no picture newer than themselves, and all comparisons.
+    """Draw the runs whose picture is missing or out of date, and all comparisons.
 
-    Runs that differ by nothing but the vehicle are drawn into one picture,
+    Runs that differ only in the vehicle are drawn into one picture,
     ``compare_TRACK_SPEED.png``.
     """
     results = outcome.results()

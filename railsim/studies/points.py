@@ -1,9 +1,9 @@
-"""Points of a study: what each run is asked for, before anything of it is loaded.
+"""Points of a study: the inputs of each run, before its definitions are loaded.
 
-A study of a hundred thousand runs that goes on must know at once which of them are done.  A
-point's key is a hash of the texts that lead to the run: contents of the vehicle, track and settings
-files and of all that they name, assignments, speed, start and end.  Loading and checking the
-definitions is left to `railsim.studies.combine`, for the runs that are to be computed.
+When a study of a hundred thousand runs is continued, its finished runs must be found at once.  The
+key of a point is a hash of the texts that define the run: contents of the vehicle, track and
+settings files and of all files that they name, assignments, speed, start and end.  Definitions are
+loaded and checked by `railsim.studies.combine`, for the runs that are to be computed.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """What one run is asked for.
+    """Inputs of one run.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class Point:
     overrides : mapping of str to tuple of str
         Assignments to the ``vehicle``, ``track`` and ``settings``.
     labels : mapping
-        What tells the run apart.
+        Labels of the run.
     key : str
-        Hash of all inputs; empty where a file cannot be read.
+        Hash of all inputs; empty if a file cannot be read.
     has_run : bool
         Whether a run in the time domain belongs to it, with a result file.
     """
@@ -62,7 +62,7 @@ class Point:
 
 
 class Fingerprints:
-    """Hashes of what files and assignments say, each file read once."""
+    """Hashes of files with assignments; each file is read once."""
 
     def __init__(self) -> None:
         self._base = cache(self._of_file)
@@ -70,7 +70,7 @@ class Fingerprints:
         self._content = cache(_content_hash)
 
     def __call__(self, kind: str, path: str | Path | None, overrides: Overrides) -> str:
-        """Return the hash of a file with assignments; empty where it cannot be read."""
+        """Return the hash of a file with assignments; empty if it cannot be read."""
         return self._of(kind, path, overrides)
 
     def _of_file(self, kind: str, path: str | Path | None) -> str:
@@ -135,27 +135,27 @@ def point_key(*parts: Any) -> str:
 def check_number(
     lists: Sequence[Sequence[object]], cores: int, seconds: Callable[[], float]
 ) -> None:
-    """Refuse a study of more runs than anybody can want by mistake.
+    """Refuse a study whose number of runs must be a mistake.
 
     Parameters
     ----------
     lists : sequence of sequences
-        What is combined.
+        Lists that are combined.
     cores : int
-        Processes that do the runs.
+        Number of processes.
     seconds : callable
-        Returns a guess of the simulated time of a run [s]; called if there are too many.
+        Returns an estimate of the simulated time of a run [s]; called if there are too many runs.
 
     Raises
     ------
-    InputError : the number of combinations is above `MOST_RUNS`; with the time that they take.
+    InputError : the number of combinations is above `MOST_RUNS`; the message gives the time needed.
     """
     number = math.prod(len(values) for values in lists)
     if number <= MOST_RUNS:
         return
     each = seconds() / REAL_TIME_FACTOR + SECONDS_BESIDES
     found = f"{number:,} runs, some {_words(number * each / cores)} on {cores} cores"
-    raise InputError([Fault("study", "", found, f"{MOST_RUNS:,} at most; give fewer values")])
+    raise InputError([Fault("study", "", found, f"at most {MOST_RUNS:,}; give fewer values")])
 
 
 def _words(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""Rows of values that a study gives the keys of its files: grids, linked keys, samples."""
+"""Rows of values for the keys of the files of a study: grids, linked keys, samples."""
 
 import math
 import re
@@ -11,8 +11,8 @@ from railsim.errors import Fault, InputError
 from railsim.studies.points import Grid
 from railsim.units import number_with_unit
 
-SPEED = "speed"  # a key that is none of a file: the speed of the run
-PERMITTED = "permitted"  # as a speed: the lower of those of the vehicle and the track
+SPEED = "speed"  # not a key of a file: the speed of the run
+PERMITTED = "permitted"  # as a speed: the lower of the speeds of vehicle and track
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class Row:
     Attributes
     ----------
     values : mapping of str to str
-        As `key=value` takes them, by the paths of the keys.
+        Texts as in `key=value`, by the paths of the keys.
     suffix : str
-        What they add to the name of the run.
+        Suffix to the name of the run.
     speed : float or None
-        Speed of the run where it is varied here [m/s].
+        Speed of the run if the row varies it [m/s].
     """
 
     values: Mapping[str, str]
@@ -63,11 +63,11 @@ def _row(values: Mapping[str, str], name: str) -> Row:
 
 
 def speed_of(text: str, option: str = "speeds") -> float:
-    """Return a speed that may have a unit [m/s].
+    """Return the speed of a text, which may have a unit [m/s].
 
     Raises
     ------
-    InputError : it is no number.
+    InputError : the text is not a number.
     """
     found = number_with_unit(text)
     if found is not None:
@@ -75,16 +75,16 @@ def speed_of(text: str, option: str = "speeds") -> float:
     try:
         return float(text)
     except ValueError:
-        fault = Fault(option, "", f"'{text}' is no speed", "such as 20 or 72km/h")
+        fault = Fault(option, "", f"'{text}' is not a speed", "such as 20 or 72km/h")
         raise InputError([fault]) from None
 
 
 def sampled(sample: Sample) -> list[dict[str, str]]:
     """Return the values of a sample, one mapping for each of its members.
 
-    Latin hypercube and Sobol's sequence by scipy: every tenth of each parameter's probability holds
-    a tenth of its values, however many parameters there are (McKay, Beckman and Conover 1979; Sobol
-    1967, scrambled after Owen).
+    Latin hypercube and Sobol's sequence by scipy: the values of each parameter are stratified over
+    its probability, for any number of parameters (McKay, Beckman and Conover 1979; Sobol 1967,
+    scrambled after Owen).
     """
     from scipy.stats import qmc
 
@@ -120,13 +120,13 @@ def quantile(spread: Spread, share: float) -> float:
     assert spread.deviation is not None
     from scipy.special import ndtri
 
-    # a sample may hold the very end, whose value is infinite
+    # a sample may contain the end of the range, whose value is infinite
     inside = min(max(share, math.ulp(0.5)), 1.0 - math.ulp(0.5))
     return spread.mean + spread.deviation * float(ndtri(inside))
 
 
 def suffix(point: Mapping[str, str]) -> str:
-    """Return what a point of the grid adds to the name of its run.
+    """Return the suffix of a point of the grid to the name of its run.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def suffix(point: Mapping[str, str]) -> str:
 
 
 def in_a_name(text: str) -> str:
-    """Return what a text is called within the name of a file, which leads to no other folder.
+    """Return a text in a form for file names, which cannot point to another folder.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A case becomes a file; several cases become files in one call."""
+"""Run of a case to a file; runs of several cases in one call."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
@@ -20,22 +20,22 @@ def run_case(
     resume: Result | None = None,
     only: Collection[str] | None = None,
 ) -> Result:
-    """Run a case into its file, which carries the case's name and key.
+    """Run a case to its file, which carries name and key of the case.
 
     Parameters
     ----------
     case : Case
-        What to run.
+        Case to run.
     path : str or Path or None
         Result file; None to keep the result in memory.
     overwrite : bool
         Replace an existing file.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
     resume : Result, optional
-        A result whose end is the beginning of this run; the file then carries no key.
+        Result whose final state is the initial state of this run; the file then carries no key.
     only : collection of str, optional
-        Names of the quantities that a result in memory holds; by default all.
+        Names of the quantities in a result in memory; by default all.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def _sink(
 
 
 def can_share_a_call(one: Case, other: Case) -> bool:
-    """Whether two cases differ in nothing but the vehicle."""
+    """Whether two cases differ only in the vehicle."""
     return (
         one.track == other.track
         and one.settings == other.settings
@@ -89,12 +89,12 @@ def run_cases(
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> list[Result | Exception]:
-    """Run cases that differ in the vehicle only into their files or memory, all in one call.
+    """Run cases that differ only in the vehicle in one call, to their files or to memory.
 
     Returns
     -------
     list of Result or Exception
-        One for each case; what went wrong with one of them leaves the others alone.
+        One for each case; the failure of one case does not affect the others.
     """
     found: dict[int, Result | Exception] = {}
     sinks: dict[int, Hdf5Sink | MemorySink] = {}

@@ -1,9 +1,9 @@
-"""Ways to propose designs: surrogate models, a genetic algorithm, differential evolution.
+"""Search methods: surrogate models, a genetic algorithm, differential evolution.
 
-A search sees a cube of side 1 for the variables, objectives that are to be small and constraints
-that are kept where they are not above zero, both NaN for designs without an answer.  It asks for
-values of several designs at a time through one function, and is deterministic: the same seed and
-values lead to the same designs.
+A search works on variables in the unit cube, objectives to minimise and constraints that are met
+where they are not positive; both are NaN for designs without values.  It requests the values of
+several designs at a time through one function, and is deterministic: the same seed and values lead
+to the same designs.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from railsim.studies.front import non_dominated
 
 Floats = NDArray[np.float64]
 
-CANDIDATES = 512  # points of Sobol's sequence that a batch is chosen from
-NEAR = 256  # further ones about members of the front, at each distance
-CELLS = 1024  # points by which the gain of a candidate is measured
+CANDIDATES = 512  # candidates for a batch, from Sobol's sequence
+NEAR = 256  # further candidates about members of the front, at each distance
+CELLS = 1024  # points for the estimate of the gain of a candidate
 SMALLEST_DISTANCE = 2e-3  # of the cube's side, between designs
-MARGIN = 0.1  # of the front's range, by which the reference point lies behind it
+MARGIN = 0.1  # distance of the reference point beyond the front, as a share of its range
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Values:
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Whether each design has an answer and keeps all constraints."""
+        """Whether each design has values and meets all constraints."""
         known = np.isfinite(self.objectives).all(axis=1)
         kept = (self.constraints <= 0.0).all(axis=1)
         return np.logical_and(known, kept)
@@ -52,7 +52,7 @@ Evaluate = Callable[[Floats], Values]
 
 @dataclass(frozen=True)
 class Task:
-    """What a search is asked for.
+    """Task of a search.
 
     Attributes
     ----------
@@ -60,9 +60,9 @@ class Task:
         Takes designs, float64[design, variable] between 0 and 1; returns the values of all designs
         so far.
     variables, objectives, constraints : int
-        How many there are.
+        Numbers of variables, objectives and constraints.
     number, batch : int
-        Designs in all, and at a time.
+        Number of designs in total, and at a time.
     seed : int
     """
 
@@ -76,18 +76,18 @@ class Task:
 
 
 def search(method: str, task: Task) -> None:
-    """Have designs evaluated by one of `METHODS` until there are as many as wanted."""
+    """Search by one of `METHODS` until the required number of designs is evaluated."""
     METHODS[method](task)
 
 
 def _surrogate(task: Task) -> None:
-    """Fit radial basis functions to what is known, and compute where they promise most.
+    """Fit radial basis functions to the known designs, and evaluate the most promising ones.
 
-    The first two batches are Sobol's sequence with the cube's centre in front.  Then each batch
-    maximises the gain of dominated volume by the surrogate, one design after the other, each as if
-    the ones before had come out as predicted; the last of a batch is the candidate farthest from
-    all known designs, so that no region is left to a wrong surrogate.  Compare Knowles (2006),
-    Mueller (2017).
+    The first two batches are the centre of the cube and Sobol's sequence.  Then each batch
+    maximises the gain of dominated volume according to the surrogate, one design after the other,
+    assuming the predicted values for the previous ones.  The last design of a batch is the
+    candidate farthest from all known designs, so that no region depends on a wrong surrogate.
+    Compare Knowles (2006), Mueller (2017).
     """
     from scipy.stats import qmc
 
@@ -123,7 +123,7 @@ def _promising(designs: Floats, values: Values, size: int, rng: np.random.Genera
     predicted = model(points)
     m = values.objectives.shape[1]
     objectives, constraints = predicted[:, :m], predicted[:, m:]
-    # where nothing is allowed, the least wrong comes first
+    # if no design is feasible, the smallest violation comes first
     excess = np.maximum(constraints, 0.0).sum(axis=1) if constraints.shape[1] else None
     allowed = np.ones(len(points), bool) if excess is None else excess <= 0.0
     if excess is not None and not allowed.any():
@@ -147,7 +147,7 @@ def _promising(designs: Floats, values: Values, size: int, rng: np.random.Genera
 
 
 def _at_bounds(points: Floats, rng: np.random.Generator) -> Floats:
-    """Return the points with one variable each at a bound, where many an optimum lies."""
+    """Return the points with one variable at a bound, where optima often lie."""
     moved = points.copy()
     column = rng.integers(points.shape[1], size=len(points))
     moved[np.arange(len(points)), column] = rng.integers(2, size=len(points))
@@ -155,14 +155,14 @@ def _at_bounds(points: Floats, rng: np.random.Generator) -> Floats:
 
 
 class _Gain:
-    """Dominated volume that candidates would add, measured by random points.
+    """Dominated volume that candidates would add, estimated with random points.
 
     Parameters
     ----------
     front : float64[design, objective]
         Known feasible designs.
     predicted : float64[candidate, objective]
-        What is promised.
+        Predicted objectives.
     """
 
     def __init__(self, front: Floats, predicted: Floats, rng: np.random.Generator) -> None:
@@ -188,14 +188,14 @@ class _Gain:
         return share
 
     def take(self, row: Floats) -> None:
-        """Count a design as known."""
+        """Treat a design as known."""
         self._open &= ~(row <= self._points).all(axis=1)
 
 
 class Surrogate:
     """Radial basis functions through the values of designs, thin-plate splines with a linear part.
 
-    Designs without an answer get the worst known value, so that a search keeps away from them.
+    Designs without values get the worst known value, so that a search avoids them.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ class Surrogate:
         return found
 
     def errors(self) -> Floats:
-        """Return the error of each column: root mean square of leaving out, over the deviation."""
+        """Return the leave-one-out error (RMS) of each column, over the standard deviation."""
         missed = []
         for i in range(len(self._designs)):
             others = np.arange(len(self._designs)) != i
@@ -258,7 +258,7 @@ def _nsga2(task: Task) -> None:
 
 
 def _without_nan(values: Floats) -> Floats:
-    """Return values in which designs without an answer are worse than all others."""
+    """Return values in which designs without values are worse than all others."""
     known = np.where(np.isnan(values), -np.inf, values)
     worst = np.where(np.isfinite(known).any(axis=0), known.max(axis=0), 0.0)
     return np.where(np.isnan(values), worst + np.abs(worst) + 1.0, values)
@@ -274,7 +274,7 @@ def _differential_evolution(task: Task) -> None:
         values = task.evaluate(designs.T)
         number = designs.shape[1]
         found = _without_nan(values.objectives)[:, 0]
-        # a design that breaks a constraint is worse than all that break none (Deb 2000)
+        # infeasible designs are worse than all feasible ones (Deb 2000)
         excess = np.maximum(_without_nan(values.constraints), 0.0).sum(axis=1)
         worst = found.max()
         return np.where(excess > 0.0, worst + abs(worst) + excess, found)[-number:]

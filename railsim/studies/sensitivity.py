@@ -1,7 +1,7 @@
-"""What matters: tornado and Sobol indices of an optimisation's values, from its surrogate.
+"""Sensitivities: tornado values and Sobol indices of an optimisation, from its surrogate.
 
-All designs that were computed are used, and none beside them; how well the surrogate knows them is
-the error of leaving one out, over the standard deviation.
+The surrogate uses all computed designs; no others are computed.  Its accuracy is given by the
+leave-one-out error over the standard deviation.
 """
 
 from dataclasses import dataclass
@@ -24,12 +24,13 @@ class Sensitivity:
     ----------
     quantity : str
     low, high : dict of str to float
-        Its value with one variable at its lower or upper bound, the others as chosen [SI].
+        Value with one variable at its lower or upper bound, the others as in the chosen design
+        [SI].
     first, total : dict of str to float
-        Sobol indices over the whole range of all variables: the share of the variance that a
+        Sobol indices over the full range of all variables: the share of the variance that a
         variable explains alone, and with its interactions [1].
     error : float
-        Of the surrogate: root mean square of leaving one design out, over the deviation [1].
+        Leave-one-out error (root mean square) of the surrogate over the standard deviation [1].
     """
 
     quantity: str
@@ -40,7 +41,7 @@ class Sensitivity:
     error: float
 
     def record(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the sensitivity as plain data."""
         return dict(self.__dict__)
 
 
@@ -54,9 +55,9 @@ def sensitivities(
     designs : float64[design, variable]
         Between 0 and 1.
     values : float64[design, quantity]
-        NaN where a design has no answer.
+        NaN where a design has no value.
     chosen : float64[variable]
-        About which single variables are moved.
+        Chosen design, about which single variables are varied.
     variables, quantities : list of str
         Names.
     """

@@ -1,7 +1,7 @@
 """Critical speeds over conicity, friction or any key of the files, point by point over the cores.
 
-Each point is kept in the folder as it is done, under a name that hashes its inputs: the same
-command goes on where it was interrupted.  A damaged point is computed again.
+Each finished point is stored in the folder under a name with a hash of its inputs, so that the same
+command continues an interrupted map.  A damaged point is computed again.
 """
 
 import hashlib
@@ -31,14 +31,14 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class MapPoint:
-    """One point of a map: everything that differs between points.
+    """One point of a map: the inputs that differ between points.
 
     Attributes
     ----------
     at : dict of str to float
         The parameters by name, ``conicity``, ``friction`` or the path of a key.
     vehicle, track, settings : Vehicle, Track, Settings
-        With the values of the point, but for its conicity.
+        Definitions with the values of the point, except its conicity.
     """
 
     at: dict[str, float]
@@ -65,18 +65,18 @@ def stability_map(
     options : dict
         Further arguments of `critical_speed`.
     folder : Path, optional
-        Where finished points are kept.
+        Folder for finished points.
     workers : int, optional
         Processes; by default one for each core.
     overwrite : bool
         Compute everything again.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
     on_remark : callable, optional
-        Called with a sentence on every kept point that is damaged and computed again; by default
-        these go to the log.
+        Called with a sentence on every stored point that is damaged and computed again; by default
+        these sentences are logged.
 
-    A point that fails has its reason among the remarks.
+    The record of a point that fails has the reason among its remarks.
     """
     jobs = [(point, options) for point in points]
     kept = [_kept(folder, job) for job in jobs]
@@ -101,7 +101,7 @@ def stability_map(
 
 
 def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
-    """Yield number and record of each waiting job as it is done."""
+    """Yield number and record of each waiting job as it ends."""
     if workers == 1:
         for number in waiting:
             yield number, point_record(*jobs[number])

@@ -1,4 +1,4 @@
-"""`State`: what of a study is done, by journal and files, and what is to be computed."""
+"""`State`: which runs of a study are done, from journal and files, and which to compute."""
 
 import os
 from collections.abc import Sequence
@@ -17,37 +17,37 @@ CHANGED = "--resume computes what has changed, --overwrite everything; or anothe
 
 
 class Runs(Protocol):
-    """What is to be done, such as `Plan`.
+    """Points of a study, such as `Plan`.
 
     Attributes
     ----------
     points : list of Point
-        What each run is asked for.
+        Inputs of each run.
     """
 
     points: list[Point]
 
     def cases(self, points: Sequence[Point]) -> list[Case]:
-        """Load what the runs of some points need."""
+        """Load the inputs of the runs of some points."""
 
 
 class State:
-    """What of a study is done and what is to be computed.
+    """Which runs of a study are done, and which are to be computed.
 
     Attributes
     ----------
     cases : list of Case
-        What is to be computed.
+        Cases to compute.
     found : list of (Point, Record)
-        Results that are there and that the journal does not know.
+        Existing results that are not in the journal.
     there : set of str
-        Names of the cases whose run is there, but not their analyses.
+        Names of the cases whose run exists, but not their analyses.
 
     Raises
     ------
     InputError
-        Everything that is wrong in what is to be computed; without `resume` also results that would
-        have to be replaced.
+        All faults of the cases to compute; without `resume` also results that would have to be
+        replaced.
     """
 
     def __init__(
@@ -80,16 +80,16 @@ class State:
         self.cases = [case for point, case in self._waiting.items() if point not in known_ones]
 
     def _is_done(self, point: Point) -> bool:
-        """Whether the journal knows the result, of these inputs, and its file has not changed."""
+        """Whether the journal has the result of these inputs, and its file has not changed."""
         entry = self._entries.get(point.name)
         if entry is None or entry.status in ("failed", "waiting") or not point.key:
             return False
         if not entry.size and not self._keep.summary and point.has_run:
-            return False  # the summary was kept, the file is wanted
+            return False  # only the summary was kept, the file is required
         return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
 
     def _faults_of(self, point: Point, case: Case) -> list[Fault]:
-        """Look at what is there of a case: a file, or a summary without one."""
+        """Examine the existing data of a case: a file, or a summary without a file."""
         if case.file_name in self._there:
             return self._look_at(point, case)
         entry = self._entries.get(case.name)
@@ -100,12 +100,12 @@ class State:
         return [Fault("--out", case.name, "a summary of other inputs", CHANGED)]
 
     def _look_at(self, point: Point, case: Case) -> list[Fault]:
-        """Take a result that is there, or say why it cannot be taken."""
+        """Accept an existing result, or record why it cannot be used."""
         path = self._folder / case.file_name
         try:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
-                if case.analyses:  # these take their time: it is a job like others
+                if case.analyses:  # takes time: done as a job like others
                     self.there.add(case.name)
                 else:
                     self.found.append((point, finished_record(case, result, self._own)))
@@ -117,10 +117,10 @@ class State:
         return [Fault("--out", str(path), "a result of other inputs", CHANGED)]
 
     def settle(self, journal: Journal) -> list[str]:
-        """Record what was found, move away what is damaged; return what the user should know."""
+        """Record existing results, rename damaged files; return remarks for the user."""
         remarks = []
         if self._lines:
-            remarks.append(f"{self._lines} damaged lines of {JOURNAL} are left out")
+            remarks.append(f"{self._lines} damaged lines of {JOURNAL} are ignored")
         for point, record in self.found:
             if self._keep.summary:
                 (self._folder / record["file"]).unlink()
@@ -157,11 +157,11 @@ class State:
 
 
 def _files(folder: Path) -> dict[str, os.stat_result]:
-    """Return the result files of a folder; a hundred thousand take less than a second."""
+    """Return the result files of a folder; fast enough for a hundred thousand."""
     try:
         with os.scandir(folder) as entries:
             return {entry.name: entry.stat() for entry in entries if entry.name.endswith(".h5")}
-    except OSError:  # not there, or no folder
+    except OSError:  # missing, or not a folder
         return {}
 
 

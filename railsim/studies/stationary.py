@@ -1,11 +1,11 @@
-"""Tests at a stand: unloading and guiding on twisted track (EN 14363, 6.1), cant, roll coefficient.
+"""Stationary tests: unloading and guiding on twisted track (EN 14363, 6.1), roll coefficient.
 
-Each is solved by Newton's method (`railsim.linear.stationary`), the twists to both sides.  A case
-without a steady state is told, and the verdict is then no pass.
+Each case is solved by Newton's method (`railsim.linear.stationary`), twists to both sides.  A case
+without a steady state is reported, and the verdict is then not a pass.
 
 Guiding (EN 14363, 6.1, the method with two separate tests): the guiding force Y_a of the leading
 outer wheel at walking pace in a level curve of R 150 m (`railsim.stability.curving`), over the
-least load of that wheelset's wheels on the twists, Y_a/Q_a <= 1.2.
+smallest wheel load of that wheelset on the twists, Y_a/Q_a <= 1.2.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,22 +31,22 @@ from railsim.stability.curving import FAILED, curving
 
 @dataclass(frozen=True)
 class StationaryValue:
-    """One quantity of one case against its limit.
+    """One quantity of one case, and its limit.
 
     Attributes
     ----------
     case, quantity : str
-        What the vehicle stands on; what is compared.
+        Track under the vehicle; quantity.
     value : float
         nan where no steady state was found [1 or rad].
     limit : float or None
-        None where a value is only told.
+        None where a value is only reported.
     place : str
         Wheel, or body.
     source : str
-        Of the limit.
+        Source of the limit.
     checked : bool
-        Whether somebody has compared the limit with the printed standard.
+        Whether the limit has been compared with the printed standard.
     """
 
     case: str
@@ -59,13 +59,13 @@ class StationaryValue:
 
     @property
     def exceeded(self) -> bool:
-        """Whether the limit is exceeded; a case that was not found exceeds nothing."""
+        """Whether the limit is exceeded; false for a case without a steady state."""
         return self.limit is not None and self.value > self.limit
 
 
 @dataclass(frozen=True)
 class Stationary:
-    """A vehicle's tests at a stand.
+    """Stationary tests of a vehicle.
 
     Attributes
     ----------
@@ -85,13 +85,13 @@ class Stationary:
 
     @property
     def verdict(self) -> str:
-        """``fail`` where a limit is exceeded, ``incomplete`` where a case was not found."""
+        """``fail`` if a limit is exceeded, ``incomplete`` if a case has no steady state."""
         if any(value.exceeded for value in self.values):
             return "fail"
         return "incomplete" if self.reasons else "pass"
 
     def record(self) -> dict[str, object]:
-        """Return it as plain numbers and strings, SI."""
+        """Return the tests as plain numbers and strings, SI."""
         values = [{**v.__dict__, "exceeded": v.exceeded} for v in self.values]
         return {
             "vehicle": self.vehicle, "edition": self.edition, "verdict": self.verdict,
@@ -108,14 +108,14 @@ def stationary(
     held: bool = True,
     settings: Settings | None = None,
 ) -> Stationary:
-    """Put a vehicle on twisted track and on cant.
+    """Stationary tests of a vehicle on twisted track and on cant.
 
     Parameters
     ----------
     vehicle : Vehicle
-        On two bogies, or on two axles.
+        Vehicle on two bogies, or on two axles.
     track : Track
-        Whose rails and friction count.
+        Gives rail profiles and friction.
     limits : StationaryLimits
     cant : float, optional
         [m]; by default the admissible cant deficiency of the service table.
@@ -125,7 +125,7 @@ def stationary(
 
     Raises
     ------
-    InputError : no cant; neither two bogies nor two axles; a cant beyond 0.5 m.
+    InputError : no cant; neither two bogies nor two axles; a cant above 0.5 m.
     """
     flat = flatten(vehicle)
     if cant is None:
@@ -169,10 +169,10 @@ def stationary(
 
 
 def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floats]:
-    """Left rail over the right one at each wheelset, by the name of the twist [m].
+    """Height of the left rail above the right one at each wheelset, by the name of the twist [m].
 
-    A vehicle on two bogies stands on the twist over their wheelbase, over their spacing, and on
-    both; one on two axles on that over their spacing.
+    For a vehicle on two bogies: twist over the wheelbase of the bogies, over their spacing, and
+    both; for a vehicle on two axles: twist over their spacing.
 
     Raises
     ------
@@ -220,7 +220,7 @@ def _guiding(
     settings: Settings | None,
     reasons: list[str],
 ) -> StationaryValue:
-    """Guiding force in the tight curve over the least load [N] of the leading wheelset."""
+    """Guiding force in the tight curve over the smallest wheel load of the leading wheelset."""
     limit = limits.guiding
     case = f"R {limit.radius:g} m, level"
     deficiency = cant_deficiency(WALKING_PACE, 1.0 / abs(limit.radius), 0.0)
@@ -244,7 +244,7 @@ def _guiding(
 
 
 def _unloading(case: str, stands: Sequence[Standing | None], limit: Constant) -> StationaryValue:
-    """Return the worst wheel of some standings; nan where one of them was not found."""
+    """Return the worst wheel over some states; nan if one of them was not found."""
     worst, place = -np.inf, ""
     for standing in stands:
         if standing is None:

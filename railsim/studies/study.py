@@ -1,7 +1,7 @@
-"""`study`: vehicles x tracks x speeds x further values, one result file a run.
+"""`study`: vehicles x tracks x speeds x further values, one result file per run.
 
-A run whose file is there with the same inputs is not computed again, so an interrupted study goes
-on where it was when it is started again.  What is done stands in the journal.
+A run whose file exists with the same inputs is not computed again, so that an interrupted study is
+continued when it is started again.  Finished runs are recorded in the journal.
 """
 
 import os
@@ -64,25 +64,23 @@ def study(
     Parameters
     ----------
     vehicles, tracks : sequence of str, Path or definition, or a single one
-        Files, names of shipped ones, or `Vehicle` and `Track`, which are written into ``inputs/``
-        of the folder.
+        Files, names of shipped ones, or `Vehicle` and `Track`, which are written to ``inputs/`` in
+        the folder.
     speeds : sequence of float, a single one, or a range such as ``"15:25:11"``; None
-        Speeds [m/s]; None where the settings have a speed table, or `linked` or `sample` vary
-        ``speed``; ``"permitted"`` is the lower of the vehicle's and the track's speed.
+        Speeds [m/s]; None if the settings have a speed table, or `linked` or `sample` vary
+        ``speed``; ``"permitted"`` is the lower of the speeds of vehicle and track.
     out : str or Path
-        Folder of the study; made if need be.
+        Folder of the study, created if it does not exist.
     grid : mapping of str to values, optional
         Values of further keys, ``{"track.friction": [0.3, 0.4]}`` or ``"0.2:0.5:4"``.
     linked : sequence of mappings, optional
-        Keys whose values go together, the first of one with the first of the others.
+        Keys whose values vary together, the first of one with the first of the others.
     sample : Sample or mapping, optional
         Random values of further keys, as the table ``sample`` of a study file.
     quantities : callable or str, optional
-        Function of the result that returns further numbers by their names, or
-        ``FILE.py:FUNCTION``.
+        Function of the result that returns further numbers by name, or ``FILE.py:FUNCTION``.
     analyses : mapping of str to Analysis or mapping, optional
-        What is computed at each point, as the tables ``analyses`` of a study file; by default a
-        run.
+        Analyses at each point, as the tables ``analyses`` of a study file; by default a run.
     settings : str, Path or Settings, optional
         Settings for all runs.
     start : float
@@ -94,28 +92,28 @@ def study(
     workers : int, optional
         Processes; by default one for each core.
     together : int
-        How many runs that differ in the vehicle only share a call at most; results are the same.
+        Largest number of runs, different only in the vehicle, that share a call; the results do not
+        change.
     scheduler : str, optional
-        Address of a dask scheduler whose workers do the runs instead.
+        Address of a dask scheduler whose workers carry out the runs instead.
     resume : bool
-        Go on with the study that is in the folder: runs whose inputs have changed are computed
-        again.
+        Continue the study in the folder: runs whose inputs have changed are computed again.
     overwrite : bool
         Compute everything again.
     plots : bool
-        Draw every run, and the vehicles against each other.
+        Draw every run, and comparisons of the vehicles.
     keep : str
-        ``all``; ``summary``, no result files; or names of quantities with commas between, ``*``
-        standing for any letters.  Summaries are made before anything is left out.
+        ``all``; ``summary``, no result files; or names of quantities separated by commas, with
+        ``*`` for any characters.  Summaries are always made from the complete result.
     compress, single : bool
-        Store arrays compressed, and with 4 bytes a number.
+        Store arrays compressed, and with 4 bytes per number.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
     on_record : callable, optional
-        Called with the record of every run that is done.
+        Called with the record of every finished run.
     on_remark : callable, optional
-        Called with every sentence on what was found in the folder, such as damaged results that
-        are computed again; by default they go to the log.
+        Called with every remark on files found in the folder, such as damaged results that are
+        computed again; by default remarks are logged.
 
     Returns
     -------
@@ -124,8 +122,8 @@ def study(
     Raises
     ------
     InputError
-        Everything that is wrong in the inputs; files in the folder belong to other inputs and
-        neither `resume` nor `overwrite` is given.
+        All faults of the inputs; files in the folder belong to other inputs and neither `resume`
+        nor `overwrite` is given.
 
     Examples
     --------
@@ -150,7 +148,7 @@ def study(
     own = named(quantities)
     work = _analyses(analyses or {})
     if own and not needs_run(work):
-        fault = Fault("--quantities", "", "no analysis makes a run", 'add one of kind = "run"')
+        fault = Fault("--quantities", "", "no analysis computes a run", 'add one of kind = "run"')
         raise InputError([fault])
     plan = Plan(
         vehicles,
@@ -170,7 +168,7 @@ def study(
     )
     inputs = {
         "railsim_version": __version__,
-        "folder": os.path.relpath(Path.cwd(), folder),  # where names of files begin
+        "folder": os.path.relpath(Path.cwd(), folder),  # folder that relative file names refer to
         "vehicles": [str(vehicle) for vehicle in vehicles],
         "tracks": [str(track) for track in tracks],
         "speeds": asked,
@@ -203,12 +201,12 @@ def study(
 
 
 def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
-    """Return the inputs of the study in a folder, and the folder where its names of files begin.
+    """Return the inputs of the study in a folder, and the folder of its relative file names.
 
     Raises
     ------
     InputError
-        There is no study, or it cannot be read.
+        There is no study, or its inputs cannot be read.
     """
     data: Any = None
     if is_file(folder / JOURNAL):
@@ -228,13 +226,13 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
 
 
 def _several(values: Any) -> list[Any]:
-    """Return values as a list, also where a single one is given."""
+    """Return one or several values as a list."""
     single = isinstance(values, str | Path | float | int | FileDefinition)
     return [values] if single else list(values)
 
 
 def _speeds(speeds: Any) -> list[float | str | None]:
-    """Return speeds as numbers, those of a range, and with units [m/s]; `PERMITTED` as it is."""
+    """Return speeds, ranges and speeds with units as numbers [m/s]; `PERMITTED` unchanged."""
     if speeds is None:
         return [None]
     found: list[float | str | None] = []
@@ -262,7 +260,7 @@ def _texts(what: str, value: Any) -> list[str]:
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers of numpy as Python's own."""
+    """Return numpy numbers as Python numbers."""
     return value.item() if hasattr(value, "item") and not isinstance(value, str) else value
 
 

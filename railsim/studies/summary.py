@@ -1,8 +1,8 @@
-"""What a study leaves beside its result files: ``summary.csv`` and ``study.json``.
+"""Summary of a study: ``summary.csv`` and ``study.json``.
 
 ``study.json`` holds the inputs of the study and a record of every run with its peaks and mid-curve
-values; ``summary.csv`` holds one line a run for spreadsheets.  All numbers are SI.  Both are made
-from the journal (`railsim.studies.journal`) when the study ends or is interrupted.
+values; ``summary.csv`` holds one line per run for spreadsheets.  All numbers are SI.  Both are
+written from the journal (`railsim.studies.journal`) when the study ends or is interrupted.
 """
 
 import csv
@@ -47,11 +47,11 @@ def waiting_record(case: Case) -> Record:
 
 
 def finished_record(case: Case, result: Result, own: str | None = None) -> Record:
-    """Return the record of a run that has its result, with its own quantities and analyses.
+    """Return the record of a run with a result, with user-defined quantities and analyses.
 
     Raises
     ------
-    RailsimError : one of these goes wrong.
+    RailsimError : one of these fails.
     """
     found = own_quantities(own, result) | analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result)}
@@ -65,12 +65,12 @@ def analysed_record(case: Case, quantities: Mapping[str, float], cpu_time: float
 
 
 def stopped_record(case: Case, reason: str) -> Record:
-    """Return the record of a point to which the model has no answer; it is not tried again."""
+    """Return the record of a point without a solution; it is not computed again."""
     return {**waiting_record(case), "status": "stopped", "status_reason": reason}
 
 
 def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
-    """Return the record of a run that has no result; `errno` is the system's reason, if any."""
+    """Return the record of a run without a result; `errno` is that of the system, if any."""
     return {
         **waiting_record(case),
         "status": "failed",
@@ -81,7 +81,7 @@ def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 
 
 
 def write_index(folder: Path, inputs: Mapping[str, Any], status: str, records: Records) -> None:
-    """Write ``study.json`` and ``summary.csv``, each appearing under its name when it is whole."""
+    """Write ``study.json`` and ``summary.csv``, each under its name when it is complete."""
     head = json.dumps({"format": FORMAT, "status": status, "inputs": dict(inputs)}, indent=1)
     with whole_file(folder / "study.json") as partial, open(partial, "wb") as file:
         file.write(head[:-2].encode() + b',\n "runs": [\n')
@@ -96,7 +96,7 @@ def write_index(folder: Path, inputs: Mapping[str, Any], status: str, records: R
 
 
 class Inputs(BaseModel):
-    """What a study was asked for, as its journal and its index keep it."""
+    """Inputs of a study, as stored in its journal and its index."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -122,7 +122,7 @@ class Inputs(BaseModel):
 
 
 class Run(BaseModel):
-    """What the index of a study must say of every run."""
+    """Required entries of every run in the index of a study."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -132,7 +132,7 @@ class Run(BaseModel):
 
 
 class Index(BaseModel):
-    """What a ``study.json`` must hold."""
+    """Required content of a ``study.json``."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -142,11 +142,11 @@ class Index(BaseModel):
 
 
 def read_index(path: Path) -> Index:
-    """Return what a ``study.json`` holds.
+    """Return the content of a ``study.json``.
 
     Raises
     ------
-    InputError : it cannot be read, or is not the index of a study.
+    InputError : the file cannot be read, or is not the index of a study.
     """
     text = read_text(path, INDEX_BYTES)
     try:
@@ -168,7 +168,7 @@ def checked(model: type[M], data: Any, file: str) -> M:
 
     Raises
     ------
-    InputError : everything in it that is not as the model wants it.
+    InputError : all faults of the data.
     """
     try:
         return model.model_validate(data)
@@ -186,11 +186,11 @@ def checked(model: type[M], data: Any, file: str) -> M:
 
 
 def check_index(path: Path) -> Index:
-    """Return what a ``study.json`` holds; every run that it calls done must have its result.
+    """Return the content of a ``study.json``; every finished run must have its result.
 
     Raises
     ------
-    InputError : as `read_index`, or results are not there.
+    InputError : as `read_index`, or results are missing.
     """
     index = read_index(path)
     allowed = "the same study with --resume computes it again"
@@ -201,21 +201,21 @@ def check_index(path: Path) -> Index:
         if Path(run.file).name != run.file:
             faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
         elif not is_file(path.parent / run.file):
-            faults.append(Fault(str(path), run.file, "the result is not there", allowed))
+            faults.append(Fault(str(path), run.file, "the result is missing", allowed))
     if faults:
         raise InputError(faults)
     return index
 
 
 def write_summary(records: Sequence[Record], stream: TextIO) -> None:
-    """Write one line a run: what tells it apart, how it ended, its peaks and mid-curve values.
+    """Write one line per run: labels, status, peaks and mid-curve values.
 
-    The header names the unit where there is one: ``Q_peak (N)``.  The columns of a quantity are
+    The header includes units: ``Q_peak (N)``.  The columns of a quantity are
     ``Q_peak`` (or ``dQ_over_Q0_max`` and ``_min``), the same with ``_wheelset``, ``_side``,
     ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at the middle of the first
     curve (``Q_mid2`` of the second).  The column ``remarks`` holds all remarks on the run.
     """
-    # the records twice, rather than all of them in memory
+    # reads the records twice, to save memory
     columns = list(dict.fromkeys(name for record in records for name in _checked_row(record)))
     writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
     units = {name: unit_of(name) for name in columns}
@@ -230,12 +230,12 @@ def _checked_row(record: Record) -> dict[str, Any]:
         return summary_row(record)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         found = f"the record of '{record['name']}' cannot be used ({error!r})"
-        allowed = "remove the journal: results that are there are kept"
+        allowed = "remove the journal: existing results are kept"
         raise InputError([Fault(JOURNAL, "", found, allowed)]) from None
 
 
 def unit_of(column: str) -> str:
-    """Return the unit of a column of the summary, empty where it has none.
+    """Return the unit of a column of the summary, empty if it has none.
 
     Examples
     --------
@@ -254,7 +254,7 @@ def unit_of(column: str) -> str:
 
 
 def summary_row(record: Record) -> dict[str, Any]:
-    """Return the cells of a run's line by the names of their columns, without units."""
+    """Return the cells of the line of a run by the names of their columns, without units."""
     row = {"name": record["name"], **record["labels"], "file": record["file"]}
     row |= {name: record.get(name, "") for name in FACTS}
     row["remarks"] = " ".join(record.get("remarks", ()))

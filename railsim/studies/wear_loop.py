@@ -1,7 +1,7 @@
-"""The worn profile put back into the simulation, step by step.
+"""Wear of wheel profiles over distance, with an update of the profile at each step.
 
-All wheels have one profile: their wear is averaged, as on a train that runs both ways and is
-turned.
+All wheels have the same profile: their wear is averaged, as on a train that runs in both directions
+and is turned.
 """
 
 import hashlib
@@ -43,16 +43,16 @@ class Route(NamedTuple):
 
 @dataclass(frozen=True)
 class WearStep:
-    """One step of the loop.
+    """One step of the wear loop.
 
     Attributes
     ----------
     distance, length : float
-        Distance run before the step, and in it [m].
+        Distance run before the step, and in the step [m].
     profile, worn : Profile
         Wheel profile in this step, and after it.
     depth : float64[position]
-        Its depth of wear per distance, mean of all wheels, over `wear_depth.grid` [m/m].
+        Depth of wear per distance, mean of all wheels, over `wear_depth.grid` [m/m].
     """
 
     distance: float
@@ -74,35 +74,35 @@ def wear_loop(
     on_remark: Callable[[str], None] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[WearStep]:
-    """Wear of a vehicle's wheels over distance, with the worn profile back in the simulation.
+    """Wear of the wheels of a vehicle over distance, with an update of the profile at each step.
 
     Parameters
     ----------
     vehicle : Vehicle
-        All its wheels have one profile.
+        Vehicle whose wheels all have the same profile.
     routes : sequence of Route or (Track, float, float)
         Tracks with their speeds [m/s] and shares of the distance.
     step : float
-        Distance between two updates of the profile [m]: so short that no step wears off more
-        than some tenths of a millimetre; more than 1 mm is refused.
+        Distance between two updates of the profile [m], such that the depth of wear in one step
+        is at most a few tenths of a millimetre; more than 1 mm is refused.
     steps : int
         Number of updates.
     settings : Settings, optional
         `outputs.contact_patches` is switched on.
     folder : Path, optional
-        Where finished steps are kept: the same call, or one with more steps, goes on after them.
+        Folder for finished steps: the same call, or one with more steps, continues after them.
     on_step : callable, optional
         Called after each step.
     on_remark : callable, optional
-        Called with a sentence on every kept step that is damaged and computed again; by default
-        these go to the log.
+        Called with a sentence on every stored step that is damaged and computed again; by default
+        these sentences are logged.
     progress : callable, optional
-        Called with the finished fraction now and then.
+        Called repeatedly with the finished fraction.
 
     Raises
     ------
-    InputError : different profiles; no route, or one without a share; no step; a step that wears
-        off too much.
+    InputError : different wheel profiles; no route, or a route without a share; no step; too much
+        wear in a step.
     ModelError : a run ended early.
     """
     name = _profile_name(vehicle)
@@ -137,12 +137,12 @@ def wear_loop(
 def wear_rows(
     found: Sequence[WearStep], vehicle: Vehicle, track: Track
 ) -> list[dict[str, float | None]]:
-    """What was worn off after each step.
+    """Wear after each step.
 
     Parameters
     ----------
     found : sequence of WearStep
-        Of `wear_loop`, from its beginning.
+        Result of `wear_loop`, from its beginning.
     vehicle, track : Vehicle, Track
         Wheelset and rails for the equivalent conicity.
 
@@ -151,7 +151,7 @@ def wear_rows(
     list of dict
         The new wheel, then the wheel after each step: `distance` [m], `area` [m2], `deepest` [m]
         and its position `deepest_y` from the nominal rolling circle [m], all since the beginning,
-        and `equivalent_conicity` at 3 mm (EN 15302), None where there is none.
+        and `equivalent_conicity` at 3 mm (EN 15302), None if it does not exist.
     """
     if not found:
         return []
@@ -184,14 +184,14 @@ def _profile_name(vehicle: Vehicle) -> str:
     names = {n for w in flatten(vehicle).bodies if w.wheelset for n in w.wheelset.profile}
     if len(names) != 1:
         found = f"{len(names)} wheel profiles"
-        raise InputError([Fault("vehicle", "profile", found, "one for all wheels")])
+        raise InputError([Fault("vehicle", "profile", found, "the same for all wheels")])
     return names.pop()
 
 
 def _check(routes: Sequence[Route], step: float, steps: int) -> None:
     faults = []
     if not routes:
-        faults.append(Fault("wear", "routes", "no route", "one at least"))
+        faults.append(Fault("wear", "routes", "no route", "at least one"))
     for route in routes:
         if not (route.share > 0.0 and math.isfinite(route.share)):
             name = route.track.name
@@ -207,7 +207,7 @@ def _check(routes: Sequence[Route], step: float, steps: int) -> None:
 def _file_name(
     vehicle: Vehicle, routes: Sequence[Route], settings: Settings, step: float, profile: Profile
 ) -> str:
-    """Name of the file of a step: a hash of all that its wear depends on."""
+    """Name of the file of a step: a hash of all its inputs."""
     rails = {rail for route in routes for rail in route.track.rail}
     inputs: list[Any] = [
         __version__, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
@@ -218,7 +218,7 @@ def _file_name(
 
 
 def _kept(path: Path | None, remark: Callable[[str], None]) -> Floats | None:
-    """Wear of a step that was computed before."""
+    """Wear of a step that has been computed before."""
     if path is None or not path.exists():
         return None
     try:
@@ -235,7 +235,7 @@ def _depth(
     worn: dict[str, Profile],
     progress: Callable[[float], None],
 ) -> Floats:
-    """Depth of wear per distance, mean of all wheels and of the routes by their shares."""
+    """Depth of wear per distance, mean of all wheels and of the routes weighted by their shares."""
     total = sum(route.share for route in routes)
     depths = []
     for number, (track, speed, share) in enumerate(routes):

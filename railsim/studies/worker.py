@@ -1,6 +1,6 @@
-"""What the server of `railsim.processes` imports: all that a worker needs, compiled code too.
+"""Imported by the server of `railsim.processes`: all that a worker needs, with compiled code.
 
-The code is loaded by the first call of each kernel: a run of two steps.
+The code is loaded at the first call of each kernel, by a run of two steps.
 """
 
 import logging
@@ -11,10 +11,10 @@ from railsim.studies.execute import is_compiled
 
 
 def load_compiled_code() -> None:
-    """Load the compiled kernels where they are there; otherwise the first worker compiles them."""
+    """Load the compiled kernels if they exist; otherwise the first worker compiles them."""
     if not is_compiled():
         return
-    logging.disable()  # nobody asked for this run
+    logging.disable()  # an auxiliary run: its remarks are not reported
     try:
         coach, track = load_vehicle("coach_manchester"), load_track("straight")
         simulate(coach, track, speed=20.0, duration=0.01)

@@ -357,7 +357,7 @@ def test_validate_knows_the_index_of_a_study_and_misses_its_results(tmp_path, si
     assert "study of 2 runs, complete, no faults" in capsys.readouterr().out
     (tmp_path / f"{COACH}_{CURVE}_20.h5").unlink()
     assert main(["validate", path]) == 2
-    assert f"{COACH}_{CURVE}_20.h5: the result is not there" in capsys.readouterr().err
+    assert f"{COACH}_{CURVE}_20.h5: the result is missing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,6 @@ ROOT = Path(__file__).parents[2]
 TERMS = ROOT / "docs" / "terms.md"
 # entries of decisions are not rewritten
 OTHERS = {TERMS, ROOT / "docs" / "decisions.md"}
-# parts of the package whose words are still to be gone through
-LATER = ("assessment", "report", "studies")
 
 
 def unwanted():
@@ -34,12 +32,7 @@ def help_texts(command, context):
 def texts():
     pages = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"]
     pages += sorted({*(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*.py")} - OTHERS)
-    package = ROOT / "railsim"
-    pages += [
-        source
-        for source in sorted(package.rglob("*.py"))
-        if source.relative_to(package).parts[0] not in LATER
-    ]
+    pages += sorted((ROOT / "railsim").rglob("*.py"))
     for page in pages:
         yield str(page.relative_to(ROOT)), page.read_text("utf-8")
     yield from help_texts(command_line, click.Context(command_line, info_name="railsim"))

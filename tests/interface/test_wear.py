@@ -53,8 +53,7 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys,
     assert f"{1e6 * twice['area']:.2f}" in line
     assert (folder / "wear.png").stat().st_size > 10_000
     # the last profile can stand in a vehicle file; it has lost what the table says.  A profile
-    # that is read has z = 0 on the nominal rolling circle, which has worn: the flange tells by how
-    # much
+    # that is read has z = 0 on the worn nominal rolling circle: the flange shows by how much
     worn, wheel = load_profile(str(folder / "wheel_200_km.csv"), "wheel"), load_profile("S1002")
     y = np.linspace(-0.06, 0.05, 5001)
     lost = np.interp(y, wheel.y, wheel.z) - np.interp(y, worn.y, worn.z)
@@ -63,7 +62,7 @@ def test_steps_are_kept_and_a_longer_distance_goes_on(command, tmp_path, capsys,
     kept.write_bytes(content.replace(b"0", b"1", 3))
     assert main([*command, "--distance", "200", "--overwrite"]) == 0
     assert (
-        capsys.readouterr().err == f"remark: {kept}: not as it was written: it is computed again\n"
+        capsys.readouterr().err == f"remark: {kept}: the record is damaged: it is computed again\n"
     )
     assert len(runs) == 2
     assert kept.read_bytes() == content

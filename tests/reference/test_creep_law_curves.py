@@ -13,6 +13,8 @@ from selection import points
 
 from railsim.contact.creep import LAWS, creep_force
 
+REFERENCE = 0.003  # accuracy of the reference (pure spin on a circle uses 0.002 of it)
+
 
 @pytest.fixture(scope="module")
 def curves(reference_dir):
@@ -35,10 +37,11 @@ def test_fastrip_no_worse_than_the_listed_one(curves, reference_dir):
         listed = list(csv.DictReader(stream))
     for row in listed:
         chosen = (curves.curve == row["curve"]) & (curves.ratio == float(row["a_over_b"]))
-        # 0.003: what the reference itself is good for (pure spin on a circle uses 0.002 of it)
-        assert error[chosen].max() < float(row["fastrip_100_maxerr_f"]) + 0.003
-        assert moment[chosen].max() < float(row["fastrip_100_maxerr_mz"]) + 0.003
-    assert error.max() < 0.075  # the listed one: 0.135
+        assert error[chosen].max() < float(row["fastrip_100_maxerr_f"]) + REFERENCE
+        assert moment[chosen].max() < float(row["fastrip_100_maxerr_mz"]) + REFERENCE
+    # error of the strip theory: 0.071 at a/b = 0.3 with lateral creepage and spin of the same
+    # sense, where its lateral force is too small (0.073 with 200 strips; the listed law: 0.135)
+    assert error.max() < 0.071 + REFERENCE
 
 
 def test_fastrip_gives_linear_theory_for_small_creepage(curves):
@@ -59,13 +62,16 @@ def test_fastrip_gives_linear_theory_for_small_creepage(curves):
 
 
 def test_polach_and_linear_are_good_without_spin_only(curves):
-    # closed formulas for treads: pure creepage within 0.06 (Polach), 0.04 (linear)
+    # closed formulas for treads: errors of the theories in pure creepage 0.059 and 0.032
     pure = np.isin(curves.curve, ("long", "lat"))
-    for law, limit in (("polach", 0.06), ("linear", 0.04)):
+    for law, limit in (("polach", 0.06), ("linear", 0.032 + REFERENCE)):
         error, _ = curves.errors(forces(curves, law), "contact_ext")
         assert error[pure].max() < limit
+    # largest error of the theory, 0.333, in pure spin on a circle: one factor reduces force and
+    # moment alike, whereas the lateral force decreases as the patch rotates about its centre.
+    # 0.91 without spin in the saturation
     error, _ = curves.errors(forces(curves, "linear"), "contact_ext")
-    assert error.max() < 0.34  # with the spin in the saturation; 0.91 without
+    assert error.max() < 0.333 + REFERENCE
 
 
 def test_table_is_the_best_and_fastrip_the_second(curves):

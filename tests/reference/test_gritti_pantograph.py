@@ -266,7 +266,9 @@ def test_lifts_2_and_3_are_found_without_their_published_parameters_reconstructe
 def test_a21_better_lift_4_from_every_seed_new(seed):
     found = optimise(load_mechanism("atr95_lift_4"), starts=20, seed=seed)
     assert found.feasible
-    assert found.objective <= 0.0044
+    # 0.00435 by the other computation, to half a unit of its last digit; here 0.0043499 from
+    # each seed
+    assert found.objective <= 0.00435 + 5e-6
     assert {limit.name for limit in found.active} == {"mu", "mu_prime"}
     assert all(limit.multiplier > 0.0 for limit in found.active)
 

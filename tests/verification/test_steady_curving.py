@@ -187,13 +187,16 @@ def test_lateral_forces_of_rolling_wheelsets_add_to_a_bogie_twist(rolling_on_twi
     """Axles canted against each other stand 2 r0 phi = 5.5 mm apart, which the primary resists.
 
     Its lateral forces, r0 above the rails, are not in the closed formula: the softer it is across,
-    the nearer the formula.
+    the smaller the unloading, down to the formula less the lean of the axles about the rails,
+    2 r0 phi/1.5 m of Q0 (next test).
     """
     unloading = [rolling.unloading for (rolling, _), _ in rolling_on_twist.values()]
     held = [held.unloading for (_, held), _ in rolling_on_twist.values()]
     assert np.all(np.diff(unloading) < 0.0)
     assert 1.15 * 0.1781 < unloading[0] < 1.3 * 0.1781
-    assert unloading[-1] == pytest.approx(0.1781, rel=0.03)
+    lean = 0.5 * 7e-3 * 2.56 / 1.5
+    # 1 % as for held wheelsets; measured 0.7 %, with 30 kN/m of lateral stiffness left
+    assert unloading[-1] == pytest.approx(0.1781 - 2.0 * 0.46 * lean / 1.5, rel=0.01)
     assert held == pytest.approx([0.1781] * len(held), rel=2e-3)
     # Q is normal to each canted plane
     rolling = rolling_on_twist[3.884e6][0][0]
@@ -207,4 +210,7 @@ def test_a_body_twist_moves_the_weight_above_rolling_wheelsets(rolling_on_twist)
     """
     rolling, held = rolling_on_twist[3e5][1]
     lean = 0.5 * 0.053 / 1.5
-    assert held.unloading - rolling.unloading == pytest.approx(2.0 * 0.46 * lean / 1.5, rel=0.15)
+    # an estimate without suspension: 0.0097 of Q0 against 0.0108, 11 % less.  The deviation does
+    # not depend on the lateral stiffness of the secondary suspension (a hundredth of it: 10 %); on
+    # that of the primary it does (0.0095 at 30 kN/m, 0.0091 at 1 MN/m).  Its cause is not known
+    assert held.unloading - rolling.unloading == pytest.approx(2.0 * 0.46 * lean / 1.5, rel=0.12)

@@ -39,7 +39,7 @@ def test_worn_profile_loses_the_area_of_the_wear():
 
 def test_wear_too_deep_for_one_step_is_refused_with_the_step_that_is_not():
     depth = spread(np.array([0.0]), np.array([5e-3]), np.array([1e-11]))
-    with pytest.raises(InputError, match=r"2000 km wear off 2\.5\d* mm; .*at most 1 mm: 78\d km"):
+    with pytest.raises(InputError, match=r"2000 km wear 2\.5\d* mm deep; .*at most 1 mm: 78\d km"):
         worn_profile(load_profile("S1002"), depth, 2e6)
 
 
@@ -47,7 +47,7 @@ def test_profile_of_few_points_is_refused():
     profile = load_profile("S1002")
     coarse = dataclasses.replace(profile, y=profile.y[::300], z=profile.z[::300])
     depth = spread(np.array([0.0]), np.array([2e-3]), np.array([1e-12]))
-    with pytest.raises(InputError, match="points 1 mm apart at most"):
+    with pytest.raises(InputError, match="points at most 1 mm apart"):
         worn_profile(coarse, depth, 1e6)
 
 
