@@ -30,7 +30,7 @@ from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import alignment_of
 from railsim.track.irregularity import displacement
 
 Floats = NDArray[np.float64]
@@ -179,7 +179,7 @@ class OutputPlan:
         self._model = model
         self._sensors = all_sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
-        self._alignment = Alignment(track)
+        self._alignment = alignment_of(track)
         self._track_file = track
         self._irregularity = displacement(track)
         known = {
