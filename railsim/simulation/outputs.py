@@ -1,6 +1,6 @@
 """From raw records of the time loop to the quantities of a result (see `railsim.notation`)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -62,7 +62,11 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     # a wheel that carries nothing has no derailment quotient
     loaded = np.where(Q > 0.0, Q, np.nan)
     places = model.system.frame_offset[model.system.bodies.frame[axles]]
-    deflection = rail_deflection(model, state)
+    lateral, roll = position[:, axles, LATERAL], position[:, axles, ROLL]
+    if model.system.support.elastic:
+        deflection = rail_deflection(model, state)
+        lateral = lateral - deflection[..., 0].mean(axis=-1)
+        roll = roll - np.diff(deflection[..., 1])[..., 0] / CANT_BASE
     return {
         "time": state[:, -3],
         "distance": state[:, -2],
@@ -72,10 +76,8 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "dQ_over_Q0": (Q - Q0) / Q0,
         "sum_Y": Y.sum(axis=-1),
         "sum_abs_Y": np.abs(Y).sum(axis=-1),
-        "wheelset_lateral": position[:, axles, LATERAL] - deflection[..., 0].mean(axis=-1),
-        "wheelset_roll": (
-            position[:, axles, ROLL] - np.diff(deflection[..., 1])[..., 0] / CANT_BASE
-        ),
+        "wheelset_lateral": lateral,
+        "wheelset_roll": roll,
         "wheelset_yaw": position[:, axles, YAW],
         "wheelset_distance": state[:, -2, None] + places + position[:, axles, 0],
         "xi_x": wheel[..., W_XI_X],
@@ -160,6 +162,26 @@ def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
         found["dQ_over_Q0" + ending] = found["Q" + ending]
     found["dQ_over_Q0"] = (found["Q"] - Q0) / Q0
     return found
+
+
+class _Chunk(Mapping[str, Floats]):
+    """Quantities by name, some of them worked out when asked for: summaries need few of them."""
+
+    def __init__(
+        self, values: dict[str, Floats], later: Mapping[str, Callable[[], Floats]]
+    ) -> None:
+        self._values, self._later = values, later
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in self._values:
+            self._values[name] = self._later[name]()
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys((*self._values, *self._later)))
+
+    def __len__(self) -> int:
+        return len(self._values.keys() | self._later.keys())
 
 
 class OutputPlan:
@@ -253,7 +275,6 @@ class OutputPlan:
     def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
         """Quantities of the first `rows` records by name."""
         values = dict(quantities(self._model, recorder, rows, Q0))
-        values |= self._place(values["distance"])
         if self.elements:
             values |= _elements(recorder.element[:rows])
         if self._sensors:
@@ -279,14 +300,13 @@ class OutputPlan:
                     values["wheelset_lateral"] - values["rail_lateral"].mean(axis=-1)
                 ),
             }
-        return values
-
-    def _place(self, distance: Floats) -> dict[str, Floats]:
-        return {
-            "mileage": self._track_file.mileage_at(distance),
-            "curvature": self._alignment.curvature(distance),
-            "cant": self._alignment.cant(distance),
+        distance = values["distance"]
+        later = {
+            "mileage": lambda: self._track_file.mileage_at(distance),
+            "curvature": lambda: self._alignment.curvature(distance),
+            "cant": lambda: self._alignment.cant(distance),
         }
+        return _Chunk(values, later)
 
     def _track(self, place: Floats) -> dict[str, Floats]:
         rails = np.zeros((4, *place.shape))

@@ -186,14 +186,17 @@ def _way_from_constant(
     farthest = min(max(LONGEST_APPROACH_TIME * speed, LONGEST_APPROACH), room)
     ways = np.arange(0.0, max(farthest, 0.0) + 0.5, 0.5)
     under = np.arange(float(np.min(offsets)), float(np.max(offsets)) + 0.5, 0.5)
-    s = start - ways[:, None] + under
-    changes = [
-        alignment.curvature_rate(s),
-        alignment.cant_angle_rate(s),
-        alignment.grade_angle_rate(s),
-    ]
-    constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
-    return float(ways[int(np.argmax(constant))] if constant.any() else farthest)
+    for tried in (ways[:1], ways):  # most runs begin where nothing changes
+        s = start - tried[:, None] + under
+        changes = [
+            alignment.curvature_rate(s),
+            alignment.cant_angle_rate(s),
+            alignment.grade_angle_rate(s),
+        ]
+        constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
+        if constant.any():
+            return float(tried[int(np.argmax(constant))])
+    return float(farthest)
 
 
 def _located(model: Model, place: float) -> Work:
