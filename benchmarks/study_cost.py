@@ -15,9 +15,13 @@ import threading
 import time
 from pathlib import Path
 
-import numpy as np
+from railsim.threads import use_one_thread
 
-from railsim.studies import study
+use_one_thread()  # before numpy is imported, as the command does: idle threads spin
+
+import numpy as np  # noqa: E402
+
+from railsim.studies import study  # noqa: E402
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ A result is read part by part: a record of 100 km needs no more memory than one 
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +20,39 @@ FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
 PIECE = 60.0  # s that are read at once by default
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """What was read last: parts of a run overlap by the margins of their filters.
+
+    Attributes
+    ----------
+    first : int
+        First row.
+    speed : float64[row]
+        From which the readings were made: at the ends of a part it differs [m/s].
+    acceleration, roll : ndarray
+        See `Record.readings`.
+    """
+
+    first: int
+    speed: Floats
+    acceleration: Floats
+    roll: Floats
+
+    def part_of(self, rows: slice, speed: Floats) -> "_Readings | None":
+        """Return what of these is part of other rows with their speeds, if anything is.
+
+        Of both parts without the first and the last row, whose speeds are of one side.
+        """
+        begin = max(self.first, rows.start) + 1
+        end = min(self.first + len(self.speed), rows.stop) - 1
+        own = slice(begin - self.first, end - self.first)
+        same = slice(begin - rows.start, end - rows.start)
+        if begin >= end or not np.array_equal(self.speed[own], speed[same]):
+            return None
+        return _Readings(begin, self.speed[own], self.acceleration[own], self.roll[own])
 
 
 class Record:
@@ -58,6 +92,7 @@ class Record:
                 "filtered by the run (settings.outputs.low_pass); --coarse assesses it nevertheless"
             )
             raise self.fault("time", f"{self.rate:.4g} samples per second", allowed)
+        self._last: _Readings | None = None
 
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """Return the error for a property of the result that is not admissible."""
@@ -107,9 +142,26 @@ class Record:
             order = [names.index(name) for name in self.sensors]
             acceleration = self.result.part("sensor_acceleration", rows)[:, order]
             return acceleration, self.result.part("sensor_roll_rate", rows)[:, order]
+        speed = np.gradient(self.distance[rows], self.time[rows])
+        known = self._last and self._last.part_of(rows, speed)
+        if known is None:
+            found = self._of_motion(rows, speed)
+        else:
+            begin, end = known.first, known.first + len(known.speed)
+            before, after = slice(rows.start, begin), slice(end, rows.stop)
+            parts = (
+                self._of_motion(before, speed[: begin - rows.start]),
+                (known.acceleration, known.roll),
+                self._of_motion(after, speed[end - rows.start :]),
+            )
+            found = np.concatenate([a for a, _ in parts]), np.concatenate([r for _, r in parts])
+        self._last = _Readings(rows.start, speed, *found)
+        return found
+
+    def _of_motion(self, rows: slice, speed: Floats) -> tuple[Floats, Floats]:
+        """Readings from the motion of the bodies."""
         motion = {name: self.result.part(name, rows) for name in MOTION}
         motion["distance"] = self.distance[rows]
-        speed = np.gradient(self.distance[rows], self.time[rows])
         return readings(self.sensors, motion, self.result.bodies, self.alignment, speed)
 
     def covered(self) -> tuple[float, float]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Remark
@@ -93,8 +92,10 @@ def _vertical_modes(flat: FlatVehicle) -> list[Remark]:
     if not names:
         return []
     stiffness, damping = _network(flat, names)
-    mass = np.diag([flat.body(name).mass for name in names])
-    squares, shapes = eigh(stiffness, mass)
+    # coordinates in which the masses are 1; scipy's eigh takes masses, and long to import
+    scale = 1.0 / np.sqrt([flat.body(name).mass for name in names])
+    squares, shapes = np.linalg.eigh(stiffness * np.outer(scale, scale))
+    shapes *= scale[:, None]
     frequency = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
     carried = np.flatnonzero(frequency > 1e-3)
     if not len(carried):

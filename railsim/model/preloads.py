@@ -1,5 +1,6 @@
 """Preloads of the suspension, with which a vehicle stands in its nominal position."""
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,10 @@ Floats = NDArray[np.float64]
 
 
 UNBALANCED = 1e-6  # share of the weight that may stay unbalanced by preloads (round-off)
+MOST_KEPT = 100  # vehicles
+# preloads of links and mounts that this process has solved, by all that they follow from: neither
+# speed, friction nor track are part of it, so that the runs of a study share them
+_KEPT: dict[bytes, tuple[Floats, Floats]] = {}
 
 
 def with_preloads(model: Model) -> Model:
@@ -28,9 +33,52 @@ def with_preloads(model: Model) -> Model:
     A load case takes the preloads of the design load: its bodies find their heights, rolls and
     pitches themselves.  So does a vehicle with springs of known free length: their preloads are
     given, and what they leave unbalanced moves the bodies.
+
+    Raises
+    ------
+    ModelError
+        The springs cannot carry the vehicle.
     """
+    key = _key(model)
+    if key not in _KEPT:
+        system = _solved(model).system
+        if len(_KEPT) >= MOST_KEPT:
+            _KEPT.clear()
+        _KEPT[key] = system.links.spring[:, 2].copy(), system.mounts.preload.copy()
+    return _filled(model, *_KEPT[key])
+
+
+def _key(model: Model) -> bytes:
+    """Hash of all that the preloads of a model follow from."""
+    system, index = model.system, model.index
+    bodies, links, mounts = system.bodies, system.links, system.mounts
+    facts = [
+        (
+            element.name,
+            element.body1,
+            element.body2,
+            getattr(element.definition, "preload", None),
+            element.definition.vertical_stiffness,
+            getattr(element.definition, "has_free_length", False),
+            getattr(element.definition, "levelling", False),
+        )
+        for element in model.flat.elements
+    ]
+    names = index.bodies, index.links, index.mounts
+    digest = hashlib.sha256(repr((names, facts, system.gravity)).encode())
+    for array in (*bodies, system.frame_offset, links.body, links.row, mounts.body, mounts.row):
+        digest.update(repr(array.shape).encode())
+        digest.update(array.tobytes())
     if model.design is not None:
-        return _levelled(_with_preloads_of(model, with_preloads(model.design)))
+        digest.update(_key(model.design))
+    return digest.digest()
+
+
+def _solved(model: Model) -> Model:
+    """Solve every `auto` preload, see `with_preloads`."""
+    if model.design is not None:
+        design = with_preloads(model.design).system
+        return _levelled(_filled(model, design.links.spring[:, 2], design.mounts.preload))
     conditions = _conditions(model.system)
     # springs carry the weight of a fixed body where they can
     weights = [(int(body), 2) for body in model.system.bodies.fixed]
@@ -151,11 +199,12 @@ def _with_solved_preloads(
     return filled, matrix @ values - right_side
 
 
-def _with_preloads_of(model: Model, design: Model) -> Model:
+def _filled(model: Model, tension: Floats, preload: Floats) -> Model:
+    """Return the model with these preloads of its links and mounts."""
     links = model.system.links._replace(row=aligned(model.system.links.row))
     mounts = model.system.mounts._replace(row=aligned(model.system.mounts.row))
-    links.spring[:, 2] = design.system.links.spring[:, 2]
-    mounts.preload[:] = design.system.mounts.preload
+    links.spring[:, 2] = tension
+    mounts.preload[:] = preload
     return replace(model, system=model.system._replace(links=links, mounts=mounts))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.layout import Section, curvature_sections
+from railsim.definitions.track import Track
 from railsim.notation import Quantity
 from railsim.result.data import Array, Result
 from railsim.result.filters import low_passed
@@ -276,7 +277,9 @@ class MidCurve:
         }
 
 
-def mid_curves(result: Result, names: Iterable[str] | None = None) -> tuple[MidCurve, ...]:
+def mid_curves(
+    result: Result, names: Iterable[str] | None = None, *, track: Track | None = None
+) -> tuple[MidCurve, ...]:
     """Return the values at the middle of every circular element that was passed.
 
     Those at the middle are interpolated linearly between the two instants around it.
@@ -287,13 +290,15 @@ def mid_curves(result: Result, names: Iterable[str] | None = None) -> tuple[MidC
         Result with ``distance``.
     names : iterable of str, optional
         Quantities; those of `PEAK_QUANTITIES` that the result has if not given.
+    track : Track, optional
+        That of the result; by default it is rebuilt from the text that the result carries.
     """
     wanted = list(names) if names is not None else [n for n in PEAK_QUANTITIES if n in result]
     distance = result["distance"]
     found: list[MidCurve] = []
     if not len(distance):
         return ()
-    for section in curvature_sections(result.track()):
+    for section in curvature_sections(track or result.track()):
         middle = 0.5 * (section.begin + section.end)
         if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:
             found.append(_mid_curve(result, wanted, section))

@@ -17,7 +17,7 @@ from railsim.kernels.time_loop import FAST
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, without_loads
 from railsim.simulation.settling import DOING, Progress, advance, curve_to_settle_in
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,7 @@ def tightest_curve(track: Track) -> tuple[float, float] | None:
         if section.start_value == section.end_value == curvature:
             place = 0.5 * (section.begin + section.end)
             break
-    return curvature, float(Alignment(track).cant(place))
+    return curvature, float(alignment_of(track).cant(place))
 
 
 def in_flange_contact(

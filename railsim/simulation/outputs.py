@@ -1,6 +1,6 @@
 """From raw records of the time loop to the quantities of a result (see `railsim.notation`)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -30,7 +30,7 @@ from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import alignment_of
 from railsim.track.irregularity import displacement
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,12 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     # a wheel that carries nothing has no derailment quotient
     loaded = np.where(Q > 0.0, Q, np.nan)
     places = model.system.frame_offset[model.system.bodies.frame[axles]]
-    deflection = rail_deflection(model, state)
+    lateral, roll = position[:, axles, LATERAL], position[:, axles, ROLL]
+    if model.system.support.elastic:
+        deflection = rail_deflection(model, state)
+        left, right = deflection[:, :, 0], deflection[:, :, 1]
+        lateral = lateral - _of_both(deflection[..., 0]) / 2.0
+        roll = roll - (right[..., 1] - left[..., 1]) / CANT_BASE
     return {
         "time": state[:, -3],
         "distance": state[:, -2],
@@ -70,12 +75,10 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "Y": Y,
         "Y_over_Q": outwards * Y / loaded,
         "dQ_over_Q0": (Q - Q0) / Q0,
-        "sum_Y": Y.sum(axis=-1),
-        "sum_abs_Y": np.abs(Y).sum(axis=-1),
-        "wheelset_lateral": position[:, axles, LATERAL] - deflection[..., 0].mean(axis=-1),
-        "wheelset_roll": (
-            position[:, axles, ROLL] - np.diff(deflection[..., 1])[..., 0] / CANT_BASE
-        ),
+        "sum_Y": _of_both(Y),
+        "sum_abs_Y": _of_both(np.abs(Y)),
+        "wheelset_lateral": lateral,
+        "wheelset_roll": roll,
         "wheelset_yaw": position[:, axles, YAW],
         "wheelset_distance": state[:, -2, None] + places + position[:, axles, 0],
         "xi_x": wheel[..., W_XI_X],
@@ -87,6 +90,12 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
     }
+
+
+def _of_both(values: Floats) -> Floats:
+    """Sum over the last axis, the sides; numpy's own takes far longer over an axis of two."""
+    total: Floats = 0.0 + values[..., 0] + values[..., 1]  # from zero, so that there is no -0.0
+    return total
 
 
 def frictional_power(values: Mapping[str, Floats], speed: Floats) -> Floats:
@@ -162,6 +171,26 @@ def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
     return found
 
 
+class _Chunk(Mapping[str, Floats]):
+    """Quantities by name, some of them worked out when asked for: summaries need few of them."""
+
+    def __init__(
+        self, values: dict[str, Floats], later: Mapping[str, Callable[[], Floats]]
+    ) -> None:
+        self._values, self._later = values, later
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in self._values:
+            self._values[name] = self._later[name]()
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys((*self._values, *self._later)))
+
+    def __len__(self) -> int:
+        return len(self._values.keys() | self._later.keys())
+
+
 class OutputPlan:
     """What a run outputs: which elements, patches and track quantities beyond the usual ones.
 
@@ -179,7 +208,7 @@ class OutputPlan:
         self._model = model
         self._sensors = all_sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
-        self._alignment = Alignment(track)
+        self._alignment = alignment_of(track)
         self._track_file = track
         self._irregularity = displacement(track)
         known = {
@@ -253,7 +282,6 @@ class OutputPlan:
     def chunk(self, recorder: Recorder, rows: int, Q0: Floats) -> Mapping[str, Floats]:
         """Quantities of the first `rows` records by name."""
         values = dict(quantities(self._model, recorder, rows, Q0))
-        values |= self._place(values["distance"])
         if self.elements:
             values |= _elements(recorder.element[:rows])
         if self._sensors:
@@ -279,14 +307,13 @@ class OutputPlan:
                     values["wheelset_lateral"] - values["rail_lateral"].mean(axis=-1)
                 ),
             }
-        return values
-
-    def _place(self, distance: Floats) -> dict[str, Floats]:
-        return {
-            "mileage": self._track_file.mileage_at(distance),
-            "curvature": self._alignment.curvature(distance),
-            "cant": self._alignment.cant(distance),
+        distance = values["distance"]
+        later = {
+            "mileage": lambda: self._track_file.mileage_at(distance),
+            "curvature": lambda: self._alignment.curvature(distance),
+            "cant": lambda: self._alignment.cant(distance),
         }
+        return _Chunk(values, later)
 
     def _track(self, place: Floats) -> dict[str, Floats]:
         rails = np.zeros((4, *place.shape))

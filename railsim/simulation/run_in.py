@@ -45,7 +45,7 @@ from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium, initial_state
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
 from railsim.simulation.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
-from railsim.track.alignment import Alignment
+from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -163,7 +163,7 @@ def _approach(model: Model, track: Track, start: float, speed: float, step: floa
     """
     system = model.system
     room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH
-    way = _way_from_constant(Alignment(track), start, system.frame_offset, room, speed)
+    way = _way_from_constant(alignment_of(track), start, system.frame_offset, room, speed)
     if _displaced(model, start):
         way = max(way, APPROACH_TIME * speed, APPROACH)
     return max(0, math.floor(min(way, room) / (speed * step)))
@@ -186,14 +186,17 @@ def _way_from_constant(
     farthest = min(max(LONGEST_APPROACH_TIME * speed, LONGEST_APPROACH), room)
     ways = np.arange(0.0, max(farthest, 0.0) + 0.5, 0.5)
     under = np.arange(float(np.min(offsets)), float(np.max(offsets)) + 0.5, 0.5)
-    s = start - ways[:, None] + under
-    changes = [
-        alignment.curvature_rate(s),
-        alignment.cant_angle_rate(s),
-        alignment.grade_angle_rate(s),
-    ]
-    constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
-    return float(ways[int(np.argmax(constant))] if constant.any() else farthest)
+    for tried in (ways[:1], ways):  # most runs begin where nothing changes
+        s = start - tried[:, None] + under
+        changes = [
+            alignment.curvature_rate(s),
+            alignment.cant_angle_rate(s),
+            alignment.grade_angle_rate(s),
+        ]
+        constant = np.all(np.abs(changes) < UNCHANGING, axis=(0, 2))
+        if constant.any():
+            return float(tried[int(np.argmax(constant))])
+    return float(farthest)
 
 
 def _located(model: Model, place: float) -> Work:
@@ -267,7 +270,7 @@ def _run(
 
 def _curve(track: Track, place: float) -> tuple[float, float]:
     """Curvature [1/m] and cant [m] at a place, 0 where negligible."""
-    alignment = Alignment(track)
+    alignment = alignment_of(track)
     curvature, cant = float(alignment.curvature(place)), float(alignment.cant(place))
     return (
         curvature if abs(curvature) >= NEGLIGIBLE else 0.0,

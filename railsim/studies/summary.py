@@ -54,7 +54,7 @@ def finished_record(case: Case, result: Result, own: str | None = None) -> Recor
     RailsimError : one of these fails.
     """
     found = own_quantities(own, result) | analysed(case, result)
-    facts = {**waiting_record(case), **run_facts(result)}
+    facts = {**waiting_record(case), **run_facts(result, case.track)}
     return {**facts, "quantities": found} if own or case.analyses else facts
 
 

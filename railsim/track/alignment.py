@@ -28,6 +28,7 @@ from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 
 Array = NDArray[np.float64]
+KEPT = "_alignment"
 
 
 def _array(s: ArrayLike) -> Array:
@@ -193,6 +194,19 @@ class Alignment:
     def _climb(self, s: ArrayLike) -> Array:
         gradient = self._gradient(s)
         return gradient / np.sqrt(1.0 + gradient**2) + 0.5 * self._lifting_cant.rate(s)
+
+
+def alignment_of(track: Track) -> Alignment:
+    """Return the alignment of a track, worked out once for each track.
+
+    Raises
+    ------
+    InputError : elements that do not fit together.
+    """
+    kept: dict[str, Alignment] = track.__dict__  # a copy of the track has it no more
+    if KEPT not in kept:
+        kept[KEPT] = Alignment(track)
+    return kept[KEPT]
 
 
 def _magnitudes(sections: Sequence[Section]) -> list[Section]:

@@ -1,0 +1,40 @@
+"""Readings of overlapping parts of a record are those of each part read by itself."""
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.assessment.record import Record
+
+ROWS = slice(0, 500), slice(300, 800), slice(310, 700), slice(0, 400), slice(900, 950)
+
+
+@pytest.fixture(scope="module")
+def run() -> railsim.Result:
+    coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
+    return railsim.simulate(coach, track, speed=20.0, start=80.0, duration=5.0)
+
+
+def test_parts_are_the_same_to_the_last_bit(run: railsim.Result) -> None:
+    shared = Record(run, "run", coarse=True)
+    for rows in ROWS:
+        alone = Record(run, "run", coarse=True).readings(rows)
+        for one, other in zip(shared.readings(rows), alone, strict=True):
+            assert one.tobytes() == other.tobytes(), rows
+
+
+def test_what_overlaps_is_not_read_again(
+    run: railsim.Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = Record(run, "run", coarse=True)
+    read: list[int] = []
+    own = Record._of_motion
+
+    def counted(self: Record, rows: slice, speed: np.ndarray) -> object:
+        read.append(rows.stop - rows.start)
+        return own(self, rows, speed)
+
+    monkeypatch.setattr(Record, "_of_motion", counted)
+    record.readings(slice(0, 500))
+    record.readings(slice(300, 800))
+    assert read == [500, 1, 301]
