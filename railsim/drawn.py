@@ -1,7 +1,7 @@
-"""Results that draw themselves.
+"""Results with a method `plot`.
 
 Analyses lie below pictures and know none of them: the function that draws a result is named, and
-looked up when a picture is asked for.
+looked up when a picture is requested.
 """
 
 from pathlib import Path
@@ -29,7 +29,7 @@ def drawn(
 
 
 class Drawn:
-    """A result with a picture of its own.
+    """A result that can be plotted.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 """Threads of the linear algebra library: none, where several runs share the cores.
 
-Matrices here have at most some hundred rows, for which threads gain nothing; and after each call
+Matrices here have at most a few hundred rows, for which threads bring no gain; and after each call
 they spin for a while on the core that another run could have: 32 runs on two cores took 5 to 12 s
 with them, and 3 s without.
 """

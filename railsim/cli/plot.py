@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from railsim.plot.study import Column
 
-# what a study's picture shows where nothing is asked for
+# default quantities of the picture of a study
 DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_abs_Y_abs", "T_gamma_abs")
 
 

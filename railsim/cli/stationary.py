@@ -1,4 +1,4 @@
-"""``railsim stationary``: a vehicle at a stand on twisted track and on cant."""
+"""``railsim stationary``: stationary tests on twisted and canted track."""
 
 import math
 from typing import TYPE_CHECKING

@@ -44,7 +44,7 @@ class RollingGrid(NamedTuple):
     bound : ndarray, shape (n_strip, n_cell)
         Traction bound over mu N/(a b), from the Hertz pressure; sums up to 1 with the cells' areas.
     x_middle : ndarray, shape (n_strip, n_cell)
-        Where sticking is asked for.
+        Where sticking is to be evaluated.
     middle, centre : ndarray, shape (3, n, n)
         Elastic slip per traction, see `railsim.kernels.halfspace.rolling_matrices`.
     """

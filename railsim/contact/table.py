@@ -386,7 +386,7 @@ def build_contact_table(
 
 
 def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
-    """Return the grid of a table, with another normal contact where one is asked for."""
+    """Return the grid of a table, with another normal contact if requested."""
     grid = grid or TableGrid()
     return replace(grid, normal=normal) if normal else grid
 

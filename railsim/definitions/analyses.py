@@ -16,7 +16,7 @@ UNITS = {
 
 
 class RunAnalysis(Definition):
-    """A run in the time domain: what a study does where nothing else is asked for."""
+    """A run in the time domain: the default analysis of a study."""
 
     kind: Literal["run"]
     """`run`: peaks and mid-curve values"""

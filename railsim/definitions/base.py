@@ -98,7 +98,7 @@ class Definition(BaseModel):
 def meanings(model: type[BaseModel]) -> dict[str, str]:
     """What the text below each field of a definition says, by the field's name.
 
-    It is read from the source when it is asked for: at import it would cost every command a tenth.
+    It is read from the source on first use: at import it would cost every command a tenth.
     """
     found: dict[str, str] = {}
     for part in reversed(model.__mro__):

@@ -1,7 +1,7 @@
 """Limit files: what a standard asks for, each value with its source.
 
 `railsim-limits/1` holds the limits of running tests, `railsim-comfort-limits/1` those of comfort,
-`railsim-stationary-limits/1` those of tests at a stand.
+`railsim-stationary-limits/1` those of stationary tests.
 
 A value is `checked` when somebody has compared it with the printed standard; until then every page
 that uses it says so.
@@ -272,7 +272,7 @@ class Guiding(Sourced):
 
 
 class StationaryLimits(FileDefinition):
-    """Tests at a stand: twisted track, cant; and a tight curve at walking pace."""
+    """Stationary tests: twisted track, cant; and a tight curve at walking pace."""
 
     format: Literal["railsim-stationary-limits/1"]
     """Kind and version of the file"""

@@ -19,5 +19,5 @@ def offers(function: Function) -> Function:
 
 
 def offered(name: str) -> Callable[..., Any]:
-    """Return the function of a name."""
+    """Return the function with a given name."""
     return _FUNCTIONS[name]

@@ -94,7 +94,7 @@ def library_folders(kind: str) -> Iterator[Path]:
 
 
 def library_files(kind: str) -> dict[str, Path]:
-    """Return the files of the libraries by their bare names; the first of a name counts."""
+    """Return the files of the libraries by their bare names; the first of each name is used."""
     files: dict[str, Path] = {}
     for folder in library_folders(kind):
         for path in sorted(folder.glob("*.toml")):

@@ -1,6 +1,6 @@
 """Vehicle files, `railsim-vehicle/1`: bodies, wheelsets, axleboxes, force elements, assemblies.
 
-Everything is a table with a name of its own, so that an extending file can replace a part of it.
+Everything is a table with its own name, so that an extending file can replace a part of it.
 Positions are those of the nominal vehicle at rest on straight level track: x forward from the
 vehicle's origin, y to the right, z down from the plane through the rail tops.  An assembly is a
 group that stands at each of its placements; its coordinates count from there.

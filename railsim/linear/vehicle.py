@@ -211,7 +211,7 @@ class LinearVehicle:
 
 
 def _check_hold(model: Model, hold: Sequence[str]) -> None:
-    """Refuse to hold what is no body of its own, or everything."""
+    """Refuse to hold parts that are not bodies, or all bodies."""
     rigid = [
         name
         for name, kind in zip(model.index.bodies, model.system.bodies.kind, strict=True)

@@ -8,7 +8,7 @@ module             job
 `tolerance`        what tolerances of the parameters do
 `model`            from the file to the arrays of `kernels.linkage`
 `kinematics`       positions along the driver, with exact derivatives by parameters
-`cams`             changes of a roller from arc to arc, every arc by itself
+`cams`             transitions of a roller from arc to arc, every arc alone
 `inversion`        the driver's value at a height, a length, without a force
 `forces`           virtual work, inertia, unknown forces, reactions of the joints
 `dynamics`         motion laws and free motion

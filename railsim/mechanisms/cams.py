@@ -1,4 +1,4 @@
-"""Cams of several arcs: where a roller goes from one to the next, and every arc by itself.
+"""Cams of several arcs: transitions of the roller from arc to arc, and every arc alone.
 
 Tangent arcs touch, so that equal positions are a double root (ill-conditioned) and equal rates a
 simple one: the change is where the rates agree, and the gap that is left there is reported.

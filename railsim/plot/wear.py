@@ -48,7 +48,7 @@ def wear_figure(
         depth.set_xlim(1e3 * SHOWN[0], 1e3 * SHOWN[1])
         depth.set_ylim(bottom=0.0)
         depth.set_xlabel("y from the nominal rolling circle, flange negative (mm)")
-        depth.set_ylabel("worn off in z (mm)")
+        depth.set_ylabel("depth of wear in z (mm)")
         depth.legend()
         values = [row["equivalent_conicity"] for row in rows]
         kilometres = [1e-3 * distance for distance, _ in wheels]

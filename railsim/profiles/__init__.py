@@ -6,7 +6,7 @@ module        job
 `profile`     `Profile`: the points, their frame and where they come from
 `builtin`     the built-in profiles, generated from their definitions
 `readers`     CSV, SIMPACK and MiniProf files as they are
-`recognition` what a file's points mean: recognised, put right, or refused
+`recognition` conventions of the points of a file: recognised, corrected or refused
 ============= ==================================================================
 
 Read `profile` first: it states the frames.
@@ -36,7 +36,7 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
     Returns
     -------
     Profile
-        Its `notes` say what was recognised and put right.
+        Its `notes` list what was recognised and corrected.
 
     Raises
     ------

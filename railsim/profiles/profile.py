@@ -44,7 +44,7 @@ class Profile:
     inclination : float
         Inclination that a rail's points already carry, as tangent (0.025 for 1:40) [1].
     notes : tuple of str
-        What was recognised and put right when the profile was read, a sentence each.
+        What was recognised and corrected when the profile was read, one sentence each.
     measured : ndarray, shape (2, n), optional
         y and z before smoothing, where the profile was smoothed [m].
     """

@@ -1,4 +1,4 @@
-"""From the points of a file to a profile: recognise, report, put right, or refuse.
+"""From the points of a file to a profile: recognise, report, correct or refuse.
 
 What can be recognised from the shape alone is corrected with a note: millimetres instead of metres,
 points out of order, z up instead of down, mirrored, origin at the flange back, a rail that is
@@ -52,7 +52,7 @@ def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> 
     Returns
     -------
     Profile
-        With a note for everything that was put right.
+        With a note on every correction.
 
     Raises
     ------

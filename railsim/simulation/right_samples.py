@@ -1,4 +1,4 @@
-"""Samples that fold nothing back: how often the loop outputs where a low pass is asked for."""
+"""Sampling without aliasing: output rate of the loop if a low-pass filter is requested."""
 
 import math
 

@@ -1,14 +1,14 @@
-"""The state in which a run starts: anywhere along a track, in curves and on irregular rails.
+"""The initial state of a run: anywhere along a track, in curves and on irregular rails.
 
-The equilibrium on straight smooth track is no state for a curve or for rails that lean: put there,
-the wheelsets would climb or fall.  So the vehicle comes from elsewhere:
+The equilibrium on straight smooth track is not a suitable initial state in a curve or on irregular
+rails: the wheelsets would climb or fall.  Therefore the vehicle runs in:
 
-- into a curve over an auxiliary track, which begins straight, takes up curvature and cant of the
-  place over a transition, and keeps them until the vehicle has settled; the state at its end,
-  relative to the track frames, is the state at the place; or, where it is asked for, it is put
-  there in the steady state that Newton's method finds;
-- into a transition, a ramp or a vertical curve over the real track, from the last place before it
-  where nothing changes under the vehicle: there it stands on a twist that it came over;
+- into a curve over an auxiliary track, which begins straight, reaches curvature and cant of the
+  starting position over a transition, and keeps them until the vehicle has settled; the state at
+  its end, relative to the track frames, is the initial state; or, if requested, the initial state
+  is the steady state found by Newton's method;
+- into a transition, a ramp or a vertical curve over the real track, from the last position before
+  it where the track under the vehicle is uniform, since its state depends on the twist passed;
 - onto irregular rails over the last seconds of the real track before the start;
 - where it does not stay on the rails that way, over the whole track from its beginning: so it can
   start wherever a run passes.
@@ -155,11 +155,11 @@ def _friction(track: Track, place: float) -> tuple[float, float]:
 
 
 def _approach(model: Model, track: Track, start: float, speed: float, step: float) -> int:
-    """Steps to drive on the real track before the start.
+    """Steps to run on the real track before the start.
 
-    Irregular rails under the wheelsets need their time.  A transition, a ramp or a vertical curve
-    is entered as the run does that comes along: from the last place before it where curvature, cant
-    and gradient under the whole vehicle are constant.
+    Irregular rails need a certain time.  A transition, a ramp or a vertical curve is entered as in
+    a run over the whole track: from the last position before it where curvature, cant and gradient
+    under the whole vehicle are constant.
     """
     system = model.system
     room = start + float(np.min(system.frame_offset)) - system.track.s_start - SMOOTH

@@ -20,12 +20,12 @@ Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 STRAIGHT = 20.0  # m
-# m at least, at low speed: some wavelengths of a wheelset, no steep ramp of cant; the way to settle
-# counts from where the last wheelset is in the curve
+# m, least lengths, at low speed: several wavelengths of a wheelset, no steep ramp of cant; the
+# settling length begins when the last wheelset is in the curve
 TRANSITION, SETTLING = 40.0, 30.0
 NEGLIGIBLE = 1e-6  # curvature (1/m) and cant (m) that are none
-# in a call, of all wheelsets: Ctrl-C is heard, and progress told, between calls; some tenths of a
-# second by the fast scheme, a second by the other one
+# in a call, of all wheelsets: Ctrl-C and progress are handled between calls; a call takes a few
+# tenths of a second with the fast scheme, a second with the other
 WHEELSET_STEPS = 40_000
 
 DOING = logging.getLogger("railsim.doing")  # what takes long, in words

@@ -313,7 +313,7 @@ def _beam(
     K_V, D, H0, dz, nu = (np.asarray(value) for value in (K_V, D, H0, dz, nu))
     if np.any(dz.real < 0.0) or np.any(dz.real >= H0.real):
         raise ModelError(
-            "a compression spring is asked for a deflection outside 0 to its free height: "
+            "the deflection of a compression spring is outside 0 to its free height: "
             f"deflection {np.min(dz.real):.6g} to {np.max(dz.real):.6g} m, "
             f"free height {np.min(H0.real):.6g} to {np.max(H0.real):.6g} m"
         )

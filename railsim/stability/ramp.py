@@ -1,8 +1,9 @@
 """Non-linear critical speed by a ramp of falling speed, and bifurcation diagrams by steps of speed.
 
 The non-linear critical speed is the lowest at which an oscillation sustains itself on ideal track.
-A ramp undershoots it: the oscillation dies some tenths of m/s late.  Hence runs at constant speed
-from states of the ramp decide, and the speed is bisected (Polach 2006, Polach and Kaiser 2012).
+A ramp undershoots it: the oscillation decays a few tenths of m/s late.  Hence runs at constant
+speed from states of the ramp decide, and the speed is bisected (Polach 2006, Polach and Kaiser
+2012).
 """
 
 from collections.abc import Callable, Sequence

@@ -7,7 +7,7 @@ Each line holds the CRC-32 of the rest, a *head* with the data needed to continu
 is examined again.  The first line of a session holds the inputs of the study.  A running study
 holds a lock on the file.
 
-Opening 100 000 runs reads the heads only; a record is read when it is asked for.
+Opening 100 000 runs reads the heads only; a record is read on access.
 """
 
 import fcntl
