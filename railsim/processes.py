@@ -12,7 +12,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import BaseContext
 
 from railsim.threads import one_thread_each
@@ -33,6 +33,7 @@ def begin_server() -> None:
     _environment.update(_that_matter())
     # the folder in which a command is given may hold modules of anybody
     os.environ["PYTHONSAFEPATH"] = "1"
+    resource_tracker.ensure_running()  # its beginning unblocks signals
     try:
         # it outlives what ends its copies, to say how they ended
         with signals_later(REQUESTS), one_thread_each():

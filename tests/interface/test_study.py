@@ -491,11 +491,19 @@ def begun(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("everyone", [False, True], ids=["parent only", "whole group"])
-@points(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143)], always=(0,))
-def test_interrupt_leaves_only_whole_files(tmp_path, everyone, name, status):
+@points(
+    ("send", "name", "status"),
+    [
+        (os.kill, "SIGINT", 130),
+        (os.killpg, "SIGTERM", 143),  # to the processes of the study as well
+        (os.kill, "SIGTERM", 143),
+        (os.killpg, "SIGINT", 130),
+    ],
+    always=(0, 1),
+)
+def test_interrupt_leaves_only_whole_files(tmp_path, send, name, status):
     process = begun(tmp_path)
-    (os.killpg if everyone else os.kill)(process.pid, getattr(signal, name))
+    send(process.pid, getattr(signal, name))
     _, errors = process.communicate(timeout=300)
     assert process.returncode == status
     assert "Traceback" not in errors
