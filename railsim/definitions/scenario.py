@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from railsim.definitions.base import Definition, FileDefinition, Finite, Name, Positive, Text
+from railsim.definitions.base import Definition, FileDefinition, Finite, Flag, Name, Positive, Text
 
 SCENARIO_FORMAT = "railsim-scenario/1"
 
@@ -64,5 +64,7 @@ class Scenario(FileDefinition):
     """`key.path=value` for all runs, the paths beginning with `vehicle.`, `track.`, `settings.`"""
     grid: dict[Text, tuple[Text, ...]] = Field(default_factory=dict)
     """Values of further keys: every part is run with each combination"""
+    single: Flag = False
+    """Store quantities with 4 bytes a number: 7 digits"""
     parts: dict[Name, Part] = Field(min_length=1)
     """Parts by name"""

@@ -125,9 +125,9 @@ class Outputs(Definition):
     tenth of the run; 0: none"""
     low_pass: LowPass | None = None
     """Low pass of all quantities before they are stored at `output_rate`"""
-    sensors: Flag = False
+    sensors: Flag | Literal["readings"] = False
     """Motion of points: floor, bogie frames, axleboxes and the vehicle's `sensors`; accelerations
-    also as accelerometers read them"""
+    also as accelerometers read them; `readings`: these and roll velocities alone"""
 
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""

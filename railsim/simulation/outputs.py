@@ -191,6 +191,9 @@ class _Chunk(Mapping[str, Floats]):
         return len(self._values.keys() | self._later.keys())
 
 
+READINGS = ("sensor_acceleration", "sensor_roll_rate")
+
+
 class OutputPlan:
     """What a run outputs: which elements, patches and track quantities beyond the usual ones.
 
@@ -208,6 +211,7 @@ class OutputPlan:
         self._model = model
         self._sensors = all_sensors(vehicle) if settings.outputs.sensors else {}
         self._asked = settings.outputs
+        self._readings_only = settings.outputs.sensors == "readings"
         self._alignment = alignment_of(track)
         self._track_file = track
         self._irregularity = displacement(track)
@@ -255,7 +259,8 @@ class OutputPlan:
         prefixes += ["patch_"] * self._asked.contact_patches
         prefixes += ["frictional_power"] * self._asked.frictional_power
         prefixes += ["track_", "rail_", "wheelset_"] * self._asked.track
-        prefixes += ["sensor_"] * bool(self._sensors)
+        if self._sensors:
+            prefixes += list(READINGS) if self._readings_only else ["sensor_"]
         more = [q for name, q in REQUESTED.items() if name.startswith(tuple(prefixes))]
         return (*QUANTITIES.values(), *(more if prefixes else ()))
 
@@ -285,14 +290,16 @@ class OutputPlan:
         if self.elements:
             values |= _elements(recorder.element[:rows])
         if self._sensors:
-            values["sensor_acceleration"], values["sensor_roll_rate"] = readings(
+            read = readings(
                 self._sensors,
                 values,
                 self._model.index.bodies,
                 self._alignment,
                 recorder.state[:rows, -1],
             )
-            values |= motions(self._sensors, values, self._model.index.bodies)
+            values |= zip(READINGS, read, strict=True)
+            if not self._readings_only:
+                values |= motions(self._sensors, values, self._model.index.bodies)
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows])
         if self._asked.frictional_power:

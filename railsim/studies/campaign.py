@@ -18,10 +18,12 @@ from railsim.definitions.vehicle import Service
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import check_folder
 from railsim.result import Result, open_result
+from railsim.result.hdf5 import Storage
 from railsim.studies.carry_out import carry_out, cores
 from railsim.studies.case import Case, short_name
 from railsim.studies.combine import load_case, name_faults
 from railsim.studies.journal import Record
+from railsim.studies.keep import Keep
 from railsim.studies.points import Point, check_number
 from railsim.studies.rows import in_a_name
 from railsim.version import __version__
@@ -111,7 +113,7 @@ def campaign(
     outcome = carry_out(
         _Cases(cases), inputs, folder, workers=workers, scheduler=scheduler, resume=resume,
         overwrite=overwrite, longest_first=True, progress=progress, on_record=on_record,
-        on_remark=on_remark,
+        keep=Keep(storage=Storage(single=plan.single)), on_remark=on_remark,
     )  # fmt: skip
     if outcome.failed:
         words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in outcome.failed)

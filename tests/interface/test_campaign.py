@@ -3,6 +3,7 @@
 import json
 import math
 
+import h5py
 import pytest
 from example_result import feed
 
@@ -50,8 +51,9 @@ SMALL = """format = "railsim-scenario/1"
 name = "small"
 standard = "en14363"
 assignments = ["settings.output_rate=200", "settings.outputs.low_pass={ frequency = 80.0 }",
-               "settings.outputs.sensors=true",
+               "settings.outputs.sensors='readings'",
                "settings.outputs.quantities=['Q', 'Y', 'wheelset_distance']"]
+single = true
 [parts.zone4]
 track = "en14363_zone4"
 speed = { cant_deficiency = 1.0, radius = 300.0, cant = 0.12 }
@@ -78,6 +80,12 @@ def test_small_campaign_ends_in_its_assessment_and_is_not_done_twice(tmp_path, c
     assert "zone 4: 3 of 25 sections" in capsys.readouterr().out
     data = json.loads((tmp_path / "out" / "assessment.json").read_text())
     assert data[0]["verdict"] in ("incomplete", "fail")
+    with h5py.File(next((tmp_path / "out").glob("*.h5"))) as file:
+        assert {name for name in file if name.startswith("sensor_")} == {
+            "sensor_acceleration", "sensor_roll_rate"
+        }  # fmt: skip
+        assert file["Q"].dtype == "f4"
+        assert file["distance"].dtype == "f8"
     again = campaign(tmp_path / "small.toml", "coach_manchester", out=tmp_path / "out", workers=1)
     assert again.computed == 0
 
