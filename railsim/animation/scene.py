@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from railsim.contact.curves import rail_curve, tape_circle_place
+from railsim.contact.curves import rail_curve, tape_circle_position
 from railsim.definitions.flatten import FlatVehicle, flatten
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, argument_fault, nearest
@@ -256,7 +256,7 @@ def _sections(result: Result, flat: FlatVehicle) -> tuple[Mapping[str, Array], .
             continue
         wheel = result.profiles[wheelset.profile[side]]
         rail = rail_curve(result.profiles[track.rail[side]], track.gauge, track.inclination)
-        tape = tape_circle_place(wheelset.back_to_back)
+        tape = tape_circle_position(wheelset.back_to_back)
         thin = slice(None, None, max(1, rail.z.size // 150))
         found.append({
             "wheel_y": sign * (tape + _thinned(wheel.y)),

@@ -9,7 +9,7 @@ over the circumference.
 import numpy as np
 
 from railsim.assessment.wear import pearce_sherratt_1991
-from railsim.contact.curves import tape_circle_place
+from railsim.contact.curves import tape_circle_position
 from railsim.definitions.flatten import flatten
 from railsim.errors import Fault, InputError
 from railsim.profiles import Profile
@@ -59,7 +59,7 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
         raise InputError([Fault("result", "wheelset", f"no wheelset {wheelset}", "")])
-    tape = tape_circle_place(wheel.back_to_back)
+    tape = tape_circle_position(wheel.back_to_back)
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
     area = pearce_sherratt_1991(result["T_gamma"][at], 2.0 * wheel.radius[side]) * ways

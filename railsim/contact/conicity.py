@@ -74,10 +74,10 @@ def equivalent_conicity(
     return np.array([_conicity(y, delta_r, potential, float(a)) for a in wanted])
 
 
-def _value(y: Array, delta_r: Array, potential: Array, place: float) -> tuple[float, float]:
-    """Radius difference and potential at a place within the range."""
-    i = min(max(int(np.searchsorted(y, place, side="right")) - 1, 0), y.size - 2)
-    d = place - y[i]
+def _value(y: Array, delta_r: Array, potential: Array, position: float) -> tuple[float, float]:
+    """Radius difference and potential at a position within the range."""
+    i = min(max(int(np.searchsorted(y, position, side="right")) - 1, 0), y.size - 2)
+    d = position - y[i]
     slope = (delta_r[i + 1] - delta_r[i]) / (y[i + 1] - y[i])
     return float(delta_r[i] + slope * d), float(potential[i] + d * (delta_r[i] + 0.5 * slope * d))
 
@@ -120,7 +120,7 @@ def _conicity(y: Array, delta_r: Array, potential: Array, amplitude: float) -> f
     # points nearer to an end than round-off would give pieces without length
     inside = (y > ends[0] + 1e-9 * amplitude) & (y < ends[1] - 1e-9 * amplitude)
     first, last = (_value(y, delta_r, potential, end) for end in ends)
-    places = np.concatenate(([ends[0]], y[inside], [ends[1]]))
+    positions = np.concatenate(([ends[0]], y[inside], [ends[1]]))
     forces = np.concatenate(([first[0]], delta_r[inside], [last[0]]))
     top = 0.5 * (first[1] + last[1])
     room = top - np.concatenate(([top], potential[inside], [top]))
@@ -130,7 +130,7 @@ def _conicity(y: Array, delta_r: Array, potential: Array, amplitude: float) -> f
     if np.max(room) <= 1e-9 * scale:
         return 0.0
     speeds = np.sqrt(2.0 * np.maximum(room, 0.0))
-    time = _travel_time(places, forces, speeds)
+    time = _travel_time(positions, forces, speeds)
     return float(0.5 * np.pi**2 / time**2)
 
 

@@ -7,7 +7,7 @@ part is spread evenly:
 - log(a/b);
 - scaled creepages ``q = G a b/(mu N) (c11 xi_x, c22 xi_y, sqrt(c11 c22) rho phi)`` with Kalker's
   coefficients and rho = 0.8 sqrt((a^2 + b^2)/2), so that each is the force of linear theory and
-  spin counts by the slip near the ellipse's far edge (the place where the slip turns round moves
+  spin counts by the slip near the ellipse's far edge (the point where the slip turns round moves
   over the patch uniformly);
 - direction of q by the angles theta from the axis of xi_x, psi from xi_y to phi;
 - magnitude as ``t = |q|/(|q| + 2)``: linear theory at 0, full sliding at 1.
@@ -183,7 +183,7 @@ def linear_coefficients(ratio: float) -> tuple[float, float, float, float]:
 def full_sliding(ratio: float, xi: Array, n: int = 200) -> Array:
     """Force where everything slides along the rigid slip, shape (..., 3) for xi of that shape.
 
-    Hertz pressure summed over n strips of n cells at Gauss-like places (cosine along the strip).
+    Hertz pressure summed over n strips of n cells at Gauss-like points (cosine along the strip).
     """
     a, b = np.sqrt(ratio), 1.0 / np.sqrt(ratio)
     angle = (np.arange(n) + 0.5) * np.pi / n

@@ -1,8 +1,8 @@
 """Profiles prepared for contact search: placed, single-valued, with slopes and curvatures.
 
-A wheel becomes candidate points along the axle, a rail a function of the lateral place.  Both keep
-only the part that a vertical search can reach: slopes up to `STEEPEST`; beyond, the rail goes on
-straight.  The frame is that of the right wheel and rail in track axes: y to the right from the
+A wheel becomes candidate points along the axle, a rail a function of the lateral position.  Both
+keep only the part that a vertical search can reach: slopes up to `STEEPEST`; beyond, the rail goes
+on straight.  The frame is that of the right wheel and rail in track axes: y to the right from the
 track's centre line, z down from the plane through the rail tops.
 """
 
@@ -46,9 +46,9 @@ class WheelCurve:
     Attributes
     ----------
     y : ndarray, shape (n,)
-        Lateral place from the nominal rolling circle, field side positive [m].
+        Lateral position from the nominal rolling circle, field side positive [m].
     u : ndarray, shape (n,)
-        Place along the axle from the wheelset's centre [m].
+        Position along the axle from the wheelset's centre [m].
     r : ndarray, shape (n,)
         Radius [m].
     t : ndarray, shape (n,)
@@ -69,7 +69,7 @@ class WheelCurve:
 
 @dataclass(frozen=True)
 class RailCurve:
-    """A right rail in the track, as a function of the lateral place.
+    """A right rail in the track, as a function of the lateral position.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class RailCurve:
 
     @property
     def Y(self) -> Array:
-        """Lateral places of the nodes [m], shape (n,)."""
+        """Lateral positions of the nodes [m], shape (n,)."""
         return self.Y0 + self.dY * np.arange(self.z.size, dtype=np.float64)
 
 
@@ -103,7 +103,7 @@ def averaged_curvature(y: Array, slope: Array, sign: float) -> Array:
     Parameters
     ----------
     y, slope : ndarray, shape (n,)
-        Lateral place, increasing [m], and dz/dy [1].
+        Lateral position, increasing [m], and dz/dy [1].
     sign : float
         1 for a rail (z down, convex upwards), -1 for a wheel.
 
@@ -167,7 +167,7 @@ def wheel_curve(
     radius : float
         Rolling radius at the nominal rolling circle [m].
     tape_circle : float
-        Place of the nominal rolling circle from the wheelset's centre [m].
+        Position of the nominal rolling circle from the wheelset's centre [m].
     spacing : float
         Distance of the candidates on level parts [m]; it shrinks with the slope t by the factor
         (1 + t^2)^(-3/4), as the width of a contact in lateral projection does.
@@ -201,20 +201,20 @@ def wheel_curve(
     density = (1.0 + slope**2) ** 0.75 / spacing
     count = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))))
     n = int(np.ceil(count[-1]))
-    places = np.interp(np.linspace(0.0, count[-1], n + 1), count, fine)
-    t = spline(places, 1)
+    nodes = np.interp(np.linspace(0.0, count[-1], n + 1), count, fine)
+    t = spline(nodes, 1)
     return WheelCurve(
-        y=places,
-        u=places + tape_circle,
-        r=radius + spline(places),
+        y=nodes,
+        u=nodes + tape_circle,
+        r=radius + spline(nodes),
         t=t,
-        du=np.gradient(places),
-        curvature=averaged_curvature(places, t, -1.0),
+        du=np.gradient(nodes),
+        curvature=averaged_curvature(nodes, t, -1.0),
     )
 
 
-def tape_circle_place(back_to_back: float) -> float:
-    """Place of the right nominal rolling circle from the wheelset's centre [m].
+def tape_circle_position(back_to_back: float) -> float:
+    """Position of the right nominal rolling circle from the wheelset's centre [m].
 
     The wheels sit on the axle at the given back-to-back distance; profiles are given from a nominal
     rolling circle 70 mm from the flange back.
@@ -242,7 +242,7 @@ def top_slice(z: Array) -> slice:
 
 
 def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
-    """Innermost lateral place of a rail's gauge side within `depth` below its top [m].
+    """Innermost lateral position of a rail's gauge side within `depth` below its top [m].
 
     Raises
     ------
@@ -259,7 +259,7 @@ def gauge_face(y: Array, z: Array, depth: float = GAUGE_DEPTH) -> float:
 
 
 def inclined_to_track(profile: Profile, gauge: float, inclination: float) -> tuple[Array, Array]:
-    """Points of a right rail in the track: lateral place and height below the rail tops [m].
+    """Points of a right rail in the track: lateral position and height below the rail tops [m].
 
     Parameters
     ----------
@@ -301,16 +301,16 @@ def rail_curve(profile: Profile, gauge: float, inclination: float) -> RailCurve:
     part = single_valued_part(y, z, int(np.argmin(z)), STEEPEST)
     spline = contour_spline(y[part], z[part])
     n = int((y[part.stop - 1] - y[part.start]) / RAIL_SPACING)
-    places = y[part.start] + RAIL_SPACING * np.arange(n + 1)
-    slope = spline(places, 1)
+    nodes = y[part.start] + RAIL_SPACING * np.arange(n + 1)
+    slope = spline(nodes, 1)
     # what lies beyond the ends continues them straight, and never upwards
     slope[0], slope[-1] = min(float(slope[0]), 0.0), max(float(slope[-1]), 0.0)
     return RailCurve(
-        Y0=float(places[0]),
+        Y0=float(nodes[0]),
         dY=RAIL_SPACING,
-        z=spline(places),
+        z=spline(nodes),
         slope=slope,
-        curvature=averaged_curvature(places, slope, 1.0),
+        curvature=averaged_curvature(nodes, slope, 1.0),
     )
 
 
@@ -341,12 +341,12 @@ def _misfit(wheel: WheelCurve, rail: RailCurve, gauge: float) -> str:
     steepest = float(wheel.t.min())
     # a wheel without flange has none to be in the way
     flank = int(np.flatnonzero(wheel.t < 0.9 * steepest)[-1]) if steepest < -0.5 else 0
-    flank_place = wheel.u[flank]
+    flank_u = wheel.u[flank]
     corner = rail.Y[int(np.argmax(rail.slope > -1.0))]
-    slack = 0.5 * gauge - flank_place
-    if corner - flank_place < 0.0:
+    slack = 0.5 * gauge - flank_u
+    if corner - flank_u < 0.0:
         return (
-            f"the flange stands on the rail, {1e3 * (flank_place - corner):.1f} mm beyond the "
+            f"the flange stands on the rail, {1e3 * (flank_u - corner):.1f} mm beyond the "
             "gauge corner, when the wheelset is central"
         )
     if wheel.u[-1] - slack < corner:

@@ -1,7 +1,7 @@
 """Elastic contact of one wheel under a given load, from the contact table, at rest.
 
 What the simulation would find for a wheel that is held at a lateral displacement and roll and
-pressed down: the patches, their loads, places and sizes.
+pressed down: the patches, their loads, positions and sizes.
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class Patch:
     N, N_z, N_y : float
         Normal force, its vertical and lateral components on the rail [N].
     y : float
-        Lateral place, track axes [m].
+        Lateral position, track axes [m].
     angle : float
         Contact angle, positive towards the flange [rad].
     a, b : float
@@ -116,7 +116,7 @@ def loaded_contact(
     Raises
     ------
     ModelError
-        If the place lies outside of the table or the load is not positive.
+        If the position lies outside of the table or the load is not positive.
     """
     if not load > 0.0:
         raise ModelError(f"a load of {load:g} N presses no wheel on a rail")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from railsim.contact.curves import misfits, rail_curve, tape_circle_place, wheel_curve
+from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.errors import InputError, ModelError
 from railsim.kernels import normal_contact as kernel
 from railsim.profiles.profile import Profile
@@ -35,7 +35,7 @@ class ExactPatch:
     N, N_z, N_y : float
         Normal force (sum of pressures), its vertical and lateral components on the rail [N].
     y : float
-        Lateral place of the pressure's centre, track axes [m].
+        Lateral position of the pressure's centre, track axes [m].
     angle : float
         Contact angle of the resulting force, positive towards the flange [rad].
     area : float
@@ -72,7 +72,7 @@ class ExactContact:
     x, s : ndarray, shape (n_x,), (n_s,)
         Element centres along the track and along the rail's contour (0 at its top) [m].
     Y : ndarray, shape (n_s,)
-        Lateral place on the rail at `s`, track axes [m].
+        Lateral position on the rail at `s`, track axes [m].
     pressure : ndarray, shape (n_x, n_s)
         Pressure [Pa].
     """
@@ -160,16 +160,16 @@ class _Geometry:
         inclination: float,
         back_to_back: float,
     ) -> None:
-        points = wheel_curve(wheel, radius, tape_circle_place(back_to_back), CANDIDATE_SPACING)
+        points = wheel_curve(wheel, radius, tape_circle_position(back_to_back), CANDIDATE_SPACING)
         nodes = rail_curve(rail, gauge, inclination)
         if faults := misfits(points, nodes, gauge, f"{wheel.name} on {rail.name}"):
             raise InputError(faults)
         cosine, sine = np.cos(roll), np.sin(roll)
-        place = y + points.u * cosine - points.r * sine
+        lateral = y + points.u * cosine - points.r * sine
         depth = points.u * sine + points.r * cosine - radius
-        self.wheel = CubicSpline(place, depth)
-        self.wheel_range = (place[0], place[-1])
-        self.radius = CubicSpline(place, points.r)
+        self.wheel = CubicSpline(lateral, depth)
+        self.wheel_range = (lateral[0], lateral[-1])
+        self.radius = CubicSpline(lateral, points.r)
         self.Y, self.z, self.slope = nodes.Y, nodes.z, nodes.slope
         stretch = np.sqrt(1.0 + nodes.slope**2)
         length = np.concatenate(([0.0], np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * nodes.dY)))
@@ -183,19 +183,19 @@ class _Geometry:
         return float(np.min(self.z[inside] - self.wheel(self.Y[inside])))
 
     def normal_gap(self, s: Array, z: float) -> tuple[Array, Array, Array, Array]:
-        """Gap along the rail's normal [m], lateral place [m], contact angle, wheel radius [m]."""
-        place = self.rail(s)
+        """Gap along the rail's normal, lateral position [m], contact angle, wheel radius [m]."""
+        points = self.rail(s)
         tangent = self.rail(s, 1)
         angle = np.arctan2(-tangent[:, 1], tangent[:, 0])
         sine, cosine = np.sin(angle), np.cos(angle)
         t = np.zeros(s.size)
         for _ in range(6):
-            Y = np.clip(place[:, 0] - t * sine, *self.wheel_range)
-            excess = place[:, 1] - t * cosine - self.wheel(Y) - z
+            Y = np.clip(points[:, 0] - t * sine, *self.wheel_range)
+            excess = points[:, 1] - t * cosine - self.wheel(Y) - z
             t += np.clip(excess / (cosine - self.wheel(Y, 1) * sine), -2e-3, 2e-3)
         first, last = self.wheel_range
         outside = (first >= Y) | (last <= Y)
-        return np.where(outside, 1.0, t), place[:, 0], angle, self.radius(Y)
+        return np.where(outside, 1.0, t), points[:, 0], angle, self.radius(Y)
 
     def solve(self, z: float, first: float, E_star: float, elements: int) -> ExactContact:
         """Solution at a given height."""

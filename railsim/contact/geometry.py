@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from railsim.contact.conicity import equivalent_conicity
-from railsim.contact.curves import misfits, rail_curve, tape_circle_place, wheel_curve
+from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile
@@ -47,7 +47,7 @@ class ContactGeometry:
         Angle of the contact plane to the track plane, positive for a normal cone, growing towards
         the flange [rad].
     contact_y : ndarray, shape (n, 2)
-        Lateral place of the contact, track axes [m].
+        Lateral position of the contact, track axes [m].
     wheel_y : ndarray, shape (n, 2)
         Lateral position of the contact on the wheel from the nominal rolling circle, positive to
         the field side [m].
@@ -75,7 +75,7 @@ class ContactGeometry:
         return equivalent_conicity(self.lateral[known], self.delta_r[known], amplitudes, track)
 
     def jumps(self, least: float = 1e-3) -> list[tuple[float, str]]:
-        """Places at which a contact jumps on its wheel by more than `least` [m].
+        """Displacements at which a contact jumps on its wheel by more than `least` [m].
 
         Returns
         -------
@@ -135,13 +135,13 @@ def contact_geometry(
         them in the middle of the track.
     """
     radii = _pair(radius)
-    tape_circle = tape_circle_place(back_to_back)
+    tape_circle = tape_circle_position(back_to_back)
     wheels = [
         wheel_curve(w, r, tape_circle, SEARCH_SPACING)
         for w, r in zip(_pair(wheel), radii, strict=True)
     ]
     rails = [rail_curve(r, gauge, inclination) for r in _pair(rail)]
-    places = (
+    displacements = (
         np.linspace(-0.010, 0.010, 401)
         if lateral is None
         else np.atleast_1d(np.asarray(lateral, dtype=np.float64))
@@ -175,18 +175,18 @@ def contact_geometry(
         return roll, contacts
 
     # from the middle outwards, so that the roll is followed from a good start
-    order = np.argsort(np.abs(places), kind="stable")
-    roll, contacts = np.empty(places.size), np.empty((places.size, 2, 6))
-    for part in (order[places[order] >= 0.0], order[places[order] < 0.0]):
-        roll[part], contacts[part] = sweep(places[part])
+    order = np.argsort(np.abs(displacements), kind="stable")
+    roll, contacts = np.empty(displacements.size), np.empty((displacements.size, 2, 6))
+    for part in (order[displacements[order] >= 0.0], order[displacements[order] < 0.0]):
+        roll[part], contacts[part] = sweep(displacements[part])
     gap = contacts[..., kernel.R_GAP]
     tape = np.array([wheels[0].u[0] - wheels[0].y[0], wheels[1].u[0] - wheels[1].y[0]])
     return ContactGeometry(
-        lateral=places,
+        lateral=displacements,
         roll=roll,
         rolling_radius=contacts[..., kernel.R_RADIUS],
         contact_angle=np.arctan(-contacts[..., kernel.R_SLOPE]),
-        contact_y=contacts[..., kernel.R_PLACE] * np.array([-1.0, 1.0]),
+        contact_y=contacts[..., kernel.R_Y] * np.array([-1.0, 1.0]),
         wheel_y=contacts[..., kernel.R_U] - tape,
         centre_z=0.5 * (gap[:, 0] + gap[:, 1]),
     )

@@ -178,8 +178,8 @@ def contact_summary(
         Pair(wheel, rail, gauge, inclination, back_to_back)
         for wheel, rail in zip(wheels, rails, strict=True)
     )
-    places = [round(share * max_shift, 6) for share in PATCH_SHARES]
-    contacts = _loaded(right.table(radii, normal), geometry, places, load)
+    shifts = [round(share * max_shift, 6) for share in PATCH_SHARES]
+    contacts = _loaded(right.table(radii, normal), geometry, shifts, load)
     return ContactSummary(
         (left, right), radii, load, normal, geometry, amplitudes,
         geometry.equivalent_conicity(amplitudes),
@@ -194,11 +194,11 @@ def _roll(geometry: ContactGeometry, y: float) -> float:
 
 
 def _loaded(
-    table: ContactTable, geometry: ContactGeometry, places: Sequence[float], load: float
+    table: ContactTable, geometry: ContactGeometry, shifts: Sequence[float], load: float
 ) -> dict[float, LoadedContact]:
     """Patches of the right wheel at the given displacements, where the geometry knows them."""
     contacts = {}
-    for y in places:
+    for y in shifts:
         roll = _roll(geometry, y)
         if np.isfinite(roll):
             try:
@@ -209,11 +209,11 @@ def _loaded(
 
 
 def _exact(
-    pair: Pair, radius: float, geometry: ContactGeometry, places: Sequence[float], load: float
+    pair: Pair, radius: float, geometry: ContactGeometry, shifts: Sequence[float], load: float
 ) -> dict[float, ExactContact]:
     """The same patches by boundary elements."""
     solutions = {}
-    for y in places:
+    for y in shifts:
         try:
             solutions[y] = exact_contact(
                 pair.wheel,

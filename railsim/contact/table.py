@@ -7,10 +7,10 @@ stiffnesses, of the potential
     U(y, z, roll, yaw) = 2/5 K e^(5/2) + 1/3 K2 e^3,   e = z - g,
 
 whose gradient through the interpolating spline is the normal force, hence conservative whatever the
-table holds; and place, direction and unit-load ellipse of the patch as functions of the load.
+table holds; and position, direction and unit-load ellipse of the patch as functions of the load.
 
-Elastic contact of a zone.  With the vertical gap h(u) of rail and wheel over the place u along the
-axle, L = (1/cos(gamma_rail) + 1/cos(gamma_wheel))/2, the wheel is pressed down to z.  The bodies
+Elastic contact of a zone.  With the vertical gap h(u) of rail and wheel over the position u along
+the axle, L = (1/cos(gamma_rail) + 1/cos(gamma_wheel))/2, the wheel is pressed down to z.  Bodies
 approach each other along the normal by theta as a whole, and the rest v = z - h - theta L of the
 overlap is taken by a foundation along the contour (Winkler; Johnson, Contact Mechanics (1985),
 4.3) of the stiffness k:
@@ -33,7 +33,7 @@ and K2 are those that give the energies under three loads.
 Zones.  A contact on the border of two zones is shared: the integrals of N_z and U, and the means
 below, carry the zone's window, and the three windows add up to one.
 
-Patch.  Place, direction and ellipse at the three loads are the pressure's means and the ellipse of
+Patch.  Position, direction and ellipse at the three loads are the pressure's means and that of
 the parabola that the foundation would take for the patch, B = (4 k/(3 N))^2 v_max^3.  Between the
 loads each is v + dv N/(N + 35 kN).
 
@@ -43,13 +43,13 @@ Interpolation: uniform cubic B-splines in s and roll, linear in w = yaw^2, where
 
 is the lateral displacement of the wheel's foot: roll turns the wheelset about its centre and moves
 the foot sideways by 0.46 mm per milliradian, so that in (y, roll) every feature of the contact
-would run diagonally through the table and be smeared over several places.  The roll's nodes lie
+would run diagonally through the table and be smeared over several nodes.  The roll's nodes lie
 close together near the middle (`railsim.kernels.contact_table.stretched_roll`): a milliradian moves
 the contact within the tread by millimetres.  The coefficients are c = f - f''/6 (second
 difference), which gives back cubic functions and smears nothing to fourth order (de Boor, A
 Practical Guide to Splines (1978), chapter XII).
 
-Frame: right wheel and rail, track axes (x forward, y right, z down), forces and places relative to
+Frame: right wheel and rail, track axes (x forward, y right, z down), forces and positions from
 the wheelset's centre.  The left wheel is the mirror image (y and roll change sign); where left and
 right differ in profile or radius a second table is built for the left, as a right one.
 """
@@ -69,7 +69,7 @@ from railsim.contact.curves import (
     WheelCurve,
     misfits,
     rail_curve,
-    tape_circle_place,
+    tape_circle_position,
     wheel_curve,
 )
 from railsim.errors import InputError
@@ -186,12 +186,12 @@ def zone_windows(wheel: WheelCurve) -> Array:
     angle = np.degrees(np.arctan(-wheel.t))
     start = int(np.argmin(np.abs(wheel.y)))
     toward_flange = slice(start, None, -1)
-    ahead, places = angle[toward_flange], wheel.y[toward_flange]
+    ahead, positions = angle[toward_flange], wheel.y[toward_flange]
     steepest = float(ahead.max())
 
     def passes(limit: float) -> float:
         beyond = np.flatnonzero(ahead > limit)
-        return float(places[beyond[0]]) if beyond.size else float(places[-1])
+        return float(positions[beyond[0]]) if beyond.size else float(positions[-1])
 
     def beyond(begin: float, end: float) -> Array:
         """0 on the tread side of `begin`, 1 on the flange side of `end`."""
@@ -308,7 +308,7 @@ def build_contact_table(
     grid = chosen_grid(grid, normal)
     height = radius if centre_height is None else centre_height
     wheel_points = wheel_curve(
-        wheel, radius, tape_circle_place(back_to_back), min(grid.spacing, grid.ds)
+        wheel, radius, tape_circle_position(back_to_back), min(grid.spacing, grid.ds)
     )
     rail_nodes = rail_curve(rail, gauge, inclination)
     if faults := misfits(wheel_points, rail_nodes, gauge, f"{wheel.name} on {rail.name}"):
@@ -345,9 +345,9 @@ def build_contact_table(
     def fill(task: tuple[int, int]) -> None:
         i_w, i_roll = task
         part = np.empty((3, n_y, N_FIELD))
-        places = s_nodes + radius * roll_nodes[i_roll]
+        y_nodes = s_nodes + radius * roll_nodes[i_roll]
         yaw = float(np.sqrt(w_nodes[i_w]))
-        kernel.fill_table_slice(part, places, roll_nodes[i_roll], yaw, *arguments)
+        kernel.fill_table_slice(part, y_nodes, roll_nodes[i_roll], yaw, *arguments)
         values[:, i_w, i_roll] = part
 
     tasks = [(i_w, i_roll) for i_w in range(grid.n_w) for i_roll in range(n_roll)]
@@ -402,7 +402,7 @@ MORE_INWARDS = 0.010
 
 
 def table_range(wheel: WheelCurve, rail: RailCurve) -> tuple[float, float]:
-    """Range of the lateral place that a table covers, in whole millimetres [m].
+    """Range of the lateral position that a table covers, in whole millimetres [m].
 
     Outwards to where the tip of the flange stands over the top of the rail: beyond, the wheelset is
     derailed.  Inwards as far as the other wheel's climbing lets this one go, and `MORE_INWARDS`.
@@ -417,7 +417,7 @@ def _wheel_arrays(wheel: WheelCurve) -> kernel.Wheel:
     """A wheel as the generator takes it, with its zones."""
     window = zone_windows(wheel)
     present = window > 1e-6
-    # what touches with the zone's edge only has a share too small to feel, but a place
+    # what touches with the zone's edge only has a share too small to feel, but a position
     window = np.where(present, np.maximum(window, 1e-6), 0.0)
     first = np.array([int(np.argmax(row)) for row in present])
     last = np.array([row.size - int(np.argmax(row[::-1])) for row in present])
@@ -437,7 +437,7 @@ def spline_coefficients(values: Array, stretched: Array) -> Array:
     """Coefficients of the splines over s and roll that give back cubic functions of both.
 
     Over the roll only near the middle: farther out, where the nodes lie too far apart to follow the
-    contact from place to place, a spline through the values would swing; there they are the
+    contact from one to the next, a spline through the values would swing; there they are the
     coefficients themselves.  Stiffnesses and axes are kept from falling below nothing.
 
     Parameters

@@ -58,8 +58,8 @@ def safe_folder(folder: Path | None) -> Path | None:
             os.makedirs(folder.parent, mode=0o700, exist_ok=True)
             os.makedirs(folder, mode=0o700, exist_ok=True)
         folder = folder.resolve()
-        for place in (folder, *folder.parents):
-            if reason := _distrust(place, below=place != folder):
+        for path in (folder, *folder.parents):
+            if reason := _distrust(path, below=path != folder):
                 notice(
                     f"the cache {folder} is not used: {reason}; remove it, or choose another by "
                     "RAILSIM_CACHE_DIR"
@@ -77,16 +77,16 @@ def safe_folder(folder: Path | None) -> Path | None:
     return folder
 
 
-def _distrust(place: Path, *, below: bool = False) -> str:
+def _distrust(path: Path, *, below: bool = False) -> str:
     """Say why another user could have written into a folder, or to what lies below it."""
-    facts = os.lstat(place)
+    facts = os.lstat(path)
     if facts.st_uid not in (os.geteuid(), 0):
-        return f"{place} belongs to another user"
+        return f"{path} belongs to another user"
     others = facts.st_mode & stat.S_IWOTH
     # a group of the same number as its user is that user's own
     group = facts.st_mode & stat.S_IWGRP and facts.st_gid not in (0, facts.st_uid)
     if (others or group) and not (below and facts.st_mode & stat.S_ISVTX):
-        return f"other users may write to {place}"
+        return f"other users may write to {path}"
     return ""
 
 

@@ -1,8 +1,8 @@
 """Rows and columns of what the wheel-rail contact writes: patches, wheels, damping of wheelsets."""
 
 # rows of Work.patch: one column per active patch.  Angle and foot are in the plane of the rails:
-# place of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal and C
-# in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
+# position of the patch from the wheelset's centre for a rail along x, and its x per yaw; normal
+# and C in the track's axes, as is the direction of the rail at the patch, (1, turn_y, turn_z).
 (
     A,
     B,

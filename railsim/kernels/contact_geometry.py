@@ -1,7 +1,7 @@
 """Contact geometry of one wheel on one rail.
 
 The wheel, turned by roll and yaw, is reduced to its trace (silhouette) line in the track's
-cross-section: at the lateral place u of the axle the point u l + r e with
+cross-section: at the lateral position u of the axle the point u l + r e with
 
     e_x = t l_x,   e_y l_y + e_z l_z = -e_x l_x,   |e| = 1,   t = dr/du,   l the axle's direction,
 
@@ -24,7 +24,7 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
     Parameters
     ----------
     u, r, t : ndarray, shape (n,)
-        Place along the axle from the wheelset's centre [m], radius [m], and dr/du [1].
+        Position along the axle from the wheelset's centre [m], radius [m], and dr/du [1].
     roll, yaw : float
         Attitude of the wheelset, C = Rz(yaw) Rx(roll) [rad].
     c_x, c_y, c_z : ndarray, shape (n,)
@@ -51,14 +51,14 @@ def trace_line(u, r, t, roll, yaw, c_x, c_y, c_z, stretch):
 
 @compiled(in_loop=False)
 def rail_height(Y, Y0, dY, z, slope):
-    """Height of the rail's surface and its slope at the lateral place `Y`, cubic, straight beyond.
+    """Height and slope of the rail's surface at the lateral position `Y`, cubic, straight beyond.
 
     Parameters
     ----------
     Y : float
-        Lateral place [m].
+        Lateral position [m].
     Y0, dY : float
-        First place and spacing of the nodes [m].
+        First position and spacing of the nodes [m].
     z, slope : ndarray, shape (n_rail,)
         Height [m] and slope [1] at the nodes.
 
@@ -84,7 +84,7 @@ def rail_height(Y, Y0, dY, z, slope):
 
 
 # Results of `rigid_contact`.
-R_GAP, R_U, R_RADIUS, R_PLACE, R_SLOPE, R_INDEX = range(6)
+R_GAP, R_U, R_RADIUS, R_Y, R_SLOPE, R_INDEX = range(6)
 
 
 @compiled(in_loop=False)
@@ -101,8 +101,8 @@ def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y,
         Height of the wheelset's centre above the rail tops, its lateral displacement [m], its
         roll [rad].
     out : ndarray, shape (6,)
-        Height at which the wheel touches [m], place u on the axle [m], rolling radius [m], lateral
-        place [m] and slope [1] on the rail, candidate (-1 if the contact is at the wheel's end).
+        Height at which the wheel touches [m], position u on the axle [m], rolling radius [m],
+        lateral position [m] and slope [1] on the rail, candidate (-1 at the wheel's end).
     """
     cosine, sine = math.cos(roll), math.sin(roll)
     n = wheel.shape[1]
@@ -131,12 +131,12 @@ def rigid_contact(wheel, rail_Y0, rail_dY, rail_z, rail_slope, centre_height, y,
             least += 0.5 * own * x * du
     else:
         index = -1
-    place = y + u * cosine - r * sine
+    Y = y + u * cosine - r * sine
     out[R_GAP] = least
     out[R_U] = u
     out[R_RADIUS] = r
-    out[R_PLACE] = place
-    out[R_SLOPE] = rail_height(place, rail_Y0, rail_dY, rail_z, rail_slope)[1]
+    out[R_Y] = Y
+    out[R_SLOPE] = rail_height(Y, rail_Y0, rail_dY, rail_z, rail_slope)[1]
     out[R_INDEX] = index
 
 

@@ -8,7 +8,7 @@ w = yaw^2, twelve fields per patch (tread, flange root, flange):
     3 a1     Hertz semi-axis along at unit load, a = a1 N^(1/3), under the middle load (m/N^(1/3))
     4, 5     c_y, c_z of the contact point from the wheelset's centre, track axes (m)
     6 b1     semi-axis across at unit load (m/N^(1/3))
-    7        tan gamma, slope of the rail at the place of contact (1)
+    7        tan gamma, slope of the rail at the point of contact (1)
     8 to 11  what 4 to 7 gain under endless load: v + dv N/(N + HALF_LOAD)
 
 The table's values are the coefficients of uniform cubic B-splines in y and roll (twice
@@ -48,7 +48,7 @@ N_WEIGHT = 16
 INSIDE, BELOW_Y, ABOVE_Y, OUTSIDE_ROLL, OUTSIDE_W = range(5)
 
 # A patch whose gap exceeds the wheel's height by more than this is skipped; it is taken at a node
-# in y and between two in roll, which differs from the exact place by less (a cell at a slope of 3).
+# in y and between two in roll, which differs from the exact one by less (a cell at a slope of 3).
 FAR = 4.0e-4
 FINE_ROLL = 4e-3  # up to about this roll the nodes lie as close as in the middle [rad]
 
@@ -137,7 +137,7 @@ def cell_weights(contact, ty, tr, roll_slope, weights):
     spline_weights(tr, roll_slope / contact.droll, weights, 8)
 
 
-def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, place):
+def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, offset):
     """Do what `contact_table_simd.sum_of_nodes` does."""
     flat = values.reshape(-1)
     starts = first + slab * np.arange(2)[:, None, None] + row * np.arange(4)[:, None]
@@ -155,7 +155,7 @@ def _sum_of_nodes_plain(values, first, row, slab, weights, tw, out, place):
         *((1.0 - tw) * part[0] + tw * part[1] for part in parts),
         (value[1] - value[0])[:N_GRADIENT],
     ]
-    out[place : place + LOOK_UP_SIZE] = np.concatenate(sums)
+    out[offset : offset + LOOK_UP_SIZE] = np.concatenate(sums)
 
 
 _sum_of_nodes = _sum_of_nodes_plain if numba.config.DISABLE_JIT else sum_of_nodes
@@ -184,7 +184,7 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
 
 @compiled
 def under_load(t, first, vertical):
-    """Place, direction and ellipse of a patch under a load, from a look-up at `t[first:]`.
+    """Position, direction and ellipse of a patch under a load, from a look-up at `t[first:]`.
 
     The ellipse of a given curvature along the rail is the longer the narrower it is, about as
     b^-0.39: the fraction is that power of the width over that under the middle load, within 2 %

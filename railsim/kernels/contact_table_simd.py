@@ -20,15 +20,15 @@ _GRADIENT, _VALUE = 4, 8  # fields with and without gradients
 
 
 @intrinsic
-def sum_of_nodes(typingctx, values, first, row, slab, weights, tw, out, place):
-    """Write to ``out[place:place + 24]`` values, then of the first four slopes and differences.
+def sum_of_nodes(typingctx, values, first, row, slab, weights, tw, out, offset):
+    """Write to ``out[offset:offset + 24]`` values, then of the first four slopes and differences.
 
     Twelve values, slopes over y and over roll, difference over w.
 
     values : ndarray of float64, C order, whose last axis holds twelve fields; first : index of the
     cell's first field in the flat array; row, slab : distances of neighbours in roll and in w;
-    weights : ndarray, shape (16,), of y, their slopes, of roll, their slopes; tw : place between
-    the two slabs.
+    weights : ndarray, shape (16,), of y, their slopes, of roll, their slopes; tw : weight of
+    the second slab.
     """
     integer, double = types.intp, types.float64
     signature = types.void(values, integer, integer, integer, weights, double, out, integer)
@@ -48,7 +48,7 @@ def _add(registers, a, b, total):
     return registers.builder.fmul(a, b) if total is None else registers.fma(a, b, total)
 
 
-def _emit(builder, values, first, row, slab, weights, tw, out, place):
+def _emit(builder, values, first, row, slab, weights, tw, out, begin):
     force, patch = Registers(builder, _GRADIENT), Registers(builder, _VALUE)
 
     def ahead(start, count):
@@ -84,8 +84,8 @@ def _emit(builder, values, first, row, slab, weights, tw, out, place):
     value, slope_y, slope_roll = (
         between(force, a, b) for a, b in zip(slabs[0][:3], slabs[1][:3], strict=True)
     )
-    force.store(value, out, place)
-    patch.store(between(patch, slabs[0][3], slabs[1][3]), out, ahead(place, _GRADIENT))
+    force.store(value, out, begin)
+    patch.store(between(patch, slabs[0][3], slabs[1][3]), out, ahead(begin, _GRADIENT))
     gradients = slope_y, slope_roll, builder.fsub(slabs[1][0], slabs[0][0])
     for i, total in enumerate(gradients):
-        force.store(total, out, ahead(place, _VALUE + _GRADIENT * (i + 1)))
+        force.store(total, out, ahead(begin, _VALUE + _GRADIENT * (i + 1)))

@@ -143,7 +143,7 @@ def adhesion_curve(n, patches, curve):
         T = mu N f(s) (xi_x, xi_s)/s,  s^2 = xi_x^2 + xi_s^2,  xi_s = xi_y + c23/c22 sqrt(a b) phi
 
     xi_s is the lateral creepage that has the lateral force of the spin in linear theory: spin is
-    taken as Shen, Hedrick and Elkins (1983) take it, with the measured curve in place of their
+    taken as Shen, Hedrick and Elkins (1983) take it, with the measured curve instead of their
     cubic.  There is no moment.
 
     Parameters
@@ -170,8 +170,8 @@ def adhesion_curve(n, patches, curve):
         k = 1
         while k < last and s > curve[k, 0]:
             k += 1
-        place = (s - curve[k - 1, 0]) / (curve[k, 0] - curve[k - 1, 0])
-        share = curve[k - 1, 1] + min(place, 1.0) * (curve[k, 1] - curve[k - 1, 1])
+        fraction = (s - curve[k - 1, 0]) / (curve[k, 0] - curve[k - 1, 0])
+        share = curve[k - 1, 1] + min(fraction, 1.0) * (curve[k, 1] - curve[k - 1, 1])
         bound = max(mu_N[i], 0.0) if a[i] > 0.0 and b[i] > 0.0 else 0.0
         factor = bound * share / (s + _TINY)
         patches.T_x[i] = factor * x
@@ -225,9 +225,9 @@ def _fastrip_strips(n, nx, ny, patches, G, work):
         per_cell = math.pi * unit / nx  # (2 a l/nx)/(a/G) over 2 mu N/(pi a b)
         for j in range(ny):
             c = j * n + i
-            place = (2 * j + 1 - ny) / ny
-            l = math.sqrt(1.0 - place * place)
-            t = bb * place
+            eta = (2 * j + 1 - ny) / ny
+            l = math.sqrt(1.0 - eta * eta)
+            t = bb * eta
             work[0, c] = per_cell * (x / f_x - t * s / f_s) / l
             work[1, c] = per_cell * y / f_y / l
             work[2, c] = per_cell * aa * s / f_s
@@ -359,19 +359,19 @@ def fastrip(n, nx, ny, patches, G, work):
         _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work)
     across = 0.0
     for j in range(ny):
-        place = (2 * j + 1 - ny) / ny
-        across += 1.0 - place * place
+        eta = (2 * j + 1 - ny) / ny
+        across += 1.0 - eta * eta
     a, b, mu_N = patches.a, patches.b, patches.mu_N
     T_x, T_y, M_z = patches.T_x, patches.T_y, patches.M_z
     for i in range(n):
         tx = ty = mz = 0.0
         for j in range(ny):
             c = j * n + i
-            place = (2 * j + 1 - ny) / ny
-            l2 = 1.0 - place * place
+            eta = (2 * j + 1 - ny) / ny
+            l2 = 1.0 - eta * eta
             tx += l2 * work[7, c]
             ty += l2 * work[8, c]
-            mz += l2 * (math.sqrt(l2) * a[i] * work[9, c] - place * b[i] * work[7, c])
+            mz += l2 * (math.sqrt(l2) * a[i] * work[9, c] - eta * b[i] * work[7, c])
         # full sliding along one direction gives pi/2 per strip: scaled to mu N
         unit = max(mu_N[i], 0.0) / (0.5 * math.pi * across)
         if not (a[i] > 0.0 and b[i] > 0.0):

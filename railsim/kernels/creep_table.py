@@ -44,12 +44,12 @@ _TINY = 1e-300
 
 
 @compiled
-def _weights(place, intervals):
+def _weights(position, intervals):
     """Interval of a uniform grid and the four weights of the cubic B-splines there."""
-    place = place if place > 0.0 else 0.0  # also for NaN, which must not become an index
-    place = min(place, float(intervals))
-    node = min(int(place), intervals - 1)
-    f = place - node
+    position = position if position > 0.0 else 0.0  # also for NaN, which must not become an index
+    position = min(position, float(intervals))
+    node = min(int(position), intervals - 1)
+    f = position - node
     g = 1.0 - f
     return (
         node,
@@ -81,7 +81,7 @@ def _angle(y, x):
 
 @compiled
 def _along_ratio(scale, r, column, r0, r1, r2, r3):
-    """Factor of a creepage in q at the place r in log(a/b)."""
+    """Factor of a creepage in q at the node r in log(a/b)."""
     return (
         r0 * scale[r, column] + r1 * scale[r + 1, column]
         + r2 * scale[r + 2, column] + r3 * scale[r + 3, column]
@@ -134,7 +134,7 @@ def table_forces(n, patches, G, table, scale, scratch):
     width = work.shape[1]
     for first in range(0, n, _BLOCK):
         count = min(_BLOCK, n - first)
-        # all places first, then all sums: the processor works on several patches at once
+        # all offsets first, then all sums: the processor works on several patches at once
         for m in range(count):
             i = first + m
             row, at = 1 + (m >> 2), (m & 3) * _RECORD

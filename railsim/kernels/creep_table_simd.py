@@ -58,10 +58,10 @@ def _emit(builder, table, start, strides, weights, sums):
         plane = builder.add(start, builder.mul(strides[0], loop.index))
         sums_j = [zero, zero]
         for j in range(_NODES):
-            place = builder.add(plane, builder.mul(strides[1], constant(j)))
+            line = builder.add(plane, builder.mul(strides[1], constant(j)))
             sums_k = [zero, zero]
             for k in range(_NODES):
-                row = builder.add(place, builder.mul(strides[2], constant(k)))
+                row = builder.add(line, builder.mul(strides[2], constant(k)))
                 for half in range(2):
                     at = builder.add(row, constant(LANES * half))
                     pointer = builder.bitcast(builder.gep(table, [at]), ir.PointerType(_FLOATS))

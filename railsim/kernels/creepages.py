@@ -1,4 +1,4 @@
-"""Places and creepages of the contact patches: see `wheel_rail` for the equations."""
+"""Positions and creepages of the contact patches: see `wheel_rail` for the equations."""
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import (
@@ -37,7 +37,7 @@ from railsim.kernels.track_frame import OMEGA
 
 @compiled(inline=True)
 def creepages(system, work, n, speed, state):
-    """Places and creepages of the active patches, see the module's equations."""
+    """Positions and creepages of the active patches, see the module's equations."""
     patch, C, frames, plane = work.patch, work.relative, work.frames, work.plane
     n_bodies = system.bodies.kind.shape[0]
     for k in range(n):
@@ -53,7 +53,7 @@ def creepages(system, work, n, speed, state):
         a1 = C[b, 0] * u1 + C[b, 1] * u2 + C[b, 2] * u3
         a2 = C[b, 3] * u1 + C[b, 4] * u2 + C[b, 5] * u3
         a3 = C[b, 6] * u1 + C[b, 7] * u2 + C[b, 8] * u3
-        # place and normal from the plane of the rails to the track's axes
+        # position and normal from the plane of the rails to the track's axes
         sine, cosine = plane[w, SINE], plane[w, COSINE]
         cy = cosine * patch[FOOT_Y, k] - sine * patch[FOOT_Z, k]
         cz = sine * patch[FOOT_Y, k] + cosine * patch[FOOT_Z, k]

@@ -178,11 +178,11 @@ def unit_ellipse(A, B, hertz):
     `hertz` as from `railsim.contact.table.ellipse_functions`; A, B half the relative curvatures
     along and across [1/m].
     """
-    place = math.log(A / B)
+    log_ratio = math.log(A / B)
     scale = A ** (1.0 / 3.0)
-    a1 = math.exp(interpolated(place, hertz.start, hertz.spacing, hertz.logarithms[0])) / scale
-    b1 = a1 * math.exp(interpolated(place, hertz.start, hertz.spacing, hertz.logarithms[1]))
-    d1 = math.exp(interpolated(place, hertz.start, hertz.spacing, hertz.logarithms[2])) * scale
+    a1 = math.exp(interpolated(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[0])) / scale
+    b1 = a1 * math.exp(interpolated(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[1]))
+    d1 = math.exp(interpolated(log_ratio, hertz.start, hertz.spacing, hertz.logarithms[2])) * scale
     return a1, b1, d1
 
 

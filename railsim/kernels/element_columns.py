@@ -7,16 +7,16 @@ from railsim.kernels import compiled
 from railsim.kernels.lanes import load_rows, starts
 
 
-def _places(columns: dict[str, int]) -> dict[str, slice]:
+def _slices(columns: dict[str, int]) -> dict[str, slice]:
     """Columns of each name, side by side in this order."""
-    places, first = {}, 0
+    slices, first = {}, 0
     for name, count in columns.items():
-        places[name] = slice(first, first + count)
+        slices[name] = slice(first, first + count)
         first += count
-    return places
+    return slices
 
 
-LINK_COLUMNS = _places(
+LINK_COLUMNS = _slices(
     {
         "point_1": 3,  # attachment points in body axes from the centres of gravity (m)
         "point_2": 3,
@@ -28,7 +28,7 @@ LINK_COLUMNS = _places(
 )
 LINK_SIZE = 16  # whole cache lines
 
-MOUNT_COLUMNS = _places(
+MOUNT_COLUMNS = _slices(
     {
         "point_1": 3,  # points in body axes, coincident in the nominal position (m)
         "point_2": 3,
@@ -53,9 +53,9 @@ ONE_SIDED = 2  # in the column FRICTION: spring and damper along z press and nev
 @compiled(inline=True)
 def link_columns(row, which):
     """Points, then nominal length, stiffness, damping and preload of eight links."""
-    place = starts(which, LINK_SIZE)
-    x1, y1, z1, x2, y2, z2, length, stiffness = load_rows(row, place, 0, 8)
-    damping, preload = load_rows(row, place, 8, 2)
+    offsets = starts(which, LINK_SIZE)
+    x1, y1, z1, x2, y2, z2, length, stiffness = load_rows(row, offsets, 0, 8)
+    damping, preload = load_rows(row, offsets, 8, 2)
     return (x1, y1, z1), (x2, y2, z2), (length, stiffness, damping, preload)
 
 
@@ -65,10 +65,10 @@ def mount_columns(row, which):
 
     Each in the order of `MOUNT_COLUMNS`.
     """
-    place = starts(which, MOUNT_SIZE)
-    x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(row, place, 0, 8)
-    kx, ky, kz, cx, cy, cz, fx, fy = load_rows(row, place, 8, 8)
-    fz, k1, k2, k3, c1, c2, c3 = load_rows(row, place, 16, 7)
+    offsets = starts(which, MOUNT_SIZE)
+    x1, y1, z1, x2, y2, z2, share_1, share_2 = load_rows(row, offsets, 0, 8)
+    kx, ky, kz, cx, cy, cz, fx, fy = load_rows(row, offsets, 8, 8)
+    fz, k1, k2, k3, c1, c2, c3 = load_rows(row, offsets, 16, 7)
     return (
         (x1, y1, z1),
         (x2, y2, z2),

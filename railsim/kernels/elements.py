@@ -6,7 +6,7 @@ energy exactly:
 - link: U(L) of the distance L between two points, force along the line (tension positive);
 - mount: U(d) with d = R_1^T (P_2 - P_1) in the axes of body 1; its gradient puts the force at P_2
   on *both* bodies.  A shear spring takes half of its stiffness in the axes of each body, with P_1
-  and P_2 the body-fixed places of its mid-height: the lateral force then acts at mid-height, as in
+  and P_2 the body-fixed points at its mid-height: the lateral force then acts at mid-height, as in
   a sheared column with parallel ends, and both end moments follow;
 - rotation: U = tr(K_d (1 - R)), R = R_1^T R_2, K_d = (k_1 + k_2 + k_3)/2 - diag(k): moments
   k_i theta_i for small angles.

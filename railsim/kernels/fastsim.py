@@ -50,7 +50,7 @@ def fastsim_workspace(n_patch: int, ny: int, nx: int) -> NDArray[np.float64]:
     """
     # eight more: the last block of patches runs over the last strip
     columns = max((n_patch * ny + 7) // 8 * 8 + 8, (max(nx, ny) + 7) // 8 * 8, 128)
-    # an odd number of cache lines: rows 4 kB apart would all want the same places of the cache
+    # an odd number of cache lines: rows 4 kB apart would all fall into the same sets of the cache
     columns = (columns // 8 | 1) * 8
     work = aligned_zeros((WORK_ROWS, columns))
     work[BOUNDS, :nx] = 1.0 - (1.0 - (2.0 * np.arange(nx) + 1.0) / nx) ** 2
@@ -87,9 +87,9 @@ def kalker_lookup(n, patches, table):
         total = a[i] + b[i]
         u = (a[i] - b[i]) / total if total > 0.0 else 0.0
         outside[i] = 1.0 if abs(u) > KALKER_U_MAX else 0.0
-        place = min(max((u + KALKER_U_MAX) * scale, 0.0), float(last))
-        node = min(int(place), last - 1)
-        w = place - node
+        position = min(max((u + KALKER_U_MAX) * scale, 0.0), float(last))
+        node = min(int(position), last - 1)
+        w = position - node
         c11[i] = table[node, 0] + w * (table[node + 1, 0] - table[node, 0])
         c22[i] = table[node, 1] + w * (table[node + 1, 1] - table[node, 1])
         c23[i] = table[node, 2] + w * (table[node + 1, 2] - table[node, 2])

@@ -72,12 +72,12 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
     all_lanes = ir.Constant(_BYTE, -1)
     zero, one = registers.zero, constant(1.0)
 
-    def place(row, vector):
+    def index(row, vector):
         offset = builder.add(builder.mul(ir.Constant(INT, row), columns), first)
         return builder.add(offset, ir.Constant(INT, LANES * vector))
 
     def load(row, vector):
-        return registers.load(data, place(row, vector))
+        return registers.load(data, index(row, vector))
 
     cell = builder.fdiv(ir.Constant(DOUBLE, 1.0), builder.sitofp(nx, DOUBLE))
     two_cells = splat(builder.fmul(cell, ir.Constant(DOUBLE, 2.0)))
@@ -125,7 +125,7 @@ def _emit_march(builder, n_vectors, data, columns, first, bounds, nx):
                 builder.store(value, slot)
     for v in range(n_vectors):
         for row, slot in zip((3, 4, 5), state[v][3:], strict=True):
-            registers.store(builder.load(slot), data, place(row, v))
+            registers.store(builder.load(slot), data, index(row, v))
 
 
 march_3 = _block_march(3)
@@ -142,14 +142,14 @@ def spread(typingctx, work, n, ny):
 
     def codegen(context, builder, sig, args):
         load, row = _rows(context, builder, sig, args[0])
-        with _strips(builder, args[1], args[2]) as (strip, first, place):
+        with _strips(builder, args[1], args[2]) as (strip, first, column):
             per_l = load(PER_L, strip, splat=True)
             y_per_l = load(Y_PER_L, strip, splat=True)
             x, y = load(3, first), load(4, first)
             spin_a, spin_b = load(5, first), load(6, first)
             grow_x = builder.fsub(builder.fmul(x, per_l), builder.fmul(spin_b, y_per_l))
             for k, value in enumerate((grow_x, builder.fmul(y, per_l), spin_a)):
-                builder.store(value, row(k, place), align=8)
+                builder.store(value, row(k, column), align=8)
         return context.get_dummy_value()
 
     return types.void(work, types.intp, types.intp), codegen
@@ -168,9 +168,9 @@ def gather(typingctx, work, n, ny):
             for slot in slots:
                 builder.store(zero, slot)
             with cgutils.for_range(builder, args[2]) as loop:
-                place = builder.add(builder.mul(loop.index, args[1]), first)
+                column = builder.add(builder.mul(loop.index, args[1]), first)
                 weights = {k: load(k, loop.index, splat=True) for k in (W_SUM, W_ALONG, W_ACROSS)}
-                sums = {k: load(k, place) for k in (3, 4, 5)}
+                sums = {k: load(k, column) for k in (3, 4, 5)}
                 for slot, (weight, k) in zip(slots, terms, strict=True):
                     product = builder.fmul(weights[weight], sums[k])
                     builder.store(builder.fadd(builder.load(slot), product), slot)
@@ -187,16 +187,16 @@ def _rows(context, builder, sig, work):
     columns = cgutils.unpack_tuple(builder, array.shape)[1]
     registers = Registers(builder)
 
-    def place(k, column):
+    def index(k, column):
         return builder.add(builder.mul(ir.Constant(INT, k), columns), column)
 
     def row(k, column):
-        return registers.pointer(array.data, place(k, column))
+        return registers.pointer(array.data, index(k, column))
 
     def load(k, column, splat=False):
         if splat:
-            return registers.splat(builder.load(builder.gep(array.data, [place(k, column)])))
-        return registers.load(array.data, place(k, column))
+            return registers.splat(builder.load(builder.gep(array.data, [index(k, column)])))
+        return registers.load(array.data, index(k, column))
 
     return load, row
 

@@ -93,7 +93,7 @@ def rolling_matrices(x, y, half_x, half_y, edge, nu, middle, centre, x_middle):
     middle, centre : ndarray, shape (3, n, n), written
         For K_xx, K_xy, K_yy; n = n_strip n_cell, strips contiguous.
     x_middle : ndarray, shape (n_strip, n_cell), written
-        Place of the rows of `middle`.
+        Position of the rows of `middle`.
     """
     n_strip, n_cell = x.shape
     here = np.empty(3)

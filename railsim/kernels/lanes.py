@@ -128,9 +128,9 @@ def where_beyond(typingctx, x, limit, beyond, within):
     return lanes(lanes, types.float64, lanes, lanes), codegen
 
 
-def _pointer(context, builder, kind, array, place):
+def _pointer(context, builder, kind, array, offset):
     data = context.make_array(kind)(context, builder, array).data
-    return Registers(builder).pointer(data, place)
+    return Registers(builder).pointer(data, offset)
 
 
 def _mask(count):
@@ -166,8 +166,8 @@ def _turned(builder, rows):
         for k in range(LANES):
             if not k & distance:
                 a, b = these[k], these[k + distance]
-                for place, mask in ((k, first), (k + distance, second)):
-                    mixed[place] = builder.shuffle_vector(
+                for index, mask in ((k, first), (k + distance, second)):
+                    mixed[index] = builder.shuffle_vector(
                         a, b, ir.Constant(ir.VectorType(INDEX, LANES), mask)
                     )
         return mixed
@@ -177,7 +177,7 @@ def _turned(builder, rows):
     return pairs(rows, 4, [0, 1, 2, 3, 8, 9, 10, 11], [4, 5, 6, 7, 12, 13, 14, 15])
 
 
-def _places(builder, rows, column):
+def _offsets(builder, rows, column):
     return [builder.add(start, column) for start in cgutils.unpack_tuple(builder, rows)]
 
 
@@ -196,8 +196,8 @@ def load_rows(typingctx, array, rows, column, count):
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[2], sig.args[2], types.intp)
         loaded = [
-            _load(builder, _pointer(context, builder, sig.args[0], args[0], place), number)
-            for place in _places(builder, args[1], column)
+            _load(builder, _pointer(context, builder, sig.args[0], args[0], offset), number)
+            for offset in _offsets(builder, args[1], column)
         ]
         return context.make_tuple(builder, result, _turned(builder, loaded)[:number])
 
@@ -217,8 +217,8 @@ def store_rows(typingctx, array, rows, column, values):
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[2], sig.args[2], types.intp)
         count, turned = _back(builder, args[3])
-        for place, row in zip(_places(builder, args[1], column), turned, strict=True):
-            _store(builder, row, _pointer(context, builder, sig.args[0], args[0], place), count)
+        for offset, row in zip(_offsets(builder, args[1], column), turned, strict=True):
+            _store(builder, row, _pointer(context, builder, sig.args[0], args[0], offset), count)
         return context.get_dummy_value()
 
     return types.void(array, rows, column, values), codegen
@@ -231,12 +231,12 @@ def add_rows(typingctx, array, rows, column, values, n):
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[2], sig.args[2], types.intp)
         count, turned = _back(builder, args[3])
-        for k, (place, row) in enumerate(
-            zip(_places(builder, args[1], column), turned, strict=True)
+        for k, (offset, row) in enumerate(
+            zip(_offsets(builder, args[1], column), turned, strict=True)
         ):
             there = builder.icmp_signed(">", args[4], ir.Constant(INT, k))
             with builder.if_then(there, likely=True):
-                pointer = _pointer(context, builder, sig.args[0], args[0], place)
+                pointer = _pointer(context, builder, sig.args[0], args[0], offset)
                 total = builder.fadd(_load(builder, pointer, count), row)
                 _store(builder, total, pointer, count)
         return context.get_dummy_value()
@@ -255,14 +255,14 @@ def add_to_pairs(typingctx, array, one, two, column, to_one, to_two, n):
     def codegen(context, builder, sig, args):
         column = context.cast(builder, args[3], sig.args[3], types.intp)
         ends = [
-            zip(_places(builder, rows, column), _back(builder, values)[1], strict=True)
+            zip(_offsets(builder, rows, column), _back(builder, values)[1], strict=True)
             for rows, values in ((args[1], args[4]), (args[2], args[5]))
         ]
         for k, pair in enumerate(zip(*ends, strict=True)):
             there = builder.icmp_signed(">", args[6], ir.Constant(INT, k))
             with builder.if_then(there, likely=True):
-                for place, row in pair:
-                    pointer = _pointer(context, builder, sig.args[0], args[0], place)
+                for offset, row in pair:
+                    pointer = _pointer(context, builder, sig.args[0], args[0], offset)
                     total = builder.fadd(_load(builder, pointer, LANES), row)
                     _store(builder, total, pointer, LANES)
         return context.get_dummy_value()
@@ -271,7 +271,7 @@ def add_to_pairs(typingctx, array, one, two, column, to_one, to_two, n):
 
 
 @intrinsic
-def load_lanes(typingctx, array, place):
+def load_lanes(typingctx, array, offset):
     """Eight numbers that follow each other in the flat array."""
 
     def codegen(context, builder, sig, args):
@@ -281,7 +281,7 @@ def load_lanes(typingctx, array, place):
 
 
 @intrinsic
-def store_lanes(typingctx, array, place, x):
+def store_lanes(typingctx, array, offset, x):
     """Store eight numbers one after the other in the flat array."""
 
     def codegen(context, builder, sig, args):
@@ -326,7 +326,7 @@ def eight_from(first, count):
 
 @compiled(inline=True)
 def eight_of(index, numbers):
-    """Entries of `index` at eight places."""
+    """Entries of `index` at the eight `numbers`."""
     return (
         index[numbers[0]],
         index[numbers[1]],

@@ -45,11 +45,11 @@ def add_to_pairs(array, one, two, column, to_one, to_two, n):
     add_rows(array, two, column, to_two, n)
 
 
-def load_lanes(array, place):
+def load_lanes(array, offset):
     """Eight numbers that follow each other."""
-    return array.reshape(-1)[place : place + LANES].copy()
+    return array.reshape(-1)[offset : offset + LANES].copy()
 
 
-def store_lanes(array, place, x):
+def store_lanes(array, offset, x):
     """Store eight numbers one after the other."""
-    array.reshape(-1)[place : place + LANES] = x
+    array.reshape(-1)[offset : offset + LANES] = x

@@ -103,8 +103,8 @@ class Linkage(NamedTuple):
 
 
 @compiled(python=False)
-def place(linkage, lane, q, b, p, at):
-    """Write A u of point p on body b to at[0:2] and its place to at[2:4] [m]."""
+def locate(linkage, lane, q, b, p, at):
+    """Write A u of point p on body b to at[0:2] and its position to at[2:4] [m]."""
     u, v = linkage.point[lane, p, 0], linkage.point[lane, p, 1]
     c, s = np.cos(q[b, 2]), np.sin(q[b, 2])
     at[0] = c * u - s * v
@@ -162,8 +162,8 @@ def constraints(linkage, lane, arc, q, s, Phi, J, one, two):
             p2 = linkage.arc_point[arc[k]]
             radius = linkage.arc_ends[arc[k], 4] * linkage.arc_radius[lane, arc[k]]
         b1, b2 = linkage.point_body[p1], linkage.point_body[p2]
-        place(linkage, lane, q, b1, p1, one)
-        place(linkage, lane, q, b2, p2, two)
+        locate(linkage, lane, q, b1, p1, one)
+        locate(linkage, lane, q, b2, p2, two)
         dx, dy = one[2] - two[2], one[3] - two[3]
         if kind == REVOLUTE:
             Phi[row], Phi[row + 1] = dx, dy
@@ -197,10 +197,10 @@ def drive(linkage, lane, q, s, Phi, J, row, one, two):
         add_row(J, row, p2, 0.0, 0.0, -1.0)
         return
     b1 = linkage.point_body[p1]
-    place(linkage, lane, q, b1, p1, one)
+    locate(linkage, lane, q, b1, p1, one)
     if kind == LENGTH:
         b2 = linkage.point_body[p2]
-        place(linkage, lane, q, b2, p2, two)
+        locate(linkage, lane, q, b2, p2, two)
         dx, dy = one[2] - two[2], one[3] - two[3]
         length = np.sqrt(dx * dx + dy * dy)
         Phi[row] = length - c - s
@@ -242,7 +242,7 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
         if kind == PARALLEL:
             continue
         b1 = linkage.point_body[p1]
-        place(linkage, lane, q, b1, p1, one)
+        locate(linkage, lane, q, b1, p1, one)
         w1 = v[b1, 2]
         gx, gy = -one[0] * w1 * w1, -one[1] * w1 * w1
         if kind == -X:
@@ -252,7 +252,7 @@ def curvature(linkage, lane, arc, q, v, right, one, two):
             right[row] = -gy
             continue
         b2 = linkage.point_body[p2]
-        place(linkage, lane, q, b2, p2, two)
+        locate(linkage, lane, q, b2, p2, two)
         w2 = v[b2, 2]
         gx += two[0] * w2 * w2
         gy += two[1] * w2 * w2
@@ -299,10 +299,10 @@ def move_along_cams(linkage, q, arc, one, two):
         p1, a = linkage.joint[k, 1], arc[k]
         first = linkage.joint[k, 4]
         last = first + linkage.joint[k, 5] - 1
-        place(linkage, 0, q, linkage.point_body[p1], p1, one)
+        locate(linkage, 0, q, linkage.point_body[p1], p1, one)
         p2 = linkage.arc_point[a]
         b2 = linkage.point_body[p2]
-        place(linkage, 0, q, b2, p2, two)
+        locate(linkage, 0, q, b2, p2, two)
         dx, dy = one[2] - two[2], one[3] - two[3]
         c, s = np.cos(q[b2, 2]), np.sin(q[b2, 2])
         u, v = c * dx + s * dy, -s * dx + c * dy

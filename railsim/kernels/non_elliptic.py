@@ -27,7 +27,7 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
     first, last : int
         Candidates of the zone.
     centre : float
-        Lateral place of the patch [m].
+        Lateral position of the patch [m].
     delta : float
         Approach of the bodies along the normal [m].
     E_star : float
@@ -48,7 +48,7 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
     between wheel and rail and creep forces during rolling, 2nd mini conference on contact
     mechanics and wear of rail/wheel systems, Budapest (1996).
     """
-    h, lift, place, length = zone.h, zone.lift, zone.c_y, zone.length
+    h, lift, y, length = zone.h, zone.lift, zone.c_y, zone.length
     z = 1e9
     best = first
     for k in range(first, last):
@@ -59,7 +59,7 @@ def kik_piotrowski(zone, first, last, centre, delta, E_star, strips):
     # candidate nearest to the patch's centre, from which the patch is followed to both sides
     middle = best
     for k in range(first, last):
-        if abs(place[k] - centre) < abs(place[middle] - centre):
+        if abs(y[k] - centre) < abs(y[middle] - centre):
             middle = k
     if _virtual_overlap(zone, z, delta, middle) <= 0.0:
         middle = best

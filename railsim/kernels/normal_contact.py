@@ -73,7 +73,7 @@ def pressure(gap, column, row, table, tolerance, p):
     gap : ndarray, shape (n,)
         Undeformed normal gap at the elements' centres, negative where the bodies overlap [m].
     column, row : ndarray of int, shape (n,)
-        Place of each element: rows run along the rolling direction; row 0 is the first one ahead
+        Indices of each element: rows run along the rolling direction; row 0 is the first one ahead
         of the middle, and each row has a mirror image behind it.
     table : ndarray, shape (n_x, n_s)
         Influence over the distances in x (at least 2 n_row) and s.

@@ -14,8 +14,8 @@ them does not slip.
 
 **Motion of a rail itself.**  `Work.rail_motion[w, side]` holds what a rail yields under its wheel,
 in the axes of the plane: displacement y, z [m] and velocity y', z' [m/s].  It adds to the rail's
-place and to its rate and, other than a shape, is a velocity of the rail's material, against which
-the wheel slips.  On rigid rails all four are zero.
+position and to its rate and, other than a shape, is a velocity of the rail's material, against
+which the wheel slips.  On rigid rails all four are zero.
 """
 
 from math import asin, sqrt
@@ -38,8 +38,8 @@ CANT_BASE = 1.5  # m, 2 b_0
 MIDDLE_Y, MIDDLE_Z, SLOPE_Y, SLOPE_Z, ROLL, SINE, COSINE, ROLL_SLOPE, BEND_Z = range(9)
 PLANE_SIZE = 16  # whole cache lines
 
-# columns of Work.rail[w, side]: friction; distance of the rail to the right of its nominal place in
-# the plane, its slope; slope of the rail in the frame's lateral direction, and that slope's change
+# columns of Work.rail[w, side]: friction; distance of the rail to the right of its nominal position
+# in the plane, its slope; slope of the rail in the frame's lateral direction, that slope's change
 FRICTION, ASIDE, ASIDE_SLOPE, RAIL_SLOPE, RAIL_BEND = range(5)
 RAIL_SIZE = 8
 

@@ -130,12 +130,12 @@ def euler_rates(sin_roll, cos_roll, sin_pitch, cos_pitch, omega):
 
 
 @compiled(inline=True)
-def store_motion(pose, place, R, X, V, omega):
+def store_motion(pose, offsets, R, X, V, omega):
     """Attitude, position, velocity and angular velocity of eight bodies; no force, no moment."""
     zero = spread(0.0)
-    store_rows(pose, place, 0, R[:8])
-    store_rows(pose, place, 8, (R[8], X[0], X[1], X[2], V[0], V[1], V[2], omega[0]))
-    store_rows(pose, place, 16, (omega[1], omega[2], zero, zero, zero, zero, zero, zero))
+    store_rows(pose, offsets, 0, R[:8])
+    store_rows(pose, offsets, 8, (R[8], X[0], X[1], X[2], V[0], V[1], V[2], omega[0]))
+    store_rows(pose, offsets, 16, (omega[1], omega[2], zero, zero, zero, zero, zero, zero))
 
 
 @compiled(merge=True)
@@ -371,7 +371,7 @@ def keep_counts(events, first, to):
 
 @compiled(merge=True)
 def mechanics(system, work, state, derivative, rails):
-    """Derivative of coordinates, velocities, place and speed; drives of the internal states.
+    """Derivative of coordinates, velocities, position and speed; drives of the internal states.
 
     Parameters
     ----------

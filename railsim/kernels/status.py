@@ -1,4 +1,4 @@
-"""Status codes of the time loop and their meaning: one place maps a code to words."""
+"""Status codes of the time loop and their meaning: the one map from codes to words."""
 
 RUNNING = 0
 DERAILED = 1

@@ -242,7 +242,7 @@ def imbalance(system, work, state, w):
 
 @compiled(inline=True)
 def support_begin(system):
-    """Place of the first wheelset's track in the state."""
+    """Index of the first wheelset's track in the state."""
     return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
 
 

@@ -96,7 +96,7 @@ def note_wheelsets(system, work, state):
 def note_wheelset(system, work, state, w):
     """Motion of a wheelset in the plane of its rails into its row of `work.support_step`.
 
-    Lateral and vertical place, roll and their rates, distances of the rails from their places.  The
+    Lateral and vertical position, roll and their rates, displacements of the rails.  The
     lateral rate is that of the material (slip); to first order in the roll of the plane.
     """
     n = system.bodies.kind.shape[0]
@@ -120,7 +120,7 @@ def note_wheelset(system, work, state, w):
 
 @compiled(merge=True)
 def step_support(system, work, state, h):
-    """Advance the track under all wheelsets by `h`; bodies, place and speed are those after it."""
+    """Advance the track under all wheelsets by `h`, with bodies, position and speed after it."""
     support = system.support
     row, before = support.row, work.above
     for w in range(work.support.shape[0]):

@@ -3,7 +3,7 @@
 State vector (float64[n_state]), for n bodies and m internal element states:
 
     0 .. 6n       coordinates x, y, z, roll, pitch, yaw of each body: position of its centre of
-                  gravity relative to its nominal place, in the axes of its own track frame (m, rad)
+                  gravity relative to its nominal position, in axes of its own track frame (m, rad)
     6n .. 12n     velocities: x', y', z' in the axes of the track frame (m/s), then the absolute
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
@@ -13,7 +13,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
                   negative once elastic rails have been settled after it
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
-An axlebox has one coordinate, its pitch about the axle; of its twelve places only `pitch` and u_2
+An axlebox has one coordinate, its pitch about the axle; of its twelve entries only `pitch` and u_2
 (here the pitch rate relative to the wheelset's axes) are used.  A fixed body keeps its coordinates;
 its u_1, u_2, u_3 are those of its track frame.
 """
@@ -262,7 +262,7 @@ class Loads(NamedTuple):
     point : float64[l, 3]    where a force acts, body axes [m]
     flags : int64[l, 3]      1 if: torque, axes of the track, over distance
     start : int64[l + 1]     first row of each load
-    table : float64[..., 4]  time [s] or place of the body's track frame [m], three components
+    table : float64[..., 4]  time [s] or position of the body's track frame [m], three components
                              [N or N m]; linear, constant beyond
     """
 

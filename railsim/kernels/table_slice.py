@@ -91,11 +91,11 @@ class Elastic(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """Candidates of a wheel in their place on the rail, those of one zone filled as far as needed.
+    """Candidates of a wheel in position on the rail, those of one zone filled as far as needed.
 
     h : gap at z = 0 [m]; lift : 1/cos(contact angle), mean of wheel and rail [1]; du, length :
     distance to the next candidate along the axle, and of the neighbours along the contour [m];
-    c_y, c_z : place from the wheelset's centre [m]; radius [m]; slope : of the rail, downwards [1];
+    c_y, c_z : position from the wheelset's centre [m]; radius [m]; slope : of the rail, down [1];
     window [1]; wheel_curvature, rail_curvature : averaged, shape (n_width, n) [1/m]; node : of the
     rail under the candidate.
     """
@@ -212,7 +212,7 @@ def near_candidates(y, p, least, c_y, c_z, stretch, centre_height, wheel, rail):
 
 @compiled(in_loop=False)
 def fill_zone(out, zone, start, end, elastic, hertz, strips):
-    """Fields of one zone at one place into `out`, shape (N_FIELD,)."""
+    """Fields of one zone at one node of the table into `out`, shape (N_FIELD,)."""
     least = zone.h[start:end].min()
     # ellipse of the averaged curvatures, which gives the foundation its stiffness
     k = FOUNDATION * elastic.E_star
@@ -235,7 +235,7 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
     k = (k**4 + (LONG_PATCH * 0.75 / (B * b1**3)) ** 4) ** 0.25
     kappa = d1 - B ** (1.0 / 3.0) * (0.75 / k) ** (2.0 / 3.0)
     heights, energies = np.empty(3), np.empty(3)
-    place, axis = np.empty((N_OF_LOAD, 3)), np.empty(3)
+    fields, axis = np.empty((N_OF_LOAD, 3)), np.empty(3)
     for j in range(3):
         load = LOADS[j]
         theta = kappa * load ** (2.0 / 3.0)
@@ -248,19 +248,19 @@ def fill_zone(out, zone, start, end, elastic, hertz, strips):
         A = 0.5 * along * carried / (across * weighted(weight, zone.radius[start:end]))
         B = kept_above((4.0 / 3.0 * k / load) ** 2 * deepest**3, elastic.floor_ratio * A)
         ellipse = unit_ellipse(A, B, hertz)
-        axis[j], place[2, j] = ellipse[0], ellipse[1]
-        place[0, j] = weighted(weight, zone.c_y[start:end]) / carried
-        place[1, j] = weighted(weight, zone.c_z[start:end]) / carried
-        place[3, j] = weighted(weight, zone.slope[start:end]) / carried
+        axis[j], fields[2, j] = ellipse[0], ellipse[1]
+        fields[0, j] = weighted(weight, zone.c_y[start:end]) / carried
+        fields[1, j] = weighted(weight, zone.c_z[start:end]) / carried
+        fields[3, j] = weighted(weight, zone.slope[start:end]) / carried
         if elastic.non_elliptic:
             a, b = non_elliptic_axes(
-                zone, start, end, place[0, j], A, B, ellipse, load, elastic.E_star, strips
+                zone, start, end, fields[0, j], A, B, ellipse, load, elastic.E_star, strips
             )
             if a > 0.0:
-                axis[j], place[2, j] = a, b
+                axis[j], fields[2, j] = a, b
     out[G], out[K], out[K2] = fit_energy(heights, energies)
     out[A1] = axis[1]
-    over_load(out, place)
+    over_load(out, fields)
 
 
 @compiled(in_loop=False)
@@ -292,14 +292,14 @@ def averaged_over_widths(zone, start, weight):
 
 
 @compiled(in_loop=False)
-def over_load(out, place):
+def over_load(out, fields):
     """Fields of the form v + dv N/(N + HALF_LOAD), as near as possible to the three loads'."""
     loads = np.array(LOADS)
     tau = loads / (loads + HALF_LOAD)
     away = tau - tau.mean()
     for m in range(N_OF_LOAD):
-        mean = place[m].mean()
-        difference = np.sum(away * place[m]) / np.sum(away * away)
+        mean = fields[m].mean()
+        difference = np.sum(away * fields[m]) / np.sum(away * away)
         start = mean - difference * tau.mean()
         if m == 2:
             start = max(start, LEAST_AXIS * mean)

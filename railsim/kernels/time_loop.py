@@ -130,7 +130,7 @@ def record(recorder, row, system, state, derivative, work, n_patches):
 
 @compiled(python=False)
 def record_patches(out, row, work, n_patches):
-    """Copy the active contact patches to their places; the others are zero."""
+    """Copy the active contact patches to their entries; the others are zero."""
     for w in range(out.shape[1]):
         for side in range(2):
             for k in range(out.shape[3]):
@@ -316,14 +316,14 @@ def step_fast(system, work, state, derivative, decay, h):
         if slides_together(system.internal, i):
             hold_within(system.internal, i, 12 * n, work.drive, state)
     state[-4] = h
-    advance_place(system.drive, state, derivative, h)
+    advance_position(system.drive, state, derivative, h)
     if system.support.elastic:
         step_support(system, work, state, h)
 
 
 @compiled(inline=True)
-def advance_place(drive, state, derivative, h):
-    """Time, place and speed after a step; a speed table is met exactly."""
+def advance_position(drive, state, derivative, h):
+    """Time, position and speed after a step; a speed table is met exactly."""
     state[-2] += h * (state[-1] + 0.5 * h * derivative[-1])
     state[-1] += h * derivative[-1]
     state[-3] += h

@@ -55,11 +55,11 @@ class TrackTables(NamedTuple):
 
 
 @compiled(inline=True)
-def frame_columns(frames, place):
+def frame_columns(frames, offsets):
     """Of eight frames: origin, attitude A, rate of turn per metre, its derivative over s."""
-    x, y, z, a0, a1, a2, a3, a4 = load_rows(frames, place, 0, 8)
-    a5, a6, a7, a8, w1, w2, w3, e1 = load_rows(frames, place, 8, 8)
-    e2, e3 = load_rows(frames, place, 16, 2)
+    x, y, z, a0, a1, a2, a3, a4 = load_rows(frames, offsets, 0, 8)
+    a5, a6, a7, a8, w1, w2, w3, e1 = load_rows(frames, offsets, 8, 8)
+    e2, e3 = load_rows(frames, offsets, 16, 2)
     return (x, y, z), (a0, a1, a2, a3, a4, a5, a6, a7, a8), (w1, w2, w3), (e1, e2, e3)
 
 
@@ -110,11 +110,11 @@ def track_frames(track, cell, cell_u, origin, frames):
     sine, cosine = sin(turn), cos(turn)
     for first in range(0, cell.shape[0], LANES):
         which = eight_from(first, cell.shape[0])
-        place = starts(eight_of(cell, which), 24)
+        offsets = starts(eight_of(cell, which), 24)
         u = load_rows(cell_u, which, 0, 1)[0]
-        x0, x1, x2, x3, y0, y1, y2, y3 = load_rows(c, place, 0, 8)
-        z0, z1, z2, z3, p0, p1, p2, p3 = load_rows(c, place, 8, 8)
-        t0, t1, t2, t3, f0, f1, f2, f3 = load_rows(c, place, 16, 8)
+        x0, x1, x2, x3, y0, y1, y2, y3 = load_rows(c, offsets, 0, 8)
+        z0, z1, z2, z3, p0, p1, p2, p3 = load_rows(c, offsets, 8, 8)
+        t0, t1, t2, t3, f0, f1, f2, f3 = load_rows(c, offsets, 16, 8)
         x, _, _ = polynomial(x0, x1, x2, x3, u)
         y, _, _ = polynomial(y0, y1, y2, y3, u)
         z, _, _ = polynomial(z0, z1, z2, z3, u)

@@ -16,7 +16,7 @@ MEMORY = 0.1  # s
 # columns of Work.vibration[w, side]: 1 once begun, memory of the filter, last value, mean squares
 # of value and difference; then of the largest vibration so far its amplitude [N], where it was [m]
 # and its frequency [Hz]
-BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, PLACE, FREQUENCY = range(9)
+BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, POSITION, FREQUENCY = range(9)
 VIBRATION = 9
 
 
@@ -54,6 +54,6 @@ def watch(wheel, vibration, b0, a1, a2, fading, h, s):
             vibration[w, side, CHANGE] = changes
             if 2.0 * square > vibration[w, side, AMPLITUDE] * vibration[w, side, AMPLITUDE]:
                 vibration[w, side, AMPLITUDE] = sqrt(2.0 * square)
-                vibration[w, side, PLACE] = s
+                vibration[w, side, POSITION] = s
                 cosine = max(-1.0, 1.0 - 0.5 * changes / square)
                 vibration[w, side, FREQUENCY] = acos(cosine) / (2.0 * pi * h)

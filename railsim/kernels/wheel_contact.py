@@ -144,13 +144,13 @@ def normal_contact(system, work, speed, state):
         work.swing[w] = 0.0
         if ahead > 0.0 and system.track.has_irregularity:
             own = smoothed + 6 * b
-            place = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
-            foresee(system.track, place, speed, w, plane, work.rail, state, own, ahead, work.coming)
+            s = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
+            foresee(system.track, s, speed, w, plane, work.rail, state, own, ahead, work.coming)
         for side in range(2):
             status, n = wheel_contact(system, work, w, side, speed, n)
             if status != RUNNING:
                 return status, w, n
-        # from the plane to the track's axes; -dU/ds in place of the force along the track
+        # from the plane to the track's axes; -dU/ds instead of the force along the track
         f_y, f_z = force[b, 1], force[b, 2]
         along = plane[w, ROLL_SLOPE] * (f_y * z - f_z * y - force[b, 3])
         f_y, f_z = cosine * f_y - sine * f_z, sine * f_y + cosine * f_z
@@ -372,7 +372,7 @@ def complete_normal_force(b, bodies, frames, C, state, force):
     track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and the normal force does no
     work on the spin, M_2 = 0.
 
-    The potential does not depend on the place along a smooth track.  Moving along it with all
+    The potential does not depend on the position along a smooth track.  Moving along it with all
     relative coordinates held, v = e_x + omega x r and u = omega per metre, the contact does no
     work; hence F_x (1 + (omega x r)_x) = -F_y (omega x r)_y - F_z (omega x r)_z - M omega: on a
     twisted track the wheels climb the rails.  `force[b, 0]` brings the share of irregular rails.

@@ -4,13 +4,13 @@ Per wheel and patch, with the table's gap g and stiffness K (see `contact_table`
 
 - penetration p = z - g, less what the loads of neighbouring patches bend the surfaces; elastic
   normal force as the gradient of the potential U, which includes the terms from the change of the
-  stiffnesses along the profile (`coupled_approaches`); place, direction and ellipse of the patch
+  stiffnesses along the profile (`coupled_approaches`); position, direction and ellipse of the patch
   under its load (`under_load`); y, z, roll of the wheelset in the plane of the rails, yaw against
   each rail's own direction (see `rails`);
 - contact damping c_N on the *geometric* rate of approach, faded in over 30 um, the sum never
   pulling;
 - the rail at the patch has the direction d = (1, t_y, t_z), from the turn of the frame at that
-  place, omega x rho, and the slopes of displaced rails; c from the wheelset's centre to the patch,
+  point, omega x rho, and the slopes of displaced rails; c from the wheelset's centre to the patch,
   c_x = (c_x/yaw)(yaw - t_y) - t_y c_y - t_z c_z with the table's (c_x/yaw);
 - creepages from the velocity of the wheel's material at the patch, v = V e_x + w_F x r + r'
   + w_abs x c less that of the rail's material (none where the rail is rigid: a slope of its shape

@@ -5,7 +5,7 @@ import math
 from railsim.definitions.track import Track
 
 LENGTH = 50.0  # m; the tables reach beyond both ends
-PLACE = 25.0  # m, where a vehicle stands on it
+POSITION = 25.0  # m, where a vehicle stands on it
 
 
 def circle(

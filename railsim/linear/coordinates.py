@@ -1,9 +1,9 @@
 """Coordinates of a vehicle without those that nothing depends on, and their names.
 
-Of the state vector of `railsim.kernels.system` are left out: time, place and speed, the memory of
-the fast scheme, the spin angles of the wheelsets (their rates stay), and the places that an axlebox
-does not use.  The reference body's x, which runs hold, is free here: held, it would be a car body
-of infinite mass.
+The following parts of the state vector of `railsim.kernels.system` are left out: time, position and
+speed, the memory of the fast scheme, the spin angles of the wheelsets (their rates stay), and the
+entries that an axlebox does not use.  The reference body's x, which runs hold, is free here: held,
+it would be a car body of infinite mass.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
 
 Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
+Indices = NDArray[np.int64]
 
 TRACK_PARTS = (
     "rail.left.y",
@@ -47,8 +47,8 @@ class Coordinates:
     names : tuple of str
         ``carbody.y``, of its rate ``carbody.y'``; of an internal state the element's name; of the
         track ``front.outer.wheelset.rail.left.y``.
-    places : int64[n]
-        Places in the state vector: positions and velocities of the bodies, internal states of
+    indices : int64[n]
+        Indices in the state vector: positions and velocities of the bodies, internal states of
         elements, displacements of elastic rails, their rates.
     bodies, components : int64[n]
         Body and component of positions and velocities, -1 of all others.
@@ -61,16 +61,16 @@ class Coordinates:
     """
 
     names: tuple[str, ...]
-    places: Places
-    bodies: Places
-    components: Places
+    indices: Indices
+    bodies: Indices
+    components: Indices
     n_positions: int
     n_velocities: int
     steps: Floats
-    forceless: Places
+    forceless: Indices
 
-    def place(self, body: int, component: int) -> int:
-        """Place of a body's position among the coordinates."""
+    def index_of(self, body: int, component: int) -> int:
+        """Index of a body's position among the coordinates."""
         same = (self.bodies == body) & (self.components == component)
         return int(np.flatnonzero(same)[0])
 
@@ -109,20 +109,20 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     names = [f"{model.index.bodies[b]}.{COMPONENTS[k]}" for b, k in positions]
     names += [f"{model.index.bodies[b]}.{COMPONENTS[k]}'" for b, k in velocities]
     rest = _internal_names(model)
-    places = [6 * b + k for b, k in positions] + [6 * n + 6 * b + k for b, k in velocities]
-    places += [12 * n + i for i in range(len(rest))]
+    indices = [6 * b + k for b, k in positions] + [6 * n + 6 * b + k for b, k in velocities]
+    indices += [12 * n + i for i in range(len(rest))]
     steps = [STEP] * len(positions) + [RATE_STEP] * len(velocities) + [FORCE_STEP] * len(rest)
     forceless = []
     if not held:
-        track, track_names = track_places(model)
-        places += [*track, *(k + RATE for k in track)]
+        track, track_names = track_indices(model)
+        indices += [*track, *(k + RATE for k in track)]
         rest += [*track_names, *(f"{name}'" for name in track_names)]
         steps += [STEP] * len(track) + [RATE_STEP] * len(track)
         if model.system.support.massless:
-            forceless = list(range(len(places) - len(track), len(places)))
+            forceless = list(range(len(indices) - len(track), len(indices)))
     return Coordinates(
         names=(*names, *rest),
-        places=np.array(places, dtype=np.int64),
+        indices=np.array(indices, dtype=np.int64),
         bodies=np.array([b for b, _ in both] + [-1] * len(rest), dtype=np.int64),
         components=np.array([k for _, k in both] + [-1] * len(rest), dtype=np.int64),
         n_positions=len(positions),
@@ -132,19 +132,19 @@ def coordinates(model: Model, *, held: bool = False, hold: Sequence[str] = ()) -
     )
 
 
-def track_places(model: Model) -> tuple[list[int], list[str]]:
-    """Places of the displacements of elastic rails and sleepers in the state, and their names."""
+def track_indices(model: Model) -> tuple[list[int], list[str]]:
+    """Indices of the displacements of elastic rails and sleepers in the state, and their names."""
     support = model.system.support
     if not support.elastic:
         return [], []
     first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(model.index.wheelsets)
     moving = DOF if support.sleeper else RAIL_DOF
-    places = [
+    indices = [
         first + SUPPORT_SIZE * w + k
         for w in range(len(model.index.wheelsets))
         for k in range(moving)
     ]
-    return places, [
+    return indices, [
         f"{wheelset}.{part}" for wheelset in model.index.wheelsets for part in TRACK_PARTS[:moving]
     ]
 
@@ -215,7 +215,7 @@ class FreeVehicle:
     @property
     def x(self) -> Floats:
         """The coordinates in the state of steady rolling, float64[n]."""
-        return self.state[self.coordinates.places].copy()
+        return self.state[self.coordinates.indices].copy()
 
     def tangent(self) -> Floats:
         """Jacobian of `rate` at the state of steady rolling, float64[n, n].
@@ -274,7 +274,7 @@ class FreeVehicle:
     def rates(self, x: Floats) -> Floats:
         """Derivatives of the coordinates, float64[k, n] of as many."""
         trials = np.repeat(self.state[None], len(x), axis=0)
-        trials[:, self.coordinates.places] = x
+        trials[:, self.coordinates.indices] = x
         derivatives = self._evaluated(trials)
         derivatives[:, self._reference[0]] = trials[:, self._reference[1]]
         velocities = derivatives[:, 6 * self._n : 12 * self._n].reshape(len(x), -1, 6)
@@ -284,7 +284,7 @@ class FreeVehicle:
         else:
             velocities[:, self._whole, :3] += change[:, None] * self._directions(trials)
         derivatives[:, 6 * self._n : 12 * self._n] = velocities.reshape(len(x), -1)
-        return np.asarray(derivatives[:, self.coordinates.places])
+        return np.asarray(derivatives[:, self.coordinates.indices])
 
     def _directions(self, states: Floats) -> Floats:
         """e_x + omega x r of whole bodies: how they move as their frames go along the track."""

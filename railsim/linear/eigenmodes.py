@@ -118,11 +118,11 @@ def oscillations(modes: Eigenmodes, most: float = np.inf) -> Eigenmodes:
 
 
 def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[Eigenmodes]:
-    """Oscillations over a parameter, each mode in the same place throughout.
+    """Oscillations over a parameter, each mode at the same index throughout.
 
     Where the pairing of neighbours is not clear, linearisations between them are looked at.  An
-    oscillation that becomes overdamped, or leaves the range of frequencies, leaves its place empty,
-    one that appears gets a new place: empty places hold NaN.
+    oscillation that becomes overdamped, or leaves the range of frequencies, leaves its entry empty,
+    one that appears gets a new entry: empty entries hold NaN.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[
     Returns
     -------
     list of Eigenmodes
-        One for each parameter, all with the same number of places.
+        One for each parameter, all with the same number of entries.
     """
     sets = [oscillations(eigenmodes(at(parameter)), most) for parameter in parameters]
     chains: list[list[int]] = [[i] for i in range(len(sets[0].eigenvalues))]
@@ -149,7 +149,7 @@ def followed(at: At, parameters: Sequence[float], most: float = np.inf) -> list[
             [-1] * (number + 1) + [j] for j in range(len(after.eigenvalues)) if j not in known
         ]
     table = np.array(chains, dtype=int).reshape(-1, len(sets))
-    return [_placed(modes, table[:, k]) for k, modes in enumerate(sets)]
+    return [_ordered(modes, table[:, k]) for k, modes in enumerate(sets)]
 
 
 def _partners(
@@ -177,14 +177,14 @@ def _partners(
     return {i: second[j] for i, j in first.items() if j in second}
 
 
-def _placed(modes: Eigenmodes, places: NDArray[np.intp]) -> Eigenmodes:
-    """Modes in given places, NaN in those that are empty (-1)."""
-    there = places >= 0
-    size, n = len(places), modes.shapes.shape[1]
+def _ordered(modes: Eigenmodes, indices: NDArray[np.intp]) -> Eigenmodes:
+    """Modes of given indices, NaN where there is none (-1)."""
+    there = indices >= 0
+    size, n = len(indices), modes.shapes.shape[1]
     values = np.full(size, np.nan, dtype=complex)
     shapes, left = np.full((2, size, n), np.nan, dtype=complex)
-    values[there] = modes.eigenvalues[places[there]]
-    shapes[there], left[there] = modes.shapes[places[there]], modes.left[places[there]]
+    values[there] = modes.eigenvalues[indices[there]]
+    shapes[there], left[there] = modes.shapes[indices[there]], modes.left[indices[there]]
     return Eigenmodes(modes.linearisation, values, shapes, left)
 
 

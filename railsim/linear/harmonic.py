@@ -60,7 +60,7 @@ class ContactPath:
         """
         found = tangent.copy()
         for body in vehicle.system.contact.body:
-            y, z, roll = (vehicle.coordinates.place(int(body), k) for k in (Y, Z, ROLL))
+            y, z, roll = (vehicle.coordinates.index_of(int(body), k) for k in (Y, Z, ROLL))
             force, height, angle = self._harmonics(vehicle, int(body))
             found[:, y] = force - tangent[:, z] * height - tangent[:, roll] * angle
         return found
@@ -101,14 +101,14 @@ class ContactPath:
         self, vehicle: FreeVehicle, body: int, y: float, pose: Floats
     ) -> tuple[Floats, Floats]:
         """Coordinates with a wheelset moved by y along its path, and its dz and droll."""
-        places = [vehicle.coordinates.place(body, k) for k in (Y, Z, ROLL)]
+        indices = [vehicle.coordinates.index_of(body, k) for k in (Y, Z, ROLL)]
         base = vehicle.x
         vehicle.rate(base)
         goal = vehicle.work.rail_force[body, [2, 3]].copy()
 
         def rest(pose: Floats) -> Floats:
             x = base.copy()
-            x[places] += (y, *pose)
+            x[indices] += (y, *pose)
             vehicle.rate(x)
             return np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
 
@@ -126,5 +126,5 @@ class ContactPath:
         else:
             raise ModelError("the contact path is not found")
         x = base.copy()
-        x[places] += (y, *pose)
+        x[indices] += (y, *pose)
         return x, pose

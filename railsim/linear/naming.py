@@ -69,21 +69,21 @@ class Parts:
         c = self.coordinates
         own = c.velocities
         energy = np.zeros_like(self._inertia)
-        places = c.bodies[own], c.components[own]
-        energy[places] = self._inertia[places] * np.abs(shape[own]) ** 2
+        entries = c.bodies[own], c.components[own]
+        energy[entries] = self._inertia[entries] * np.abs(shape[own]) ** 2
         total = float(energy.sum())
         return energy / total if total > 0.0 else energy
 
     @cached_property
-    def _places(self) -> dict[tuple[int, int], int]:
-        """Place of each position component among the coordinates."""
+    def _indices(self) -> dict[tuple[int, int], int]:
+        """Index of each position component among the coordinates."""
         c = self.coordinates
         return {(int(c.bodies[k]), int(c.components[k])): k for k in range(c.n_positions)}
 
     def component(self, shape: Complex, body: int, component: int) -> complex:
         """Position component of a shape, 0 where the body is held or has none."""
-        place = self._places.get((body, component))
-        return 0j if place is None else complex(shape[place])
+        index = self._indices.get((body, component))
+        return 0j if index is None else complex(shape[index])
 
     def bogie_of(self, body: int) -> str:
         """First part of a body's dotted name."""

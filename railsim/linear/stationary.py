@@ -17,7 +17,7 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_columns import W_Q
 from railsim.kernels.system import FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
-from railsim.linear.circle import PLACE, circle
+from railsim.linear.circle import POSITION, circle
 from railsim.linear.steady import SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
@@ -117,7 +117,7 @@ def on_twist(
 
 def _placed(balance: Equilibrium) -> Floats:
     state = balance.state.copy()
-    state[-2] = PLACE
+    state[-2] = POSITION
     return state
 
 
@@ -125,8 +125,8 @@ def _twisted(system: System, heights: Floats) -> System:
     """The frame of each wheelset canted for itself; all other frames stay level."""
     coefficients = system.track.coefficients.copy()
     for body, height in zip(system.contact.body, heights, strict=True):
-        place = PLACE + system.frame_offset[system.bodies.frame[body]]
-        cell = int((place - system.track.s_start) / system.track.ds)
+        s = POSITION + system.frame_offset[system.bodies.frame[body]]
+        cell = int((s - system.track.s_start) / system.track.ds)
         coefficients[cell, PHI, 0] = np.arcsin(height / CANT_BASE)
     return system._replace(track=system.track._replace(coefficients=aligned(coefficients)))
 

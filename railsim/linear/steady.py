@@ -3,7 +3,7 @@
 On a circle nothing changes with time when seen from the track frames: r' = 0, the angular velocity
 of a body is u = C^T w_F, of a wheelset too but for its spin rate, which is unknown, and all
 accelerations and internal rates vanish.  The unknowns are the coordinates, of wheelsets the spin
-rate in place of the pitch; the reference body's x stays, held by the traction.
+rate instead of the pitch; the reference body's x stays, held by the traction.
 
 Newton's method on forces and moments, with differences, a line search, and a least-squares step
 where the matrix is nearly singular.  The normal force has a potential and creep forces are
@@ -25,7 +25,7 @@ from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import RATE, REFERENCE_MASS
 from railsim.kernels.system import AXLEBOX, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
-from railsim.linear.coordinates import track_places
+from railsim.linear.coordinates import track_indices
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, components_of, without_loads, work_arrays
 from railsim.notation import COMPONENTS
@@ -92,7 +92,7 @@ class SteadyRolling:
         Parameters
         ----------
         guess : float64[n_state]
-            Positions and spin rates count; place and time are kept.
+            Positions and spin rates count; position and time are kept.
         speed : float
             [m/s].
 
@@ -229,7 +229,7 @@ class SteadyRolling:
 def _conditions(
     model: Model, system: System, held: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Places of unknowns and equations in state and derivative; inertia of each equation."""
+    """Indices of unknowns and equations in state and derivative; inertia of each equation."""
     n = model.index.n_bodies
     bodies = system.bodies
     unknowns, equations, inertias = [], [], []
@@ -246,7 +246,7 @@ def _conditions(
                 float(bodies.mass[body] if component < 3 else bodies.inertia[body, component - 3])
             )
     if not held:
-        track, _ = track_places(model)
+        track, _ = track_indices(model)
         unknowns += track
         equations += [RATE + k for k in track]
         inertias += [REFERENCE_MASS] * len(track)

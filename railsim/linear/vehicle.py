@@ -14,7 +14,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, ModelError, argument_fault
 from railsim.kernels.internal import PAD
 from railsim.kernels.system import FIXED, RIGID, System
-from railsim.linear.circle import PLACE, circle
+from railsim.linear.circle import POSITION, circle
 from railsim.linear.coordinates import Coordinates, FreeVehicle, coordinates
 from railsim.linear.harmonic import ContactPath
 from railsim.linear.steady import SteadyRolling, SteadyState, led
@@ -146,7 +146,7 @@ class LinearVehicle:
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
         self._known: dict[float, SteadyState] = {}
         self._rest = balance.state.copy()
-        self._rest[-2] = PLACE
+        self._rest[-2] = POSITION
         there = circle(track, curvature=self.curvature, cant=cant)
         check_fixed(assembled.flat, there)
         self.system = without_loads(self.model.system)._replace(track=track_tables(there))

@@ -1,4 +1,4 @@
-"""Everything that a mechanism file asks for, computed: `analyse` is the place to begin reading."""
+"""Everything that a mechanism file asks for, computed: `analyse` is where to begin reading."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

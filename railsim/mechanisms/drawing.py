@@ -93,11 +93,11 @@ def _cam(motion: Motion, name: str) -> Line:
         angles = begin + turn * np.linspace(0.0, swept, ARC_POINTS)
         radius, k = linkage.arc_radius[0, arc], linkage.arc_point[arc]
         cx, cy = linkage.point[0, k]
-        places = [
+        positions = [
             motion.at(linkage.point_body[k], cx + radius * np.cos(a), cy + radius * np.sin(a))[0]
             for a in angles
         ]
-        parts.append(np.stack(places, axis=1))
+        parts.append(np.stack(positions, axis=1))
     return Line("cam", name, np.concatenate(parts, axis=1))
 
 
@@ -107,13 +107,13 @@ def points(motion: Motion) -> dict[str, Floats]:
 
 
 def joint_points(motion: Motion) -> dict[str, str]:
-    """The name under which each place is shown: points held together have one, by first point."""
+    """The name under which each point is shown: points held together have one, by first point."""
     shown: dict[str, str] = {}
     known = points(motion)
     taken: list[tuple[Floats, str]] = []
     size = float(motion.model.linkage.size)
     for name, xy in known.items():
-        same = [other for place, other in taken if np.max(np.abs(place - xy)) < 1e-9 * size]
+        same = [other for position, other in taken if np.max(np.abs(position - xy)) < 1e-9 * size]
         shown[name] = same[0] if same else name
         if not same:
             taken.append((xy, name))

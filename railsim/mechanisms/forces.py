@@ -6,7 +6,7 @@ With the driver `s` as the only coordinate (primes by s)
     M s'' + M' s'^2/2 = Q
 
 (virtual work and Lagrange's equation of one coordinate; A. Sommerfeld, Mechanik, 1943, ch. VI).
-A force F at a place r has the generalised force F r'; one between two points at the distance L,
+A force F at a point r has the generalised force F r'; one between two points at the distance L,
 positive when it pushes, F L'.
 """
 
@@ -72,7 +72,7 @@ def masses(motion: Motion) -> list[tuple[Any, Any, Any, Any]]:
         m, inertia = model.number(body.mass), model.number(body.inertia)
         if np.any(np.real(m) != 0.0) or np.any(np.real(inertia) != 0.0):
             k = model.bodies[name]
-            found.append((m, motion.at(k, *model.place(body.centre)), inertia, k))
+            found.append((m, motion.at(k, *model.position(body.centre)), inertia, k))
     for element in model.definition.elements.values():
         if isinstance(element, PointMass):
             found.append((model.number(element.mass), motion.point(element.point_mass), 0.0, 0))

@@ -144,8 +144,8 @@ class Judge:
         if model.end < model.start:
             order = order[::-1]
         motion = tangents(solve(model, both[order]), moved, second=False)
-        place = np.argsort(order, kind="stable")
-        return self._judged(motion, model, place[:GRID], place[GRID:])
+        rank = np.argsort(order, kind="stable")
+        return self._judged(motion, model, rank[:GRID], rank[GRID:])
 
     def _judged(self, motion: Motion, model: Model, grid: Any, zone: Any) -> Judgement:
         length, rate, _ = motion.length(self.pair)

@@ -47,14 +47,14 @@ class Motion:
     known: dict[str, Triple] = field(default_factory=dict, repr=False, compare=False)
 
     def point(self, name: str) -> Triple:
-        """Place of a named point with two derivatives, shapes (..., position, 2)."""
+        """Position of a named point with two derivatives, shapes (..., position, 2)."""
         if name not in self.known:
             k = self.model.points[name]
             self.known[name] = self.at(self.model.linkage.point_body[k], *self._local(k))
         return self.known[name]
 
     def arc_centre(self, joint: int) -> Any:
-        """Place of the centre of the arc that a cam's roller is on, shape (position, 2)."""
+        """Position of the centre of the arc that a cam's roller is on, shape (position, 2)."""
         linkage = self.model.linkage
         found = np.zeros((self.s.shape[-1], 2))
         for arc in np.unique(self.arcs[:, joint]):
@@ -68,7 +68,7 @@ class Motion:
         return (u[:, :1], u[:, 1:]) if np.iscomplexobj(u) else (u[0, 0], u[0, 1])
 
     def at(self, body: int, u: Any, v: Any) -> Triple:
-        """As `point`, for a place (u, v) in the axes of a body."""
+        """As `point`, for a point (u, v) in the axes of a body."""
         x, y, theta = (self.q[..., body, i] for i in range(3))
         c, s = np.cos(theta), np.sin(theta)
         ax, ay = c * u - s * v, s * u + c * v

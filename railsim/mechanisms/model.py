@@ -56,8 +56,8 @@ class Model:
         """Value of a number of the file."""
         return number(quantity, self.values)
 
-    def place(self, where: Any) -> tuple[Values, Values]:
-        """Coordinates of a place of the file in its body's axes [m]."""
+    def position(self, where: Any) -> tuple[Values, Values]:
+        """Coordinates of a point of the file in its body's axes [m]."""
         return place(where, self.values)
 
     def lanes(self, names: Sequence[str]) -> "Model":
@@ -151,9 +151,9 @@ class _Arrays:
         self.bodies = {"ground": 0, **{name: i + 1 for i, name in enumerate(definition.bodies)}}
         self.points = {name: i for i, name in enumerate(point_names(definition))}
         self.body_of = [self.bodies[name.partition(".")[0]] for name in self.points]
-        places = list(definition.ground.points.values())
-        places += [w for body in definition.bodies.values() for w in body.points.values()]
-        self.place = [self._filled(place(where, values)) for where in places]
+        positions = list(definition.ground.points.values())
+        positions += [w for body in definition.bodies.values() for w in body.points.values()]
+        self.position = [self._filled(place(where, values)) for where in positions]
         self.joint: list[list[int]] = []
         self.value: list[Any] = []
         self.arc_point: list[int] = []
@@ -208,11 +208,11 @@ class _Arrays:
             body, arcs = self.bodies[cam.body], centred_arcs(cam, self.values)
         else:
             body = self.body_of[self.points[cam.path]]
-            start = self.place[self.points[cam.path]]
+            start = self.position[self.points[cam.path]]
             arcs = tangent_arcs(cam, start[:, :1], start[:, 1:], self.values)
         for x, y, radius, ends in arcs:
-            self.arc_point.append(len(self.place))
-            self.place.append(self._filled((x, y)))
+            self.arc_point.append(len(self.position))
+            self.position.append(self._filled((x, y)))
             self.body_of.append(body)
             self.arc_radius.append(self._filled((radius,))[:, 0])
             self.arc_ends.append(ends)
@@ -229,12 +229,12 @@ class _Arrays:
             axis = kernel.X if driver.axis == "x" else kernel.Y
             drive = [axis, self.points[driver.coordinate], 0]
         radii: NDArray[Any] = np.array(self.arc_radius, dtype=self.dtype).reshape(-1, self.lanes)
-        places = np.array(self.place)
+        positions = np.array(self.position)
         return Linkage(
             len(self.bodies) - 1,
-            float(np.max(np.abs(places[:, 0].real))),
+            float(np.max(np.abs(positions[:, 0].real))),
             np.array(self.body_of, dtype=np.int64),
-            np.ascontiguousarray(places.transpose(1, 0, 2)),
+            np.ascontiguousarray(positions.transpose(1, 0, 2)),
             np.array(self.joint, dtype=np.int64),
             np.ascontiguousarray(np.array(self.value).transpose(1, 0, 2)),
             np.array(self.arc_point, dtype=np.int64),
@@ -328,9 +328,9 @@ def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> 
                 body, other = known.partition(".")[0], new.partition(".")[0]
                 if body in placed and other not in placed:
                     k = arrays.bodies[other]
-                    at = _world(pose[arrays.bodies[body]], arrays.place[arrays.points[known]])
+                    at = _world(pose[arrays.bodies[body]], arrays.position[arrays.points[known]])
                     pose[k, :2] = 0.0
-                    pose[k, :2] = at - _world(pose[k], arrays.place[arrays.points[new]])
+                    pose[k, :2] = at - _world(pose[k], arrays.position[arrays.points[new]])
                     placed.add(other)
                     moved = True
     return pose

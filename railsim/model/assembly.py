@@ -1,6 +1,6 @@
 """From definitions to the flat arrays of `railsim.kernels.system`, and names to numbers.
 
-`assemble` is the only place that knows both sides: what a user wrote (bodies, elements with names)
+Only `assemble` knows both sides: what a user wrote (bodies, elements with names)
 and what the kernels read (arrays with indices).  `Index` keeps the way back.
 """
 
@@ -78,7 +78,7 @@ class Index:
         return len(self.bodies)
 
     def coordinate(self, body: str, component: int) -> int:
-        """Place of a coordinate in the state vector."""
+        """Index of a coordinate in the state vector."""
         return 6 * self.bodies.index(body) + component
 
 
@@ -283,14 +283,14 @@ def _bodies(flat: FlatVehicle) -> tuple[Bodies, Floats]:
     """Arrays of the bodies, and the arc length of each track frame from the reference body."""
     names = _names(flat.bodies)
     origin = flat.body(flat.reference).position[0]
-    places = [round(body.position[0] - origin, 9) for body in flat.bodies]
-    offsets = sorted(set(places))
+    positions = [round(body.position[0] - origin, 9) for body in flat.bodies]
+    offsets = sorted(set(positions))
     kinds = np.array(
         [FIXED if body.fixed else _KINDS[body.kind] for body in flat.bodies], dtype=np.int64
     )
     bodies = Bodies(
         kind=kinds,
-        frame=np.array([offsets.index(place) for place in places], dtype=np.int64),
+        frame=np.array([offsets.index(position) for position in positions], dtype=np.int64),
         parent=np.array(
             [names.index(body.parent) if body.parent else -1 for body in flat.bodies],
             dtype=np.int64,

@@ -1,7 +1,7 @@
 """Force elements of a vehicle as rows of arrays (see `railsim.kernels.system`).
 
 Every kind of element becomes a link (point to point), a mount (three axes) or a load (given force),
-with internal states where its force has a memory.  A mount's point on body 1 is the place of its
+with internal states where its force has a memory.  A mount's point on body 1 is the location of its
 point on body 2 in the nominal position, reached rigidly: the deflection is zero there.
 """
 
@@ -134,11 +134,11 @@ class ElementArrays:
     def _add_mount(self, element: FlatElement, law: Element) -> None:
         point1, point2 = np.array(element.point1), np.array(element.point2)
         middle = 0.5 * (point1 + point2)
-        place = middle if isinstance(law, ShearSpring) else point2
+        point = middle if isinstance(law, ShearSpring) else point2
         row: dict[str, Any] = {
             "name": element.name,
             "body": self._pair(element),
-            **self._levers(element, place, place),
+            **self._levers(element, point, point),
             "stiffness": _NOTHING,
             "damping": _NOTHING,
             "preload": _NOTHING,
@@ -408,8 +408,8 @@ def _table(rows: list[dict[str, Any]], columns: Mapping[str, slice], size: int) 
     """Values of all names in their columns, one row an element."""
     table = aligned_zeros((len(rows), size))
     for row, values in zip(table, rows, strict=True):
-        for name, place in columns.items():
-            row[place] = values[name]
+        for name, span in columns.items():
+            row[span] = values[name]
     return table
 
 

@@ -208,8 +208,8 @@ class _Balance:
         if system.support.elastic:
             first = model.n_state - N_SCALARS - SUPPORT_SIZE * len(system.contact.body)
             moving = DOF if system.support.sleeper else RAIL_DOF
-            places = first + SUPPORT_SIZE * np.arange(len(system.contact.body))
-            degrees = (places[:, None] + np.arange(moving)).ravel().tolist()
+            starts = first + SUPPORT_SIZE * np.arange(len(system.contact.body))
+            degrees = (starts[:, None] + np.arange(moving)).ravel().tolist()
             self._unknowns += degrees
             self._equations += [RATE + k for k in degrees]
         for i in np.flatnonzero(system.internal.kind == AIR):
@@ -380,7 +380,7 @@ def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) 
     Parameters
     ----------
     frames : float64[n_frames, FRAME_SIZE]
-        Track frames at the bodies' places for this `s`.
+        Track frames at the bodies' positions for this `s`.
     """
     state = balance.state.copy()
     state[-2] = s

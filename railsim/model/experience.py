@@ -127,12 +127,12 @@ def _largest(names: Sequence[str], shape: Floats) -> str:
 
 def _network(flat: FlatVehicle, names: Sequence[str]) -> tuple[Floats, Floats]:
     """Vertical stiffness and damping matrices of the bodies `names`, all others held."""
-    place = {name: k for k, name in enumerate(names)}
+    index = {name: k for k, name in enumerate(names)}
     matrices = np.zeros((2, len(names), len(names)))
     for element in flat.elements:
         values = np.array([_upright(element) * element.definition.vertical_stiffness, 0.0])
         values[1] = _upright(element) * element.definition.vertical_damping
-        ends = [place[body] for body in (element.body1, element.body2) if body in place]
+        ends = [index[body] for body in (element.body1, element.body2) if body in index]
         for i in ends:
             for j in ends:
                 matrices[:, i, j] += values if i == j else -values

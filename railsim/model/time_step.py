@@ -220,7 +220,7 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
 
 
 def _jacobian(function, state: Floats, step: float = 1e-8) -> Floats:  # type: ignore[no-untyped-def]
-    """Jacobian by forward differences; the place along the track and the speed stay as they are."""
+    """Jacobian by forward differences; position along the track and speed stay as they are."""
     base = function(state)
     size = len(state) - N_SCALARS
     columns = np.empty((size, size))

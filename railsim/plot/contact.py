@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from railsim.contact.curves import inclined_to_track, rail_curve, tape_circle_place
+from railsim.contact.curves import inclined_to_track, rail_curve, tape_circle_position
 from railsim.contact.elastic import LoadedContact
 from railsim.contact.exact_normal import ExactContact
 from railsim.contact.geometry import ContactGeometry
@@ -74,7 +74,7 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
     sign = 2.0 * side - 1.0
     rail_y, rail_z = inclined_to_track(pair.rail, pair.gauge, pair.inclination)
     head = rail_curve(pair.rail, pair.gauge, pair.inclination)
-    tape = tape_circle_place(pair.back_to_back)
+    tape = tape_circle_position(pair.back_to_back)
     axes.plot(sign * 1e3 * rail_y, -1e3 * rail_z, color=RAIL)
     wheel_y, wheel_z = 1e3 * (pair.wheel.y + tape), -1e3 * pair.wheel.z
     axes.plot(sign * wheel_y, wheel_z + LIFT, color=WHEEL)

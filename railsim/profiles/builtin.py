@@ -56,7 +56,7 @@ S1002_ROOT = (
 
 
 def s1002_height(y: Array) -> Array:
-    """Height of the S1002 contour [mm] at the lateral place y [mm], flange at negative y.
+    """Height of the S1002 contour [mm] at the lateral position y [mm], flange at negative y.
 
     Source: EN 13715, wheel profile S1002 (also UIC 510-2), sections A to H.  The standard's
     polynomials join with steps of 1.2e-4 mm at -35 mm and 4e-5 mm at -26 mm.
@@ -90,11 +90,11 @@ def s1002_height(y: Array) -> Array:
 
 
 def even_points(y: Array, z: Array, spacing: float) -> Array:
-    """Lateral places at about equal distances along the contour through the given points."""
+    """Lateral positions at about equal distances along the contour through the given points."""
     length = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))))
     n = max(int(np.ceil(length[-1] / spacing)), 1)
-    places: Array = np.interp(np.linspace(0.0, length[-1], n + 1), length, y)
-    return places
+    positions: Array = np.interp(np.linspace(0.0, length[-1], n + 1), length, y)
+    return positions
 
 
 def s1002() -> Profile:

@@ -23,7 +23,7 @@ from railsim.text import printable
 Kind = Literal["wheel", "rail"]
 
 FLANGE_BACK = -0.070
-"""Lateral place of the flange back from the nominal rolling circle [m] (EN 13715: 70 mm)."""
+"""Lateral position of the flange back from the nominal rolling circle [m] (EN 13715: 70 mm)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -304,7 +304,7 @@ def _miniprof(file: str, lines: list[str]) -> RawProfile:
 
 
 def _miniprof_columns(file: str, line: int, value: str) -> list[int]:
-    """Places of X and Y in a column definition such as ``X,Y,A,C``."""
+    """Indices of X and Y in a column definition such as ``X,Y,A,C``."""
     names = [name.strip().upper() for name in value.split(",")]
     if "X" not in names or "Y" not in names:
         raise _fault(file, line, f"ColumnDef={value}", "the columns X and Y are needed")

@@ -5,7 +5,7 @@ points out of order, z up instead of down, mirrored, origin at the flange back, 
 already inclined, duplicate points, single outliers, measuring noise.  What cannot be recognised is
 refused with the line and a remedy: gaps, vertical steps, a rail given as wheel, too few points.
 
-The shape of a wheel: a tread at least 30 mm wide and a flange, the highest place of the contour
+The shape of a wheel: a tread at least 30 mm wide and a flange, the highest point of the contour
 seen from the rail, within its first half and round (the contour turns back behind it).  The shape
 of a rail: a crown from which the contour only falls, 14 mm or more on the gauge side.
 """
@@ -77,7 +77,7 @@ def recognised_profile(raw: RawProfile, file: str, kind: Kind | None = None) -> 
     inclination = 0.0
     if kind == "wheel":
         _orient_wheel(work)
-        _place_wheel(work)
+        _shift_wheel(work)
     else:
         inclination = _orient_rail(work)
     _check_steps(work, kind)
@@ -263,18 +263,18 @@ def _rail_like(work: Points) -> bool:
     return False
 
 
-def _place_wheel(work: Points) -> None:
+def _shift_wheel(work: Points) -> None:
     """Origin at the nominal rolling circle; from the flange back where the file has it there."""
     tip = int(np.argmax(work.z))
     before = work.y[: tip + 1]
     back = float(before.min())
     slope_back = np.abs(np.diff(work.z[: tip + 1])) > 5.0 * np.abs(np.diff(before))
     has_back = bool(slope_back.any()) and float(work.z[tip] - work.z[: tip + 1].min()) > 5e-3
-    place = float(work.y[tip])
-    if not -0.066 < place < -0.045:
+    tip_y = float(work.y[tip])
+    if not -0.066 < tip_y < -0.045:
         if not has_back:
             raise work.fail(
-                f"the flange's tip lies at y = {1e3 * place:.1f} mm and the flange back is missing",
+                f"the flange's tip lies at y = {1e3 * tip_y:.1f} mm and the flange back is missing",
                 "give y from the nominal rolling circle: flange back at -70 mm, tip near -55 mm",
             )
         shift = FLANGE_BACK - back
@@ -295,10 +295,10 @@ def _place_wheel(work: Points) -> None:
     work.z = work.z - level
 
 
-def _function_part(y: Array, z: Array, place: float) -> tuple[Array, Array]:
-    """Run of increasing y around the outermost point near a lateral place."""
-    near = np.flatnonzero(np.abs(y - place) < 5e-3)
-    start = int(near[np.argmax(z[near])]) if near.size else int(np.argmin(np.abs(y - place)))
+def _function_part(y: Array, z: Array, position: float) -> tuple[Array, Array]:
+    """Run of increasing y around the outermost point near a lateral position."""
+    near = np.flatnonzero(np.abs(y - position) < 5e-3)
+    start = int(near[np.argmax(z[near])]) if near.size else int(np.argmin(np.abs(y - position)))
     first = last = start
     while first > 0 and y[first - 1] < y[first]:
         first -= 1

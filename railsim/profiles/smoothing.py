@@ -96,11 +96,11 @@ def _noise(s: Array, values: Array) -> float:
         return 0.0
     centre = np.arange(2, n - 2)
     weights = np.ones((centre.size, 4))
-    places = s[centre[:, None] + np.array([-2, -1, 1, 2])]
+    near = s[centre[:, None] + np.array([-2, -1, 1, 2])]
     for a in range(4):
         for b in range(4):
             if a != b:
-                weights[:, a] *= (s[centre] - places[:, b]) / (places[:, a] - places[:, b])
+                weights[:, a] *= (s[centre] - near[:, b]) / (near[:, a] - near[:, b])
     predicted = np.sum(weights * values[centre[:, None] + np.array([-2, -1, 1, 2])], axis=1)
     spread = np.sqrt(1.0 + np.sum(weights**2, axis=1))
     return float(np.median(np.abs(values[centre] - predicted) / spread) / 0.6745)

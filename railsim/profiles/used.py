@@ -29,8 +29,8 @@ def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:
         except InputError as error:
             shown = name if len(name) < 60 else f"{name[:57]}..."
             for fault in error.faults:
-                place = f", {fault.key}" if fault.key else ""
-                found = f"profile '{shown}'{place}: {fault.found}"
+                location = f", {fault.key}" if fault.key else ""
+                found = f"profile '{shown}'{location}: {fault.found}"
                 faults.append(Fault(file, key, found, fault.allowed))
     return faults
 

@@ -47,7 +47,7 @@ class Inputs:
 
 
 def check_types(vehicles: Sequence[object], track: object) -> None:
-    """Raise TypeError where a name or a file is given in place of what it stands for."""
+    """Raise TypeError where a name or a file is given instead of what it stands for."""
     for kind, wanted, given in [
         *(("vehicle", Vehicle, vehicle) for vehicle in vehicles),
         ("track", Track, track),
@@ -60,8 +60,8 @@ def check_types(vehicles: Sequence[object], track: object) -> None:
 def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
     """Speed at the start: as given, or from the settings' speed table [m/s]."""
     if settings.drive.speed_table is not None:
-        place, value = np.array(settings.drive.speed_table).T
-        return float(np.interp(start, place, value))
+        distance, value = np.array(settings.drive.speed_table).T
+        return float(np.interp(start, distance, value))
     if speed is None:
         raise InputError(
             [argument_fault("speed", "", "no speed is given", "a speed in m/s, e.g. 20")]

@@ -69,9 +69,9 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
 
 
 def _add(model: Model, name: str, change: InitialState, state: Floats) -> None:
-    place = model.index.coordinate(name, 0)
-    rate = 6 * model.index.n_bodies + place
-    state[place : place + 6] += (
+    first = model.index.coordinate(name, 0)
+    rate = 6 * model.index.n_bodies + first
+    state[first : first + 6] += (
         change.x, change.y, change.z, change.roll, change.pitch, change.yaw,
     )  # fmt: skip
     state[rate : rate + 6] += (
@@ -94,22 +94,22 @@ def _follow_contacts(
 
     It is moved there bit by bit, so that the contacts never lie deep in one another.
     """
-    place = model.index.coordinate(model.index.wheelsets[w], 0)
+    first = model.index.coordinate(model.index.wheelsets[w], 0)
     parts = max(1, round(abs(change.y) / LONGEST), round(abs(change.yaw) / TURN))
     trial = state.copy()
     for part in range(1, parts + 1):
         left = 1.0 - part / parts
-        trial[[place + 1, place + 5]] = state[[place + 1, place + 5]]
-        trial[place + 1] -= left * change.y
-        trial[place + 5] -= left * change.yaw
-        if not _carries(model, w, place, wanted, trial):
+        trial[[first + 1, first + 5]] = state[[first + 1, first + 5]]
+        trial[first + 1] -= left * change.y
+        trial[first + 5] -= left * change.yaw
+        if not _carries(model, w, first, wanted, trial):
             return
-    state[[place + 2, place + 3]] = trial[[place + 2, place + 3]]
+    state[[first + 2, first + 3]] = trial[[first + 2, first + 3]]
 
 
-def _carries(model: Model, w: int, place: int, wanted: Floats, trial: Floats) -> bool:
+def _carries(model: Model, w: int, first: int, wanted: Floats, trial: Floats) -> bool:
     """Find the height and roll at which wheelset `w` carries `wanted`, by Newton's method."""
-    moved = [place + 2, place + 3]
+    moved = [first + 2, first + 3]
     for _ in range(_STEPS):
         loads = _wheel_loads(model, trial)
         if loads is None:

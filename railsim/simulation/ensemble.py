@@ -1,11 +1,11 @@
 """Several vehicles on one track as one system: many runs per compiled call.
 
-The vehicles share time, place and speed and do not interact; each has its own bodies,
+The vehicles share time, position and speed and do not interact; each has its own bodies,
 elements and wheels.  In the time loop FASTSIM then marches the strips of all their wheels side by
 side, and what a call or an evaluation costs by itself is spent once.
 
 Arrays hold vehicle after vehicle, indices are moved on accordingly; but mounts of one kind are
-together, and a track frame serves all vehicles that have a body at its place.  Nothing large is
+together, and a track frame serves all vehicles that have a body at its position.  Nothing large is
 copied: equal contact tables are one, and so is the track's table.
 """
 
@@ -66,7 +66,7 @@ class Part:
     Attributes
     ----------
     state : int64[n_state]
-        Places of its own state; the last three, time, place and speed, are those of all.
+        Indices of its own state; the last three, time, position and speed, are those of all.
     bodies, wheelsets, elements : slice
         Its bodies, wheelsets and recorded elements.
     """
@@ -107,7 +107,7 @@ class Ensemble:
         n, m = bodies[-1].stop, internal[-1].stop
         track = SUPPORT_SIZE * systems[0].support.elastic  # of each wheelset
         self.parts = tuple(
-            Part(_places(n, m, track, own, inner, axles, wheelsets[-1].stop), own, axles, chosen)
+            Part(_indices(n, m, track, own, inner, axles, wheelsets[-1].stop), own, axles, chosen)
             for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
         )
         if len(models) == 1:
@@ -275,9 +275,9 @@ def _joined_recorder(
 
     links = _starts(len(system.links.length) for system in systems)
     mounts = _starts(len(system.mounts.body) for system in systems)
-    place = np.argsort(_order_of_mounts(systems))
+    moved = np.argsort(_order_of_mounts(systems))
     chosen = [
-        (group, index + links[k] if group == LINK else place[index + mounts[k]])
+        (group, index + links[k] if group == LINK else moved[index + mounts[k]])
         for k, recorder in enumerate(recorders)
         for group, index in recorder.chosen.tolist()
     ]
@@ -322,10 +322,10 @@ def _slices(lengths: Iterable[int]) -> list[slice]:
     return [slice(start, end) for start, end in pairwise(ends)]
 
 
-def _places(
+def _indices(
     n: int, m: int, track: int, bodies: slice, internal: slice, wheelsets: slice, w: int
 ) -> Ints:
-    """Places of one vehicle's state in that of n bodies, m internal states, w wheelsets' tracks."""
+    """Indices of one vehicle's state in that of n bodies, m internal states, w wheelsets."""
     coordinates = np.arange(6 * bodies.start, 6 * bodies.stop)
     inner = np.arange(internal.start, internal.stop)
     first = 18 * n + 2 * m

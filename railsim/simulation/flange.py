@@ -33,18 +33,18 @@ def tightest_curve(track: Track) -> tuple[float, float] | None:
     """Curvature [1/m] and cant [m] in the tightest curve; None where all are wide."""
     sections = curvature_sections(track)
     ends = [
-        (abs(value), value, place)
+        (abs(value), value, s)
         for section in sections
-        for value, place in ((section.start_value, section.begin), (section.end_value, section.end))
+        for value, s in ((section.start_value, section.begin), (section.end_value, section.end))
     ]
-    size, curvature, place = max(ends)
+    size, curvature, s = max(ends)
     if size < 1.0 / WIDEST:
         return None
     for section in sections:
         if section.start_value == section.end_value == curvature:
-            place = 0.5 * (section.begin + section.end)
+            s = 0.5 * (section.begin + section.end)
             break
-    return curvature, float(alignment_of(track).cant(place))
+    return curvature, float(alignment_of(track).cant(s))
 
 
 def in_flange_contact(

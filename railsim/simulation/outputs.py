@@ -61,7 +61,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     outwards = np.array([-1.0, 1.0])
     # a wheel that carries nothing has no derailment quotient
     loaded = np.where(Q > 0.0, Q, np.nan)
-    places = model.system.frame_offset[model.system.bodies.frame[axles]]
+    offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
     lateral, roll = position[:, axles, LATERAL], position[:, axles, ROLL]
     if model.system.support.elastic:
         deflection = rail_deflection(model, state)
@@ -80,7 +80,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "wheelset_lateral": lateral,
         "wheelset_roll": roll,
         "wheelset_yaw": position[:, axles, YAW],
-        "wheelset_distance": state[:, -2, None] + places + position[:, axles, 0],
+        "wheelset_distance": state[:, -2, None] + offsets + position[:, axles, 0],
         "xi_x": wheel[..., W_XI_X],
         "xi_y": wheel[..., W_XI_Y],
         "phi": wheel[..., W_PHI],
@@ -128,7 +128,7 @@ def rail_deflection(model: Model, state: Floats) -> Floats:
 
 
 def run_extremes(extremes: Floats, Q0: Floats) -> dict[str, Floats]:
-    """Largest and smallest values over all steps of a run, each with its time and place.
+    """Largest and smallest values over all steps of a run, each with its time and position.
 
     Parameters
     ----------
@@ -322,14 +322,14 @@ class OutputPlan:
         }
         return _Chunk(values, later)
 
-    def _track(self, place: Floats) -> dict[str, Floats]:
-        rails = np.zeros((4, *place.shape))
+    def _track(self, distance: Floats) -> dict[str, Floats]:
+        rails = np.zeros((4, *distance.shape))
         if self._irregularity is not None:
-            rails = self._irregularity(place.ravel())[0].reshape(4, *place.shape)
+            rails = self._irregularity(distance.ravel())[0].reshape(4, *distance.shape)
         return {
-            "track_curvature": self._alignment.curvature(place),
-            "track_cant": self._alignment.cant(place),
-            "track_gradient": self._alignment.gradient(place),
+            "track_curvature": self._alignment.curvature(distance),
+            "track_cant": self._alignment.cant(distance),
+            "track_gradient": self._alignment.gradient(distance),
             "rail_lateral": np.stack((rails[0], rails[2]), axis=-1),
             "rail_vertical": np.stack((rails[1], rails[3]), axis=-1),
         }

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, PLACE
+from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
 from railsim.simulation.advance import Run
 from railsim.simulation.outputs import run_extremes
@@ -68,18 +68,18 @@ def beyond_experience(
     ratio = extremes["Q"][0] / Q0
     w, side = _largest(ratio)
     if ratio[w, side] > MOST_Q:
-        place = _place(extremes, "Q", (0, w, side), f"{wheelsets[w]}, {SIDES[side]}")
+        where = _where(extremes, "Q", (0, w, side), f"{wheelsets[w]}, {SIDES[side]}")
         found.append(
-            f"The largest Q is {ratio[w, side]:.3g} times the static wheel load ({place}), beyond "
+            f"The largest Q is {ratio[w, side]:.3g} times the static wheel load ({where}), beyond "
             f"all experience (limit {MOST_Q:g}): the forces of this run are not to be relied upon."
         )
     limit = 10e3 + Q0.sum(axis=1) / 3.0
     ratio = np.abs(extremes["sum_Y"]) / limit
     row, w = _largest(ratio)
     if ratio[row, w] > MOST_SUM_Y:
-        place = _place(extremes, "sum_Y", (row, w), wheelsets[w])
+        where = _where(extremes, "sum_Y", (row, w), wheelsets[w])
         found.append(
-            f"The largest sum_Y is {abs(extremes['sum_Y'][row, w]) / 1e3:.4g} kN ({place}), "
+            f"The largest sum_Y is {abs(extremes['sum_Y'][row, w]) / 1e3:.4g} kN ({where}), "
             f"{ratio[row, w]:.3g} times the limit 10 kN + P0/3 of EN 14363, beyond all experience "
             f"(limit {MOST_SUM_Y:g}): the forces of this run are not to be relied upon."
         )
@@ -102,22 +102,22 @@ def lifted_wheels(
     if number == 0:
         return ()
     w, side = (int(k) for k in np.unravel_index(np.argmax(unloaded), unloaded.shape))
-    place = _place(extremes, "Q", (1, w, side), "first at")
+    where = _where(extremes, "Q", (1, w, side), "first at")
     who = f"{wheelsets[w]}, {SIDES[side]}"
     others = "" if number == 1 else f"; {number} wheels in all were off their rails"
     return (
         f"A wheel lifts off its rail: {who}, for {1e3 * unloaded[w, side]:.3g} ms altogether "
-        f"({place}){others}.",
+        f"({where}){others}.",
     )
 
 
 def _largest(ratio: Floats) -> tuple[int, ...]:
-    """Place of the largest value; of a run that ended before its first instant all are NaN."""
+    """Index of the largest value; of a run that ended before its first instant all are NaN."""
     known = np.where(np.isnan(ratio), -np.inf, ratio)
     return tuple(int(k) for k in np.unravel_index(np.argmax(known), ratio.shape))
 
 
-def _place(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str) -> str:
+def _where(extremes: Mapping[str, Floats], name: str, index: tuple[int, ...], words: str) -> str:
     """Say when and where an extreme value occurs."""
     time, s = (float(extremes[f"{name}_{fact}"][index]) for fact in ("time", "distance"))
     return f"{words}{'' if words.endswith('at') else ','} t = {time:.2f} s, s = {s:.1f} m"
@@ -180,7 +180,7 @@ def vibration(
     w, side = (int(index) for index in np.unravel_index(np.argmax(share), share.shape))
     if not share[w, side] > VIBRATES:
         return ()
-    frequency, place = measured[w, side, FREQUENCY], measured[w, side, PLACE]
+    frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
     if irregular:
         cause = "excited by the irregularities of the rails"
     else:
@@ -190,5 +190,5 @@ def vibration(
     return (
         f"The wheel loads vibrate above {CUT_OFF:g} Hz: {100.0 * share[w, side]:.0f} % of Q0 at "
         f"{frequency:.0f} Hz on the {('left', 'right')[side]} wheel of {wheelsets[w]}, vehicle at "
-        f"s = {place:.0f} m; {cause}.",
+        f"s = {position:.0f} m; {cause}.",
     )

@@ -39,7 +39,7 @@ from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System, Work
 from railsim.kernels.time_loop import FAST
-from railsim.linear.circle import PLACE, circle
+from railsim.linear.circle import POSITION, circle
 from railsim.linear.steady import NotConverged, led
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium, initial_state
@@ -117,7 +117,7 @@ def _arrived(
 ) -> Floats:
     """State at `start` after so many steps over the real track."""
     speed = float(balance.state[-1])
-    place = start - steps * speed * step
+    s = start - steps * speed * step
     before = 0.0
 
     def settling(done: float, whole: float) -> None:
@@ -130,13 +130,13 @@ def _arrived(
         if progress is not None:
             progress(before + done, before + whole)
 
-    state = None if remark is None else _steady(model, balance, track, place, remark)
+    state = None if remark is None else _steady(model, balance, track, s, remark)
     if state is None:
-        state = settled(model, balance, track, place, step, settling)
+        state = settled(model, balance, track, s, step, settling)
     if state is None:
-        work = _located(model, place)
-        state = initial_state(model, balance, place, work.frames)
-    state[-2] = place
+        work = _located(model, s)
+        state = initial_state(model, balance, s, work.frames)
+    state[-2] = s
     if steps:
         follow_rails(model, state)
         system = without_loads(model.system)._replace(drive=CONSTANT_SPEED)
@@ -145,12 +145,12 @@ def _arrived(
     return state
 
 
-def _friction(track: Track, place: float) -> tuple[float, float]:
-    """Coefficients of friction of the left and right rail at a place."""
+def _friction(track: Track, s: float) -> tuple[float, float]:
+    """Coefficients of friction of the left and right rail at `s`."""
     if track.friction_table is None:
         return track.friction
     table = np.array(track.friction_table)
-    left, right = (float(np.interp(place, table[:, 0], table[:, k])) for k in (1, -1))
+    left, right = (float(np.interp(s, table[:, 0], table[:, k])) for k in (1, -1))
     return left, right
 
 
@@ -181,7 +181,7 @@ def _way_from_constant(
 ) -> float:
     """Way to the start from where the track under the vehicle does not change [m].
 
-    0 where it is such a place; where there is none, as far as one goes back at most.
+    0 where the start is such a point; where there is none, as far as one goes back at most.
     """
     farthest = min(max(LONGEST_APPROACH_TIME * speed, LONGEST_APPROACH), room)
     ways = np.arange(0.0, max(farthest, 0.0) + 0.5, 0.5)
@@ -199,14 +199,14 @@ def _way_from_constant(
     return float(farthest)
 
 
-def _located(model: Model, place: float) -> Work:
-    """Work arrays with the track frames and rails of a vehicle at `place`."""
+def _located(model: Model, s: float) -> Work:
+    """Work arrays with the track frames and rails of a vehicle at `s`."""
     system = model.system
     work = work_arrays(system)
     reference = system.bodies.frame[system.bodies.references[0]]
     if (
         locate_frames(
-            system.track, system.frame_offset, reference, place, work.frames, work.cell, work.cell_u
+            system.track, system.frame_offset, reference, s, work.frames, work.cell, work.cell_u
         )
         != RUNNING
     ):
@@ -228,13 +228,13 @@ def follow_rails(model: Model, state: Floats) -> None:
     speed, n = state[-1], model.index.n_bodies
     plane = _located(model, float(state[-2])).plane
     for w, body in enumerate(model.system.contact.body):
-        place, rate = 6 * body, 6 * n + 6 * body
+        first, rate = 6 * body, 6 * n + 6 * body
         height = model.system.bodies.nominal[body, 1]
         # the centre of the wheelset leans over with the rails
-        state[place + 1] += plane[w, MIDDLE_Y] - height * plane[w, SINE]
-        state[place + 2] += plane[w, MIDDLE_Z]
-        state[place + 3] += plane[w, ROLL]
-        state[place + 5] += plane[w, SLOPE_Y]
+        state[first + 1] += plane[w, MIDDLE_Y] - height * plane[w, SINE]
+        state[first + 2] += plane[w, MIDDLE_Z]
+        state[first + 3] += plane[w, ROLL]
+        state[first + 5] += plane[w, SLOPE_Y]
         state[rate + 1] += speed * (plane[w, SLOPE_Y] - height * plane[w, ROLL_SLOPE])
         state[rate + 2] += speed * plane[w, SLOPE_Z]
         state[rate + 3] += speed * plane[w, ROLL_SLOPE]
@@ -268,10 +268,10 @@ def _run(
         )
 
 
-def _curve(track: Track, place: float) -> tuple[float, float]:
-    """Curvature [1/m] and cant [m] at a place, 0 where negligible."""
+def _curve(track: Track, s: float) -> tuple[float, float]:
+    """Curvature [1/m] and cant [m] at `s`, 0 where negligible."""
     alignment = alignment_of(track)
-    curvature, cant = float(alignment.curvature(place)), float(alignment.cant(place))
+    curvature, cant = float(alignment.curvature(s)), float(alignment.cant(s))
     return (
         curvature if abs(curvature) >= NEGLIGIBLE else 0.0,
         cant if abs(cant) >= NEGLIGIBLE else 0.0,
@@ -301,7 +301,7 @@ def _steady(
         return level._replace(track=track_tables(part)), speed
 
     rolling = balance.state.copy()
-    rolling[-2] = PLACE
+    rolling[-2] = POSITION
     try:
         state = led(model, along, rolling)[0].state
     except NotConverged as error:
@@ -333,7 +333,7 @@ def settled(
     Returns
     -------
     float64[n_state] or None
-        Relative to the track frames; time, place and speed are those of `balance`.
+        Relative to the track frames; time, position and speed are those of `balance`.
 
     Raises
     ------

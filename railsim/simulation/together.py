@@ -107,7 +107,7 @@ def outcomes(
     progress: Progress | None = None,
     profiles: Mapping[str, Profile] | None = None,
 ) -> list[Result | Exception]:
-    """As `simulate_together`, but with the error in place of the result of a vehicle that fails."""
+    """As `simulate_together`, but with the error instead of the result of a vehicle that fails."""
     check_types(vehicles, track)
     settings = settings or Settings()
     inputs = Inputs.checked(track, settings, speed, start, duration, until)

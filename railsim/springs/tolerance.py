@@ -1,6 +1,6 @@
 """How far the ride height scatters because springs are not made exactly as drawn.
 
-The places of the seats on frame and arm are those of the nominal nest; wire, mean diameter, coils,
+The seats on frame and arm keep their positions in the nominal nest; wire, mean diameter, coils,
 free height, shear modulus and bush deviate within their tolerances, and the arm finds its
 equilibrium.  What changes is the height of the bogie frame above the axle, `-L sin(phi)` measured
 at the hinge, positive when the frame stands too high.

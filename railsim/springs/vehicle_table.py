@@ -82,16 +82,16 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
     ------
     InputError : no table `[vehicle]`, or a load that the nest cannot carry.
     """
-    place = suspension.vehicle
-    if place is None:
+    table = suspension.vehicle
+    if table is None:
         raise InputError([Fault(suspension.name, "vehicle", "missing", "needed: where it goes")])
-    name = place.load if load is None else load
+    name = table.load if load is None else load
     _, (case,) = load_cases(suspension, {name: suspension.loads[name]})
-    nest, remarks = _nest(suspension, place, case)
+    nest, remarks = _nest(suspension, table, case)
     return VehiclePart(
-        assembly=place.assembly,
-        axleboxes={"arm": _axlebox(place)},
-        elements={"arm_bush": _bush(suspension, place, case), "coil_nest": nest},
+        assembly=table.assembly,
+        axleboxes={"arm": _axlebox(table)},
+        elements={"arm_bush": _bush(suspension, table, case), "coil_nest": nest},
         case=case,
         remarks=remarks,
     )
@@ -116,11 +116,11 @@ def vehicle_text(
     remove : sequence of str, optional
         Parts of that vehicle to remove; by default those of the table.
     """
-    place = suspension.vehicle
-    if place is None:
+    table = suspension.vehicle
+    if table is None:
         raise ValueError("the suspension has no vehicle table")
-    extends = place.extends if extends is None else extends
-    remove = place.remove if remove is None else remove
+    extends = table.extends if extends is None else extends
+    remove = table.remove if remove is None else remove
     head: dict[str, Any] = {
         "format": "railsim-vehicle/1",
         "name": f"{Path(extends).stem} on {suspension.name}",
@@ -144,40 +144,40 @@ def vehicle_text(
     return heading + notes + _INNERMOST_ARRAY.sub(_on_one_line, text)
 
 
-def _axlebox(place: VehicleTable) -> dict[str, Any]:
+def _axlebox(table: VehicleTable) -> dict[str, Any]:
     return {
-        "wheelset": place.wheelset,
-        "position": _rounded([0.0, place.lateral_position, -place.wheel_radius]),
-        "pitch_inertia": place.pitch_inertia,
+        "wheelset": table.wheelset,
+        "position": _rounded([0.0, table.lateral_position, -table.wheel_radius]),
+        "pitch_inertia": table.pitch_inertia,
         "sides": "both",
     }
 
 
-def _bush(suspension: TrailingArmSuspension, place: VehicleTable, case: Case) -> dict[str, Any]:
+def _bush(suspension: TrailingArmSuspension, table: VehicleTable, case: Case) -> dict[str, Any]:
     length = suspension.arm.length
     hinge = [
         -length * np.cos(case.rotation),
-        place.lateral_position,
-        -place.wheel_radius + length * np.sin(case.rotation),
+        table.lateral_position,
+        -table.wheel_radius + length * np.sin(case.rotation),
     ]
     return {
         "kind": "bushing",
-        "bodies": [place.frame, "arm"],
+        "bodies": [table.frame, "arm"],
         "point": _rounded(hinge),
         "sides": "both",
-        "stiffness": list(place.bush.stiffness),
-        "damping": list(place.bush.damping),
-        "rotational_stiffness": list(place.bush.rotational_stiffness),
-        "rotational_damping": list(place.bush.rotational_damping),
+        "stiffness": list(table.bush.stiffness),
+        "damping": list(table.bush.damping),
+        "rotational_stiffness": list(table.bush.rotational_stiffness),
+        "rotational_damping": list(table.bush.rotational_damping),
     }
 
 
 def _nest(
-    suspension: TrailingArmSuspension, place: VehicleTable, case: Case
+    suspension: TrailingArmSuspension, table: VehicleTable, case: Case
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     outer = case.springs["outer"]
     height = float(outer.height)
-    seat = -place.wheel_radius - suspension.arm.seat_height
+    seat = -table.wheel_radius - suspension.arm.seat_height
     touching = [state for state in case.springs.values() if state.deflection > 0.0]
     K_V = sum(float(state.force / state.deflection) for state in touching)
     bending = case.K_C - case.K_L * height**2 / 4.0
@@ -191,10 +191,10 @@ def _nest(
         remarks.append("The inner spring does not work at this load and is left out.")
     nest = {
         "kind": "shear_spring",
-        "bodies": [place.frame, "arm"],
+        "bodies": [table.frame, "arm"],
         "points": [
-            _rounded([0.0, place.lateral_position, seat - height]),
-            _rounded([0.0, place.lateral_position, seat]),
+            _rounded([0.0, table.lateral_position, seat - height]),
+            _rounded([0.0, table.lateral_position, seat]),
         ],
         "sides": "both",
         "stiffness": _rounded([case.K_L, case.K_L, K_V]),

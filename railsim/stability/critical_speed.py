@@ -369,10 +369,10 @@ def _birth(
     prepared = motion.prepared
     state = motion.rest(speed, 0.0)
     names = prepared.coordinates.names
-    places = prepared.coordinates.places[[names.index(n) for n in mode.linearisation.names]]
+    indices = prepared.coordinates.indices[[names.index(n) for n in mode.linearisation.names]]
     wheelsets = [f"{w}.y" for w in motion.model.index.wheelsets]
     size = max(abs(mode.shapes[0, mode.linearisation.names.index(w)]) for w in wheelsets)
-    state[places] += FIRST * (mode.shapes[0] / size).real
+    state[indices] += FIRST * (mode.shapes[0] / size).real
     state = motion.stretch(state, speed, speed, 2.0 * period).state  # the scheme's memory settles
     rest = flow.reduced(motion.prepared.steady(speed).state)
     begin = flow.reduced(state) - rest

@@ -27,7 +27,7 @@ from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
 from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.linear.circle import PLACE, circle
+from railsim.linear.circle import POSITION, circle
 from railsim.linear.coordinates import coordinates
 from railsim.linear.naming import parts_of
 from railsim.linear.steady import NotConverged, SteadyRolling, led
@@ -65,20 +65,20 @@ class Curving(Drawn):
         1 by Newton's method, 2 by time integration, 0 where there is no steady state; values are
         NaN there.
     Q, Y, Y_over_Q, dQ_over_Q0, T_gamma, contact_y : float64[r, i, m, wheelset, side]
-        See `railsim.notation`; `contact_y` is the place of the most loaded patch across the track
+        See `railsim.notation`; `contact_y` is the lateral position of the most loaded patch
         [m].
     lateral, attack : float64[r, i, m, wheelset]
         Lateral displacement [m] and angle of attack, the yaw against the radial direction [rad].
     sum_Y : float64[r, i, m, wheelset]
         [N].
     steering : float64[r, i, m, bogie]
-        Yaw of the bogie frames against the track at their own places [rad].
+        Yaw of the bogie frames against the track at their own positions [rad].
     car_roll : float64[r, i, m]
         Roll of the (first) car body against the track [rad].
     wheelsets, bogies : tuple of str
         Names.
     wheelset_position : tuple of float
-        Places of the wheelsets along the vehicle, against its reference body [m].
+        Positions of the wheelsets along the vehicle, against its reference body [m].
     remarks : tuple of str
         Remarks for the reader.
     """
@@ -306,7 +306,7 @@ class _Search:
         self.remarks = (*balance.remarks, *_remarks(balance.model))
         self.parts = parts_of(self.model, coordinates(self.model))
         rest = balance.state.copy()
-        rest[-2] = PLACE
+        rest[-2] = POSITION
         self._rest = _Known(0.0, 0.0, WALKING_PACE**2, _friction(track), rest)
         self._last: _Known = self._rest
 
@@ -352,7 +352,7 @@ class _Search:
         speed = math.sqrt(goal.square)
         solver = SteadyRolling(self.model, system)
         state = self._last.state.copy()
-        state[-3:] = 0.0, PLACE, speed
+        state[-3:] = 0.0, POSITION, speed
         try:
             state = solver.prepared(state, speed)
             straight = self._system(0.0, 0.0, goal.friction)
@@ -367,7 +367,7 @@ class _Search:
         stages, recorder = np.zeros((3, len(state))), empty_recorder(self.model, 1)
         before = np.zeros_like(self.Q0)
         for second in range(int(SETTLING)):
-            state[-2] = PLACE
+            state[-2] = POSITION
             status, *_ = time_loop(
                 system,
                 work,
@@ -402,7 +402,7 @@ class _Search:
             "Y_over_Q": quotient,
             "dQ_over_Q0": (Q - self.Q0) / self.Q0,
             "T_gamma": wheel[:, :, W_T_GAMMA],
-            "contact_y": _contact_places(solver, len(wheelsets)),
+            "contact_y": _contact_positions(solver, len(wheelsets)),
             "lateral": state[6 * wheelsets + 1],
             "attack": state[6 * wheelsets + 5],
             "sum_Y": Y.sum(axis=1),
@@ -427,8 +427,8 @@ def _remarks(model: Model) -> tuple[str, ...]:
     )
 
 
-def _contact_places(solver: SteadyRolling, wheelsets: int) -> Floats:
-    """Place of each wheel's most loaded patch from the wheelset's middle [m]."""
+def _contact_positions(solver: SteadyRolling, wheelsets: int) -> Floats:
+    """Position of each wheel's most loaded patch from the wheelset's middle [m]."""
     work = solver.work
     found = np.full((wheelsets, 2), np.nan)
     load = np.zeros((wheelsets, 2))
@@ -453,11 +453,11 @@ def _gathered(
     for name in Curving.VALUES:
         first = found[0, 0, 0][name]
         arrays[name] = np.full((*shape, *first.shape), np.nan)
-        for place, values in found.items():
-            arrays[name][place] = values[name]
+        for entry, values in found.items():
+            arrays[name][entry] = values[name]
     converged = np.zeros(shape, dtype=np.int64)
-    for place, values in found.items():
-        converged[place] = values["converged"]
+    for entry, values in found.items():
+        converged[entry] = values["converged"]
     index = search.model.index
     return Curving(
         np.array(radius, dtype=float),

@@ -2,7 +2,7 @@
 
 Ramps of speed and bifurcation diagrams run on anything that can move for a while from a state, at a
 speed that goes evenly from one value to another.  The vehicle does so by the time loop of runs, on
-straight smooth track; its place is set back after each stretch.
+straight smooth track; its position is set back after each stretch.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.system import TABLE, Drive
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.linear.circle import PLACE
+from railsim.linear.circle import POSITION
 from railsim.linear.vehicle import LinearVehicle
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
 from railsim.model.work import work_arrays
@@ -120,12 +120,12 @@ class VehicleMotion:
         size = self.model.n_state
         self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
         self._recorder = empty_recorder(self.model, int(LONGEST * OUTPUT_RATE) + 2)
-        self._places = 6 * self.system.contact.body + 1
+        self._indices = 6 * self.system.contact.body + 1
 
     def rest(self, speed: float, amplitude: float) -> Floats:
         """State of steady rolling with the wheelsets displaced by `amplitude` [m]."""
         state = self.prepared.steady(speed).state.copy()
-        state[self._places] += amplitude
+        state[self._indices] += amplitude
         state[-3] = -1.0  # marks a state without memory
         return state
 
@@ -150,9 +150,9 @@ class VehicleMotion:
     ) -> Stretch:
         state = before.copy()
         fresh = int(before[-3] < 0.0)
-        state[-3:] = 0.0, PLACE, begin
+        state[-3:] = 0.0, POSITION, begin
         way = 0.5 * (begin + end) * duration
-        table = np.array([[PLACE, begin], [PLACE + way, end]])
+        table = np.array([[POSITION, begin], [POSITION + way, end]])
         system = self.system._replace(drive=Drive(TABLE, table, np.zeros(3)))
         steps = max(1, round(duration / self.step))
         status, where, _, rows = time_loop(
@@ -174,6 +174,6 @@ class VehicleMotion:
         return Stretch(
             state,
             offset + self.step * self.every * np.arange(rows),
-            self._recorder.state[:rows][:, self._places].copy(),
+            self._recorder.state[:rows][:, self._indices].copy(),
             wheel.sum(axis=2),
         )

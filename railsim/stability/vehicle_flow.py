@@ -12,7 +12,7 @@ from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
-from railsim.linear.circle import PLACE
+from railsim.linear.circle import POSITION
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import CONSTANT_SPEED, work_arrays
 from railsim.stability.motion import VehicleMotion
@@ -44,7 +44,7 @@ class VehicleFlow:
         self._work = work_arrays(self._system)
         self._speed = speed
         self._rest = motion.prepared.steady(speed).state.copy()
-        self._places, self._floors = self._moving()
+        self._indices, self._floors = self._moving()
         n = motion.model.index.n_bodies
         spins = 6 * n + 6 * self._system.contact.body + 4
         self._spins = spins
@@ -54,46 +54,46 @@ class VehicleFlow:
         self._recorder = empty_recorder(motion.model, OBSERVED + 2)
 
     def _moving(self) -> tuple[NDArray[np.int64], Floats]:
-        """Places of all entries that move, and the least size of each."""
+        """Indices of all entries that move, and the least size of each."""
         model, system = self._motion.model, self._system
         n, m = model.index.n_bodies, len(system.internal.kind)
         c = self._motion.prepared.coordinates
         reference = int(system.bodies.references[0])
-        places: list[int] = []
+        indices: list[int] = []
         floors: list[float] = []
         for k in range(c.n_positions + c.n_velocities):
             body, component = int(c.bodies[k]), int(c.components[k])
             if body == reference and component == 0:
                 continue
             is_velocity = k >= c.n_positions
-            places.append(int(c.places[k]))
+            indices.append(int(c.indices[k]))
             floors.append(FLOORS[1] if is_velocity else FLOORS[0])
             if is_velocity:
-                places.append(12 * n + m + 6 * body + component)
+                indices.append(12 * n + m + 6 * body + component)
                 floors.append(FLOORS[3])
-        places += [12 * n + i for i in range(m)] + [18 * n + m + i for i in range(m)]
+        indices += [12 * n + i for i in range(m)] + [18 * n + m + i for i in range(m)]
         floors += [FLOORS[2]] * m + [FLOORS[4]] * m
         if system.support.elastic:
             end = model.n_state - N_SCALARS
             first = end - SUPPORT_SIZE * len(system.contact.body)
             track = list(range(first, end))
-            places += track
+            indices += track
             kinds = (FLOORS[0], FLOORS[1], FLOORS[1], FLOORS[3], FLOORS[3])
             floors += [kinds[(k - first) % SUPPORT_SIZE // DOF] for k in track]
-        return np.array(places, dtype=np.int64), np.array(floors)
+        return np.array(indices, dtype=np.int64), np.array(floors)
 
     def reduced(self, state: Floats) -> Floats:
         """Moving entries of a state of the time loop."""
         full = state.copy()
         full[self._spins] -= self._per_speed * state[-1]
-        return np.asarray(full[self._places])
+        return np.asarray(full[self._indices])
 
     def full(self, reduced: Floats, speed: float) -> Floats:
         """State of the time loop."""
         state = self._rest.copy()
-        state[self._places] = reduced
+        state[self._indices] = reduced
         state[self._spins] += self._per_speed * speed
-        state[-3:] = 0.0, PLACE, speed
+        state[-3:] = 0.0, POSITION, speed
         return state
 
     def steps(self, duration: float) -> int:

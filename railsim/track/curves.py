@@ -18,7 +18,7 @@ class Curve:
     Attributes
     ----------
     section : Section
-        Its place in the plan.
+        Its section of the plan.
     curvature : float
         Positive to the right [1/m].
     cant : float

@@ -53,7 +53,7 @@ POINTS_PER_WAVE = 32
 PERIOD_IN_WAVES = 20.0
 # Share of the range of the rows around by which a spline between measured rows may leave it.
 OVERSHOOT = 0.25
-_INNER = np.arange(1, 8) / 8.0  # places within an interval, over its length
+_INNER = np.arange(1, 8) / 8.0  # positions within an interval, over its length
 # Largest displacement between the rows over that at the rows, from which on it is remarked on.
 BEYOND_ROWS = 1.05
 
@@ -144,29 +144,29 @@ def _triangle(middle: float, length: float) -> Displacement:
 def _measured(part: Measured, track: Track) -> Displacement:
     from scipy.interpolate import CubicHermiteSpline  # a quarter of a second; most need none
 
-    places, values, slopes = _interpolation(part)
-    spline = CubicHermiteSpline(places, values, slopes, axis=1)
+    positions, values, slopes = _interpolation(part)
+    spline = CubicHermiteSpline(positions, values, slopes, axis=1)
     slope = spline.derivative()
-    window = _window(places[0], places[-1], part.fade)
+    window = _window(positions[0], positions[-1], part.fade)
 
     def moved(s: Array) -> tuple[Array, Array]:
-        at = np.clip(s, places[0], places[-1])
+        at = np.clip(s, positions[0], positions[-1])
         return _windowed(spline(at), slope(at), *window(s))
 
     return moved
 
 
 def _interpolation(part: Measured) -> tuple[Array, Array, Array]:
-    """Places of the rows [m], and displacements [m] and slopes [1] there by columns."""
+    """Positions of the rows [m], and displacements [m] and slopes [1] there by columns."""
     rows = np.array(part.rows)
-    places = rows[:, 0] + part.shift
+    positions = rows[:, 0] + part.shift
     values = part.scale * rows[:, 1:].T
-    return places, values, np.stack([shape_preserving_slopes(places, row) for row in values])
+    return positions, values, np.stack([shape_preserving_slopes(positions, row) for row in values])
 
 
-def _between(places: Array, values: Array, slopes: Array) -> Array:
-    """Cubic Hermite interpolation at seven places within every interval between the rows."""
-    h = np.diff(places)
+def _between(positions: Array, values: Array, slopes: Array) -> Array:
+    """Cubic Hermite interpolation at seven positions within every interval between the rows."""
+    h = np.diff(positions)
     t = _INNER
     basis = np.stack(
         ((1.0 + 2.0 * t) * (1.0 - t) ** 2, t * (1.0 - t) ** 2, t**2 * (3.0 - 2.0 * t),
@@ -183,7 +183,7 @@ class Between:
     column: str
     at_rows: float
     between: float
-    place: float
+    s: float
 
 
 def largest_between_rows(part: Measured) -> Between:
@@ -192,18 +192,18 @@ def largest_between_rows(part: Measured) -> Between:
     A record that does not resolve the shortest wave that it holds lets the rails go further than
     any row says.
     """
-    places, values, slopes = _interpolation(part)
-    found = np.abs(_between(places, values, slopes)).reshape(4, -1)
-    inner = places[:-1, None] + np.diff(places)[:, None] * _INNER
+    positions, values, slopes = _interpolation(part)
+    found = np.abs(_between(positions, values, slopes)).reshape(4, -1)
+    inner = positions[:-1, None] + np.diff(positions)[:, None] * _INNER
     at_rows = np.abs(values).max(axis=1)
     further = np.where(at_rows > 0.0, found.max(axis=1) - at_rows, -np.inf)
     column = int(np.argmax(further))
-    place = int(np.argmax(found[column]))
+    index = int(np.argmax(found[column]))
     return Between(
         COLUMNS[column],
         float(at_rows[column]),
-        float(found[column, place]),
-        float(inner.ravel()[place]),
+        float(found[column, index]),
+        float(inner.ravel()[index]),
     )
 
 
@@ -217,13 +217,13 @@ def measured_remarks(track: Track) -> list[str]:
         if found.between > BEYOND_ROWS * found.at_rows:
             remarks.append(
                 f"The rails go further between the rows of irregularities.{index} than at them: "
-                f"{found.column} reaches {1e3 * found.between:.3g} mm at s = {found.place:.1f} m, "
+                f"{found.column} reaches {1e3 * found.between:.3g} mm at s = {found.s:.1f} m, "
                 f"the largest row is {1e3 * found.at_rows:.3g} mm."
             )
     return remarks
 
 
-def shape_preserving_slopes(places: Array, values: Array) -> Array:
+def shape_preserving_slopes(positions: Array, values: Array) -> Array:
     """Slopes at the rows for piecewise cubic interpolation without false waves.
 
     Those of the cubic spline where the rows resolve the wave; where the spline leaves the range of
@@ -233,7 +233,7 @@ def shape_preserving_slopes(places: Array, values: Array) -> Array:
 
     Parameters
     ----------
-    places : ndarray, shape (n,)
+    positions : ndarray, shape (n,)
         Increasing arc lengths [m].
     values : ndarray, shape (n,)
         Displacements [m].
@@ -245,17 +245,17 @@ def shape_preserving_slopes(places: Array, values: Array) -> Array:
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
-    slopes = CubicSpline(places, values)(places, 1)
-    monotone = PchipInterpolator(places, values)(places, 1)
+    slopes = CubicSpline(positions, values)(positions, 1)
+    monotone = PchipInterpolator(positions, values)(positions, 1)
     padded = np.concatenate((values[:1], values, values[-1:]))
     around = np.stack([padded[i : i + len(values) - 1] for i in range(4)])
     low, high = around.min(axis=0), around.max(axis=0)
     allowed = OVERSHOOT * (high - low)
     while True:
-        inside = _between(places, values, slopes)
+        inside = _between(positions, values, slopes)
         lowest, highest = inside.min(axis=1), inside.max(axis=1)
         wrong = (lowest < low - allowed) | (highest > high + allowed)
-        ends = np.zeros(len(places), dtype=bool)
+        ends = np.zeros(len(positions), dtype=bool)
         ends[:-1] |= wrong
         ends[1:] |= wrong
         if not np.any(ends & (slopes != monotone)):

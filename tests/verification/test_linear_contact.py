@@ -162,10 +162,10 @@ def run_from(prepared, mode, speed, scheme):
     """Damping ratio of a mode in a run that starts with its shape."""
     model, rest = prepared.model, prepared.steady(speed).state
     names = mode.linearisation.names
-    places = prepared.coordinates.places[[prepared.coordinates.names.index(n) for n in names]]
+    indices = prepared.coordinates.indices[[prepared.coordinates.names.index(n) for n in names]]
     lateral = [abs(mode.shapes[0, names.index(f"{w}.y")]) for w in model.index.wheelsets]
     state = rest.copy()
-    state[places] += AMPLITUDE * (mode.shapes[0] / max(lateral)).real
+    state[indices] += AMPLITUDE * (mode.shapes[0] / max(lateral)).real
     system = prepared.system._replace(drive=CONSTANT_SPEED)
     level = level_track_with_friction(system)
     h = Stability(model, level, rest, scheme, lambda _: None).choose(1.0 / 200.0)
@@ -186,7 +186,7 @@ def run_from(prepared, mode, speed, scheme):
         )
         assert status == 0
         time.append((k + 1) * steps * h)
-        seen.append(mode.left[0] @ (state[places] - rest[places]))
+        seen.append(mode.left[0] @ (state[indices] - rest[indices]))
     later = slice(16, None)
     growth = np.polyfit(time[later], np.log(np.abs(seen[later])), 1)[0]
     omega = np.polyfit(time[later], np.unwrap(np.angle(seen[later])), 1)[0]

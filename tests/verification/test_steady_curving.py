@@ -7,7 +7,7 @@ from rig import test_vehicle
 
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
-from railsim.linear.circle import PLACE, circle
+from railsim.linear.circle import POSITION, circle
 from railsim.linear.stationary import WALKING_PACE, on_cant, on_twist, roll_coefficient
 from railsim.linear.steady import NotConverged, led
 from railsim.model.time_step import empty_recorder
@@ -23,7 +23,7 @@ def curving(vehicle, radius, cant, speed, friction=None):
     track = load_track("curve_r250")
     balance = steady(vehicle, track, Settings(), speed)
     start = balance.state.copy()
-    start[-2] = PLACE
+    start[-2] = POSITION
 
     def along(share):
         part = circle(track, curvature=share / radius, cant=share * cant, friction=friction)
@@ -58,7 +58,7 @@ def test_newton_finds_the_end_of_a_long_run(name, radius):
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     work = work_arrays(system)
     for _ in range(60):
-        state[-2] = PLACE
+        state[-2] = POSITION
         status, *_ = time_loop(
             system,
             work,
