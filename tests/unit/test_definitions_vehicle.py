@@ -203,7 +203,7 @@ def test_element_without_points_stands_at_its_bodies():
     [
         ({"bodies": {"frame": BODY}}, "a vehicle needs one at least"),
         ({"wheelsets": {"a": WHEELSET}, "reference": "b"}, "no body 'b'"),
-        ({"wheelsets": {"a": WHEELSET, "b": WHEELSET}}, "stand at the same place"),
+        ({"wheelsets": {"a": WHEELSET, "b": WHEELSET}}, "stand at the same position"),
         ({"wheelsets": {"a": {**WHEELSET, "radius": 0.5}}}, "z = -0.5 m"),
         ({"wheelsets": {"a": WHEELSET}, "bodies": {"a": BODY}}, "the name 'a' is used twice"),
     ],
