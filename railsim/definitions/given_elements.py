@@ -47,7 +47,7 @@ class AppliedForce(CarriesNoWeight, Element):
         return None if self.point is None else (self.point, self.point)
 
     def mirrored(self, signs: Signs) -> Self:
-        """Return the load in a mirrored placement; a torque turns the other way round than a force."""
+        """Return the load in a mirrored placement; a torque turns opposite to a force."""
         handed = signs[0] * signs[1] * signs[2]
         turns = (handed * signs[0], handed * signs[1], handed * signs[2])
         tables = {

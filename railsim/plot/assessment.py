@@ -28,7 +28,7 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
 
 
 def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
-    """Bars of the worst place of each quantity, zone by zone, in per cent of the limit."""
+    """Bars of each quantity's worst row, zone by zone, in per cent of the limit."""
     reports = [zone for a in assessments for zone in a.zones]
     zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
     rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
@@ -107,7 +107,7 @@ def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any
         points = [
             (
                 5e-4 * (values.section.begin + values.section.end),
-                100.0 * max(max(values.values[name, place]) / limit for place, limit in there),
+                100.0 * max(max(values.values[name, label]) / limit for label, limit in there),
             )
             for values in report.values
             if (there := [(p, limit) for p, limit in limits.items() if (name, p) in values.values])
