@@ -64,8 +64,8 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
 def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw the values of the sections over the distance; None where there are no zones.
 
-    A row of axes for each vehicle, one for each zone; of each quantity the place with the largest
-    share of its limit.
+    A row of axes for each vehicle, one for each zone; of each quantity the values where their
+    share of the limit is largest.
     """
     reports = [zone for a in assessments for zone in a.zones if zone.values and zone.rows]
     if not reports:

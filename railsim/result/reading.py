@@ -279,17 +279,17 @@ class _Reader:
         for key in thing.attrs:
             if key in ("DIMENSION_LIST", "REFERENCE_LIST"):
                 continue
-            place = f"{name}.{key}" if name else key
+            location = f"{name}.{key}" if name else key
             try:
                 value = thing.attrs[key]
             except Exception as error:
-                raise _unreadable(self._path, place, error) from None
+                raise _unreadable(self._path, location, error) from None
             value = value.item() if isinstance(value, np.generic) else value
             if isinstance(value, bytes):  # a text of fixed length
                 value = value.decode("utf-8", errors="replace")
             if not isinstance(value, str | int | float):
                 words = f"found {str(value)[:60]}"
-                raise self.fault(place, words, "a text or a number")
+                raise self.fault(location, words, "a text or a number")
             facts[key] = value
         return facts
 

@@ -21,7 +21,7 @@ from railsim.studies.case import Case
 
 Numbers = dict[str, float]
 
-PLACES = ("x", "blocks", "wheelset")  # of comfort points and wheels
+LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
 def analysed(case: Case, result: Result | None) -> Numbers:
@@ -89,7 +89,7 @@ def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, fl
     for key, value in row.items():
         if isinstance(value, Mapping):
             yield from _numbers(value, f"{before}{key}_")
-        elif isinstance(value, int | float) and math.isfinite(value) and key not in PLACES:
+        elif isinstance(value, int | float) and math.isfinite(value) and key not in LOCATIONS:
             yield f"{before}{key}", float(value)
 
 
