@@ -133,13 +133,13 @@ def standing(name, **changes):
     model = assemble(vehicle, track, Settings())
     balance = equilibrium(model, 10.0)
     moved = balance.state[: 6 * len(model.index.bodies)].reshape(-1, 6)
-    places = {name: (moved[k, 1], moved[k, 2]) for k, name in enumerate(model.index.bodies)}
+    moves = {name: (moved[k, 1], moved[k, 2]) for k, name in enumerate(model.index.bodies)}
     moment = sum(
-        body.mass * GRAVITY * (body.position[1] + places[body.name][0])
+        body.mass * GRAVITY * (body.position[1] + moves[body.name][0])
         for body in flatten(vehicle).bodies
-        if body.name in places
+        if body.name in moves
     )
-    return float(places[vehicle.reference][1]), balance.Q0, moment
+    return float(moves[vehicle.reference][1]), balance.Q0, moment
 
 
 def test_y25_wagon_sinks_by_its_two_stage_springs_under_load():
