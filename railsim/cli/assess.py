@@ -129,7 +129,7 @@ def _service(
     deficiency: float | None,
     category: str | None,
 ) -> "Service | None":
-    """Service table with options in place of the vehicles' values; None where there are none."""
+    """Service table with options instead of the vehicles' values; None where there are none."""
     given = {
         name: value
         for name, value in (

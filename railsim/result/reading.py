@@ -240,7 +240,7 @@ class _Reader:
             if isinstance(member, h5py.Dataset):
                 self._check_dataset(above + name, member)
             elif not isinstance(member, h5py.Group):
-                raise self.fault(above + name, "a link or a type in place of a dataset")
+                raise self.fault(above + name, "a link or a type instead of a dataset")
             yield name, member
 
     def _check_dataset(self, name: str, dataset: h5py.Dataset) -> None:
@@ -378,7 +378,7 @@ class _Reader:
 
     def _floats(self, name: str, dataset: h5py.Dataset) -> Array:
         if dataset.dtype.kind == "S":
-            raise self.fault(name, "names in place of numbers")
+            raise self.fault(name, "names instead of numbers")
         try:
             return frozen(dataset[()])
         except Exception as error:

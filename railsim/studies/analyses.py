@@ -1,4 +1,4 @@
-"""The analyses of a case: computed in addition to, or in place of, a run in the time domain.
+"""The analyses of a case: computed in addition to, or instead of, a run in the time domain.
 
 Each returns numbers by name, which become columns of ``summary.csv``; the names of an analysis
 called ``curve`` in the study begin with ``curve.``.

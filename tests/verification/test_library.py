@@ -178,7 +178,7 @@ def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
 
 
 def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
-    """2.4 MN/m in place of 0.37: bounce rises with the stiffness of both stages in series."""
+    """2.4 MN/m instead of 0.37: bounce rises with the stiffness of both stages in series."""
 
     def bounce(secondary):
         primary = 2 * 0.991e6  # of one bogie side
