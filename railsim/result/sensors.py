@@ -76,9 +76,9 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
         found[name] = (point.body, point.position)
     origin = reference.position[0]
     placed: dict[str, Sensor] = {}
-    for name, (body, point) in found.items():
+    for name, (body, position) in found.items():
         cg = bodies[body].position
-        arm = (point[0] - cg[0], point[1] - cg[1], point[2] - cg[2])
+        arm = (position[0] - cg[0], position[1] - cg[1], position[2] - cg[2])
         placed[name] = Sensor(body, cg[0] - origin, arm)
     return placed
 
