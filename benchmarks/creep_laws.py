@@ -67,7 +67,7 @@ def nanoseconds(law, n, grid, inputs, rounds=25):
 
 def step_microseconds(rounds=200):
     """Least time of a step of the fast scheme by law, measured in turns; and the chosen steps."""
-    vehicle, track, speed, place = CURVE
+    vehicle, track, speed, distance = CURVE
     never = 1 << 40
     cases, chosen = {}, {}
     for law in LAWS:
@@ -77,7 +77,7 @@ def step_microseconds(rounds=200):
         step, _ = prepared.pace.at(speed)
         arrays = (work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
                   empty_recorder(prepared.model, 1))  # fmt: skip
-        time_loop(system, *arrays, FAST, step, Chunk(1, int(place / speed / step), never))
+        time_loop(system, *arrays, FAST, step, Chunk(1, int(distance / speed / step), never))
         cases[law], chosen[law] = (system, arrays, state.copy(), step), step
     best = dict.fromkeys(cases, np.inf)
     for _ in range(rounds):

@@ -93,7 +93,7 @@ class ExudynCoach:
         for b, name in enumerate(self.names):
             body = self._flat.body(name)
             i_x, i_y, i_z = body.inertia
-            place = TO_EXUDYN @ np.array(body.position)
+            position = TO_EXUDYN @ np.array(body.position)
             displacement = TO_EXUDYN @ state[6 * b : 6 * b + 3]
             roll, pitch, yaw = state[6 * b + 3 : 6 * b + 6]
             if body.kind == "wheelset":
@@ -103,13 +103,13 @@ class ExudynCoach:
             turning = TO_EXUDYN @ rates[3:]
             node = self.mbs.AddNode(
                 items.NodeRigidBodyRxyz(
-                    referenceCoordinates=[*place, 0.0, 0.0, 0.0],
+                    referenceCoordinates=[*position, 0.0, 0.0, 0.0],
                     initialCoordinates=[*displacement, roll, -yaw, pitch],
                     initialVelocities=[*velocity, *turning],
                 )
             )
             self._nodes.append(node)
-            reference += [*place, 0.0, 0.0, 0.0]
+            reference += [*position, 0.0, 0.0, 0.0]
             self._bodies.append(
                 self.mbs.AddObject(
                     items.ObjectRigidBody(

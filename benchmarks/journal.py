@@ -61,9 +61,9 @@ def unsynced(journal):
 
     def line(head, body):
         text = json.dumps(head).encode() + b"\t" + body
-        place = journal._end + 9 + len(text) - len(body)
+        offset = journal._end + 9 + len(text) - len(body)
         journal._append(b"%08x\t%s\n" % (module.zlib.crc32(text), text))
-        return place
+        return offset
 
     return line
 

@@ -50,7 +50,7 @@ class Peer:
 
     @property
     def kept(self) -> np.ndarray:
-        """Places in the state but for the memory of railsim's own scheme."""
+        """Indices in the state but for the memory of railsim's own scheme."""
         system = self.prepared.model.system
         n = 12 * len(system.bodies.kind) + len(system.internal.kind)
         size = len(self.prepared.state)

@@ -1,7 +1,7 @@
 """Fill the tables of `docs/validation/contact_geometry.md`.
 
 ``python docs/generate_contact.py`` takes some minutes: it runs the curving study with six
-contact tables, boundary elements at a dozen places, and an independent rigid search.
+contact tables, boundary elements at a dozen points, and an independent rigid search.
 """
 
 import dataclasses
@@ -57,7 +57,7 @@ def rigid_table() -> str:
             inclination=inclination,
             lateral=np.arange(-0.0080, 0.00801, 2e-5),
         )
-        jumps = np.array([place for place, _ in fine.jumps(0.4e-3)])
+        jumps = np.array([lateral for lateral, _ in fine.jumps(0.4e-3)])
         errors = []
         for i, y in enumerate(lateral):
             if np.min(np.abs(jumps - y)) < 1.5e-4:
@@ -75,8 +75,8 @@ def rigid_table() -> str:
                 0.012,
                 xtol=1e-9,
             )
-            for side, (_, place, on_rail) in enumerate(sides(roll)):
-                radius = 0.46 + np.interp(place, *wheel)
+            for side, (_, on_wheel, on_rail) in enumerate(sides(roll)):
+                radius = 0.46 + np.interp(on_wheel, *wheel)
                 angle = np.arctan(-np.interp(on_rail, rail[0], slope))
                 errors.append(
                     (
@@ -86,13 +86,13 @@ def rigid_table() -> str:
                 )
         worst = np.max(errors, axis=0)
         conicity = fine.equivalent_conicity([0.001, 0.003, 0.005])
-        places = sorted({round(1e3 * abs(p), 2) for p, _ in fine.jumps(1e-3)})
+        positions = sorted({round(1e3 * abs(p), 2) for p, _ in fine.jumps(1e-3)})
         body.append(
             (
                 name,
                 f"{1e3 * worst[0]:.4f}",
                 f"{1e3 * worst[1]:.2f}",
-                ", ".join(f"{p:.2f}" for p in places),
+                ", ".join(f"{p:.2f}" for p in positions),
                 " / ".join(f"{c:.3f}" for c in conicity),
             )
         )

@@ -151,7 +151,7 @@ def facts(name: str, vehicle: Vehicle) -> str:
             f"{mass / 1e3:.2f} t, {mass * GRAVITY / 2e3 / len(wheelsets):.2f} kN",
         ),
         ("wheelsets", f"{len(wheelsets)}, radius {wheel.radius[0]:g} m, profile {profiles}"),
-        ("places of the wheelsets", ", ".join(f"{w.position[0]:g}" for w in wheelsets) + " m"),
+        ("positions of the wheelsets", ", ".join(f"{w.position[0]:g}" for w in wheelsets) + " m"),
         (
             "admissible speed, cant deficiency",
             f"{3.6 * service.admissible_speed:.0f} km/h, {1e3 * service.cant_deficiency:.0f} mm",

@@ -13,7 +13,7 @@ result = railsim.simulate(coach, track, speed=20.0, until=600.0)
 
 for peak in railsim.peaks(result):
     quantity = peak.quantity
-    place = peak.labels.get("wheelset", ""), peak.labels.get("side", "")
-    print(f"{quantity.words:45} {quantity.text(peak.value):>9} at {peak.distance:5.1f} m", *place)
+    labels = peak.labels.get("wheelset", ""), peak.labels.get("side", "")
+    print(f"{quantity.words:45} {quantity.text(peak.value):>9} at {peak.distance:5.1f} m", *labels)
 
 figure = result.plot(path="01_first_run.png", overwrite=True)

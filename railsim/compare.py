@@ -103,7 +103,7 @@ def compare(results: Mapping[str, Result]) -> tuple[Comparison, ...]:
 
 @dataclass(frozen=True)
 class Difference:
-    """How far a result is from the first one along the track, in one quantity at one place.
+    """Difference of a result from the first one along the track, in one series of a quantity.
 
     Attributes
     ----------
@@ -112,9 +112,9 @@ class Difference:
         Where on the vehicle: dimension to name.
     result : str
         What the result is called.
-    distance : float64[place]
-        Places of the first result's reference body that both have passed [m].
-    values : float64[place]
+    distance : float64[position]
+        Positions of the first result's reference body that both have passed [m].
+    values : float64[position]
         Value of this result less that of the first [SI].
     """
 
@@ -127,8 +127,8 @@ class Difference:
     @property
     def largest(self) -> tuple[float, float]:
         """The difference of the largest magnitude [SI], and where it is [m]."""
-        place = int(np.argmax(np.abs(self.values)))
-        return float(self.values[place]), float(self.distance[place])
+        index = int(np.argmax(np.abs(self.values)))
+        return float(self.values[index]), float(self.distance[index])
 
 
 def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Difference]:
@@ -145,7 +145,7 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
 
     Raises
     ------
-    InputError : results over different plans, or that have no place in common.
+    InputError : results over different plans, or that have no part of the track in common.
     """
     (first, base), *others = results.items()
     faults = []
@@ -154,23 +154,27 @@ def differences(results: Mapping[str, Result], names: Sequence[str]) -> list[Dif
             found = f"runs over another plan than {first}"
             faults.append(Fault(label, "track", found, "results over one plan"))
         elif not _shared(base, result).any():
-            found = f"passes no place that {first} passes"
+            found = f"has no part of the track in common with {first}"
             faults.append(Fault(label, "distance", found, "results that share a part of the track"))
     if faults:
         raise InputError(faults)
     found_ones = []
     for label, result in others:
         there = _shared(base, result)
-        places = base["distance"][there]
+        positions = base["distance"][there]
         for name in names:
             if name in base and name in result:
                 mine, other = _leading(base, name), _leading(result, name)
                 for side, values in mine.items():
-                    there_too = np.interp(places, result["distance"], other[side])
+                    there_too = np.interp(positions, result["distance"], other[side])
                     labels = {"wheelset": base.wheelsets[0], **({"side": side} if side else {})}
                     found_ones.append(
                         Difference(
-                            base.quantities[name], labels, label, places, there_too - values[there]
+                            base.quantities[name],
+                            labels,
+                            label,
+                            positions,
+                            there_too - values[there],
                         )
                     )
     return found_ones
@@ -185,9 +189,9 @@ def _leading(result: Result, name: str) -> dict[str, Array]:
 
 
 def _shared(one: Result, other: Result) -> Any:
-    """Which places of a result lie within the other one's."""
-    places, others = one["distance"], other["distance"]
-    return (places >= others[0]) & (places <= others[-1])
+    """Which positions of a result lie within the other one's."""
+    positions, others = one["distance"], other["distance"]
+    return (positions >= others[0]) & (positions <= others[-1])
 
 
 def comparison_csv(rows: Sequence[Comparison]) -> str:

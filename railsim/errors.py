@@ -37,9 +37,9 @@ class Fault:
     option: str = ""
 
     def __str__(self) -> str:
-        place = f"{self.file}: {self.key}" if self.key else self.file
+        location = f"{self.file}: {self.key}" if self.key else self.file
         remedy = f"; {self.allowed}" if self.allowed else ""
-        return f"{place}: {self.found}{remedy}"
+        return f"{location}: {self.found}{remedy}"
 
     def on_command_line(self) -> "Fault":
         """Return the fault as the command line names it: by options, also those in backquotes."""

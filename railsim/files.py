@@ -114,12 +114,12 @@ def _unwritable(folder: Path) -> str:
     """Say why nothing can be written into a folder, which may still have to be made."""
     if folder.is_symlink() and not folder.exists():
         return f"{folder} is a link that leads nowhere"
-    place = folder.absolute()
-    while not place.exists():
-        place = place.parent
-    if not place.is_dir():
-        return f"{place} is a file"
-    return "" if os.access(place, os.W_OK | os.X_OK) else f"{place} cannot be written to"
+    existing = folder.absolute()
+    while not existing.exists():
+        existing = existing.parent
+    if not existing.is_dir():
+        return f"{existing} is a file"
+    return "" if os.access(existing, os.W_OK | os.X_OK) else f"{existing} cannot be written to"
 
 
 def make_folder(folder: Path) -> None:

@@ -210,7 +210,7 @@ QUANTITIES: dict[str, Quantity] = _table(
         _AXLE,
         "mm",
         1e3,
-        "of the wheelset relative to the track at its place, positive to the right; on elastic "
+        "of the wheelset relative to the track at its position, positive to the right; on elastic "
         "rails less the mean of their deflections",
     ),
     Quantity(
@@ -408,7 +408,7 @@ REQUESTED: dict[str, Quantity] = _table(
     ),
     Quantity(
         "patch_x",
-        "place of the patch along the track",
+        "position of the patch along the track",
         "x_c",
         "m",
         _PATCH,
@@ -418,7 +418,7 @@ REQUESTED: dict[str, Quantity] = _table(
     ),
     Quantity(
         "patch_y",
-        "place of the patch across the track",
+        "position of the patch across the track",
         "y_c",
         "m",
         _PATCH,
@@ -504,7 +504,7 @@ REQUESTED: dict[str, Quantity] = _table(
         ("time", "sensor", "axis"),
         "mm",
         1e3,
-        "from its place in the nominal vehicle, in the track frame of its body",
+        "from its position in the nominal vehicle, in the track frame of its body",
     ),
     Quantity(
         "wheelset_lateral_on_rails",
@@ -554,7 +554,7 @@ REQUESTED: dict[str, Quantity] = _table(
         _WHEEL,
         "mm",
         1e3,
-        "irregularity at the wheelset's place, to the right",
+        "irregularity at the wheelset's position, to the right",
     ),
     Quantity(
         "rail_vertical",
@@ -564,7 +564,7 @@ REQUESTED: dict[str, Quantity] = _table(
         _WHEEL,
         "mm",
         1e3,
-        "irregularity at the wheelset's place, down",
+        "irregularity at the wheelset's position, down",
     ),
     Quantity(
         "rail_deflection_lateral",

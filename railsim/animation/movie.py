@@ -42,11 +42,11 @@ def write_movie(
     frames_per_second : int
         Pictures a second when it is played.
     gain : float
-        Factor on the motion of the bodies against their nominal places.
+        Factor on the motion of the bodies against their nominal positions.
 
     Raises
     ------
-    InputError : the name or the place; MP4 without ffmpeg.
+    InputError : the name or the location; MP4 without ffmpeg.
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
@@ -96,8 +96,8 @@ def draw(view: Axes, sections: list[Axes], scene: Scene, frame: int, gain: float
     ))  # fmt: skip
     view.set(xlim=(-15.0, 15.0), ylim=(4.5, -4.5), aspect="equal")
     view.set_axis_off()
-    place = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"
-    view.set_title(f"{scene.title}\nt {scene.time[frame]:.2f} s{place}", fontsize=8, loc="left")
+    at_s = "" if scene.Q is None else f", s {scene.distance[frame]:.1f} m"
+    view.set_title(f"{scene.title}\nt {scene.time[frame]:.2f} s{at_s}", fontsize=8, loc="left")
     for side, axes in enumerate(sections):
         _draw_section(axes, scene, frame, side)
 
@@ -114,13 +114,13 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Array,
             found.append((depth, points, "#8a8a8a", "#6b6b6b"))
     for k, body in enumerate(scene.bodies):
         q = scene.pose[frame, k]
-        place = _track(scene, s0 + body.offset + q[0])
+        frame_at = _track(scene, s0 + body.offset + q[0])
         face, edge = COLOURS[body.kind]
         for points in _shape(body):
             moved = _turned(points, gain * q[3], 0.0 if body.kind == "wheelset" else gain * q[4],
                             gain * q[5])  # fmt: skip
             moved += np.array([(gain - 1.0) * q[0], body.y + gain * q[1], body.z + gain * q[2]])
-            seen, depth = _seen(_space(place, moved), at)
+            seen, depth = _seen(_space(frame_at, moved), at)
             found.append((depth, seen, face, edge))
     return found
 

@@ -37,7 +37,7 @@ class Drawn:
     offset : float
         Arc length of its frame beyond that of the reference body [m].
     y, z : float
-        Nominal place of its centre of gravity in the track frame [m].
+        Nominal position of its centre of gravity in the track frame [m].
     box : tuple of float
         Half length, half width, half height and height of the box's middle below the centre of
         gravity [m]; of a wheelset its radius, half the wheels' distance, 0, 0.
@@ -62,7 +62,7 @@ class Scene:
     time, distance : float64[frame]
         [s], [m]
     pose : float64[frame, body, 6]
-        Against the nominal place, as `body_position` [m], [rad].
+        Against the nominal position, as `body_position` [m], [rad].
     track : dict
         ``s``, ``x``, ``y``, ``heading``, ``cant`` along the track [m], [rad].
     Q, Y : float64[frame, wheelset, 2] or None

@@ -148,7 +148,7 @@ def assess(
     limits : str or Path, optional
         Limits file, or name of a shipped one; by default that of the standard.
     service : Service, optional
-        Used in place of the vehicles' service tables.
+        Used instead of the vehicles' service tables.
     method : {'normal', 'simplified'}
         Measuring method: with wheel forces, or with accelerations only.
     causal : bool

@@ -116,7 +116,7 @@ def comfort_report(record: Record) -> list[PointComfort]:
     return [
         PointComfort(
             name,
-            record.place(name),
+            record.sensor_offset(name),
             mean_comfort(np.concatenate(into.blocks), np.concatenate(into.back)),
             np.sqrt(into.iso / into.count),
             {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
@@ -168,7 +168,7 @@ def _transitions(record: Record, columns: list[int]) -> list[list[TransitionComf
             continue
         a, roll = record.readings(rows)
         for number, column in enumerate(columns):
-            s = record.distance[rows] + record.place(names[column])
+            s = record.distance[rows] + record.sensor_offset(names[column])
             if s[0] > section.begin or s[-1] < section.end:
                 continue
             begin, end = np.interp([section.begin, section.end], s, time)

@@ -146,7 +146,7 @@ class _Part:
         self.floor = [k for k, name in enumerate(names) if not name.startswith("frame_")]
         self.frames = [k for k, name in enumerate(names) if name.startswith("frame_")]
         self.names = names
-        self.s_sensor = {k: record.distance[rows] + record.place(name)
+        self.s_sensor = {k: record.distance[rows] + record.sensor_offset(name)
                          for k, name in enumerate(names)}  # fmt: skip
         self.inner = inner
         if not names:
@@ -187,20 +187,20 @@ def _forces(part: _Part, found: SectionValues) -> None:
     begin, end, turn = section.begin, section.end, section.turn
     centres = window_centres(begin, end, MEAN, STEP)
     for w in part.wheelsets:
-        place = f"wheelset {w + 1}"
+        label = f"wheelset {w + 1}"
         s = part.s_forces[:, w]
         around, inside = _around(s, begin, end), _between(s, begin, end)
         means = distance_means(s[around], part.sum_Y[around, w], centres, MEAN)
         # the force on the rails points outwards where it points away from the curve's centre
-        found.values["sum_Y", place] = _signed(means, -turn)
+        found.values["sum_Y", label] = _signed(means, -turn)
         sides = (0, 1) if turn == 0 else ((0,) if turn > 0 else (1,))
         for side in sides:
-            wheel = place + (" outer" if turn else (" left", " right")[side])
+            wheel = label + (" outer" if turn else (" left", " right")[side])
             Q = part.Q[inside, w, side]
             found.values["Q", wheel] = [float(np.percentile(Q, HIGH))]
             _quotient(part, found, w, side, centres, wheel)
         if turn:
-            _quasi_static(part, found, w, inside, place)
+            _quasi_static(part, found, w, inside, label)
 
 
 def _quotient(
@@ -221,7 +221,7 @@ def _quotient(
         found.values["Y_over_Q", wheel] = [float(np.percentile(means, HIGH))]
 
 
-def _quasi_static(part: _Part, found: SectionValues, w: int, inside: slice, place: str) -> None:
+def _quasi_static(part: _Part, found: SectionValues, w: int, inside: slice, label: str) -> None:
     turn = found.section.turn
     outer = 0 if turn > 0 else 1
     Q, Y = part.Q[inside, w], part.Y[inside, w]
@@ -230,10 +230,10 @@ def _quasi_static(part: _Part, found: SectionValues, w: int, inside: slice, plac
     inner = 1 - outer
     loaded = Q[:, inner] > 0.0
     quotient = outwards[inner] * Y[loaded, inner] / Q[loaded, inner]
-    found.values["Y_qst", f"{place} outer"] = [guiding]
-    found.values["Q_qst", f"{place} outer"] = [float(np.percentile(Q[:, outer], 50.0))]
+    found.values["Y_qst", f"{label} outer"] = [guiding]
+    found.values["Q_qst", f"{label} outer"] = [float(np.percentile(Q[:, outer], 50.0))]
     inner_mean = float(np.mean(quotient)) if len(quotient) else math.nan
-    found.values["Y_over_Q_inner", f"{place} inner"] = [inner_mean]
+    found.values["Y_over_Q_inner", f"{label} inner"] = [inner_mean]
 
 
 def _instability(part: _Part, found: SectionValues) -> None:
@@ -252,9 +252,9 @@ def _instability(part: _Part, found: SectionValues) -> None:
         )
         around = _around(s[near], begin, end)
         square = distance_means(s[near][around], np.square(band[around]), centres, length)
-        place = f"wheelset {w + 1}"
-        found.values["instability", place] = [float(np.sqrt(np.max(np.maximum(square, 0.0))))]
-        found.frequencies[place] = f0
+        label = f"wheelset {w + 1}"
+        found.values["instability", label] = [float(np.sqrt(np.max(np.maximum(square, 0.0))))]
+        found.frequencies[label] = f0
 
 
 def dominant_frequency(x: Floats, rate: float) -> float:

@@ -131,7 +131,7 @@ class Record:
         bodies = self.result.bodies if all(name in self.result for name in MOTION) else ()
         return {name: sensor for name, sensor in known.items() if sensor.body in bodies}
 
-    def place(self, sensor: str) -> float:
+    def sensor_offset(self, sensor: str) -> float:
         """Arc length of a sensor relative to the reference body [m]."""
         return self.sensors[sensor].offset + self.sensors[sensor].arm[0]
 
@@ -166,8 +166,8 @@ class Record:
 
     def covered(self) -> tuple[float, float]:
         """Range of arc length that the whole vehicle covered after the start [m]."""
-        places = [*self.offsets, *(self.place(name) for name in self.sensors)]
-        ahead, behind = max(0.0, *places), min(0.0, *places)
+        offsets = [*self.offsets, *(self.sensor_offset(name) for name in self.sensors)]
+        ahead, behind = max(0.0, *offsets), min(0.0, *offsets)
         first = int(np.searchsorted(self.time, self.time[0] + START))
         first = min(first, self.rows - 1)
         started = max(float(self.distance[first]), float(self.distance[0]) + ahead - behind)
@@ -183,10 +183,10 @@ class Record:
 
     def rows_between(self, begin: float, end: float, margin: float) -> slice:
         """Rows in which any part of the vehicle is between two arc lengths, with a margin [s]."""
-        places = [0.0, *self.offsets, *(self.place(name) for name in self.sensors)]
+        offsets = [0.0, *self.offsets, *(self.sensor_offset(name) for name in self.sensors)]
         extra = math.ceil(margin * self.rate)
-        first = int(np.searchsorted(self.distance, begin - max(places))) - extra
-        last = int(np.searchsorted(self.distance, end - min(places))) + extra
+        first = int(np.searchsorted(self.distance, begin - max(offsets))) - extra
+        last = int(np.searchsorted(self.distance, end - min(offsets))) + extra
         return slice(max(0, first), min(self.rows, last + 1))
 
     def pieces(self, margin: float) -> list[tuple[slice, slice]]:

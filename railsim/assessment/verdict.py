@@ -241,17 +241,17 @@ def _rows(
             continue
         gathered: dict[str, list[tuple[float, float]]] = {}
         for value in values:
-            for (name, place), numbers in value.values.items():
+            for (name, label), numbers in value.values.items():
                 if name == rule.name:
                     pairs = [(value.section.cant_deficiency, number) for number in numbers]
-                    gathered.setdefault(place, []).extend(pairs)
-        for place, pairs in gathered.items():
+                    gathered.setdefault(label, []).extend(pairs)
+        for label, pairs in gathered.items():
             influence, found = np.array(pairs).T
-            limit, sourced = limit_of[rule.name](place)
+            limit, sourced = limit_of[rule.name](label)
             if rule.name == "Y_qst":
-                found = _high_friction(values, place, found, limits)
+                found = _high_friction(values, label, found, limits)
             estimate = _estimate(rule, influence, found, limits, service, straight=zone == "1")
-            rows.append(Assessed(rule, place, estimate, limit, sourced.source, sourced.checked))
+            rows.append(Assessed(rule, label, estimate, limit, sourced.source, sourced.checked))
     return tuple(rows)
 
 
@@ -276,15 +276,15 @@ def _estimate(
 
 
 def _high_friction(
-    values: Sequence[SectionValues], place: str, guiding: Floats, limits: RunningLimits
+    values: Sequence[SectionValues], label: str, guiding: Floats, limits: RunningLimits
 ) -> Floats:
     """Guiding forces, corrected where Y/Q of the inner wheel indicates high friction."""
     law = limits.high_friction
     if law is None:
         return guiding
-    inner = place.replace("outer", "inner")
+    inner = label.replace("outer", "inner")
     quotient = np.array(
-        [v.values["Y_over_Q_inner", inner][0] for v in values if ("Y_qst", place) in v.values]
+        [v.values["Y_over_Q_inner", inner][0] for v in values if ("Y_qst", label) in v.values]
     )
     excess = np.where(quotient > law.threshold, quotient - law.threshold, 0.0)
     return np.asarray(guiding - law.slope * excess)
@@ -293,22 +293,22 @@ def _high_friction(
 def _limits(
     vehicle: Vehicle, service: Service, limits: RunningLimits, Q0: Floats, zone: str, radius: float
 ) -> dict[str, Callable[[str], tuple[float, Sourced]]]:
-    """Limit of each quantity by place [SI], with its source."""
+    """Limit of each quantity by wheelset, wheel or sensor [SI], with its source."""
 
-    def axle(place: str) -> float:
-        static = float(np.mean(Q0[int(place.split()[1]) - 1]))
+    def axle(label: str) -> float:
+        static = float(np.mean(Q0[int(label.split()[1]) - 1]))
         law = limits.sum_Y
         return law.k1[service.category] * (law.constant + law.factor * static)
 
-    def wheel(place: str) -> float:
-        static = float(np.mean(Q0[int(place.split()[1]) - 1]))
+    def wheel(label: str) -> float:
+        static = float(np.mean(Q0[int(label.split()[1]) - 1]))
         speed, law = service.admissible_speed, limits.Q
         most = next((m for v, m in law.by_speed if speed <= v * (1.0 + 1e-4)), law.above)
         return min(law.constant + static, most)
 
-    def frame(place: str) -> float:
+    def frame(label: str) -> float:
         law = limits.frame_y
-        return law.constant - law.slope * _bogie_mass(vehicle, int(place.split("_")[1]))
+        return law.constant - law.slope * _bogie_mass(vehicle, int(label.split("_")[1]))
 
     index = int(zone) - 1
     steady = limits.Y_qst
@@ -327,11 +327,11 @@ def _limits(
         return lambda _: pair
 
     found = {name: always(pair) for name, pair in fixed.items()}
-    found["sum_Y"] = lambda place: (axle(place), limits.sum_Y)
-    found["Q"] = lambda place: (wheel(place), limits.Q)
-    found["frame_y"] = lambda place: (frame(place), limits.frame_y)
+    found["sum_Y"] = lambda label: (axle(label), limits.sum_Y)
+    found["Q"] = lambda label: (wheel(label), limits.Q)
+    found["frame_y"] = lambda label: (frame(label), limits.frame_y)
     share = limits.instability
-    found["instability"] = lambda place: (share.value * axle(place), share)
+    found["instability"] = lambda label: (share.value * axle(label), share)
     return found
 
 

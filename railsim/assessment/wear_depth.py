@@ -69,17 +69,17 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
     roll = result["wheelset_roll"][:, wheelset, None]
     # to the axes of the wheelset
     across = result["patch_y"][at] + roll * result["patch_z"][at]
-    places = (-1.0, 1.0)[side] * across - tape
+    centres = (-1.0, 1.0)[side] * across - tape
     widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))
-    return spread(places, widths, shares * area[:, None]) / float(np.sum(ways))
+    return spread(centres, widths, shares * area[:, None]) / float(np.sum(ways))
 
 
-def spread(places: Floats, widths: Floats, areas: Floats) -> Floats:
+def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
     """Sum of half ellipses of given areas over `grid`.
 
     Parameters
     ----------
-    places, widths, areas : ndarray, one shape
+    centres, widths, areas : ndarray, one shape
         Centres, half widths [m] and areas [m2].
 
     Returns
@@ -88,7 +88,7 @@ def spread(places: Floats, widths: Floats, areas: Floats) -> Floats:
         Heights [m], whose integral over each cell is exact.
     """
     counted = areas > 0.0
-    y, b, A = places[counted], np.maximum(widths[counted], 1e-5), areas[counted]
+    y, b, A = centres[counted], np.maximum(widths[counted], 1e-5), areas[counted]
     edges = np.concatenate([grid() - 0.5 * SPACING, [RANGE[1]]])
     inside = np.zeros(len(edges))
     for start in range(0, len(y), 2000):  # in parts, to limit the memory

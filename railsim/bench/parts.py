@@ -53,12 +53,12 @@ def least_time(call: Callable[[], Any], repetitions: int, evaluations: int) -> f
     return best / evaluations
 
 
-def state_at(vehicle: str, track: str, speed: float, place: float) -> tuple[Preparation, Floats]:
-    """Prepare a run and advance it to a place along the track."""
+def state_at(vehicle: str, track: str, speed: float, distance: float) -> tuple[Preparation, Floats]:
+    """Prepare a run and advance it to a position along the track."""
     prepared = prepare(load_vehicle(vehicle), load_track(track), Settings(), speed)
     system, state = prepared.model.system, prepared.state.copy()
     step, _ = prepared.pace.at(speed)
-    steps = int(place / speed / step)
+    steps = int(distance / speed / step)
     time_loop(
         system,
         work_arrays(system),
@@ -77,7 +77,7 @@ def right_hand_side_parts(
     vehicle: str = "coach_manchester",
     track: str = "curve_r250",
     speed: float = 20.0,
-    place: float = 396.0,
+    distance: float = 396.0,
     repetitions: int = REPETITIONS,
 ) -> dict[str, Any]:
     """Measure the right-hand side and its parts in the middle of the curve.
@@ -89,7 +89,7 @@ def right_hand_side_parts(
         scheme calls it), `wheel_rail`, `parts` by name, `rest`: evaluation less the parts, `step`:
         a whole step of the fast scheme in the loop.
     """
-    prepared, state = state_at(vehicle, track, speed, place)
+    prepared, state = state_at(vehicle, track, speed, distance)
     model = prepared.model
     system, work = model.system, work_arrays(model.system)
     derivative = np.zeros_like(state)
@@ -110,7 +110,7 @@ def right_hand_side_parts(
     evaluation = measured("many_mechanics")
     return {
         "vehicle": vehicle,
-        "place": place,
+        "place": distance,
         "patches": patches,
         "right_hand_side": measured("many_right_hand_sides"),
         "evaluation": evaluation,

@@ -30,7 +30,7 @@ class Plan:
         How often each run, and the batch, is done.
     reference : bool
         Whether errors are measured (RK4 at 0.125 ms takes twenty times as long as the run).
-    place : float
+    distance : float
         Where the right-hand side is taken apart [m].
     part_repetitions : int
         How often a part is measured.
@@ -53,7 +53,7 @@ class Plan:
     repetitions: int = 5
     batches: int = 4
     reference: bool = True
-    place: float = 396.0
+    distance: float = 396.0
     part_repetitions: int = REPETITIONS
     grids: tuple[int, ...] = GRIDS
     ensembles: tuple[int, ...] = SIZES
@@ -81,7 +81,7 @@ def shortened(plan: Plan, until: float) -> Plan:
         runs=tuple(replace(run, until=until) for run in plan.runs),
         batch=tuple(replace(run, until=until) for run in plan.batch),
         ensemble_run=replace(plan.ensemble_run, until=until),
-        place=min(plan.place, until),
+        distance=min(plan.distance, until),
     )
 
 
@@ -110,7 +110,9 @@ def benchmark(plan: Plan, progress: Callable[[float], None] = lambda _: None) ->
             reference = references[plain]
         found["runs"].append(speed_and_error(scenario, plan.repetitions, reference))
         progress(0.5 * (number + 1) / len(plan.runs))
-    found["parts"] = right_hand_side_parts(place=plan.place, repetitions=plan.part_repetitions)
+    found["parts"] = right_hand_side_parts(
+        distance=plan.distance, repetitions=plan.part_repetitions
+    )
     found["fastsim"] = fastsim_grids(plan.grids, repetitions=plan.part_repetitions)
     progress(0.6)
     found["ensembles"] = ensembles(plan.ensembles, plan.repetitions, plan.ensemble_run)

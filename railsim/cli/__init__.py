@@ -1,6 +1,6 @@
 """The command line: one module per command, imported when the command is called.
 
-`main` is the entry point and the one place where an exception becomes an exit status.  A command's
+`main` is the entry point; only here does an exception become an exit status.  A command's
 module holds a click command named `command`; heavy parts of railsim are imported inside its
 function, so that ``railsim --help`` answers at once.
 """

@@ -129,7 +129,7 @@ def _service(
     deficiency: float | None,
     category: str | None,
 ) -> "Service | None":
-    """Service table with options in place of the vehicles' values; None where there are none."""
+    """Service table with options instead of the vehicles' values; None where there are none."""
     given = {
         name: value
         for name, value in (
@@ -179,7 +179,7 @@ def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list
 
 
 def assessment_csv(assessments: "Sequence[Assessment]") -> str:
-    """Return one line for each zone, quantity and place, for spreadsheets; SI."""
+    """Return one line for each zone, quantity and location, for spreadsheets; SI."""
     import csv
     import io
 
@@ -226,7 +226,7 @@ def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[s
         lines += [f"  {reason}" for reason in assessment.reasons]
     for zone in assessment.zones:
         header = [
-            f"zone {zone.zone}: {len(zone.values)} of {zone.needed} sections", "place", "unit",
+            f"zone {zone.zone}: {len(zone.values)} of {zone.needed} sections", "location", "unit",
             "N", "mean", "s", "estimate", "limit", "% of limit",
         ]  # fmt: skip
         rows = [_row(row) for row in assessment.worst if row in zone.rows]

@@ -282,13 +282,13 @@ def _lines(rows: "Sequence[Comparison]", results: "dict[str, Result]") -> list[s
         words = f"{row.quantity.words}, {row.where}" if by_sign else row.quantity.words
         differences = row.differences
         for index, (label, peak) in enumerate(row.peaks.items()):
-            place = peak.labels.get("wheelset", "")
+            wheelset = peak.labels.get("wheelset", "")
             block.append(
                 [
                     "" if index else row.quantity.name,
                     "" if index else words,
                     label,
-                    f"{results[label].wheelsets.index(place) + 1}" if place else "",
+                    f"{results[label].wheelsets.index(wheelset) + 1}" if wheelset else "",
                     peak.labels.get("side", ""),
                     row.quantity.text(peak.value),
                     f"{peak.time:.2f}",

@@ -48,7 +48,7 @@ def contact_data(found: "ContactSummary") -> dict[str, Any]:
         {"amplitude": float(a), "value": float(v)}
         for a, v in zip(found.amplitudes, found.conicity, strict=True)
     ]
-    data["jumps"] = [{"lateral": place, "side": side} for place, side in found.geometry.jumps()]
+    data["jumps"] = [{"lateral": lateral, "side": side} for lateral, side in found.geometry.jumps()]
     data["patches"] = found.patches
     data["notes"] = found.notes
     return data

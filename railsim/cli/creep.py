@@ -61,16 +61,16 @@ def lines_of(patch: "Patch", rows: Sequence[dict[str, Any]]) -> list[str]:
         f"Creep force over mu N, a = {1e3 * patch.a:.2f} mm, b = {1e3 * patch.b:.2f} mm, "
         f"N = {1e-3 * patch.N:.1f} kN, mu = {patch.mu:g}"
     )
-    by_place: dict[tuple[str, float], dict[str, dict[str, Any]]] = {}
+    by_creepage: dict[tuple[str, float], dict[str, dict[str, Any]]] = {}
     for row in rows:
-        by_place.setdefault((row["case"], row["size"]), {})[row["law"]] = row
+        by_creepage.setdefault((row["case"], row["size"]), {})[row["law"]] = row
     body = [
         [
             case,
             f"{size:g}",
             *(f"{_shown(by_law[law]['T_x'])} {_shown(by_law[law]['T_y'])}" for law in LAWS),
         ]
-        for (case, size), by_law in by_place.items()
+        for (case, size), by_law in by_creepage.items()
     ]
     return ["", head, *table(["T_x, T_y by", "creepage", *LAWS], body)]
 

@@ -108,14 +108,14 @@ def _lines(found: "Curving") -> list[str]:
         outer = 0 if radius > 0.0 else 1
         for i, deficiency in enumerate(found.cant_deficiency):
             for m, mu in enumerate(found.friction):
-                place = r, i, m
+                index = r, i, m
                 values = [
-                    1e3 * found.lateral[place][0],
-                    1e3 * found.attack[place][0],
-                    1e-3 * found.Q[place][0, outer],
-                    1e-3 * found.Y[place][0, outer],
-                    found.Y_over_Q[place][0, outer],
-                    found.T_gamma[place].sum(),
+                    1e3 * found.lateral[index][0],
+                    1e3 * found.attack[index][0],
+                    1e-3 * found.Q[index][0, outer],
+                    1e-3 * found.Y[index][0, outer],
+                    found.Y_over_Q[index][0, outer],
+                    found.T_gamma[index].sum(),
                 ]
                 decimals = (2, 2, 1, 1, 3, 0)
                 cells = [
@@ -129,7 +129,7 @@ def _lines(found: "Curving") -> list[str]:
                         f"{mu:g}",
                         f"{found.speed[r, i]:.2f}",
                         *cells,
-                        MARKS[int(found.converged[place])],
+                        MARKS[int(found.converged[index])],
                     ]
                 )
     header = [

@@ -295,7 +295,7 @@ def track_data(track: "Track", speeds: Sequence[float]) -> dict[str, Any]:
 
 
 def _irregularity(part: "Irregularity") -> dict[str, Any]:
-    """Return an irregularity; of a measured one what its rows hold in place of the rows."""
+    """Return an irregularity; of a measured one what its rows hold instead of the rows."""
     from railsim.definitions.irregularity import READING, Measured
 
     data = part.model_dump(exclude_none=True, exclude={"rows"})

@@ -17,8 +17,8 @@ from railsim.files import check_file
 def command(file: str, out: str, overwrite: bool, as_json: bool, quiet: bool) -> None:
     """Write a result as CSV, for MATLAB and Octave, or as Parquet.
 
-    CSV and Parquet have a column for each place of each quantity; a MATLAB file holds the arrays
-    with their dimensions.  All numbers are SI.
+    CSV and Parquet have a column for each wheel, body or sensor of each quantity; a MATLAB file
+    holds the arrays with their dimensions.  All numbers are SI.
 
     \b
     Example:

@@ -45,7 +45,7 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
 @click.option("--case", metavar="NAME", help="Case of the file instead of its base.")
 @click.option(
     "--at",
-    "places",
+    "at",
     multiple=True,
     metavar="NAME=VALUE",
     help="Also print all results at a given value of one of them (SI), such as height=0.8955.",
@@ -63,7 +63,7 @@ def command(
     starts: int | None,
     seed: int | None,
     case: str | None,
-    places: tuple[str, ...],
+    at: tuple[str, ...],
     out: str | None,
     assignments: tuple[str, ...],
     overwrite: bool,
@@ -97,7 +97,7 @@ def command(
         for file, mechanism in zip(files, mechanisms, strict=True):
             with _faults_in(file, mechanism):
                 results.append(_analysed(mechanism, case))
-    found = [_values_at(result, places) for result in results]
+    found = [_values_at(result, at) for result in results]
     cases = {} if searched else _cases(files[0], mechanisms[0], results[0])
     written: list[Path] = []
     if out is not None:
@@ -174,20 +174,20 @@ def _faults_in(file: str, mechanism: "Mechanism") -> Iterator[None]:
         ) from None
 
 
-def _values_at(result: "Analysis", places: Sequence[str]) -> list[dict[str, Any]]:
+def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:
     """Results where one of them has a value, by the words of --at."""
     from railsim.errors import Fault, InputError
 
     found = []
-    for place in places:
-        name, equals, written = place.partition("=")
+    for assignment in at:
+        name, equals, written = assignment.partition("=")
         try:
             value = float(written)
         except ValueError:
             equals = ""
         if not equals:
-            raise InputError([Fault("--at", "", f"'{place}'", "NAME=VALUE, in SI units")])
-        found.append({"where": place, **result.at(name.strip(), value)})
+            raise InputError([Fault("--at", "", f"'{assignment}'", "NAME=VALUE, in SI units")])
+        found.append({"where": assignment, **result.at(name.strip(), value)})
     return found
 
 
@@ -233,7 +233,7 @@ def _lines(
     return lines
 
 
-def _result_lines(result: "Analysis", places: Sequence[dict[str, Any]]) -> list[str]:
+def _result_lines(result: "Analysis", at: Sequence[dict[str, Any]]) -> list[str]:
     from railsim.mechanisms import tables
     from railsim.mechanisms.selection import checks, selection
     from railsim.mechanisms.tolerance import scatter
@@ -242,8 +242,8 @@ def _result_lines(result: "Analysis", places: Sequence[dict[str, Any]]) -> list[
     case = f", case {result.case}" if result.case else ""
     lines = [f"{definition.name}{case}", ""]
     lines += table(*tables.upright(tables.position_table(result)))
-    if places:
-        rows = [(p["where"], {k: v for k, v in p.items() if k != "where"}) for p in places]
+    if at:
+        rows = [(p["where"], {k: v for k, v in p.items() if k != "where"}) for p in at]
         lines += ["", *table(*tables.upright(tables.value_table(result, rows)))]
     lines += ["", *tables.sentences(result)]
     lines += ["", *table(*tables.reaction_table(result))]

@@ -30,15 +30,12 @@ MOST_ROWS = 15
 @click.option(
     "--method",
     type=click.Choice(["surrogate", "nsga2", "differential_evolution"]),
-    help="In place of the file's. nsga2 needs pip install 'railsim[optimise]'.",
+    help="Instead of the file's. nsga2 needs pip install 'railsim[optimise]'.",
 )
 @click.option(
-    "--evaluations",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Designs, in place of the file's.",
+    "--evaluations", type=click.IntRange(min=1), metavar="N", help="Designs, instead of the file's."
 )
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="In place of the file's.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Instead of the file's.")
 @click.option(
     "--choose",
     type=int,

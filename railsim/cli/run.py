@@ -158,7 +158,7 @@ class _Shown(logging.Handler):
 
 
 def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
-    """Open a result to go on from, which says speed and place itself."""
+    """Open a result to go on from, which gives speed and position itself."""
     from railsim.errors import Fault, InputError
     from railsim.result import open_run
 
@@ -324,8 +324,8 @@ def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
     kinds = {"abs": "largest magnitude", "max": "largest", "min": "smallest"}
     rows = []
     for peak in found:
-        place = peak.labels.get("wheelset", "")
-        number = f"{result.wheelsets.index(place) + 1} {place}" if place else ""
+        wheelset = peak.labels.get("wheelset", "")
+        number = f"{result.wheelsets.index(wheelset) + 1} {wheelset}" if wheelset else ""
         words = peak.quantity.words
         rows.append(
             [

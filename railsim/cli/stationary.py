@@ -96,7 +96,8 @@ def _lines(found: "Stationary", *, quiet: bool) -> list[str]:
             if in_degrees else f"{v:.3f}" for v in (value.value, value.limit)
         ]  # fmt: skip
         rows.append([value.case, value.quantity, value.place, *shown])
-    lines += ["", *table(["standing on", "quantity", "place", "value", "limit"], rows, numbers=3)]
+    header = ["standing on", "quantity", "location", "value", "limit"]
+    lines += ["", *table(header, rows, numbers=3)]
     if not quiet:
         how = "held across the track" if found.held else "free across the track"
         lines += ["", f"note: wheelsets {how}"]

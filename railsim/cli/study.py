@@ -100,7 +100,7 @@ def _is_number(text: str) -> bool:
     metavar="FILE.py:FUNCTION",
     help="Function that is given each result and returns further numbers by their names.",
 )
-@click.option("--scenario", metavar="F", help="Scenario in place of tracks and speeds.")
+@click.option("--scenario", metavar="F", help="Scenario instead of tracks and speeds.")
 @click.option("--out", default="study", metavar="DIR", show_default=True, help="Folder.")
 @click.option(
     "--start", type=float, default=0.0, metavar="S", help="Start of all runs in m along the track."

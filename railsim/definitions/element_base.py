@@ -62,7 +62,7 @@ def two_sided(rows: Rows) -> Rows:
 
 
 def times(vector: tuple[float, float, float], signs: Signs) -> tuple[float, float, float]:
-    """Return a vector with the signs of a mirrored place."""
+    """Return a vector with the signs of a mirrored placement."""
     return (vector[0] * signs[0], vector[1] * signs[1], vector[2] * signs[2])
 
 
@@ -77,11 +77,11 @@ class Element(Definition):
         return None
 
     def mirrored(self, signs: Signs) -> Self:
-        """Return the element in a mirrored place; `signs` holds -1 for each reversed axis."""
+        """Return the element in a mirrored placement; `signs` holds -1 for each reversed axis."""
         return self
 
     def parts(self) -> list[tuple[str, Vector, "Element"]]:
-        """Elements of which this one consists: suffix of the name, place from its point [m]."""
+        """Elements of which this one consists: suffix of the name, offset from its point [m]."""
         return []
 
     def with_known_preload(self, point1: Vector, point2: Vector) -> Self:
@@ -190,7 +190,7 @@ class PreloadAlongAxes(Definition):
         preload: Literal["auto"] | Vector
 
     def mirrored(self, signs: Signs) -> Self:
-        """Return the element in a mirrored place: the preload turns with the axes."""
+        """Return the element in a mirrored placement: the preload turns with the axes."""
         if self.preload == "auto":
             return self
         return self.model_copy(update={"preload": times(self.preload, signs)})

@@ -52,7 +52,7 @@ def _as_written(detail: Any, path: Sequence[str], data: Any) -> Any:
         node = node[int(item)] if isinstance(node, list) else node.get(item)
     numbers = int | float
     if isinstance(node, list) and len(node) == 2 and isinstance(detail["input"], numbers):
-        node = node[1]  # a row of place and value
+        node = node[1]  # a row of arc length and value
     if not (isinstance(node, numbers) and isinstance(detail["input"], numbers)):
         return detail
     return {**detail, "input": node}

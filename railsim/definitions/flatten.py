@@ -26,7 +26,7 @@ POSITION_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class FlatBody:
-    """A body in its nominal place.
+    """A body in its nominal position.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class FlatBody:
 
 @dataclass(frozen=True)
 class FlatElement:
-    """A force element in its nominal place.
+    """A force element in its nominal position.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class FlatElement:
     point1, point2 : tuple of 3 floats
         Where it acts in vehicle axes; an element without points: the bodies' positions [m].
     definition : Element
-        Its parameters, with signs as they are in this place.
+        Its parameters, with signs as they are in this placement.
     """
 
     name: str
@@ -129,7 +129,7 @@ class FlatVehicle:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _Frame:
     """Where a group stands: names and keys that lead to it, origin and direction of its x axis."""
 
     scope: tuple[str, ...] = ()
@@ -154,8 +154,8 @@ class _Place:
             self.origin[2] + local[2],
         )
 
-    def inner(self, assembly: str, placement: Placement) -> "_Place":
-        return _Place(
+    def inner(self, assembly: str, placement: Placement) -> "_Frame":
+        return _Frame(
             (*self.scope, placement.name),
             (*self.path, "assemblies", assembly),
             self.point(placement.position),
@@ -163,13 +163,13 @@ class _Place:
         )
 
 
-def _places(
-    group: Vehicle | Assembly, place: _Place
-) -> Iterator[tuple[Vehicle | Assembly, _Place]]:
-    yield group, place
+def _frames(
+    group: Vehicle | Assembly, frame: _Frame
+) -> Iterator[tuple[Vehicle | Assembly, _Frame]]:
+    yield group, frame
     for name, assembly in group.assemblies.items():
         for placement in assembly.placements:
-            yield from _places(assembly, place.inner(name, placement))
+            yield from _frames(assembly, frame.inner(name, placement))
 
 
 @offers
@@ -199,64 +199,64 @@ def vehicle_faults(vehicle: Vehicle) -> list[Fault]:
 def _flat(vehicle: Vehicle) -> FlatVehicle:
     vehicle = loaded(vehicle)
     known, _ = body_names(vehicle.model_dump())
-    places = list(_places(vehicle, _Place()))
-    bodies = [body for group, place in places for body in _bodies(group, place)]
-    wheelsets = [body for group, place in places for body in _wheelsets(group, place)]
+    frames = list(_frames(vehicle, _Frame()))
+    bodies = [body for group, frame in frames for body in _bodies(group, frame)]
+    wheelsets = [body for group, frame in frames for body in _wheelsets(group, frame)]
     wheelsets.sort(key=lambda body: -body.position[0])
     order = {body.name: index for index, body in enumerate(wheelsets)}
-    boxes = [box for group, place in places for box in _axleboxes(group, place, known)]
+    boxes = [box for group, frame in frames for box in _axleboxes(group, frame, known)]
     boxes.sort(key=lambda box: order[box.parent or ""])
     flat = (*bodies, *wheelsets, *boxes)
     positions = {body.name: body.position for body in flat}
-    elements = [e for group, place in places for e in _elements(group, place, positions)]
+    elements = [e for group, frame in frames for e in _elements(group, frame, positions)]
     fixed = [body.name for body in flat if body.fixed]
     reference = vehicle.reference or [*fixed, flat[0].name][0]
     return FlatVehicle(vehicle.name, flat, tuple(elements), reference)
 
 
-def _bodies(group: Vehicle | Assembly, place: _Place) -> Iterator[FlatBody]:
+def _bodies(group: Vehicle | Assembly, frame: _Frame) -> Iterator[FlatBody]:
     for name, body in group.bodies.items():
-        at = place.point(body.position)
-        yield FlatBody(place.full(name), "body", body.mass, body.inertia, at, fixed=body.fixed)
+        at = frame.point(body.position)
+        yield FlatBody(frame.full(name), "body", body.mass, body.inertia, at, fixed=body.fixed)
 
 
-def _wheelsets(group: Vehicle | Assembly, place: _Place) -> Iterator[FlatBody]:
+def _wheelsets(group: Vehicle | Assembly, frame: _Frame) -> Iterator[FlatBody]:
     for name, wheelset in group.wheelsets.items():
-        at = place.point(wheelset.position)
-        yield FlatBody(place.full(name), "wheelset", wheelset.mass, wheelset.inertia, at, wheelset)
+        at = frame.point(wheelset.position)
+        yield FlatBody(frame.full(name), "wheelset", wheelset.mass, wheelset.inertia, at, wheelset)
 
 
 def _axleboxes(
-    group: Vehicle | Assembly, place: _Place, known: dict[str, str]
+    group: Vehicle | Assembly, frame: _Frame, known: dict[str, str]
 ) -> Iterator[FlatBody]:
     for name, box in group.axleboxes.items():
-        parent = resolve(box.wheelset, place.scope, None, known)
+        parent = resolve(box.wheelset, frame.scope, None, known)
         for sided, side in sided_names(name, {"sides": box.sides}):
             yield FlatBody(
-                place.full(sided),
+                frame.full(sided),
                 "axlebox",
                 0.0,
                 (0.0, 0.0, 0.0),
-                place.point(box.position, side),
+                frame.point(box.position, side),
                 parent=parent,
                 pitch_inertia=box.pitch_inertia,
             )
 
 
 def _elements(
-    group: Vehicle | Assembly, place: _Place, positions: dict[str, Vector]
+    group: Vehicle | Assembly, frame: _Frame, positions: dict[str, Vector]
 ) -> Iterator[FlatElement]:
     for name, element in group.elements.items():
         for sided, side in sided_names(name, {"sides": getattr(element, "sides", None)}):
-            ends = [resolve(body, place.scope, side, positions) or "" for body in element.bodies]
+            ends = [resolve(body, frame.scope, side, positions) or "" for body in element.bodies]
             points = element.end_points()
             if points is None:
                 at = (positions[ends[0]], positions[ends[-1]])
             else:
-                at = (place.point(points[0], side), place.point(points[1], side))
-            definition = element.mirrored(place.signs(side)).with_known_preload(*at)
+                at = (frame.point(points[0], side), frame.point(points[1], side))
+            definition = element.mirrored(frame.signs(side)).with_known_preload(*at)
             body2 = ends[1] if len(ends) == 2 else ""
-            full, signs = place.full(sided), place.signs(side)
+            full, signs = frame.full(sided), frame.signs(side)
             parts = definition.parts()
             for suffix, offset, part in parts:
                 there = _sum(at[0], tuple(s * d for s, d in zip(signs, offset, strict=True)))
@@ -279,23 +279,23 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
     wheelsets = flat.of_kind("wheelset")
     for ahead, behind in pairwise(wheelsets):
         if ahead.position[0] - behind.position[0] < POSITION_TOLERANCE:
-            found = f"'{ahead.name}' and '{behind.name}' stand at the same place"
+            found = f"'{ahead.name}' and '{behind.name}' stand at the same position"
             key = f"{keys[behind.name]}.position"
             faults.append(Fault("", key, found, "wheelsets one behind the other"))
-    for group, place in _places(vehicle, _Place()):
-        faults += _side_faults(group, place)
-        faults += _torque_faults(group, place, {body.name: body.kind for body in flat.bodies})
+    for group, frame in _frames(vehicle, _Frame()):
+        faults += _side_faults(group, frame)
+        faults += _torque_faults(group, frame, {body.name: body.kind for body in flat.bodies})
     # a definition that stands several times is reported once
     return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
 
 def _keys(vehicle: Vehicle) -> dict[str, str]:
     keys: dict[str, str] = {}
-    for group, place in _places(vehicle, _Place()):
+    for group, frame in _frames(vehicle, _Frame()):
         for table in ("wheelsets", "axleboxes"):
             for name, part in getattr(group, table).items():
                 for sided, _ in sided_names(name, {"sides": getattr(part, "sides", None)}):
-                    keys[place.full(sided)] = place.key(table, name)
+                    keys[frame.full(sided)] = frame.key(table, name)
     return keys
 
 
@@ -322,29 +322,29 @@ def _axlebox_faults(flat: FlatVehicle, keys: dict[str, str]) -> list[Fault]:
     return faults
 
 
-def _side_faults(group: Vehicle | Assembly, place: _Place) -> list[Fault]:
+def _side_faults(group: Vehicle | Assembly, frame: _Frame) -> list[Fault]:
     faults = []
     for name, box in group.axleboxes.items():
         if box.sides == "both" and box.position[1] <= 0.0:
-            faults.append(_not_on_the_right(place.key("axleboxes", name, "position")))
+            faults.append(_not_on_the_right(frame.key("axleboxes", name, "position")))
     for name, element in group.elements.items():
         points = element.end_points()
         if getattr(element, "sides", None) != "both" or points is None:
             continue
         if max(points[0][1], points[1][1]) <= 0.0:
-            faults.append(_not_on_the_right(place.key("elements", name)))
+            faults.append(_not_on_the_right(frame.key("elements", name)))
     return faults
 
 
-def _torque_faults(group: Vehicle | Assembly, place: _Place, kinds: dict[str, str]) -> list[Fault]:
+def _torque_faults(group: Vehicle | Assembly, frame: _Frame, kinds: dict[str, str]) -> list[Fault]:
     faults = []
     for name, element in group.elements.items():
         if not isinstance(element, AxleTorque):
             continue
-        ends = [resolve(body, place.scope, None, kinds) or "" for body in element.bodies]
+        ends = [resolve(body, frame.scope, None, kinds) or "" for body in element.bodies]
         found = [kinds[end] for end in ends]
         if found != ["body", "wheelset"]:
-            key = place.key("elements", name, "bodies")
+            key = frame.key("elements", name, "bodies")
             allowed = "first the body that takes the reaction, then the wheelset"
             faults.append(Fault("", key, " and ".join(f"'{kind}'" for kind in found), allowed))
     return faults

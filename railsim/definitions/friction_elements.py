@@ -178,7 +178,7 @@ class CentrePlate(SlidingFriction, PairElement):
         return self.point, self.point
 
     def parts(self) -> list[tuple[str, Vector, Element]]:
-        """Pads that carry the plate: suffix of the name, place from the centre [m], pad."""
+        """Pads that carry the plate: suffix of the name, offset from the centre [m], pad."""
         found: list[tuple[str, Vector, Element]] = []
         rule = _gauss_on_ring(self.inner_radius, self.radius)
         for ring, (radius, share) in enumerate(rule):
@@ -196,8 +196,8 @@ class CentrePlate(SlidingFriction, PairElement):
                     sliding_ratio=self.sliding_ratio,
                     stribeck_speed=self.stribeck_speed,
                 )
-                place = (radius * cos(angle), radius * sin(angle), 0.0)
-                found.append((f"pad_{4 * ring + quarter + 1}", place, pad))
+                offset = (radius * cos(angle), radius * sin(angle), 0.0)
+                found.append((f"pad_{4 * ring + quarter + 1}", offset, pad))
         return found
 
 

@@ -28,9 +28,9 @@ class AppliedForce(CarriesNoWeight, Element):
     point: Vector | None = None
     """Where the force acts [m]; by default at the centre of gravity"""
     axes: Literal["body", "track"] = "body"
-    """Axes of force and torque: those of the body, or those of the track at its place"""
+    """Axes of force and torque: those of the body, or those of the track at its position"""
     over: Literal["time", "distance"] = "time"
-    """First column of the tables: time, or the place of the body's nominal position on the track"""
+    """First column of the tables: time, or the arc length of the body's nominal position"""
     force_table: TimeRows | None = None
     """Rows [time s or distance m, Fx, Fy, Fz N], linear in between, constant beyond"""
     torque_table: TimeRows | None = None
@@ -47,7 +47,7 @@ class AppliedForce(CarriesNoWeight, Element):
         return None if self.point is None else (self.point, self.point)
 
     def mirrored(self, signs: Signs) -> Self:
-        """Return the load in a mirrored place; a torque turns the other way round than a force."""
+        """Return the load in a mirrored placement; a torque turns opposite to a force."""
         handed = signs[0] * signs[1] * signs[2]
         turns = (handed * signs[0], handed * signs[1], handed * signs[2])
         tables = {
@@ -71,7 +71,7 @@ class AxleTorque(CarriesNoWeight, PairElement):
     ) = None
     """Rows [time s or distance m, factor of the torque], linear in between, constant beyond"""
     over: Literal["time", "distance"] = "time"
-    """First column of `demand_table`: time, or the place of the wheelset's nominal position"""
+    """First column of `demand_table`: time, or the arc length of the wheelset's nominal position"""
     slip_control: tuple[NonNegative, Positive] | None = None
     """Slip (omega r - V)/V at which the torque begins to fall, and slip at which it is gone [1]"""
 

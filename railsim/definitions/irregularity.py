@@ -1,7 +1,7 @@
 """Irregularities of a track file: measured, single and random displacements of the rails.
 
 Each rail is displaced laterally (y, positive to the right) and vertically (z, positive downwards)
-from the place that plan, cant and vertical profile give it; several irregularities add up.  A
+from the position that plan, cant and vertical profile give it; several irregularities add up.  A
 disturbance that does not end at zero by itself is faded in and out over `fade`.
 """
 
@@ -79,7 +79,7 @@ class Irregular(Definition):
 
 
 class Single(Irregular):
-    """A disturbance at one place, `length` long about `s`."""
+    """A single disturbance, `length` long about `s`."""
 
     if TYPE_CHECKING:
         s: float
@@ -95,7 +95,7 @@ class Single(Irregular):
         return self.length / (40.0 if self.shape == "triangle" else 16.0)
 
     def summary(self) -> str:
-        """Return its kind and place."""
+        """Return its kind and arc length."""
         return f"{self.type} at {self.s:g} m"
 
 
@@ -158,12 +158,12 @@ class Measured(Irregular):
 
     def resolution(self) -> float:
         """Return half the least distance of the rows, 0.05 m at least [m]."""
-        places = [row[0] for row in self.rows or ()]
-        return max(0.05, 0.5 * min(b - a for a, b in pairwise(places)))
+        s = [row[0] for row in self.rows or ()]
+        return max(0.05, 0.5 * min(b - a for a, b in pairwise(s)))
 
     def summary(self) -> str:
         """Return that it is measured, and its number of rows."""
-        return f"measured, {len(self.rows or ())} places"
+        return f"measured, {len(self.rows or ())} rows"
 
 
 class Dip(Single):
@@ -232,7 +232,7 @@ class Coefficients(Definition):
     vertical: NonNegative = 0.0
     """A_v of the longitudinal level [m rad]"""
     cross_level: NonNegative = 0.0
-    """Coefficient of the cross level in place of A_v [m rad]"""
+    """Coefficient of the cross level instead of A_v [m rad]"""
     gauge: NonNegative = 0.0
     """A_g of the gauge [m rad]"""
     omega_c: Positive = 0.8246

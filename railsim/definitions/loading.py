@@ -322,14 +322,14 @@ def _loaded(model: type[D], source: Source, overrides: Iterable[str]) -> D:
 
 def _validated(model: type[D], source: Source, known: Format) -> D:
     faults = [*known.prepare(source.data), *known.raw_faults(source.data)]
-    faults = [_placed(fault, source) for fault in faults]
+    faults = [_located(fault, source) for fault in faults]
     try:
         definition = model.model_validate(source.data)
     except ValidationError as error:
         faults = validation_faults(error, source, model) + faults
     else:
         if not faults:
-            faults = [_placed(fault, source) for fault in known.faults(definition)]
+            faults = [_located(fault, source) for fault in known.faults(definition)]
     if faults:
         raise InputError(dict.fromkeys(faults))
     return definition
@@ -340,5 +340,5 @@ def _format_fault(file: str, found: object, allowed: Iterable[str]) -> Fault:
     return Fault(file, "format", named, "allowed: " + ", ".join(allowed))
 
 
-def _placed(fault: Fault, source: Source) -> Fault:
+def _located(fault: Fault, source: Source) -> Fault:
     return fault if fault.file else source.fault(fault.key, fault.found, fault.allowed)

@@ -102,7 +102,7 @@ def _unknown(group: Any, load: LoadGroup, key: str) -> Iterator[Fault]:
         known = list(getattr(group, table))
         for name in getattr(load, table):
             if name not in known:
-                found = f"no {word} '{name}' at this place of the vehicle"
+                found = f"no {word} '{name}' in this part of the vehicle"
                 yield Fault("", f"{key}.{table}.{name}", found, nearest(name, known))
     for name, inner in load.assemblies.items():
         if name in group.assemblies:

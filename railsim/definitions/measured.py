@@ -147,7 +147,7 @@ def _rows_of(path: Path, text: str, how: Reading) -> tuple[Rows, list[Fault]]:
         if how.falling_mileage:
             begin = row[0] if not rows else begin
             row = (begin - row[0], *row[1:])
-        faults += _misplaced(path, number, row, rows)
+        faults += _row_faults(path, number, row, rows)
         rows.append(row)
     if not faults and len(rows) < 4:
         faults.append(Fault(str(path), "", f"{len(rows)} rows", "four rows at least"))
@@ -236,35 +236,35 @@ def _problem(cells: list[str], header: list[Column | None]) -> tuple[str, str] |
     return None
 
 
-def _misplaced(path: Path, number: int, row: tuple[float, ...], before: Rows) -> list[Fault]:
-    place = f"line {number}"
+def _row_faults(path: Path, number: int, row: tuple[float, ...], before: Rows) -> list[Fault]:
+    line = f"line {number}"
     faults = []
     if before and row[0] <= before[-1][0]:
         found = f"s = {row[0]:g} m does not increase"
-        faults.append(Fault(str(path), place, found, "arc lengths that increase from row to row"))
+        faults.append(Fault(str(path), line, found, "arc lengths that increase from row to row"))
     elif before:
         steepest = max(abs(new - old) for new, old in zip(row[1:], before[-1][1:], strict=True))
         if steepest > STEEPEST * (row[0] - before[-1][0]):
             found = f"{steepest * 1e3:.3g} mm within {row[0] - before[-1][0]:.3g} m"
             allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
-            faults.append(Fault(str(path), place, found, allowed))
+            faults.append(Fault(str(path), line, found, allowed))
     largest = max(abs(value) for value in row[1:])
     if largest > LARGEST:
         allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
-        faults.append(Fault(str(path), place, f"a displacement of {largest:g} m", allowed))
+        faults.append(Fault(str(path), line, f"a displacement of {largest:g} m", allowed))
     return faults
 
 
 def _row(header: list[Column | None], cells: list[str]) -> tuple[float, ...]:
-    place = 0.0
+    s = 0.0
     rails = [0.0] * len(COLUMNS)
     for column, cell in zip(header, cells, strict=True):
         if column is None:
             continue
         (name, unit), value = column, float(cell)
         if name == "s":
-            place = unit * value
+            s = unit * value
             continue
         for index, share in enumerate(SHARES[name]):
             rails[index] += share * unit * value
-    return (place, *rails)
+    return (s, *rails)

@@ -377,7 +377,7 @@ def _size_faults(mechanism: Mechanism) -> list[Fault]:
     values = parameter_values(mechanism)
     found = sizes(mechanism, values)
     if not found:
-        return [Fault("", "bodies", "no lengths", "points at different places")]
+        return [Fault("", "bodies", "no lengths", "points at different positions")]
     middle = float(np.median(list(found.values())))
     faults = [
         Fault("", key, f"{size:g} m, the others about {middle:.3g} m", "lengths in metres")

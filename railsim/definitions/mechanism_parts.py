@@ -45,7 +45,7 @@ Pair = tuple[PointName, PointName]
 
 
 class Polar(Definition):
-    """A place in polar coordinates."""
+    """A point in polar coordinates."""
 
     radius: Quantity
     """Distance from the body's origin [m]"""
@@ -53,21 +53,21 @@ class Polar(Definition):
     """Direction from the body's x axis [rad]"""
 
 
-def _place_tag(value: Any) -> str:
+def _coordinates_tag(value: Any) -> str:
     return "polar" if isinstance(value, dict | Polar) else "cartesian"
 
 
-Place = Annotated[
+Coordinates = Annotated[
     Annotated[tuple[Quantity, Quantity], Tag("cartesian")] | Annotated[Polar, Tag("polar")],
-    Discriminator(_place_tag),
+    Discriminator(_coordinates_tag),
 ]
 
 
 class Ground(Definition):
     """What does not move."""
 
-    points: dict[Name, Place] = Field(default_factory=dict)
-    """Places by name [m]"""
+    points: dict[Name, Coordinates] = Field(default_factory=dict)
+    """Points by name [m]"""
     gravity: Quantity = 9.81
     """Gravitational acceleration along -y [m/s2]"""
 
@@ -75,11 +75,11 @@ class Ground(Definition):
 class Body(Definition):
     """A rigid body; its axes are where its points say."""
 
-    points: dict[Name, Place] = Field(default_factory=dict)
-    """Places by name in the body's axes [m]"""
+    points: dict[Name, Coordinates] = Field(default_factory=dict)
+    """Points by name in the body's axes [m]"""
     mass: Quantity = 0.0
     """Mass [kg]"""
-    centre: Place = (0.0, 0.0)
+    centre: Coordinates = (0.0, 0.0)
     """Centre of gravity in the body's axes [m]"""
     inertia: Quantity = 0.0
     """Moment of inertia about the centre of gravity [kg m2]"""
@@ -91,7 +91,7 @@ class Start(Definition):
     """Pose of a body from which the assembly at the driver's start is found."""
 
     x: QuantityOrAuto = AUTO
-    """Place of the body's origin [m]; by default from a revolute joint or 0"""
+    """Position of the body's origin [m]; by default from a revolute joint or 0"""
     y: QuantityOrAuto = AUTO
     """The same along y [m]"""
     angle: Quantity = 0.0
@@ -147,7 +147,7 @@ class Arc(Definition):
     """Side to which the path turns on its way"""
     length: Quantity | None = None
     """Length along the path [m], of a path of tangent arcs"""
-    centre: Place | None = None
+    centre: Coordinates | None = None
     """Centre in the cam's axes [m], instead of tangency"""
     begin: Quantity | None = None
     """Direction from the given centre to the arc's begin [rad]; by default where its rates equal

@@ -1,4 +1,4 @@
-"""Values of a mechanism's parameters, places and sizes."""
+"""Values of a mechanism's parameters, points and sizes."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -86,8 +86,8 @@ def number(quantity: float | str, values: Mapping[str, Any], key: str = "") -> A
         raise InputError([Fault("", key, str(error), hint)]) from None
 
 
-def place(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:
-    """Coordinates of a place in its body's axes."""
+def coordinates(where: Any, values: Mapping[str, Any], key: str = "") -> tuple[Any, Any]:
+    """Coordinates of a point in its body's axes."""
     if isinstance(where, Polar):
         radius, angle = number(where.radius, values, key), number(where.angle, values, key)
         return radius * np.cos(angle), radius * np.sin(angle)
@@ -116,7 +116,7 @@ def sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:
     parts += [(f"bodies.{name}", body) for name, body in mechanism.bodies.items()]
     for key, part in parts:
         for name, where in part.points.items():
-            x, y = place(where, values)
+            x, y = coordinates(where, values)
             found[f"{key}.points.{name}"] = float(np.hypot(x, y))
     for name, joint in mechanism.joints.items():
         if isinstance(joint, Link):

@@ -64,7 +64,7 @@ def groups(
 def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
     """Return a fault where assemblies stand so often, or so deeply, that nobody can mean it.
 
-    Counts without placing anything: ten assemblies of ten places each within one another are 1e10.
+    Counts without placing anything: ten nested assemblies of ten placements each are 1e10.
     """
     total = 0
     level: list[tuple[Mapping[str, Any], tuple[str, ...], int]] = [(parts, (), 1)]

@@ -85,7 +85,7 @@ def with_values(
 
 
 def _given(value: Any, _: Any) -> Any:
-    """Return a value whatever stands in its place."""
+    """Return a value whatever the present one is."""
     return _plain(value)
 
 
@@ -128,8 +128,8 @@ def _assign(
     parent, last = descend(source.data, path, path[0] in free, dict(defaults))
     present = parent[last] if not isinstance(parent, dict) or last in parent else None
     parent[last] = read(present)
-    place = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
-    replace_origin(source.origin, place, parent[last], origin)
+    names = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
+    replace_origin(source.origin, names, parent[last], origin)
 
 
 def _value(written: str, text_expected: bool) -> Any:

@@ -128,14 +128,14 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     whole = list(path)
     if len(whole) < 2 or whole[0] in data or whole[0] in (defaults or {}):
         return whole
-    found = [place for place in _places(data) if _holds(place, whole)]
+    found = [keys for keys in _paths(data) if _holds(keys, whole)]
     if len(found) > 1:
-        shown = ", ".join(".".join(place) for place in found[:4])
+        shown = ", ".join(".".join(keys) for keys in found[:4])
         raise KeyError(f"'{'.'.join(whole)}' is {len(found)} keys: {shown}")
     return found[0] if found else whole
 
 
-def _places(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
+def _paths(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
     """Yield the paths of all tables, lists and values."""
     if isinstance(node, dict):
         members = [(str(key), value) for key, value in node.items()]
@@ -150,25 +150,25 @@ def _places(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
         return
     for key, value in members:
         yield [*before, key]
-        yield from _places(value, (*before, key))
+        yield from _paths(value, (*before, key))
 
 
-def _holds(place: Sequence[str], path: Sequence[str]) -> bool:
-    """Whether a place ends as a short path does and holds its other parts, in their order."""
-    if place[-1] != path[-1]:
+def _holds(keys: Sequence[str], path: Sequence[str]) -> bool:
+    """Whether keys end as a short path does and hold its other parts, in their order."""
+    if keys[-1] != path[-1]:
         return False
-    rest = iter(place)
+    rest = iter(keys)
     return all(part in rest for part in path)
 
 
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:
-    place = ".".join(before) or "the file"
+    table = ".".join(before) or "the file"
     if isinstance(node, dict):
-        return f"no '{part}' in {place}; {nearest(part, {*node, *others})}"
+        return f"no '{part}' in {table}; {nearest(part, {*node, *others})}"
     if isinstance(node, list):
         names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
         if names:
-            return f"no member '{part}' in {place}; {nearest(part, map(str, names))}"
+            return f"no member '{part}' in {table}; {nearest(part, map(str, names))}"
         indices = f"allowed: 0 to {len(node) - 1}" if node else "it is empty"
-        return f"no member '{part}' in {place}; {indices}"
-    return f"'{place}' is a value and has no members"
+        return f"no member '{part}' in {table}; {indices}"
+    return f"'{table}' is a value and has no members"

@@ -23,7 +23,7 @@ Vehicles = Annotated[dict[Text, Finite], Field(min_length=1)]
 
 
 class PublishedValue(Definition):
-    """One quantity at one place, for each vehicle."""
+    """One quantity of one wheelset or wheel, for each vehicle."""
 
     quantity: Literal[tuple(QUANTITIES)]  # type: ignore[valid-type]
     """Quantity of a result"""

@@ -20,9 +20,9 @@ ORDER = 4  # of the Butterworth band pass
 BLIND = 0.1
 
 
-def equal_step(places: Array) -> float | None:
-    """Step of equally spaced places [m]; None where the steps differ by more than 1 %."""
-    steps = np.diff(places)
+def equal_step(s: Array) -> float | None:
+    """Step of equally spaced arc lengths [m]; None where the steps differ by more than 1 %."""
+    steps = np.diff(s)
     mean = float(np.mean(steps))
     return mean if np.max(np.abs(steps - mean)) <= 0.01 * mean else None
 
@@ -67,7 +67,7 @@ def from_chord(values: Array, step: float, chord: tuple[float, float]) -> Array:
     step : float
         Distance between rows [m].
     chord : pair of float
-        Parts a behind and b ahead of the place of measuring [m].
+        Parts a behind and b ahead of the measuring point [m].
     """
     a, b = chord
 

@@ -132,7 +132,7 @@ class Outputs(Definition):
     elements: tuple[Text, ...] = ()
     """Full names of force elements, `*` standing for any letters: their deflection, force, power"""
     contact_patches: Flag = False
-    """Place, size, load, creep forces and pressure of every contact patch"""
+    """Position, size, load, creep forces and pressure of every contact patch"""
     frictional_power: Flag = False
     """Power that each wheel's contact turns into heat"""
     track: Flag = False

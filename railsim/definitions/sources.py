@@ -199,11 +199,11 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         found = "values nested too deeply"
         raise InputError([Fault(file, "", found, f"{DEEPEST} levels at most")]) from None
     except tomllib.TOMLDecodeError as error:
-        place = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
-        if place:
-            message = str(error).replace(place.group(0), "")
-            key = f"line {place.group(1)}"
-            found = f"broken TOML at column {place.group(2)}: {message}"
+        located = re.search(r"\s*\(at line (\d+), column (\d+)\)", str(error))
+        if located:
+            message = str(error).replace(located.group(0), "")
+            key = f"line {located.group(1)}"
+            found = f"broken TOML at column {located.group(2)}: {message}"
         else:
             line = text.count("\n") + 1
             key, found = f"line {line}", f"broken TOML: {error}"

@@ -163,7 +163,7 @@ class BumpStop(CarriesNoWeight, PointElement):
     """Rows [travel of body 2 m, force N]; from [0, 0] on it serves both directions"""
 
     def mirrored(self, signs: Signs) -> Self:
-        """Return the stop in a mirrored place: the two directions of its axis change places."""
+        """Return the stop in a mirrored placement: the two directions of its axis are exchanged."""
         if signs["xyz".index(self.axis)] > 0.0 or self.table[0][0] == 0.0:
             return self
         turned = tuple((-x, -force) for x, force in reversed(self.table))

@@ -219,7 +219,7 @@ class Support(Definition):
 
     @property
     def values(self) -> SupportValues | None:
-        """Values of the preset with those given in their places; None for rigid rails."""
+        """Values of the preset, replaced by those given; None for rigid rails."""
         base = PRESETS[self.preset]
         if base is None:
             return None

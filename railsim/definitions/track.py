@@ -28,7 +28,7 @@ from railsim.definitions.offered import offered
 from railsim.definitions.support import Support
 from railsim.drawn import Drawn
 
-Place = TypeVar("Place", float, Any)
+ArcLength = TypeVar("ArcLength", float, Any)
 TRACK_FORMAT = "railsim-track/1"
 MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
 
@@ -241,7 +241,7 @@ class Track(FileDefinition, Drawn):
     """Elements of the vertical profile; where shorter than the plan, the last gradient continues"""
 
     irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
-    """Displacements of the rails from their ideal places; they add up"""
+    """Displacements of the rails from their ideal positions; they add up"""
     support: Support = Support()
     """What carries the rails: rigid, or elastic as a moving track model"""
 
@@ -250,7 +250,7 @@ class Track(FileDefinition, Drawn):
         """Length of the plan [m]."""
         return sum(element.length for element in self.plan)
 
-    def mileage_at(self, s: "Place") -> "Place":
+    def mileage_at(self, s: "ArcLength") -> "ArcLength":
         """Mileage at an arc length, or at an array of them [m]."""
         return self.mileage - s if self.falling_mileage else self.mileage + s
 

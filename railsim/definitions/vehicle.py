@@ -77,7 +77,7 @@ class Axlebox(Definition):
 
 
 class Placement(Definition):
-    """One place where an assembly stands."""
+    """One position and direction of an assembly."""
 
     name: Name
     """Name that goes before the names within the assembly, joined by a dot"""
@@ -88,7 +88,7 @@ class Placement(Definition):
 
 
 class Assembly(Definition):
-    """A group of parts that occurs at one or several places."""
+    """A group of parts that occurs once or several times."""
 
     placements: tuple[Placement, ...] = Field(min_length=1)
     """Where the assembly stands"""
@@ -110,7 +110,7 @@ class Point(Definition):
     body: Text
     """Full name of the body"""
     position: Vector
-    """Place in the nominal vehicle [m]"""
+    """Position in the nominal vehicle [m]"""
 
 
 class Service(Definition):
@@ -174,7 +174,7 @@ class Vehicle(FileDefinition, Drawn):
         """Return the table of bodies that a notebook shows."""
         rows: list[list[object]] = []
         for body in self._flat().bodies:
-            place = " ".join(f"{value:.3f}" for value in body.position)
+            position = " ".join(f"{value:.3f}" for value in body.position)
             inertia = " ".join(f"{value:.0f}" for value in body.inertia)
-            rows.append([body.name, body.kind, f"{body.mass:.0f}", inertia, place])
+            rows.append([body.name, body.kind, f"{body.mass:.0f}", inertia, position])
         return ["body", "kind", "mass (kg)", "Ixx Iyy Izz (kg m²)", "x y z (m)"], rows

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.mechanism_parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
-from railsim.definitions.mechanism_values import number, parameter_values, place, point_names
+from railsim.definitions.mechanism_values import coordinates, number, parameter_values, point_names
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 
@@ -58,7 +58,7 @@ class Model:
 
     def position(self, where: Any) -> tuple[Values, Values]:
         """Coordinates of a point of the file in its body's axes [m]."""
-        return place(where, self.values)
+        return coordinates(where, self.values)
 
     def lanes(self, names: Sequence[str]) -> "Model":
         """The same model with a lane for each parameter, moved by `1j * STEP`."""
@@ -153,7 +153,7 @@ class _Arrays:
         self.body_of = [self.bodies[name.partition(".")[0]] for name in self.points]
         positions = list(definition.ground.points.values())
         positions += [w for body in definition.bodies.values() for w in body.points.values()]
-        self.position = [self._filled(place(where, values)) for where in positions]
+        self.position = [self._filled(coordinates(where, values)) for where in positions]
         self.joint: list[list[int]] = []
         self.value: list[Any] = []
         self.arc_point: list[int] = []
@@ -270,7 +270,7 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
     Where no angle is given an arc ends on the line through its centre and the next: there the
     normals agree, and with them the rates of the motion.
     """
-    centres = [place(arc.centre, values) for arc in cam.arcs]
+    centres = [coordinates(arc.centre, values) for arc in cam.arcs]
     radii = [number(arc.radius, values) for arc in cam.arcs]
     shared: list[tuple[float, float]] = []
     for i in range(len(cam.arcs) - 1):

@@ -2,7 +2,7 @@
 
 =================  ==========================================================================
 `style.py`         what all pictures share: colours, fonts, the shading of curves
-`selection.py`     which quantities and places to draw: ``Q``, ``Y:1:left``
+`selection.py`     which quantities and labels to draw: ``Q``, ``Y:1:left``
 `histories.py`     quantities over time or distance
 `overlay.py`       the same quantities of several results in one picture
 `track.py`         a track: plan, curvature and cant

@@ -28,7 +28,7 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
 
 
 def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
-    """Bars of the worst place of each quantity, zone by zone, in per cent of the limit."""
+    """Bars of each quantity's worst row, zone by zone, in per cent of the limit."""
     reports = [zone for a in assessments for zone in a.zones]
     zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
     rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
@@ -64,8 +64,8 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
 def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw the values of the sections over the distance; None where there are no zones.
 
-    A row of axes for each vehicle, one for each zone; of each quantity the place with the largest
-    share of its limit.
+    A row of axes for each vehicle, one for each zone; of each quantity the values where their
+    share of the limit is largest.
     """
     reports = [zone for a in assessments for zone in a.zones if zone.values and zone.rows]
     if not reports:
@@ -107,7 +107,7 @@ def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any
         points = [
             (
                 5e-4 * (values.section.begin + values.section.end),
-                100.0 * max(max(values.values[name, place]) / limit for place, limit in there),
+                100.0 * max(max(values.values[name, label]) / limit for label, limit in there),
             )
             for values in report.values
             if (there := [(p, limit) for p, limit in limits.items() if (name, p) in values.values])

@@ -109,7 +109,7 @@ def _draw_pair(axes: Axes, geometry: ContactGeometry, pair: Pair, side: int) -> 
     axes.set_xlim(*sorted((sign * low, sign * high)))
     axes.set_ylim(-30.0, LIFT + 10.0)
     axes.set_aspect("equal")
-    axes.set_xlabel("lateral place $y$ (mm)")
+    axes.set_xlabel("lateral position $y$ (mm)")
     axes.set_ylabel("height (mm)")
 
 
@@ -139,13 +139,13 @@ def _draw_smoothing(axes: Axes, profiles: Sequence[Profile]) -> None:
         name = unformatted(profile.name)
         axes.plot(1e3 * profile.y, 1e6 * normal, ".", ms=2, color=colour, label=name)
     axes.axhline(0.0, color="0.35", lw=0.7)
-    axes.set_xlabel("place on the profile $y$ (mm)")
+    axes.set_xlabel("position on the profile $y$ (mm)")
     axes.set_ylabel("measured − smoothed (µm)")
     axes.legend(loc="upper right")
 
 
 def functions_figure(geometry: ContactGeometry) -> Figure:
-    """Rolling radius difference, radii, contact angles, places and roll over displacement."""
+    """Rolling radius difference, radii, contact angles, positions and roll over displacement."""
     y = 1e3 * geometry.lateral
     with styled():
         figure = Picture(figsize=(9.6, 5.4))
@@ -157,7 +157,7 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
         panels = (
             (axes[0, 1], 1e3 * geometry.rolling_radius, "rolling radius (mm)"),
             (axes[0, 2], np.degrees(geometry.contact_angle), "contact angle (deg)"),
-            (axes[1, 0], 1e3 * geometry.wheel_y, "place on the wheel (mm)"),
+            (axes[1, 0], 1e3 * geometry.wheel_y, "position on the wheel (mm)"),
             (axes[1, 1], 1e3 * np.abs(geometry.contact_y), "distance from track centre (mm)"),
         )
         for panel, values, label in panels:
@@ -180,8 +180,8 @@ def functions_figure(geometry: ContactGeometry) -> Figure:
         for panel in axes[1]:
             panel.set_xlabel("lateral displacement $y$ (mm)")
         for panel in axes.flat:
-            for place, _ in geometry.jumps():
-                panel.axvline(1e3 * place, color="0.8", lw=0.5, zorder=0)
+            for lateral, _ in geometry.jumps():
+                panel.axvline(1e3 * lateral, color="0.8", lw=0.5, zorder=0)
     return figure
 
 
@@ -259,8 +259,8 @@ def patches_figure(
         figure.suptitle(title, x=0.06, y=1.0 - 0.1 / height, ha="left", va="top")
         _explain_lines(figure, 1.0 - 0.3 / height, labels[: 2 if other else 1])
         axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
-        places = [patch.y for contact in contacts.values() for patch in contact.patches]
-        low, high = 1e3 * min(places) - 14.0, 1e3 * max(places) + 14.0
+        positions = [patch.y for contact in contacts.values() for patch in contact.patches]
+        low, high = 1e3 * min(positions) - 14.0, 1e3 * max(positions) + 14.0
         image = None
         for panel, (y, contact) in zip(axes, contacts.items(), strict=False):
             if exact is not None and y in exact and exact[y].pressure.size:
@@ -281,7 +281,7 @@ def patches_figure(
         for panel in axes[::columns]:
             panel.set_ylabel("along the rail (mm)")
         for panel in axes[max(len(contacts) - columns, 0) : len(contacts)]:
-            panel.set_xlabel("lateral place (mm)")
+            panel.set_xlabel("lateral position (mm)")
         if image is not None:
             bar = figure.add_axes((0.92, 0.2, 0.012, 0.6))
             figure.colorbar(image, cax=bar, label="pressure by boundary elements (MPa)")

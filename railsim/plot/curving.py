@@ -11,7 +11,7 @@ from railsim.plot.style import DISTINCT, Picture, say, styled, wheelset_colours
 from railsim.stability.curving import Curving
 
 Floats = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 LEFT, RIGHT = 0, 1
 MAPS = 3  # maps of wear side by side at most
@@ -85,7 +85,7 @@ def curving_figure(found: Curving, title: str) -> Figure:
     return figure
 
 
-def _wear_maps(figure: SubFigure, found: Curving, order: Places) -> None:
+def _wear_maps(figure: SubFigure, found: Curving, order: Indices) -> None:
     """Wear number of the leading outer wheel over radius and cant deficiency for each friction."""
     number = min(len(found.friction), MAPS)
     radius, deficiency = found.radius[order], 1e3 * found.cant_deficiency
@@ -94,11 +94,11 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Places) -> None:
         found.T_gamma[order][:, :, :, 0, :], outer[:, None, None, None], axis=-1
     )[..., 0]
     largest = float(np.nanmax(wear)) if np.isfinite(wear).any() else 1.0
-    places = np.arange(len(radius))
+    columns = np.arange(len(radius))
     for m, axes in enumerate(figure.subplots(1, number, squeeze=False)[0]):
         axes.grid(visible=False)
         picture = axes.pcolormesh(
-            places,
+            columns,
             np.arange(len(deficiency)),
             wear[:, :, m].T,
             shading="nearest",
@@ -106,7 +106,7 @@ def _wear_maps(figure: SubFigure, found: Curving, order: Places) -> None:
             vmax=largest,
             cmap="viridis",
         )
-        axes.set_xticks(places, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
+        axes.set_xticks(columns, [f"{value:g}" for value in radius], fontsize=7.5, rotation=45)
         axes.set_yticks(np.arange(len(deficiency)), [f"{value:g}" for value in deficiency])
         if wear[:, :, m].size <= NUMBERS:
             _numbers(axes, wear[:, :, m], largest)
@@ -139,7 +139,7 @@ def _ticks(radius: Floats) -> list[float]:
     return [step for step in steps if 0.9 * np.min(radius) <= step <= 1.1 * np.max(radius)]
 
 
-def _lines(axes: Axes, found: Curving, order: Places, values: Floats, words: str) -> None:
+def _lines(axes: Axes, found: Curving, order: Indices, values: Floats, words: str) -> None:
     """Values over radius; friction by colour, cant deficiency by line."""
     styles: list[Any] = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5))]
     for m, mu in enumerate(found.friction):
@@ -174,13 +174,13 @@ def _plan(axes: Axes, found: Curving) -> None:
         say(axes, "no steady state at any radius for the first deficiency and friction")
         return
     r = int(np.argmin(np.where(there, np.abs(found.radius), np.inf)))
-    place = np.array(found.wheelset_position)
+    x = np.array(found.wheelset_position)
     for y in (-HALF, HALF):
         axes.axhline(y, color="0.75", lw=2.5, zorder=1)
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):
         yaw = EXAGGERATED * found.attack[r, 0, 0, w]
-        middle = np.array([place[w], EXAGGERATED * found.lateral[r, 0, 0, w]])
+        middle = np.array([x[w], EXAGGERATED * found.lateral[r, 0, 0, w]])
         along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
         ends = [middle - HALF * across, middle + HALF * across]
         axes.plot(*np.transpose(ends), color=colours[name], lw=1.6, zorder=2)
@@ -188,7 +188,7 @@ def _plan(axes: Axes, found: Curving) -> None:
             wheel = [end - WHEEL * along, end + WHEEL * along]
             axes.plot(*np.transpose(wheel), color=colours[name], lw=4.0, zorder=3)
     axes.set(
-        xlim=(np.min(place) - 2.0, np.max(place) + 2.0),
+        xlim=(np.min(x) - 2.0, np.max(x) + 2.0),
         ylim=(1.9, -1.9),  # to the right is downwards
         aspect="equal",
         xticks=[],
@@ -200,7 +200,7 @@ def _plan(axes: Axes, found: Curving) -> None:
     )
 
 
-def _steering(axes: Axes, found: Curving, order: Places) -> None:
+def _steering(axes: Axes, found: Curving, order: Indices) -> None:
     """How all wheelsets stand in the curve at the first cant deficiency and friction."""
     colours = wheelset_colours(found.wheelsets)
     for w, name in enumerate(found.wheelsets):

@@ -43,13 +43,13 @@ def front_figure(
     with styled():
         figure = Picture(figsize=(6.4 if columns == 1 else 4.4 * columns, 4.4 * rows),
                          layout="constrained")  # fmt: skip
-        for place, (i, j) in enumerate(pairs, start=1):
-            axes = figure.add_subplot(rows, columns, place)
+        for number, (i, j) in enumerate(pairs, start=1):
+            axes = figure.add_subplot(rows, columns, number)
             _pair(axes, values[:, [i, j]], feasible, list(front), chosen)
             axes.set(xlabel=labels[i], ylabel=labels[j])
             if single:
                 axes.set_title("Designs in the order of computation")
-            if place == 1:
+            if number == 1:
                 axes.legend(loc="best")
     return figure
 
@@ -105,14 +105,14 @@ def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
     names = sorted(one["low"], key=lambda name: abs(one["high"][name] - one["low"][name]))
     axes.use_sticky_edges = False
     widest = max(abs(one["high"][name] - one["low"][name]) for name in names)
-    for place, name in enumerate(names):
+    for row, name in enumerate(names):
         low, high = one["low"][name], one["high"][name]
-        axes.barh(place, high - low, left=low, height=0.55, color=DISTINCT[4], zorder=2)
+        axes.barh(row, high - low, left=low, height=0.55, color=DISTINCT[4], zorder=2)
         if abs(high - low) < NARROW * widest:
             continue
         for value, words in ((low, "low"), (high, "high")):
             outer = (value >= max(low, high)) if words == "high" else (value > min(low, high))
-            axes.annotate(words, (value, place), xytext=(4 if outer else -4, 0),
+            axes.annotate(words, (value, row), xytext=(4 if outer else -4, 0),
                           textcoords="offset points", va="center",
                           ha="left" if outer else "right", fontsize=7, color="0.3")  # fmt: skip
     axes.set_yticks(range(len(names)), [_short(name) for name in names])
@@ -122,12 +122,12 @@ def _tornado(axes: Axes, one: Mapping[str, Any], label: str) -> None:
 
 def _indices(axes: Axes, one: Mapping[str, Any]) -> None:
     names = sorted(one["total"], key=lambda name: one["total"][name])
-    places = np.arange(len(names))
+    rows = np.arange(len(names))
     total = [one["total"][name] for name in names]
     first = [one["first"][name] for name in names]
-    axes.barh(places + 0.17, total, height=0.3, color=DISTINCT[0], label="with interactions")
-    axes.barh(places - 0.17, first, height=0.3, color=DISTINCT[5], label="alone")
-    axes.set_yticks(places, [_short(name) for name in names])
+    axes.barh(rows + 0.17, total, height=0.3, color=DISTINCT[0], label="with interactions")
+    axes.barh(rows - 0.17, first, height=0.3, color=DISTINCT[5], label="alone")
+    axes.set_yticks(rows, [_short(name) for name in names])
     axes.set_xlim(0.0, max(1.0, *total, *first))
     axes.set(
         xlabel="share of the variance",

@@ -45,7 +45,7 @@ def histories(
     result : Result
         What to draw.
     selections : sequence of str
-        Quantities and places, see `railsim.plot.selection`.
+        Quantities and labels, see `railsim.plot.selection`.
     over : {"distance", "time"}
         Horizontal axis; the distance is that of the reference body.
     by : {"wheel", "wheelset"}
@@ -60,7 +60,7 @@ def histories(
 
     Raises
     ------
-    InputError : a quantity or place that the result does not have, an empty part.
+    InputError : a quantity or label that the result does not have, an empty part.
     """
     check_not_empty(result)
     window = slice(None) if between is None else _window(result[over], between)
@@ -162,11 +162,11 @@ def _draw(
         )
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
-    places = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
-    if by == "wheelset" and len(places) == 1:
-        place = places.pop()
-        number = result.wheelsets.index(place) + 1
-        heading = f"{heading}: {number} {unformatted(short_names(result.wheelsets)[place])}"
+    drawn = {line.labels["wheelset"] for line in panel.lines if "wheelset" in line.labels}
+    if by == "wheelset" and len(drawn) == 1:
+        wheelset = drawn.pop()
+        number = result.wheelsets.index(wheelset) + 1
+        heading = f"{heading}: {number} {unformatted(short_names(result.wheelsets)[wheelset])}"
     names = [
         unformatted(" ".join(v for k, v in line.labels.items() if k != "component"))
         for line in others

@@ -182,8 +182,8 @@ def path_figure(result: Analysis) -> Figure:
     axes.plot(x, y, color=MAIN)
     for name, values in result.zone.items():
         axes.plot(values["x"] * 1e3, values["height"] * 1e3, "o", color="k", ms=4)
-        place = (values["x"] * 1e3, values["height"] * 1e3)
-        axes.annotate(name, place, xytext=(6, -3), textcoords="offset points", fontsize=8)
+        point = (values["x"] * 1e3, values["height"] * 1e3)
+        axes.annotate(name, point, xytext=(6, -3), textcoords="offset points", fontsize=8)
     axes.set_xlabel("x since start / mm")
     axes.set_ylabel("height over start / mm")
     return figure
@@ -325,8 +325,8 @@ def carpet_figure(result: Analysis) -> Figure:
     heights = table.heights * 1e3
     for i, pressure in enumerate(table.pressures):
         axes.plot(heights, table.forces[:, i] / 1e3, color="0.55", lw=0.9, marker=".", ms=3)
-        place = (heights[0], table.forces[0, i] / 1e3)
-        axes.annotate(f"{pressure / 1e6:g} MPa", place, xytext=(-4, 0), fontsize=8,
+        point = (heights[0], table.forces[0, i] / 1e3)
+        axes.annotate(f"{pressure / 1e6:g} MPa", point, xytext=(-4, 0), fontsize=8,
                       textcoords="offset points", ha="right", va="center")  # fmt: skip
     length = _values("length", result)
     axes.plot(length, result.output["force"] / 1e3, color=MAIN, lw=2.2, label="load")

@@ -168,9 +168,9 @@ def _shape(axes: Axes, mode: Mode) -> None:
     shares = [100.0 * mode.participation[name] for name in names]
     reference = mode.shape.get(names[0], 1.0 + 0j)
     colours = [_phase_colour(mode.shape.get(name), reference) for name in names]
-    place = np.arange(len(names))
-    axes.barh(place, shares, color=colours, height=0.7)
-    axes.set_yticks(place, names, fontsize=6.5)
+    rows = np.arange(len(names))
+    axes.barh(rows, shares, color=colours, height=0.7)
+    axes.set_yticks(rows, names, fontsize=6.5)
     axes.set_ylim(max(len(names), LEAST_BARS) - 0.5, -0.5)
     axes.set_xlim(0.0, None)
     axes.grid(visible=False, axis="y")

@@ -30,7 +30,7 @@ def overlay(
     results : mapping of str to Result
         Results by what they are called in the picture.
     selections : sequence of str
-        Quantities and places, see `railsim.plot.selection`; all results must have them.
+        Quantities and labels, see `railsim.plot.selection`; all results must have them.
     over : {"distance", "time"}
         Horizontal axis; the distance is that of the reference body.
 
@@ -142,12 +142,12 @@ def _draw(axes: Axes, horizontal: Array, panel: Panel, colour: str) -> None:
 
 def _label(axes: Axes, panel: Panel, results: Iterable[Result]) -> None:
     quantity = panel.quantity
-    places = {
+    labels = {
         label for line in panel.lines for dim, label in line.labels.items() if dim != "side"
     } - {quantity.long_name.rpartition(", ")[2]}
     heading = quantity.long_name[:1].upper() + quantity.long_name[1:]
-    if len(places) == 1:
-        heading += f": {unformatted(places.pop())}"
+    if len(labels) == 1:
+        heading += f": {unformatted(labels.pop())}"
     axes.set_title(heading)
     axes.set_ylabel(unit_label(quantity))
     axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)

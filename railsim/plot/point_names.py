@@ -26,7 +26,7 @@ def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]
     axes : Axes
         With its limits as they stay.
     named : mapping of str to ndarray, shape (2,)
-        Places by their names, in data.
+        Points by their names, in data.
     drawn : sequence of ndarray, shape (point, 2)
         Lines that are better not covered, in data.
     """
@@ -38,10 +38,10 @@ def name_points(axes: Axes, named: Mapping[str, Floats], drawn: Sequence[Floats]
     ink = np.concatenate([_along(axes.transData.transform(xy) / per_point) for xy in drawn])
     marks = np.array(list(at.values()))
     boxes: list[Floats] = []
-    for name, place in at.items():
+    for name, point in at.items():
         found = [
             (_cost(box, boxes, frame, ink, marks) + 0.15 * reach, k, offset, box)
-            for k, (reach, offset, box) in enumerate(_candidates(name, place))
+            for k, (reach, offset, box) in enumerate(_candidates(name, point))
         ]
         _, _, offset, box = min(found, key=lambda one: one[:2])
         boxes.append(box)
@@ -57,15 +57,15 @@ def _along(line: Floats) -> Floats:
     return np.concatenate(parts)
 
 
-def _candidates(name: str, place: Floats) -> list[tuple[float, Floats, Floats]]:
-    """Reach, offset of the name's middle, and box x0, y0, x1, y1 of every place tried."""
+def _candidates(name: str, point: Floats) -> list[tuple[float, Floats, Floats]]:
+    """Reach, offset of the name's middle, and box x0, y0, x1, y1 of every position tried."""
     half = np.array([0.29 * SIZE * len(name), 0.6 * SIZE])
     found = []
     for reach in REACHES:
         for direction in DIRECTIONS:
             unit = np.array([np.cos(direction), np.sin(direction)])
             offset = unit * reach + np.array([np.sign(round(unit[0], 6)), unit[1]]) * half
-            middle = place + offset
+            middle = point + offset
             found.append((reach, offset, np.concatenate((middle - half, middle + half))))
     return found
 

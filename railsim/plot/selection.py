@@ -1,6 +1,6 @@
-"""Which quantities and places to draw.
+"""Which quantities and labels to draw.
 
-A selection is the name of a quantity, followed by the places that it is wanted at, in any order:
+A selection is the name of a quantity, followed by the labels that are wanted, in any order:
 ``Q``, ``Y:1:left``, ``body_acceleration:carbody:y``.  A wheelset is called by its name or by its
 number from the leading end.
 """
@@ -61,7 +61,7 @@ def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Pane
 
     Raises
     ------
-    InputError : a quantity or place does not exist, or there are too many lines to tell apart.
+    InputError : a quantity or label does not exist, or there are too many lines to tell apart.
     """
     faults: list[Fault] = []
     found: list[Panel] = []
@@ -76,12 +76,12 @@ def panels(result: Result, selections: tuple[str, ...] | list[str]) -> list[Pane
 
 
 def _panels(result: Result, selection: str) -> list[Panel]:
-    name, *places = selection.split(":")
+    name, *labels = selection.split(":")
     drawable = [key for key, q in result.quantities.items() if q.dims[0] == "time" != key]
     if name not in drawable:
         raise _fault(selection, f"no quantity '{name}'", nearest(name, drawable))
     quantity = result.quantities[name]
-    wanted = _places(result, quantity, selection, places)
+    wanted = _wanted(result, quantity, selection, labels)
     per_panel = ["component"] if "component" in quantity.dims else []
     per_line = [dim for dim in quantity.dims[1:] if dim not in per_panel]
     lines = list(product(*(wanted[dim] for dim in per_line)))
@@ -102,18 +102,18 @@ def _line(result: Result, name: str, labels: dict[str, str]) -> Line:
     return Line(result.series(name, **labels), labels)
 
 
-def _places(
-    result: Result, quantity: Quantity, selection: str, places: list[str]
+def _wanted(
+    result: Result, quantity: Quantity, selection: str, given: list[str]
 ) -> dict[str, list[str]]:
     wanted = {dim: list(result.coordinates[dim]) for dim in quantity.dims[1:]}
     known = {label: (dim, label) for dim, labels in wanted.items() for label in labels}
     numbered = enumerate(wanted.get("wheelset", []), start=1)
     known |= {str(number): ("wheelset", label) for number, label in numbered}
     chosen: dict[str, list[str]] = {}
-    for place in filter(None, places):
-        if place not in known:
-            raise _fault(selection, f"no place '{place}'", nearest(place, known))
-        dim, label = known[place]
+    for name in filter(None, given):
+        if name not in known:
+            raise _fault(selection, f"no label '{name}'", nearest(name, known))
+        dim, label = known[name]
         chosen.setdefault(dim, []).append(label)
     return wanted | chosen
 

@@ -226,17 +226,17 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     single.set_xlabel(f"change of the ride height at {unformatted(shown.name)} / mm")
     single.legend(loc="lower right", fontsize=7.5)
     ordered = sorted(results, key=lambda result: result.load)
-    places = np.arange(len(ordered))
-    for place, result in zip(places, ordered, strict=True):
+    columns = np.arange(len(ordered))
+    for column, result in zip(columns, ordered, strict=True):
         every.plot(
-            [place] * 2,
+            [column] * 2,
             [result.lowest * 1e3, result.highest * 1e3],
             color=FAINT,
             lw=7,
             solid_capstyle="butt",
         )
         every.plot(
-            [place] * 2,
+            [column] * 2,
             [-result.random * 1e3, result.random * 1e3],
             color=MAIN,
             lw=7,
@@ -245,7 +245,7 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     every.plot([], [], color=FAINT, lw=5, label="worst case")
     every.plot([], [], color=MAIN, lw=5, label="random")
     names = [unformatted(result.name) for result in ordered]
-    every.set_xticks(places, names, rotation=30, ha="right")
+    every.set_xticks(columns, names, rotation=30, ha="right")
     every.set_xlim(-0.6, len(ordered) - 0.4)
     every.axhline(0.0, color="0.35", lw=0.8)
     every.set_ylabel("ride height / mm")
@@ -328,8 +328,8 @@ def _draw_arm(
         wire = Circle((0.0, 0.0), 0.5e3 * d, fc=colour)
         head = seat + share * (top - seat)
         _draw_spring(axes, seat, head, along, 1e3 * spring.mean_diameter, wire, float(turns))
-    for place, radius, face in ((hinge, 26.0, "0.82"), (hinge, 9.0, "w"), (axle, 60.0, "0.92")):
-        axes.add_patch(Circle(tuple(place), radius, fc=face, ec="0.25", lw=1.0, zorder=3))
+    for centre, radius, face in ((hinge, 26.0, "0.82"), (hinge, 9.0, "w"), (axle, 60.0, "0.92")):
+        axes.add_patch(Circle(tuple(centre), radius, fc=face, ec="0.25", lw=1.0, zorder=3))
     axes.annotate(
         "",
         xy=tuple(_moved(axle, 0.0, -62.0)),
@@ -348,8 +348,8 @@ def _draw_arm(
     )
 
 
-def _moved(place: Floats, right: float, up: float) -> Floats:
-    moved: Floats = place + np.array([right, up])
+def _moved(point: Floats, right: float, up: float) -> Floats:
+    moved: Floats = point + np.array([right, up])
     return moved
 
 
@@ -369,7 +369,7 @@ def _draw_spring(
         # the coils turn from the seat's direction into the frame's
         side = (1.0 - share) * along + share * np.array([1.0, 0.0])
         edge = -0.5 if half % 2 == 0 else 0.5
-        place = foot + share * (head - foot) + edge * D * side
+        centre = foot + share * (head - foot) + edge * D * side
         axes.add_patch(
-            Circle(tuple(place), 0.5 * d, fc=wire.get_facecolor(), ec="w", lw=0.5, zorder=4)
+            Circle(tuple(centre), 0.5 * d, fc=wire.get_facecolor(), ec="w", lw=0.5, zorder=4)
         )

@@ -47,17 +47,17 @@ class Column:
 def curves_figure(quantities: Sequence[Column], x: Column, family: Column | None) -> Figure:
     """Quantities over a parameter, a curve for each member of a family.
 
-    Where several runs share a place, the curve is their median and a band goes from the smallest to
+    Where several runs share a point, the curve is their median and a band goes from the smallest to
     the largest.
     """
     members = [None] if family is None else family.different
     colours = _colours(len(members))
     others = [None] * len(x.values) if family is None else family.values
-    places = list(zip(x.values, others, strict=True))
+    points = list(zip(x.values, others, strict=True))
     with styled():
         figure, cells = _panels(len(quantities))
-        if len(set(places)) < len(places):
-            words = "Medians of the runs at each place; bands from the smallest to the largest"
+        if len(set(points)) < len(points):
+            words = "Medians of the runs at each point; bands from the smallest to the largest"
             figure.suptitle(words, x=0.01, ha="left", fontsize=8.5, fontweight="normal")
         for axes, quantity in zip(cells, quantities, strict=True):
             for member, colour in zip(members, colours, strict=True):
@@ -76,15 +76,15 @@ def _of(family: Column | None, member: Any) -> Any:
 
 
 def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, member: Any) -> None:
-    places = x.different
+    different = x.different
     there: dict[int, list[float]] = {}
-    for i, (value, place) in enumerate(zip(quantity.values, x.values, strict=True)):
-        if value is not None and place is not None and (mask is None or mask[i]):
-            there.setdefault(places.index(place), []).append(value)
+    for i, (value, abscissa) in enumerate(zip(quantity.values, x.values, strict=True)):
+        if value is not None and abscissa is not None and (mask is None or mask[i]):
+            there.setdefault(different.index(abscissa), []).append(value)
     if not there:
         return
     order = sorted(there)
-    at = [places[k] if x.numeric else k for k in order]
+    at = [different[k] if x.numeric else k for k in order]
     middle = [float(np.median(there[k])) for k in order]
     label = None if member is None else unformatted(_text(member))
     axes.plot(at, middle, "o-", color=colour, ms=3.5, label=label)
@@ -97,7 +97,7 @@ def _curve(axes: Axes, quantity: Column, x: Column, mask: Any, colour: Any, memb
 
 
 def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
-    """Quantities over two parameters in colours; the median where several runs share a place."""
+    """Quantities over two parameters in colours; the median where several runs share a point."""
     with styled():
         figure, cells = _panels(len(quantities))
         columns, rows = x.different, y.different
@@ -107,8 +107,8 @@ def map_figure(quantities: Sequence[Column], x: Column, y: Column) -> Figure:
                 if value is not None and a is not None and b is not None:
                     there.setdefault((rows.index(b), columns.index(a)), []).append(value)
             values = np.full((len(rows), len(columns)), np.nan)
-            for place, found in there.items():
-                values[place] = float(np.median(found))
+            for cell, found in there.items():
+                values[cell] = float(np.median(found))
             _draw_map(figure, axes, values)
             axes.set_title(quantity.words)
             axes.set(xlabel=x.words, ylabel=y.words)
@@ -133,8 +133,8 @@ def _draw_map(figure: Figure, axes: Axes, values: Any) -> None:
 
 def _ticks(tell: Any, values: Sequence[Any]) -> None:
     step = -(-len(values) // 8)
-    places = range(0, len(values), step)
-    tell(list(places), [unformatted(_text(values[place])) for place in places])
+    indices = range(0, len(values), step)
+    tell(list(indices), [unformatted(_text(values[index])) for index in indices])
 
 
 def ranking_figure(quantities: Sequence[Column], names: Sequence[str]) -> Figure:

@@ -56,7 +56,7 @@ def track_figure(track: Track, title: str = "") -> Figure:
     Figure
         The plan with equal scales, right of the track downwards; below it the functions of the
         distance as they act, with their kinks rounded; at the end what is unusual in the
-        alignment, with the places marked.
+        alignment, with the positions marked.
     """
     alignment = Alignment(track)
     s = np.linspace(0.0, track.length, RESOLUTION + 1)
@@ -84,14 +84,14 @@ def track_figure(track: Track, title: str = "") -> Figure:
             shade(axes[1 + k], shown, named=k == 0)
             if k + 1 < len(rows):
                 axes[1 + k].tick_params(labelbottom=False)
-        for place, _ in remarks:
+        for position, _ in remarks:
             axes[1].plot(
-                place, 0.0, marker="^", ms=5, color=LIMIT, clip_on=False,
+                position, 0.0, marker="^", ms=5, color=LIMIT, clip_on=False,
                 transform=axes[1].get_xaxis_transform(),
             )  # fmt: skip
         axes[-1].set_xlabel("Distance along the track $s$ (m)")
         if remarks:
-            words = "\n".join(f"s = {place:.0f} m: {text}" for place, text in remarks)
+            words = "\n".join(f"s = {position:.0f} m: {text}" for position, text in remarks)
             figure.supxlabel(f"Remarks\n{words}", x=0.012, ha="left", fontsize=8, color=LIMIT)
         return figure
 
@@ -103,8 +103,8 @@ def _draw(axes: Axes, row: _Row, s: Array) -> None:
     if any(values.min() < 0.0 for values in row.curves.values()):
         axes.axhline(0.0, color="0.35", lw=0.6, zorder=1)
     if len(row.curves) > 1:
-        place = (1.0, 0.93)  # beside the title
-        axes.legend(loc="lower right", bbox_to_anchor=place, ncols=len(row.curves))
+        corner = (1.0, 0.93)  # beside the title
+        axes.legend(loc="lower right", bbox_to_anchor=corner, ncols=len(row.curves))
     axes.set_title(row.title)
     axes.set_ylabel(row.label)
     axes.margins(x=0.0)
@@ -160,16 +160,16 @@ def _rail_rows(track: Track, s: Array) -> list[_Row]:
 def _friction_rows(track: Track, s: Array) -> list[_Row]:
     if track.friction_table is None:
         return []
-    place, left, right = np.array(track.friction_table).T
-    curves = {"left": np.interp(s, place, left), "right": np.interp(s, place, right)}
+    table_s, left, right = np.array(track.friction_table).T
+    curves = {"left": np.interp(s, table_s, left), "right": np.interp(s, table_s, right)}
     return [_Row("Friction", r"$\mu$", curves)]
 
 
 def _support_rows(track: Track, s: Array) -> list[_Row]:
     if track.support.variation is None or track.support.preset == "rigid":
         return []
-    place, pads, ballast = np.array(track.support.variation).T
-    curves = {"pads": np.interp(s, place, pads), "ballast": np.interp(s, place, ballast)}
+    table_s, pads, ballast = np.array(track.support.variation).T
+    curves = {"pads": np.interp(s, table_s, pads), "ballast": np.interp(s, table_s, ballast)}
     return [_Row("Stiffness and damping of the support, times those of the preset", "", curves)]
 
 
@@ -187,7 +187,7 @@ def _constants(track: Track) -> str:
 
 
 def _marked(track: Track) -> list[tuple[float, str]]:
-    """Return place and text of what is unusual in the alignment; equal texts once."""
+    """Return position and text of what is unusual in the alignment; equal texts once."""
     sections = {
         section.key: section
         for part in (curvature_sections(track), cant_sections(track), gradient_sections(track))
@@ -198,13 +198,13 @@ def _marked(track: Track) -> list[tuple[float, str]]:
         if remark.key in sections:
             found.setdefault(remark.text, []).append(sections[remark.key].begin)
     marked = sorted(
-        (min(places), text + (f"; {len(places)} times" if len(places) > 1 else ""))
-        for text, places in found.items()
+        (min(begins), text + (f"; {len(begins)} times" if len(begins) > 1 else ""))
+        for text, begins in found.items()
     )
     if len(marked) <= MOST_REMARKS:
         return marked
-    *shown, (place, text) = marked[:MOST_REMARKS]
-    return [*shown, (place, f"{text}; and {len(marked) - MOST_REMARKS} more")]
+    *shown, (position, text) = marked[:MOST_REMARKS]
+    return [*shown, (position, f"{text}; and {len(marked) - MOST_REMARKS} more")]
 
 
 def _plan(axes: Axes, alignment: Alignment, sections: Sequence[Section], s: Array) -> None:

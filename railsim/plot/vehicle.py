@@ -53,14 +53,14 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
         figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
         grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
         end = _leading_end(flat)
-        for place, view, limits in (
+        for cell, view, limits in (
             (grid[0, :], SIDE, None),
             (grid[1, :], TOP, None),
             (grid[2, 0], SIDE, end),
             (grid[2, 1], TOP, end),
             (grid[2, 2], BEHIND, None),
         ):
-            _draw_view(figure.add_subplot(place), view, flat, colours, limits)
+            _draw_view(figure.add_subplot(cell), view, flat, colours, limits)
         figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
         return figure
 

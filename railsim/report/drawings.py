@@ -74,12 +74,12 @@ def _shapes(flat: FlatVehicle, kinds: Sequence[str], view: View) -> Iterator[str
         ends_of = (element.point1, element.point2)
         title = f"<title>{escape(element.name)}</title>"
         if np.allclose(*ends_of):
-            x, y = _place(element.point1, view)
+            x, y = _projected(element.point1, view)
             yield f'<circle class="k{number}" cx="{x:.3f}" cy="{y:.3f}" r=".07">{title}</circle>'
         else:
             yield _line(ends_of, view, f"k{number}", title)
     for body in (*flat.of_kind("body"), *flat.of_kind("axlebox")):
-        x, y = _place(body.position, view)
+        x, y = _projected(body.position, view)
         size = 0.14 if body.kind == "body" else 0.06
         yield (
             f'<path class="body" d="M{x - size:.3f},{y:.3f}h{2 * size:.3f}M{x:.3f},{y - size:.3f}'
@@ -101,12 +101,12 @@ def _wheelset(body: FlatBody, view: View) -> Iterator[str]:
         yield _line([(x - radius, y + side, z), (x + radius, y + side, z)], view, "wheel")
 
 
-def _place(point: Vector, view: View) -> tuple[float, float]:
+def _projected(point: Vector, view: View) -> tuple[float, float]:
     return point[view[0]], point[view[1]]
 
 
 def _line(points: Sequence[Vector], view: View, name: str, title: str = "") -> str:
-    text = " ".join(f"{x:.3f},{y:.3f}" for x, y in (_place(point, view) for point in points))
+    text = " ".join(f"{x:.3f},{y:.3f}" for x, y in (_projected(point, view) for point in points))
     return f'<polyline class="{name}" points="{text}">{title}</polyline>'
 
 

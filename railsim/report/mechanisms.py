@@ -267,8 +267,9 @@ def player(result: Analysis) -> dict[str, Any]:
                 "width": 1.4 * pictures.WIDTHS[line.kind],
                 "dash": DASHES.get(line.kind),
                 "colour": COLOURS.get(line.kind, "#1d2429"),
-                "places": [
-                    " ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in place) for place in line.xy
+                "points": [
+                    " ".join(f"{x * 1e3:.1f},{-y * 1e3:.1f}" for x, y in points)
+                    for points in line.xy
                 ],
             }
             for line in drawn

@@ -181,8 +181,8 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
             words = f"{quantity.words}, {WORDS[peak['kind']]}"
             row = rows.setdefault((quantity.name, peak["kind"]), [words])
             row += [""] * (1 + number - len(row))
-            place = peak.get("wheelset", "")
-            where = f"wheelset {wheelsets.index(place) + 1} " if place in wheelsets else ""
+            wheelset = peak.get("wheelset", "")
+            where = f"wheelset {wheelsets.index(wheelset) + 1} " if wheelset in wheelsets else ""
             where += f"{peak.get('side', '')} at {peak['distance']:.1f} m"
             row.append((quantity.text(peak["value"]), where))
     table = Table(

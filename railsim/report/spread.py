@@ -127,10 +127,10 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
         pairs = [(-value, number) for number, value in enumerate(values) if value is not None]
         ranked.append([number for _, number in sorted(pairs)])
     chosen: dict[int, None] = {}
-    for place in range(len(names)):
+    for rank in range(len(names)):
         for ranks in ranked:
-            if place < len(ranks) and len(chosen) < most:
-                chosen[ranks[place]] = None
+            if rank < len(ranks) and len(chosen) < most:
+                chosen[ranks[rank]] = None
     if not chosen:
         chosen = dict.fromkeys(range(most))
     return [names[number] for number in sorted(chosen)]

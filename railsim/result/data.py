@@ -176,7 +176,7 @@ class Result:
         return self._arrays.part(name, rows)
 
     def series(self, name: str, **labels: str | int) -> Array:
-        """Return one quantity at named places along its dimensions.
+        """Return one quantity, selected by labels along its dimensions.
 
         Parameters
         ----------
@@ -286,9 +286,9 @@ class Result:
         try:
             return load(str(self._attributes[name]))
         except InputError as error:
-            place = f"{self._source}: " if self._source else ""
+            source = f"{self._source}: " if self._source else ""
             raise InputError(
-                replace(fault, file=f"{place}{fault.file}") for fault in error.faults
+                replace(fault, file=f"{source}{fault.file}") for fault in error.faults
             ) from None
 
     def inputs(self) -> dict[str, Any]:
@@ -321,7 +321,7 @@ class Result:
         Parameters
         ----------
         *quantities : str
-            Quantities, with places where not all are wanted: ``"Q"``, ``"Y:1:left"``,
+            Quantities, with labels where not all are wanted: ``"Q"``, ``"Y:1:left"``,
             ``"body_acceleration:carbody:y"``; by default those of the curving study.
         over : {"distance", "time"}
             Horizontal axis.
@@ -341,7 +341,7 @@ class Result:
         Raises
         ------
         InputError
-            A quantity or place that the result does not have; the file exists.
+            A quantity or label that the result does not have; the file exists.
         """
         # looked up: results lie below pictures and know none of them
         chosen = {"selections": quantities} if quantities else {}
@@ -407,7 +407,7 @@ class Result:
         Returns
         -------
         DataFrame
-            Rows by time [s]; a column for each place, called as in `plot`:
+            Rows by time [s]; a column for each set of labels, called as in `plot`:
             ``Q:front.outer.wheelset:left`` [SI].  Its ``attrs["units"]`` gives the unit of every
             column.
 
@@ -429,11 +429,11 @@ class Result:
             if name not in over_time:
                 raise KeyError(f"{name} is not over time; {nearest(name, over_time)}")
             quantity = self._quantities[name]
-            places = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
-            for place, values in zip(places, array.reshape(len(array), -1).T, strict=True):
-                column = ":".join((name, *place))
+            combinations = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
+            for labels, values in zip(combinations, array.reshape(len(array), -1).T, strict=True):
+                column = ":".join((name, *labels))
                 columns[column] = values
-                own = quantity.component(place[-1]) if "component" in quantity.dims else quantity
+                own = quantity.component(labels[-1]) if "component" in quantity.dims else quantity
                 units[column] = own.unit
         frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))
         frame.attrs["units"] = units

@@ -1,6 +1,6 @@
 """A result in the files of other programs: CSV, MATLAB, Parquet.
 
-CSV and Parquet hold what is a function of time, a column for each place, named
+CSV and Parquet hold what is a function of time, a column for each set of labels, named
 ``Q:front.outer.wheelset:left``; in CSV the unit follows.  A MATLAB file holds the arrays under
 their names with their dimensions, and ``units``, names and facts of the run as structures.
 """
@@ -38,15 +38,15 @@ def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path
 
 
 def columns(result: Result) -> Iterator[tuple[str, str, Array]]:
-    """Yield name, unit and values of every place of every quantity that is a function of time."""
+    """Yield name, unit and values of every column of every quantity over time."""
     for name, quantity in result.quantities.items():
         if quantity.dims[0] != "time":
             continue
         array = result[name]
-        places = [result.coordinates[dim] for dim in quantity.dims[1:]]
-        for labels in product(*places):
+        coordinates = [result.coordinates[dim] for dim in quantity.dims[1:]]
+        for labels in product(*coordinates):
             at: tuple[Any, ...] = tuple(
-                names.index(label) for names, label in zip(places, labels, strict=True)
+                names.index(label) for names, label in zip(coordinates, labels, strict=True)
             )
             unit = quantity.unit
             if "component" in quantity.dims:

@@ -1,4 +1,4 @@
-"""Largest values of a result with the place where they occur, and values at mid-curve."""
+"""Largest values of a result with the positions where they occur, and values at mid-curve."""
 
 import math
 import warnings
@@ -45,7 +45,7 @@ BY_SIGN = ("dQ_over_Q0",)
 
 @dataclass(frozen=True)
 class Peak:
-    """An extreme value over time and over all places of a quantity.
+    """An extreme value over time and over all wheels, bodies or sensors of a quantity.
 
     Attributes
     ----------
@@ -114,13 +114,13 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
         return _peak_of_steps(result, name, kind)
     rows = evaluated(result)
     array = result.part(name, rows)
-    place = _extreme(array, kind)
+    index = _extreme(array, kind)
     return Peak(
         result.quantities[name],
-        float(array[place]),
-        _labels(result, name, place[1:]),
-        float(result["time"][rows][place[0]]),
-        float(result["distance"][rows][place[0]]),
+        float(array[index]),
+        _labels(result, name, index[1:]),
+        float(result["time"][rows][index[0]]),
+        float(result["distance"][rows][index[0]]),
         kind,
     )
 
@@ -133,7 +133,7 @@ def evaluated(result: Result) -> slice:
 
 
 def _extreme(array: Array, kind: str) -> tuple[Any, ...]:
-    """Place of the extreme value of an array; values that are not a number are left out."""
+    """Index of the extreme value of an array; values that are not a number are left out."""
     key = {"abs": np.abs(array), "max": array, "min": -array}[kind]
     return np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
 
@@ -142,13 +142,13 @@ def _peak_of_steps(result: Result, name: str, kind: str) -> Peak:
     found = result.groups["peaks"]
     rows = {"abs": slice(0, 2), "max": slice(0, 1), "min": slice(1, 2)}[kind]
     values = found[name][rows]
-    place = _extreme(values, kind)
+    index = _extreme(values, kind)
     return Peak(
         result.quantities[name],
-        float(values[place]),
-        _labels(result, name, place[1:]),
-        float(found[f"{name}_time"][rows][place]),
-        float(found[f"{name}_distance"][rows][place]),
+        float(values[index]),
+        _labels(result, name, index[1:]),
+        float(found[f"{name}_time"][rows][index]),
+        float(found[f"{name}_distance"][rows][index]),
         kind,
     )
 
@@ -241,12 +241,12 @@ class MidCurve:
     values : mapping of str to ndarray
         Quantity to its values, without the dimension time [SI].
     peaks : tuple of Peak
-        Largest magnitude of every quantity over its places.
+        Largest magnitude of every quantity over its dimensions.
     medians, scatter : mapping of str to ndarray
         Median over the full curve, and half the distance between the percentiles 15.87 and 84.13,
         which is one standard deviation of a normal distribution [SI].
     median_peaks : tuple of Peak
-        Largest median of every quantity over its places.
+        Largest median of every quantity over its dimensions.
     full_curve : (float, float)
         Where the reference body is while all wheelsets are in the full curve, without the
         first third of it [m]; where it is shorter than that, its middle.
@@ -354,13 +354,13 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
 
 
 def _largest(result: Result, name: str, array: Array, time: float, distance: float) -> Peak:
-    """Largest magnitude over the places of a quantity."""
-    place = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
-    labels = _labels(result, name, place)
-    return Peak(result.quantities[name], float(array[place]), labels, time, distance)
+    """Largest magnitude over the dimensions of a quantity."""
+    index = np.unravel_index(np.argmax(np.abs(np.nan_to_num(array))), array.shape)
+    labels = _labels(result, name, index)
+    return Peak(result.quantities[name], float(array[index]), labels, time, distance)
 
 
-def _labels(result: Result, name: str, place: tuple[Any, ...]) -> dict[str, str]:
+def _labels(result: Result, name: str, indices: tuple[Any, ...]) -> dict[str, str]:
     dims = result.quantities[name].dims[1:]
-    names = zip(dims, place, strict=True)
+    names = zip(dims, indices, strict=True)
     return {dim: result.coordinates[dim][index] for dim, index in names}

@@ -259,8 +259,8 @@ class StreamingPercentiles:
         half = len(self._counts) // 2
         while float(np.max(np.abs(values))) >= half * self.width:
             self._widen()
-        place = np.floor(values / self.width).astype(np.int64) + half
-        self._counts += np.bincount(place, minlength=2 * half)
+        indices = np.floor(values / self.width).astype(np.int64) + half
+        self._counts += np.bincount(indices, minlength=2 * half)
         self.count += len(values)
 
     def _widen(self) -> None:

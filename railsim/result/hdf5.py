@@ -137,7 +137,7 @@ class Hdf5Sink(SinkContext):
                 partial.remove()
             if error.errno in FULL:
                 raise OSError(error.errno, os.strerror(error.errno), str(self.path)) from None
-            fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another place")
+            fault = Fault(option, "", f"cannot write {self.path} ({error})", "choose another path")
             raise InputError([fault]) from None
         except BaseException:  # an interrupt, before a `with` can see to it
             if partial is not None:
@@ -373,7 +373,7 @@ def _describe(dataset: h5py.Dataset, quantity: Quantity) -> None:
 
 
 def _describe_peaks(group: h5py.Group, file: h5py.File) -> None:
-    """Units, names and dimensions of largest and smallest values, their times and places."""
+    """Units, names and dimensions of largest and smallest values, their times and distances."""
     _write_names(group, "extreme", EXTREMES)
     for name, dataset in group.items():
         if name == "extreme":

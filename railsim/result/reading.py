@@ -240,7 +240,7 @@ class _Reader:
             if isinstance(member, h5py.Dataset):
                 self._check_dataset(above + name, member)
             elif not isinstance(member, h5py.Group):
-                raise self.fault(above + name, "a link or a type in place of a dataset")
+                raise self.fault(above + name, "a link or a type instead of a dataset")
             yield name, member
 
     def _check_dataset(self, name: str, dataset: h5py.Dataset) -> None:
@@ -279,17 +279,17 @@ class _Reader:
         for key in thing.attrs:
             if key in ("DIMENSION_LIST", "REFERENCE_LIST"):
                 continue
-            place = f"{name}.{key}" if name else key
+            location = f"{name}.{key}" if name else key
             try:
                 value = thing.attrs[key]
             except Exception as error:
-                raise _unreadable(self._path, place, error) from None
+                raise _unreadable(self._path, location, error) from None
             value = value.item() if isinstance(value, np.generic) else value
             if isinstance(value, bytes):  # a text of fixed length
                 value = value.decode("utf-8", errors="replace")
             if not isinstance(value, str | int | float):
                 words = f"found {str(value)[:60]}"
-                raise self.fault(place, words, "a text or a number")
+                raise self.fault(location, words, "a text or a number")
             facts[key] = value
         return facts
 
@@ -378,7 +378,7 @@ class _Reader:
 
     def _floats(self, name: str, dataset: h5py.Dataset) -> Array:
         if dataset.dtype.kind == "S":
-            raise self.fault(name, "names in place of numbers")
+            raise self.fault(name, "names instead of numbers")
         try:
             return frozen(dataset[()])
         except Exception as error:

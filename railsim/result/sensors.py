@@ -76,9 +76,9 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
         found[name] = (point.body, point.position)
     origin = reference.position[0]
     placed: dict[str, Sensor] = {}
-    for name, (body, place) in found.items():
+    for name, (body, position) in found.items():
         cg = bodies[body].position
-        arm = (place[0] - cg[0], place[1] - cg[1], place[2] - cg[2])
+        arm = (position[0] - cg[0], position[1] - cg[1], position[2] - cg[2])
         placed[name] = Sensor(body, cg[0] - origin, arm)
     return placed
 

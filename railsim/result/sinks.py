@@ -30,7 +30,7 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Sink(Protocol):
-    """What a simulation needs of the place that its output goes to."""
+    """What a simulation needs of its output's destination."""
 
     def begin(
         self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS

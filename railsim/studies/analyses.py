@@ -1,4 +1,4 @@
-"""The analyses of a case: computed in addition to, or in place of, a run in the time domain.
+"""The analyses of a case: computed in addition to, or instead of, a run in the time domain.
 
 Each returns numbers by name, which become columns of ``summary.csv``; the names of an analysis
 called ``curve`` in the study begin with ``curve.``.
@@ -21,7 +21,7 @@ from railsim.studies.case import Case
 
 Numbers = dict[str, float]
 
-PLACES = ("x", "blocks", "wheelset")  # of comfort points and wheels
+LOCATIONS = ("x", "blocks", "wheelset")  # of comfort points and wheels
 
 
 def analysed(case: Case, result: Result | None) -> Numbers:
@@ -89,7 +89,7 @@ def _numbers(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, fl
     for key, value in row.items():
         if isinstance(value, Mapping):
             yield from _numbers(value, f"{before}{key}_")
-        elif isinstance(value, int | float) and math.isfinite(value) and key not in PLACES:
+        elif isinstance(value, int | float) and math.isfinite(value) and key not in LOCATIONS:
             yield f"{before}{key}", float(value)
 
 

@@ -112,9 +112,9 @@ class Evaluation:
 
     def _study(self, progress: Progress) -> None:
         linked: dict[str, list[str]] = {}
-        for place, (path, variable) in enumerate(self.variables):
+        for column, (path, variable) in enumerate(self.variables):
             for key in (path, *variable.also):
-                linked[key] = [row[place] for row in self.rows]
+                linked[key] = [row[column] for row in self.rows]
         outcome = study(
             out=self.folder,
             linked=[*self._inputs["linked"], linked],

@@ -16,7 +16,7 @@ INPUTS = "inputs"
 
 
 def as_files(given: Sequence[Any], folder: Path) -> list[str | Path]:
-    """Return files in place of definitions, written if they do not exist."""
+    """Return files instead of definitions, written if they do not exist."""
     found: list[str | Path] = []
     taken: dict[str, str] = {}
     for one in given:

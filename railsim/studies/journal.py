@@ -150,17 +150,17 @@ class Journal:
             "changed": 0 if file is None else file.st_mtime_ns,
         }
         body = _json(record)
-        place = self._line(facts, body)
-        entry = Entry(**facts, offset=place, length=len(body))
+        offset = self._line(facts, body)
+        entry = Entry(**facts, offset=offset, length=len(body))
         self.entries[entry.name] = entry
         return entry
 
     def _line(self, head: Mapping[str, Any], body: bytes) -> int:
         text = _json(head) + b"\t" + body
-        place = self._end + 9 + len(text) - len(body)
+        offset = self._end + 9 + len(text) - len(body)
         self._append(b"%08x\t%s\n" % (zlib.crc32(text), text))
         os.fsync(self._handle)
-        return place
+        return offset
 
     def _append(self, data: bytes) -> None:
         """Append the whole line or nothing: half a line would corrupt the next one."""
@@ -214,13 +214,13 @@ class Records(Sequence[Record]):
         return len(self._entries)
 
     @overload
-    def __getitem__(self, place: int) -> Record: ...
+    def __getitem__(self, index: int) -> Record: ...
     @overload
-    def __getitem__(self, place: slice) -> list[Record]: ...
-    def __getitem__(self, place: int | slice) -> Record | list[Record]:
-        if isinstance(place, slice):
-            return list(self._read(self._entries[place]))
-        return next(self._read([self._entries[place]]))
+    def __getitem__(self, index: slice) -> list[Record]: ...
+    def __getitem__(self, index: int | slice) -> Record | list[Record]:
+        if isinstance(index, slice):
+            return list(self._read(self._entries[index]))
+        return next(self._read([self._entries[index]]))
 
     def __iter__(self) -> Iterator[Record]:
         return self._read(self._entries)

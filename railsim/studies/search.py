@@ -132,12 +132,12 @@ def _promising(designs: Floats, values: Values, size: int, rng: np.random.Genera
     chosen: list[int] = []
     gain = _Gain(front, objectives[allowed], rng)
     distance = np.sqrt(((points[:, None] - designs[None]) ** 2).sum(axis=2)).min(axis=1)
-    for place in range(size):
+    for number in range(size):
         free = distance > SMALLEST_DISTANCE
         if not free.any():
             break
         worth = np.where(allowed & free, gain.of(objectives), 0.0)
-        explore = place == size - 1 and size > 1
+        explore = number == size - 1 and size > 1
         pick = int(np.argmax(np.where(free, distance, 0.0) if explore or worth.max() <= 0.0
                              else worth + 1e-9 * distance))  # fmt: skip
         chosen.append(pick)

@@ -245,17 +245,17 @@ def _guiding(
 
 def _unloading(case: str, stands: Sequence[Standing | None], limit: Constant) -> StationaryValue:
     """Return the worst wheel over some states; nan if one of them was not found."""
-    worst, place = -np.inf, ""
+    worst, label = -np.inf, ""
     for standing in stands:
         if standing is None:
-            worst, place = np.nan, ""
+            worst, label = np.nan, ""
             break
         shares = (standing.Q0 - standing.Q) / standing.Q0
         w, side = np.unravel_index(int(np.argmax(shares)), shares.shape)
         if shares[w, side] > worst:
             worst = float(shares[w, side])
-            place = f"wheelset {w + 1} {('left', 'right')[side]}"
+            label = f"wheelset {w + 1} {('left', 'right')[side]}"
     words = "unloading (Q0 - Q)/Q0"
     return StationaryValue(
-        case, words, float(worst), limit.value, place, limit.source, limit.checked
+        case, words, float(worst), limit.value, label, limit.source, limit.checked
     )

@@ -17,7 +17,7 @@ WHEELSETS = (
 )
 BODIES = ("carbody", "front.frame", "rear.frame", *WHEELSETS)
 COORDINATES = {"wheelset": WHEELSETS, "body": BODIES}
-PLACES = np.array([10.78, 8.22, -8.22, -10.78])
+OFFSETS = np.array([10.78, 8.22, -8.22, -10.78])
 
 
 def text(path):
@@ -42,7 +42,7 @@ def arrays(speed=20.0, duration=49.0, rate=50.0, gain=1.0):
     """Return all quantities of a run through the R 250 m curve as smooth made-up functions."""
     time = np.arange(round(duration * rate) + 1) / rate
     distance = speed * time
-    at = distance[:, None] + PLACES
+    at = distance[:, None] + OFFSETS
     ramp = np.interp(at, [300.0, 360.0, 420.0, 480.0], [0.0, 1.0, 1.0, 0.0]) * gain
     lead = np.array([1.0, 0.25, 0.7, 0.2])
     bump = gain * (np.exp(-(((at - 355.0) / 12.0) ** 2)) - np.exp(-(((at - 425.0) / 12.0) ** 2)))

@@ -1,7 +1,7 @@
 """Made-up runs for assessments: forces as functions of time and distance, no physics."""
 
 import numpy as np
-from example_result import BODIES, COORDINATES, PLACES, PROFILES, text
+from example_result import BODIES, COORDINATES, OFFSETS, PROFILES, text
 
 from railsim.definitions.track import Track
 from railsim.notation import QUANTITIES
@@ -65,7 +65,7 @@ def made(
     """  # fmt: skip
     time = np.arange(round((until or on.length) / speed * rate) + 1) / rate
     distance = speed * time
-    at = distance[:, None] + PLACES
+    at = distance[:, None] + OFFSETS
     shape = (*at.shape, 2)
     loads = np.full(shape, Q0) if Q is None else Q(time, at)
     forces = np.zeros(shape) if Y is None else Y(time, at)

@@ -44,7 +44,7 @@ def test_peaks_and_mid_curve_values_are_compared():
     assert set(rows[-1].peaks) == {"base"}  # the short run ends before the middle
 
 
-def test_command_prints_value_place_time_and_difference(files, capsys):
+def test_command_prints_value_wheel_time_and_difference(files, capsys):
     assert main(["compare", *files]) == 0
     printed = capsys.readouterr().out
     line = next(each for each in printed.splitlines() if "lower" in each and "-5.58" in each)

@@ -148,8 +148,8 @@ def test_creep_has_a_row_for_each_law_direction_and_size(capsys):
     from railsim.contact.creep import LAWS
 
     assert {row["law"] for row in rows} == set(LAWS)
-    places = {(row["case"], row["size"]) for row in rows}
-    assert len(rows) == len(places) * len(LAWS)
+    creepages = {(row["case"], row["size"]) for row in rows}
+    assert len(rows) == len(creepages) * len(LAWS)
     sizes = np.array([np.hypot(row["T_x"], row["T_y"]) for row in rows])
     # midpoint sums of the elliptic bound over 10 x 10 cells exceed mu N by 1.48 %
     assert (sizes < 1.0148).all()

@@ -180,8 +180,8 @@ def test_export_to_csv_and_matlab_holds_every_value(tmp_path):
         header, first = next(reader), next(reader)
         count = 1 + sum(1 for _ in reader)
     assert count == len(result.time)
-    place = header.index("Q:front.outer.wheelset:left (N)")
-    assert float(first[place]) == result.Q[0, 0, 0]
+    column = header.index("Q:front.outer.wheelset:left (N)")
+    assert float(first[column]) == result.Q[0, 0, 0]
     assert "body_position:carbody:yaw (rad)" in header
     assert "Y_over_Q:front.outer.wheelset:left" in header
     data = loadmat(export(result, tmp_path / "r.mat"), squeeze_me=True)

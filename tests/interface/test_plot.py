@@ -83,8 +83,8 @@ def test_curve_and_transitions_are_shaded_where_they_are(result):
 
 def test_over_time_the_shades_are_where_the_reference_body_was(result):
     (axes,) = histories(result, ["Y"], over="time").axes
-    places = [(low, high) for low, high, _ in shades(axes)]
-    np.testing.assert_allclose(places, [(15.0, 18.0), (18.0, 21.0), (21.0, 24.0)])
+    ranges = [(low, high) for low, high, _ in shades(axes)]
+    np.testing.assert_allclose(ranges, [(15.0, 18.0), (18.0, 21.0), (21.0, 24.0)])
     np.testing.assert_array_equal(drawn(axes)[0].get_xdata(), result.time)
 
 
@@ -113,7 +113,7 @@ def test_part_of_the_axis(result):
         histories(result, ["Y"], between=(2000.0, 3000.0))
 
 
-def test_places_are_chosen_by_name_or_number(result):
+def test_labels_are_chosen_by_name_or_number(result):
     for selection in ("Y:2:right", "Y:front.inner.wheelset:right", "Y:right:2"):
         (axes,) = histories(result, [selection]).axes
         (line,) = drawn(axes)
@@ -139,7 +139,7 @@ def test_by_wheelset_every_wheelset_has_its_axes(result):
     ("selection", "words"),
     [
         ("wheelset_jaw", "did you mean 'wheelset_yaw'"),
-        ("Q:5", "no place '5'"),
+        ("Q:5", "no label '5'"),
         ("Q:rigth", "did you mean 'right'"),
         ("Q0", "no quantity 'Q0'"),
         ("time", "no quantity 'time'"),

@@ -78,7 +78,7 @@ def test_tables_of_a_notebook_show_names_literally(coach, result):
     assert "<td>Q</td>" in result._repr_html_()
 
 
-def test_frames_have_a_column_for_each_place(result):
+def test_frames_have_a_column_for_each_set_of_labels(result):
     pytest.importorskip("pandas")
     frame = result.to_pandas("Q", "body_position")
     wheelset, body = result.wheelsets[0], result.bodies[0]

@@ -48,7 +48,7 @@ function probe(frame) {
   over.dispatchEvent(new w.MouseEvent("mousemove", at(0.3)));
   over.dispatchEvent(new w.MouseEvent("mousemove", at(0.35)));
   found.readings = Array.from(d.querySelectorAll(".readings tbody td")).map(c => c.textContent);
-  found.place = d.querySelector(".readings th").textContent;
+  found.position = d.querySelector(".readings th").textContent;
   found.linked = plots.map(u => u.cursor.idx);
   over.dispatchEvent(new w.MouseEvent("mousedown", at(0.3)));
   d.dispatchEvent(new w.MouseEvent("mousemove", at(0.5)));
@@ -151,7 +151,7 @@ def test_page_works_in_a_browser_at_desktop_and_phone_width(html, tmp_path):
         # read-off: names of the runs, and a value of each quantity
         assert found["readings"][0] == "a"
         assert all(found["readings"][:7])
-        assert found["place"].startswith("s = ")
+        assert found["position"].startswith("s = ")
         assert len(set(found["linked"])) == 1
         assert found["linked"][0] > 0
         low, high = found["zoomed"][0]
@@ -177,9 +177,9 @@ def test_cells_without_an_instant_are_interpolated_and_none_is_made_up_beyond_th
     axis = np.array([10.0, 20.0, 30.0])
     thin = thinned(axis, axis[:, None], np.linspace(0.0, 40.0, 17))
     there = np.isfinite(thin[:, 0])
-    places = np.ravel([[2.5 * c + 0.625, 2.5 * c + 1.875] for c in range(16)])
-    assert np.all(there[(places > 12.5) & (places < 30.0)])
-    assert not there[(places < 10.0) | (places > 32.5)].any()
+    positions = np.ravel([[2.5 * c + 0.625, 2.5 * c + 1.875] for c in range(16)])
+    assert np.all(there[(positions > 12.5) & (positions < 30.0)])
+    assert not there[(positions < 10.0) | (positions > 32.5)].any()
     assert np.all(np.diff(thin[there, 0]) >= 0.0)
 
 

@@ -17,7 +17,7 @@ def small(values, distance=(0.0, 10.0, 20.0), **facts):
     )
 
 
-def test_peak_names_value_place_and_time():
+def test_peak_names_value_wheel_and_time():
     result = small([[[1.0, 2.0]], [[3.0, -7.0]], [[5.0, 6.0]]])
     largest = peak(result, "Q")
     assert (largest.value, largest.time, largest.distance) == (-7.0, 1.0, 10.0)

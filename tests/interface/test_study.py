@@ -251,10 +251,10 @@ def test_bad_study_is_refused_and_nothing_is_written(tmp_path, simulated, given,
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("place", ["file/study", "file"])
-def test_folder_that_cannot_be_written_is_refused(tmp_path, simulated, place, capsys):
+@pytest.mark.parametrize("path", ["file/study", "file"])
+def test_folder_that_cannot_be_written_is_refused(tmp_path, simulated, path, capsys):
     (tmp_path / "file").write_text("")
-    assert main(arguments(tmp_path / place, 20)) == 2
+    assert main(arguments(tmp_path / path, 20)) == 2
     assert "--out" in capsys.readouterr().err
     assert simulated == []
 
@@ -377,7 +377,7 @@ def test_missing_dask_is_answered_with_the_install_command(tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
-def test_grid_may_vary_places_in_tables(tmp_path):
+def test_grid_may_vary_values_in_tables(tmp_path):
     settings = tmp_path / "s.toml"
     table = "drive = {mode = 'table', speed_table = [[0.0, 20.0], [300.0, 15.0]]}"
     settings.write_text(f'format = "railsim-settings/1"\n{table}\n')

@@ -116,7 +116,7 @@ def test_difference_along_the_track_is_that_of_the_values():
     assert [one.labels.get("side") for one in found] == ["left", "right", None]
     for k in (0, 1):
         assert found[k].values == pytest.approx(-0.1 * base.Y[:, 0, k], abs=1e-9)
-    value, place = found[2].largest
+    value, s = found[2].largest
     yaw = base["wheelset_yaw"][:, 0]
     assert abs(value) == pytest.approx(0.1 * np.max(np.abs(yaw)))
-    assert np.interp(place, base["distance"], np.abs(yaw)) == pytest.approx(np.max(np.abs(yaw)))
+    assert np.interp(s, base["distance"], np.abs(yaw)) == pytest.approx(np.max(np.abs(yaw)))

@@ -34,7 +34,7 @@ def test_force_never_exceeds_friction(law, ratio, xi_x, xi_y, phi):
 def test_reversed_creepages_reverse_the_force(law, ratio, xi_x, xi_y, phi):
     force = creep_force(**patch(ratio), xi_x=xi_x, xi_y=xi_y, phi=phi, law=law)
     back = creep_force(**patch(ratio), xi_x=-xi_x, xi_y=-xi_y, phi=-phi, law=law)
-    # on an axis of the table the force across it is the round-off of the place, 1e-11 of 24 kN
+    # on an axis of the table the force across it is round-off of the coordinates, 1e-11 of 24 kN
     np.testing.assert_allclose(back, [-t for t in force], rtol=1e-12, atol=1e-6)
 
 

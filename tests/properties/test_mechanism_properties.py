@@ -21,8 +21,8 @@ LENGTH = st.floats(0.2, 1.0)
 ANGLE = st.floats(-3.0, 3.0)
 
 
-def turned(place, angle):
-    x, y = place
+def turned(point, angle):
+    x, y = point
     c, s = math.cos(angle), math.sin(angle)
     return [c * x - s * y, s * x + c * y]
 
@@ -198,7 +198,7 @@ def test_expressions_are_the_arithmetic_that_they_say(text, a, b):
     carried = evaluate(Expression(text), {"a": np.array([[a + 1j * STEP]]), "b": b})
     exact = float(np.imag(np.ravel(carried))[0]) / STEP
     scale = max(1.0, abs(exact), abs(expected))
-    assume(scale < 1e3)  # steep places need a finer difference
+    assume(scale < 1e3)  # steep slopes need a finer difference
     assert exact == pytest.approx(slope, abs=1e-4 * scale)
 
 

@@ -43,9 +43,9 @@ def lifts():
     return {name: analyse(load_mechanism(name, ["sampling.points=401"])) for name in names}
 
 
-def at_places(result, name):
+def at_positions(result, name):
     """A result at closed, zone low, work, high, end."""
-    zone = [result.zone[place][name] for place in ("low", "work", "high")]
+    zone = [result.zone[position][name] for position in ("low", "work", "high")]
     return np.array([result.output[name][0], *zone, result.output[name][-1]])
 
 
@@ -145,13 +145,13 @@ def test_a10_ratios_reconstructed(lifts):
     result = lifts["atr95_lift_5"]
     ratio = [32.984, 25.853, 24.506, 23.123, 18.474]
     across = [-2.306, -1.763, -2.141, -2.410, 1.712]
-    assert at_places(result, "ratio") == pytest.approx(ratio, abs=3e-3)
-    assert at_places(result, "ratio_x") == pytest.approx(across, abs=3e-3)
+    assert at_positions(result, "ratio") == pytest.approx(ratio, abs=3e-3)
+    assert at_positions(result, "ratio_x") == pytest.approx(across, abs=3e-3)
 
 
 def test_a11_travel_of_the_zone_reconstructed(lifts):
     zone = lifts["atr95_lift_5"].zone
-    travel = [np.degrees(zone[place]["travel"]) for place in ("low", "work", "high")]
+    travel = [np.degrees(zone[position]["travel"]) for position in ("low", "work", "high")]
     assert travel == pytest.approx([8.733, 13.796, 19.058], abs=5e-3)
 
 
@@ -231,8 +231,8 @@ def test_a20_cam_reconstructed(lifts):
     assert np.degrees(rocker[0] - rocker[1]) == pytest.approx(4.973, abs=2e-3)
     force = [10292.8, 8364.9, 7948.6, 7536.1, 4586.6]
     pressure = [0.36227, 0.32472, 0.32447, 0.33024, 0.48390]
-    assert at_places(result, "force") == pytest.approx(force, abs=0.5)
-    assert at_places(result, "pressure") / 1e6 == pytest.approx(pressure, abs=5e-5)
+    assert at_positions(result, "force") == pytest.approx(force, abs=0.5)
+    assert at_positions(result, "pressure") / 1e6 == pytest.approx(pressure, abs=5e-5)
 
 
 @pytest.mark.slow
@@ -329,7 +329,7 @@ def test_a22_lift_5_that_fits_its_cylinder_from_every_seed_new(seed):
 @pytest.mark.slow
 def test_a23_constant_actuator_force_new(lifts):
     def spread(result):
-        low, high = (result.zone[place]["travel"] for place in ("low", "high"))
+        low, high = (result.zone[position]["travel"] for position in ("low", "high"))
         inside = (result.output["travel"] >= low) & (result.output["travel"] <= high)
         force = result.output["force"][inside]
         force = np.append(force, [result.zone[p]["force"] for p in ("low", "high")])
@@ -362,7 +362,7 @@ def test_cam_by_its_rounded_centres_reconstructed(lifts):
         assert rounded.rate_after == pytest.approx(rounded.rate_before, rel=1e-4)
     travel = [np.degrees(change.travel) for change in plain.transitions]
     assert travel == pytest.approx([9.16, 26.70], abs=5e-3)
-    assert at_places(result, "force") == pytest.approx(at_places(plain, "force"), rel=2e-5)
+    assert at_positions(result, "force") == pytest.approx(at_positions(plain, "force"), rel=2e-5)
 
 
 def test_a24_six_bar_new(lifts):
@@ -411,7 +411,7 @@ def test_a26_generalised_ratio_at_work_reconstructed(lifts):
 
 def test_a27_pressure_angle_and_roller_force_of_the_cam_reconstructed(lifts):
     result = lifts["atr95"]
-    angle = np.degrees(at_places(result, "cam_pressure_angle"))
+    angle = np.degrees(at_positions(result, "cam_pressure_angle"))
     assert angle == pytest.approx([-26.650, -12.926, -7.220, -1.841, 29.016], abs=5e-3)
     force = np.abs(result.reactions["cam"].components[:, 0])
     heights = result.output["height"]
@@ -423,8 +423,8 @@ def test_a28_effective_weight_and_mass_reconstructed(lifts):
     result = lifts["atr95_lift_5"]
     weight = [297.22, 322.18, 324.96, 324.47, 296.01]
     mass = [24.20, 26.65, 27.23, 27.57, 26.21]
-    assert at_places(result, "effective_weight") == pytest.approx(weight, abs=2e-2)
-    assert at_places(result, "effective_mass") == pytest.approx(mass, abs=2e-2)
+    assert at_positions(result, "effective_weight") == pytest.approx(weight, abs=2e-2)
+    assert at_positions(result, "effective_mass") == pytest.approx(mass, abs=2e-2)
 
 
 def test_a29_reactions_of_lift_5_reconstructed(lifts):

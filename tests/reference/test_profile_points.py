@@ -55,6 +55,6 @@ def test_benchmark_rail_agrees_with_the_benchmarks_points(points):
     profile = load_profile("benchmark")
     forward = np.diff(profile.y, prepend=-1.0) > 0
     contour = CubicSpline(1e3 * profile.y[forward], 1e3 * profile.z[forward])
-    # the places of the origins are free: the benchmark's lies off the rail's axis
+    # the positions of the origins are free: the benchmark's lies off the rail's axis
     fit = least_squares(lambda d: contour(y[head] + d[0]) - z[head] - d[1], [7.5, 0.0])
     assert np.max(np.abs(fit.fun)) < 5e-5  # half-widths printed to 1e-5 mm

@@ -26,8 +26,8 @@ def tried(normal: int, case) -> list:
         try:
             outcomes.append(case(seed))
         except Exception as error:
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            words = f"seed {seed}: {type(error).__name__}: {error} ({place.name}:{place.lineno})"
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            words = f"seed {seed}: {type(error).__name__}: {error} ({frame.name}:{frame.lineno})"
             failed.append(words[:2000])
             if MORE:
                 print(f"\n{words[:2000]}", file=sys.__stderr__, flush=True)

@@ -16,21 +16,21 @@ def bytes_damaged(data, rng):
     for _ in range(int(rng.integers(1, 4))):
         if not data:
             break
-        place = int(rng.integers(len(data)))
+        offset = int(rng.integers(len(data)))
         length = int(2 ** rng.uniform(0, 10))
         match rng.integers(6):
             case 0:
-                data[place] ^= 1 << int(rng.integers(8))
+                data[offset] ^= 1 << int(rng.integers(8))
             case 1:
-                del data[place:]
+                del data[offset:]
             case 2:
-                del data[place : place + length]
+                del data[offset : offset + length]
             case 3:
-                data[place:place] = data[place : place + length]
+                data[offset:offset] = data[offset : offset + length]
             case 4:
-                data[place : place + length] = bytes(len(data[place : place + length]))
+                data[offset : offset + length] = bytes(len(data[offset : offset + length]))
             case 5:
-                data[place:place] = rng.bytes(length)
+                data[offset:offset] = rng.bytes(length)
     return bytes(data)
 
 
@@ -57,10 +57,10 @@ def text_damaged(text, rng):
                 other = int(rng.integers(len(lines)))
                 lines[at], lines[other] = lines[other], lines[at]
             case 7:
-                place = int(rng.integers(len(lines[at]) + 1))
+                column = int(rng.integers(len(lines[at]) + 1))
                 lines[at] = (
-                    lines[at][:place]
+                    lines[at][:column]
                     + str(rng.choice(list("[]{}\"'#,=\x00\x1b\n")))
-                    + (lines[at][place:])
+                    + (lines[at][column:])
                 )
     return "\n".join(lines) + "\n"

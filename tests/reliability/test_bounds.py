@@ -32,12 +32,12 @@ def test_million_runs_are_told_with_their_number_and_time(refused, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("places", [1, 3])
-def test_assemblies_nested_without_end_are_refused(places, refused, tmp_path):
+@pytest.mark.parametrize("count", [1, 3])
+def test_assemblies_nested_without_end_are_refused(count, refused, tmp_path):
     """A chain of forty, and one of which each link has three of the next: 1e19 bodies."""
     text, path = VEHICLE, "assemblies.deep"
     for _ in range(40):
-        spots = ", ".join(f'{{name = "p{k}", position = [{k}.0, 0.0, 0.0]}}' for k in range(places))
+        spots = ", ".join(f'{{name = "p{k}", position = [{k}.0, 0.0, 0.0]}}' for k in range(count))
         text += f"[{path}]\nplacements = [{spots}]\n"
         path += ".assemblies.deep"
     (tmp_path / "nested.toml").write_text(text)

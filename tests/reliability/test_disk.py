@@ -26,17 +26,17 @@ KB = 1024
 @pytest.fixture
 def small_disk(tmp_path):
     """A file system of six megabytes, really full when it is full; where one may be mounted."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", f"size={6 * 1024 * KB}", "tmpfs", str(place)]
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={6 * 1024 * KB}", "tmpfs", str(folder)]
     try:
         done = subprocess.run(command, capture_output=True)
     except FileNotFoundError:
         pytest.skip("no mount here")
     if done.returncode:
         pytest.skip("only root may mount a file system")
-    yield place
-    subprocess.run(["umount", "-l", str(place)], check=True)
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def leave(disk, room):
@@ -97,8 +97,8 @@ def test_full_disk_is_one_line(small_disk, tmp_path, capsys, command, room):
 
 
 def fill(journal, record):
-    for place in range(10):
-        journal.add({**record, "name": f"run {place}"}, "key", None)
+    for number in range(10):
+        journal.add({**record, "name": f"run {number}"}, "key", None)
 
 
 def test_full_disk_keeps_the_journal_whole(small_disk):

@@ -40,18 +40,18 @@ def test_extreme_models(tmp_path, capsys, monkeypatch):
     def case(seed):
         rng = np.random.default_rng(seed)
         vehicle, track = MODELS[seed % len(MODELS)]
-        places = [
+        values = [
             (kind, *pair)
             for kind, file in (("vehicle", load_vehicle(vehicle)), ("track", load_track(track)))
             for pair in numbers(file.model_dump(exclude_unset=True))
         ]
-        speed, place = 10 ** rng.uniform(-0.3, 2.17), rng.uniform(0.0, 0.9)
+        speed, share = 10 ** rng.uniform(-0.3, 2.17), rng.uniform(0.0, 0.9)
         given = ["run", vehicle, track, "--speed", f"{speed:.4g}"]
-        # anywhere, also in curves; at walking speed the run-in to such a place takes its time
+        # anywhere, also in curves; at walking speed the run-in to such a position takes its time
         if speed > 5.0:
-            given += ["--start", f"{place * load_track(track).length:.4g}"]
-        for at in rng.choice(len(places), rng.integers(1, 4), replace=False):
-            kind, path, value = places[at]
+            given += ["--start", f"{share * load_track(track).length:.4g}"]
+        for at in rng.choice(len(values), rng.integers(1, 4), replace=False):
+            kind, path, value = values[at]
             factor = rng.choice([-1.0, 0.0, 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-2, 2)])
             given += ["--set", f"{kind}.{path}={float(value * factor)!r}"]
         path = tmp_path / "run.h5"

@@ -1,7 +1,7 @@
 """Runs and studies that are killed at any moment: whole results, or none; the rest is swept.
 
 The moments are shares of the CPU time that the command takes when nobody disturbs it, so that they
-fall into the same places of its work on a slow machine, and on one that others use as well.
+fall into the same stages of its work on a slow machine, and on one that others use as well.
 """
 
 import os

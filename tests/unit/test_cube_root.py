@@ -1,4 +1,4 @@
-"""Cube root of the contact forces: that of the library to a few units in the last place."""
+"""Cube root of the contact forces: that of the library to a few units in the last digit."""
 
 import numpy as np
 

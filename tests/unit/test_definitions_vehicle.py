@@ -77,7 +77,7 @@ def test_left_copy_is_the_mirror_image():
 
 
 def assembly_of_assemblies():
-    """Two bogies of two axles each; every inner assembly is mirrored in its second place."""
+    """Two bogies of two axles each; every inner assembly is mirrored in its second placement."""
     axle = {
         "placements": [
             {"name": "outer", "position": [1.0, 0.0, 0.0]},
@@ -120,11 +120,11 @@ def test_nested_mirrors_compose():
         "rear.inner": 1.0,  # mirrored twice
         "rear.outer": -1.0,
     }
-    for place, sign in signs.items():
-        element = right[f"{place}.rod.right"]
+    for scope, sign in signs.items():
+        element = right[f"{scope}.rod.right"]
         assert element.definition.preload == (5.0 * sign, 1.0, 0.0)
-        assert element.point1[0] == pytest.approx(x[f"{place}.wheelset"] + sign * 0.2, abs=1e-15)
-        assert element.body1 == f"{place.split('.')[0]}.frame"
+        assert element.point1[0] == pytest.approx(x[f"{scope}.wheelset"] + sign * 0.2, abs=1e-15)
+        assert element.body1 == f"{scope.split('.')[0]}.frame"
 
 
 def test_names_resolve_from_the_innermost_assembly_outwards():
@@ -203,7 +203,7 @@ def test_element_without_points_stands_at_its_bodies():
     [
         ({"bodies": {"frame": BODY}}, "a vehicle needs one at least"),
         ({"wheelsets": {"a": WHEELSET}, "reference": "b"}, "no body 'b'"),
-        ({"wheelsets": {"a": WHEELSET, "b": WHEELSET}}, "stand at the same place"),
+        ({"wheelsets": {"a": WHEELSET, "b": WHEELSET}}, "stand at the same position"),
         ({"wheelsets": {"a": {**WHEELSET, "radius": 0.5}}}, "z = -0.5 m"),
         ({"wheelsets": {"a": WHEELSET}, "bodies": {"a": BODY}}, "the name 'a' is used twice"),
     ],
@@ -318,7 +318,7 @@ def test_further_elements_are_placed(element):
     assert flat.body2 == ("" if element is WIND else "front")
 
 
-def test_stop_with_two_different_sides_turns_round_in_a_mirrored_place():
+def test_stop_with_two_different_sides_turns_round_in_a_mirrored_placement():
     definition = flatten(wagon(STOP)).elements[0].definition
     turned = definition.mirrored((-1.0, 1.0, 1.0))
     assert turned.table == ((-0.02, -8.0), (-0.0, -0.0), (0.01, 5.0))

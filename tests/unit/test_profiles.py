@@ -40,8 +40,8 @@ def test_arcs_of_a_rail_close_on_the_standards_head(name, half_width, depth):
     # Their joints are printed to 0.001 mm.
     half_widths, radii, flank = RAIL_HEADS[name]
     centre, angle = np.array([0.0, radii[0]]), 0.0
-    for i, place in enumerate(half_widths):
-        angle = np.arcsin((place - centre[0]) / radii[i])
+    for i, half in enumerate(half_widths):
+        angle = np.arcsin((half - centre[0]) / radii[i])
         centre = centre + (radii[i] - radii[i + 1]) * np.array([np.sin(angle), -np.cos(angle)])
     end = np.arctan2(1.0, flank)
     closing = centre + radii[-1] * np.array([np.sin(end), -np.cos(end)])

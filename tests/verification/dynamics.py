@@ -236,7 +236,7 @@ def _contact_energy(system, work, state):
 
 
 def _over_rail(system, state, b, side):
-    """Lateral place, height, roll and yaw of a wheelset over one of its rails."""
+    """Lateral position, height, roll and yaw of a wheelset over one of its rails."""
     track = system.track
     s = state[-2] + system.frame_offset[system.bodies.frame[b]] - track.s_start
     cell = int(s / track.ds)

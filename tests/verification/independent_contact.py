@@ -65,12 +65,12 @@ def lowest_gap(
 ):
     """Height at which a wheel touches, from its whole surface instead of its trace line.
 
-    With an `approach` along the normal, the place is sought where h + approach/cos(gamma) is
-    least, and h at that place is returned.
+    With an `approach` along the normal, the point is sought where h + approach/cos(gamma) is
+    least, and h at that point is returned.
 
     Every circle of the wheel is a set of points over the turn angle theta; the rail is a polyline
-    over the lateral place.  `wheel_y, wheel_z` as `Profile`; `rail_y, rail_z` placed in the track,
-    rail_y increasing.  Returns height, place on the wheel and place on the rail.
+    over the lateral position.  `wheel_y, wheel_z` as `Profile`; `rail_y, rail_z` placed in the
+    track, rail_y increasing.  Returns height, lateral position on the wheel and on the rail.
     """
     rotation = np.array(
         [[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
@@ -81,25 +81,25 @@ def lowest_gap(
     def gaps(profile_y, profile_z, theta):
         u, r = (tape_circle + profile_y)[:, None], (radius + profile_z)[:, None]
         body = np.stack((r * np.sin(theta), u + 0 * theta, r * np.cos(theta)))
-        place = np.einsum("ij,jkl->ikl", rotation, body)
-        lateral = y + place[1]
+        points = np.einsum("ij,jkl->ikl", rotation, body)
+        lateral = y + points[1]
         height = np.interp(lateral, rail_y, rail_z, left=1.0, right=1.0)
         lift = approach * np.interp(lateral, rail_y, stretch) if approach else 0.0
-        return height + radius - place[2] + lift, lateral, lift
+        return height + radius - points[2] + lift, lateral, lift
 
     stretch = np.hypot(1.0, np.gradient(rail_z, rail_y))
 
     theta = np.linspace(-0.12, 0.12, 61) if yaw else np.zeros(1)
     h, lateral, lift = gaps(wheel_y, wheel_z, theta)
     i, k = np.unravel_index(np.argmin(h), h.shape)
-    place, angle, width, turn = wheel_y[i], theta[k], 2e-4, 0.004 if yaw else 0.0
+    on_wheel, angle, width, turn = wheel_y[i], theta[k], 2e-4, 0.004 if yaw else 0.0
     for _ in range(4):
-        ys = np.linspace(place - width, place + width, 41)
+        ys = np.linspace(on_wheel - width, on_wheel + width, 41)
         angles = np.linspace(angle - turn, angle + turn, 41) if yaw else np.zeros(1)
         h, lateral, lift = gaps(ys, np.interp(ys, wheel_y, wheel_z), angles)
         i, k = np.unravel_index(np.argmin(h), h.shape)
-        place, angle, width, turn = ys[i], angles[k], width / 8, turn / 8
-    return (h - lift)[i, k], place, lateral[i, k]
+        on_wheel, angle, width, turn = ys[i], angles[k], width / 8, turn / 8
+    return (h - lift)[i, k], on_wheel, lateral[i, k]
 
 
 def rail_points(half_widths=(10.228, 26.0265), inclination=0.025, gauge=1.435):

@@ -13,7 +13,7 @@ def closure(A, B, C, k):
 
 
 def upper(travel, p):
-    """Angles delta, phi, gamma and the head's place of the upper four-bar, from the rod's pivot."""
+    """Angles delta, phi, gamma and the head's point of the upper four-bar, from the rod's pivot."""
     alpha = p["upper_alpha_in"] + travel
     a, b, c, d, e, h = (p[f"upper_{x}"] for x in "abcdeh")
     A = -2 * e * (h + b * np.sin(alpha))

@@ -47,14 +47,14 @@ def independent_contact(rail, y):
     roll = brentq(difference, -0.012, 0.012, xtol=1e-9)
     slope = np.gradient(rail[1], rail[0])
     return roll, [
-        (0.46 + np.interp(place, *WHEEL), np.arctan(-np.interp(on_rail, rail[0], slope)))
-        for _, place, on_rail in sides(roll)
+        (0.46 + np.interp(on_wheel, *WHEEL), np.arctan(-np.interp(on_rail, rail[0], slope)))
+        for _, on_wheel, on_rail in sides(roll)
     ]
 
 
 def test_radii_and_angles_agree_with_an_independent_search(pair):
     geometry, rail = pair
-    jumps = np.array([place for place, _ in geometry.jumps(0.4e-3)] or [1.0])
+    jumps = np.array([lateral for lateral, _ in geometry.jumps(0.4e-3)] or [1.0])
     checked = 0
     for i in range(3, geometry.lateral.size, 14):
         y = geometry.lateral[i]
@@ -63,7 +63,7 @@ def test_radii_and_angles_agree_with_an_independent_search(pair):
         roll, sides = independent_contact(rail, y)
         assert geometry.roll[i] == pytest.approx(roll, abs=2e-6)
         for side, (radius, angle) in enumerate(sides):
-            # the independent search resolves places to 0.01 mm on the wheel where the gap is flat
+            # the independent search resolves 0.01 mm on the wheel where the gap is flat
             assert geometry.rolling_radius[i, side] == pytest.approx(radius, abs=0.01e-3)
             assert geometry.contact_angle[i, side] == pytest.approx(angle, abs=1e-3)
         checked += 1
@@ -72,10 +72,10 @@ def test_radii_and_angles_agree_with_an_independent_search(pair):
 
 def test_jumps_lie_where_an_independent_search_finds_them(pair):
     geometry, rail = pair
-    for place, side in geometry.jumps(2e-3):
-        if not 0.0 < place < 0.0060 or side != "right":
+    for lateral, side in geometry.jumps(2e-3):
+        if not 0.0 < lateral < 0.0060 or side != "right":
             continue
-        radii = [independent_contact(rail, place + d)[1][1][0] for d in (-5e-5, 5e-5)]
+        radii = [independent_contact(rail, lateral + d)[1][1][0] for d in (-5e-5, 5e-5)]
         assert radii[1] - radii[0] > 2e-5  # the jump's other sides are within 0.05 mm
 
 

@@ -38,7 +38,7 @@ def worn(seed):
     return Profile(f"worn {seed}", "wheel", profile.y, profile.z + fade * change)
 
 
-def random_places(n, seed):
+def random_positions(n, seed):
     rng = np.random.default_rng(seed)
     for _ in range(n):
         roll = rng.uniform(-0.010, 0.010)
@@ -50,7 +50,7 @@ def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
     table = build_contact_table(load_profile("S1002"), load_profile("60E1"), grid=FINE_YAW)
     rail = rail_points()
     errors = []
-    for y, roll, yaw in random_places(30, seed=1):
+    for y, roll, yaw in random_positions(30, seed=1):
         height = lowest_gap(*WHEEL, *rail, y, roll, yaw, 0.46)[0]
         errors.append(evaluate(table, y, roll, yaw**2)[0][:, 0].min() - height)
     # g is fitted to the patch's energies: below first touch where a patch grows to one side only
@@ -63,7 +63,7 @@ def test_heights_of_worn_profiles_agree_too(seed):
     wheel, rail = worn(seed), rail_points(inclination=0.05)
     table = build_contact_table(wheel, load_profile("60E1"), inclination=0.05, grid=FINE_YAW)
     errors = []
-    for y, roll, yaw in random_places(12, seed):
+    for y, roll, yaw in random_positions(12, seed):
         height = lowest_gap(wheel.y, wheel.z, *rail, y, roll, yaw, 0.46)[0]
         errors.append(evaluate(table, y, roll, yaw**2)[0][:, 0].min() - height)
     assert np.max(np.abs(errors)) < 40e-6
@@ -78,7 +78,7 @@ def test_normal_force_is_the_gradient_of_one_potential_over_the_whole_table(whee
         else build_contact_table(worn(wheel), load_profile("60E1"), grid=NARROW)
     )
     step = np.diag([1e-8, 1e-8, 1e-8, 1e-9])
-    for y, roll, yaw in random_places(40, seed=5):
+    for y, roll, yaw in random_positions(40, seed=5):
         w = yaw**2 + 1e-6
         z = evaluate(table, y, roll, w)[0][:, 0].min() + 70e-6
         at = np.array([y, z, roll, w])
@@ -106,14 +106,14 @@ def test_work_around_a_closed_path_through_root_and_flange_is_zero():
     assert abs(parts.sum()) < 1e-4 * np.abs(parts).sum()
 
 
-@pytest.mark.parametrize("place", [0.0002, 0.0052, 0.0066])
-def test_force_has_no_jump_where_the_contact_jumps(place):
+@pytest.mark.parametrize("lateral", [0.0002, 0.0052, 0.0066])
+def test_force_has_no_jump_where_the_contact_jumps(lateral):
     # through the jumps within the tread, to the root and to the flange, with the wheel pressed
     # down by the same amount: a quarter of the step gives a quarter of the change
     table = standard_table()
 
     def largest_change(step):
-        y = np.arange(place - 3e-4, place + 3e-4, step)
+        y = np.arange(lateral - 3e-4, lateral + 3e-4, step)
         lowest = np.array([evaluate(table, a, 0.0)[0][:, 0].min() for a in y])
         f = [forces(table, a, b + 80e-6, 0.0)[:2] for a, b in zip(y, lowest, strict=True)]
         return np.abs(np.diff(f, axis=0)).max()
@@ -235,10 +235,10 @@ def test_zones_share_a_contact_on_their_border_instead_of_counting_it_twice():
         inclination=0.0,
         grid=TableGrid(s_min=-0.02, s_max=0.0, roll_max=0.003, n_w=2),
     )
-    places = np.arange(-0.018, -0.005, 1e-4)
+    positions = np.arange(-0.018, -0.005, 1e-4)
     totals, shares = [], []
-    for place in places:
-        fields = evaluate(table, place, 0.0)[0]
+    for position in positions:
+        fields = evaluate(table, position, 0.0)[0]
         p = np.maximum(fields[:, 0].min() + 60e-6 - fields[:, 0], 0.0)
         tangent = under_load(fields, 60e3)[:, 3]
         vertical = (fields[:, 1] * p**1.5 + fields[:, 2] * p**2) * np.hypot(1.0, tangent) ** 2.5

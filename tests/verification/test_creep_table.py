@@ -176,8 +176,8 @@ def test_force_and_slope_are_continuous_over_the_seams():
         ((1.1, 0.0, 0.0), (0.0, 1.0, 0.3)),
         ((T_HALF / 3.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ):
-        places = np.array(at) + step * np.arange(-3, 4)[:, None] * np.array(along)
-        slopes = np.diff(table_force(ratio, places), axis=0) / step
+        coordinates = np.array(at) + step * np.arange(-3, 4)[:, None] * np.array(along)
+        slopes = np.diff(table_force(ratio, coordinates), axis=0) / step
         # slopes over 1e-5 of numbers rounded to 1e-7 (single precision): steady to 0.02;
         # a kink of the force would show as a jump of its own size
         assert np.abs(np.diff(slopes, axis=0)).max() < 0.04

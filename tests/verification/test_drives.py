@@ -111,9 +111,9 @@ def test_wheel_loads_balance_the_traction():
     """
     result = driven()
     load = np.sum(result["Q"], axis=2)[-1]
-    place = np.array([HALF_BASE, -HALF_BASE]) + result["body_position"][-1, 1:, 0]
-    weight = place[0] + place[1]  # of the wheelsets, 1.5 t each, which move with their axles
-    moment = -np.sum(load * place) + 1500.0 * 9.81 * weight
+    x = np.array([HALF_BASE, -HALF_BASE]) + result["body_position"][-1, 1:, 0]
+    weight = x[0] + x[1]  # of the wheelsets, 1.5 t each, which move with their axles
+    moment = -np.sum(load * x) + 1500.0 * 9.81 * weight
     traction_force = np.sum(on_wheels(result)[-1])
     assert moment == pytest.approx(traction_force * HEIGHT, rel=1e-3)
     assert np.sum(load) == pytest.approx(np.sum(result["Q0"]), rel=1e-4)

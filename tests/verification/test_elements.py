@@ -184,13 +184,13 @@ def test_sliding_around_a_circle_turns_the_force_with_it():
     time = np.linspace(0.0, 2.0, 4001)
     turn = 2.0 * np.pi
 
-    def place(t):
+    def position(t):
         return radius * np.array([np.cos(turn * t) - 1.0, np.sin(turn * t), 0.0, 0.0, 0.0, 0.0])
 
     def rate(t):
         return radius * turn * np.array([-np.sin(turn * t), np.cos(turn * t), 0.0, 0.0, 0.0, 0.0])
 
-    force = rig.path(time, place, rate)[2000:-1, :2]
+    force = rig.path(time, position, rate)[2000:-1, :2]
     assert np.hypot(*force.T) == pytest.approx(mu * N, rel=1e-3)
     v = np.array([rate(t)[:2] for t in time[2000:-1]])
     work = np.sum(force * v) * (time[1] - time[0])
@@ -252,7 +252,7 @@ def test_tilting_stiffness_and_edge_of_a_centre_plate():
     for axis in (3, 4):
         small = rig.forces(1e-5 * np.eye(6)[axis], np.zeros(6))
         assert small[axis] == pytest.approx(1e-5 * k * (R**2 + r**2) / 4.0, rel=1e-3)
-    # at the angle where one outer pad alone carries N: edge of the plate, within the pads' place
+    # at the angle where one outer pad alone carries N: edge of the plate, within the pads' circle
     far = rig.forces([0.0, 0.0, 0.0, 0.02, 0.0, 0.0], np.zeros(6))
     assert 0.0 < far[3] / far[2] < R
 

@@ -19,9 +19,9 @@ def disturbed(model, state):
     state[6 * n + car + 2] += 0.1
     state[6 * n + car + 3] += 0.02
     for wheelset, y in zip(model.index.wheelsets, (0.004, -0.004, 0.003, 0.001), strict=True):
-        place = model.index.coordinate(wheelset, 0)
-        state[place + 1] += y
-        state[6 * n + place + 1] += 0.05
+        index = model.index.coordinate(wheelset, 0)
+        state[index + 1] += y
+        state[6 * n + index + 1] += 0.05
     return state
 
 

@@ -253,7 +253,7 @@ def test_states_come_back_as_they_went_in():
     members = models([coach(), test_vehicle("two_axle_wagon")], load_track("straight"))
     ensemble = Ensemble(members, [empty_recorder(model, 1) for model in members])
     rng = np.random.default_rng(0)
-    common = 1e-3, 1.0, 2.0, 3.0  # last step, time, place, speed
+    common = 1e-3, 1.0, 2.0, 3.0  # last step, time, distance, speed
     own = [model.n_state - len(common) for model in members]
     states = [np.append(rng.normal(size=size), common) for size in own]
     joint = ensemble.state(states)

@@ -129,8 +129,8 @@ def test_a_fixed_car_stays_in_the_moving_track_frame(through_the_curve):
     assert result.body_velocity[:, car] == pytest.approx(0.0, abs=1e-15)
 
 
-def test_a_fixed_car_has_the_acceleration_of_its_place_in_the_curve(through_the_curve):
-    """V^2/R towards the centre in level axes, turned by the cant; R is that of the body's place."""
+def test_a_fixed_car_has_the_acceleration_of_its_position_in_the_curve(through_the_curve):
+    """V^2/R towards the centre in level axes, turned by the cant; R is the body's own."""
     result = through_the_curve
     car = list(result.coordinates["body"]).index("carbody")
     height = 1.8  # m above the rails
@@ -157,7 +157,7 @@ def test_what_cannot_be_fixed_is_told(vehicle, track, settings, sentence):
         )
 
 
-def test_a_body_that_cannot_stand_by_itself_is_held_in_its_nominal_place():
+def test_a_body_that_cannot_stand_by_itself_is_held_in_its_nominal_position():
     """An anchor without springs; the run says so."""
     vehicle = rig("probe", spring=hanging([2e5, 3e5, 4e5]))
     assert equilibrium(assemble(vehicle, STRAIGHT, Settings()), 5.0).remarks == (

@@ -32,7 +32,7 @@ def test_creep_forces_of_contacts_wheelset_a22():
     10 %.
     """
     wheelset = HeldWheelset(10e3, 2.0, "S1002", law="table", rail="benchmark", friction=0.3)
-    place, errors, heights = [], [], []
+    lateral, errors, heights = [], [], []
     for row in contact_a22():
         y, roll, yaw, spin = (
             1e-3 * row["y_mm"],
@@ -46,12 +46,12 @@ def test_creep_forces_of_contacts_wheelset_a22():
         z = 1e-3 * row["z_ws_mm"]
         z = brentq(unbalanced, z - 0.2e-3, z + 0.2e-3, xtol=1e-11)
         found = wheelset.forces(y, z, roll, yaw, spin)
-        place.append(row["y_mm"])
+        lateral.append(row["y_mm"])
         heights.append(1e3 * z - row["z_ws_mm"])
         errors.append((found.X[0] - row["FX_track_total"], found.Y[0] - row["FY_track_total"]))
     errors = np.hypot(*np.array(errors).T) / (0.3 * 10e3)
-    place = np.array(place)
-    far, near = errors[place >= 6.5], errors[place <= 4.5]
+    lateral = np.array(lateral)
+    far, near = errors[lateral >= 6.5], errors[lateral <= 4.5]
     assert len(far) == 7
     assert len(near) == 7
     assert np.sqrt(np.mean(far**2)) < 0.01

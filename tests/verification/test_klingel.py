@@ -48,7 +48,7 @@ def test_wavelength_of_a_conical_wheelset_is_klingels(amplitude):
     # the simple formula, of which the text books say that it neglects the roll
     assert np.diff(crossings) == pytest.approx(wavelength(TAPER, 0.0), rel=0.02)
     # a free wheelset neither gains nor loses: the amplitude stays while mass forces are small,
-    # once it has left the place where it was put, with straight wheels off the middle
+    # once it has left the position where it was put, with straight wheels off the middle
     first, last = (np.max(np.abs(y[inside])) for inside in ((s > 10.0) & (s < 27.0), s > 43.0))
     assert last == pytest.approx(first, rel=0.01)
     assert last == pytest.approx(amplitude, rel=0.05)

@@ -133,13 +133,13 @@ def standing(name, **changes):
     model = assemble(vehicle, track, Settings())
     balance = equilibrium(model, 10.0)
     moved = balance.state[: 6 * len(model.index.bodies)].reshape(-1, 6)
-    places = {name: (moved[k, 1], moved[k, 2]) for k, name in enumerate(model.index.bodies)}
+    moves = {name: (moved[k, 1], moved[k, 2]) for k, name in enumerate(model.index.bodies)}
     moment = sum(
-        body.mass * GRAVITY * (body.position[1] + places[body.name][0])
+        body.mass * GRAVITY * (body.position[1] + moves[body.name][0])
         for body in flatten(vehicle).bodies
-        if body.name in places
+        if body.name in moves
     )
-    return float(places[vehicle.reference][1]), balance.Q0, moment
+    return float(moves[vehicle.reference][1]), balance.Q0, moment
 
 
 def test_y25_wagon_sinks_by_its_two_stage_springs_under_load():
@@ -178,7 +178,7 @@ def test_c62a_stands_higher_when_empty_by_its_bolster_springs():
 
 
 def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
-    """2.4 MN/m in place of 0.37: bounce rises with the stiffness of both stages in series."""
+    """2.4 MN/m instead of 0.37: bounce rises with the stiffness of both stages in series."""
 
     def bounce(secondary):
         primary = 2 * 0.991e6  # of one bogie side

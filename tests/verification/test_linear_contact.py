@@ -29,8 +29,8 @@ def on_springs(linearisation, lateral, yaw):
     """A linearised wheelset with springs to the ground."""
     names, matrix = list(linearisation.names), linearisation.matrix.copy()
     for name, stiffness, inertia in (("y", lateral, 1813.0), ("yaw", yaw, 1120.0)):
-        place = names.index(f"wheelset.{name}'"), names.index(f"wheelset.{name}")
-        matrix[place] -= stiffness / inertia
+        entry = names.index(f"wheelset.{name}'"), names.index(f"wheelset.{name}")
+        matrix[entry] -= stiffness / inertia
     return Linearisation(linearisation.names, matrix, linearisation.state, linearisation.parameter)
 
 

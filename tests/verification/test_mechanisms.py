@@ -189,9 +189,9 @@ def test_energy_is_kept_without_damping():
     work = np.zeros(len(found.s))
     nodes, weights = np.polynomial.legendre.leggauss(20)
     for i, s in enumerate(found.s):
-        places = 0.5 * s * (nodes + 1.0)
-        order = np.argsort(-places)
-        forces = generalised_force(solve(model, places[order]))
+        positions = 0.5 * s * (nodes + 1.0)
+        order = np.argsort(-positions)
+        forces = generalised_force(solve(model, positions[order]))
         work[i] = 0.5 * s * float(np.sum(weights[order] * forces))
     assert kinetic == pytest.approx(work, abs=1e-8 * kinetic.max())
 

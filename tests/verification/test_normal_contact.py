@@ -70,7 +70,7 @@ def test_both_normal_contacts_of_the_table_are_exact_for_an_ellipse(radius, norm
 
 @pytest.fixture(scope="module")
 def pairs():
-    """S1002 on 60E1: exact contact and table at the same places, 60 kN."""
+    """S1002 on 60E1: exact contact and table at the same positions, 60 kN."""
     wheel, rail = load_profile("S1002"), load_profile("60E1")
     lateral = 1e-3 * np.array([-6.0, -1.0, 0.3, 3.0, 4.9, 5.1, 5.8, 6.1, 6.5])
     roll = contact_geometry(wheel, rail, lateral=lateral).roll
@@ -86,7 +86,7 @@ def pairs():
     return lateral, roll, exact, tables
 
 
-def test_table_agrees_with_boundary_elements_in_place_direction_and_height(pairs):
+def test_table_agrees_with_boundary_elements_in_position_direction_and_height(pairs):
     lateral, roll, exact, tables = pairs
     for y, angle, contact in zip(lateral, roll, exact, strict=True):
         found = loaded_contact(tables["hertz"], y, angle, LOAD)
@@ -173,7 +173,7 @@ def test_lateral_stiffness_is_that_of_the_boundary_elements(wheel_name, rail_nam
 @pytest.mark.parametrize("cone", [0.05, 0.025])
 @pytest.mark.parametrize("load", [10e3, 54.5e3, 100e3])
 def test_lateral_stiffness_of_cones_is_the_closed_form(cone, load):
-    # W gamma/(b0 - r0 gamma) on rails that touch at one place of their crown
+    # W gamma/(b0 - r0 gamma) on rails that touch at one point of their crown
     name = f"cone_1in{round(1 / cone)}"
     wheel, rail = load_profile(name), load_profile("60E1")
     grid = TableGrid(s_min=-0.005, s_max=0.005, roll_max=0.003, n_w=2)

@@ -112,7 +112,7 @@ def test_start_anywhere(start):
 def test_start_on_a_transition_is_the_state_on_the_way(start):
     """In the transitions of R 250 m the vehicle stands on the twist that it came over.
 
-    0.5 kN: the run from the beginning of the track has other steps to the place.
+    0.5 kN: the run from the beginning of the track has other steps to this position.
     """
     coach, track = load_vehicle("coach_manchester"), load_track("curve_r250")
     here = simulate(coach, track, speed=20.0, start=start, duration=0.5)
@@ -165,7 +165,7 @@ def test_start_where_the_run_in_leaves_the_rails_comes_over_the_whole_track(stra
 
     def refused(model, balance, track, start, step, progress):
         if start > 1.0:
-            raise InputError([Fault("--start", "", "off the rails", "another place")])
+            raise InputError([Fault("--start", "", "off the rails", "another position")])
         return usual(model, balance, track, start, step, progress)
 
     monkeypatch.setattr(run_in, "settled", refused)
@@ -241,8 +241,8 @@ def test_continued_run_gives_the_same_bytes(case, name, straight, tmp_path):
     whole = simulate(vehicle, track, speed=speed, until=60.0, settings=settings)
     # the first part ends at an output of the whole run
     row = len(whole.time) // 2
-    place = float(whole.distance[row])
-    first = simulate(vehicle, track, speed=speed, settings=settings, until=place)
+    end = float(whole.distance[row])
+    first = simulate(vehicle, track, speed=speed, settings=settings, until=end)
     first.to_hdf5(tmp_path / "first.h5")
     for begin in (first, open_result(tmp_path / "first.h5")):
         second = simulate(vehicle, track, settings=settings, resume=begin, until=60.0)

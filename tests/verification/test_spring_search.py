@@ -20,7 +20,7 @@ def found(request):
 
 
 def built(suspension, nest):
-    """The suspension with the nest of the search in place of its own."""
+    """The suspension with the nest of the search instead of its own."""
     changes = {}
     for name, spring in (("outer", nest.outer), ("inner", nest.inner)):
         table = suspension.springs[name].model_dump(exclude_none=True)

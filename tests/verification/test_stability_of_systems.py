@@ -112,8 +112,8 @@ def test_a_motion_at_the_bifurcation_has_the_critical_modes_period(birth, motion
     assert found[0].speed == pytest.approx(start.speed, abs=0.1)
 
 
-def test_modes_keep_their_places_where_frequencies_cross():
-    """Two oscillators, one of which overtakes the other: sorted by size they would change places.
+def test_modes_keep_their_rows_where_frequencies_cross():
+    """Two oscillators, one of which overtakes the other: sorted by size they would change rows.
 
     Their coupling is weak: on a coarse grid the eigenvectors alone would not tell them apart.
     """
@@ -130,7 +130,7 @@ def test_modes_keep_their_places_where_frequencies_cross():
     assert second == pytest.approx(np.full(8, 2.0), rel=1e-3)
 
 
-def test_an_oscillation_that_becomes_overdamped_leaves_its_place_empty():
+def test_an_oscillation_that_becomes_overdamped_leaves_its_row_empty():
     def at(c):
         return Linearisation(("x", "v"), np.array([[0.0, 1.0], [-1.0, -c]]), np.zeros(2), c)
 

@@ -85,7 +85,7 @@ def test_newton_finds_the_end_of_a_long_run(name, radius):
     [(250.0, 0.15, 20.0), (400.0, 0.05, 12.0), (3000.0, 0.1, 60.0), (-300.0, -0.12, 22.0)],
 )
 def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
-    """Q2: total Q and Y of the vehicle from masses, places and the circle alone; 0.1 %.
+    """Q2: total Q and Y of the vehicle from masses, positions and the circle alone; 0.1 %.
 
     Each mass moves on its own circle; forces along the normal at the middle of the vehicle.
     """
@@ -97,7 +97,7 @@ def test_sums_of_forces_by_newton_and_euler(radius, cant, speed):
         y, z = state[6 * b + 1 : 6 * b + 3] + system.bodies.nominal[b]
         right = y * np.cos(angle) - z * np.sin(angle)
         offset = system.frame_offset[system.bodies.frame[b]] * kappa
-        # towards the centre at the body's own place; its share along the middle's normal
+        # towards the centre at the body's own position; its share along the middle's normal
         inwards = speed**2 * kappa * (1.0 - kappa * right) * np.cos(offset)
         need += mass * np.array(
             [

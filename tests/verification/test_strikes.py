@@ -109,7 +109,7 @@ def test_peaks_are_at_least_those_of_the_outputs():
         assert (smallest <= np.nanmin(result[name], axis=0)).all()
 
 
-def test_file_holds_peaks_with_units_times_and_places(tmp_path):
+def test_file_holds_peaks_with_units_times_and_distances(tmp_path):
     result = over_the_dip()
     path = result.to_hdf5(tmp_path / "run.h5")
     assert railsim.peaks(railsim.open_result(path)) == railsim.peaks(result)

@@ -111,8 +111,8 @@ def over_the_joint(speed, h, scheme="rk4", damping=0.0, stiffness=None, after=0.
         values.setflags(write=False)
         system = system._replace(contact=system.contact._replace(values=values))
     n = model.index.n_bodies
-    place = model.index.coordinate("wheelset", 0)
-    state[6 * n + place + 4] *= speed / state[-1]
+    index = model.index.coordinate("wheelset", 0)
+    state[6 * n + index + 4] *= speed / state[-1]
     state[-1], state[-2] = speed, -9.0
     work, derivative, stages = work_arrays(system), np.zeros_like(state), np.zeros((3, len(state)))
     steps = int((9.0 / speed + after) / h)
@@ -203,7 +203,7 @@ def test_support_that_varies_along_the_track():
         until=100.0,
         settings=Settings(outputs={"track": True}),
     )
-    place, deflection = result.wheelset_distance[:, 0], result["rail_deflection_vertical"][:, 0, 0]
-    before = deflection[(place > 30.0) & (place < 40.0)].mean()
-    behind = deflection[(place > 90.0) & (place < 100.0)].mean()
+    s, deflection = result.wheelset_distance[:, 0], result["rail_deflection_vertical"][:, 0, 0]
+    before = deflection[(s > 30.0) & (s < 40.0)].mean()
+    behind = deflection[(s > 90.0) & (s < 100.0)].mean()
     assert behind == pytest.approx(0.5 * before, rel=0.01)

@@ -138,12 +138,12 @@ def test_friction_counts_by_side_and_along_the_track(coach):
         (1000.0, 0.0, 0.0),
     )
     result = simulate(coach, curve(friction_table=rows), speed=20.0)
-    place = result.wheelset_distance
+    s = result.wheelset_distance
     wear = result.T_gamma + result.T_gamma_spin
-    in_curve = (place > 180.0) & (place < 249.0)
-    assert np.all(wear[:, :, 1][place > 51.0] == 0.0)
-    assert np.all(wear[:, :, 0][place > 251.0] == 0.0)
-    assert np.all(wear[place < 49.0] > 0.0)
+    in_curve = (s > 180.0) & (s < 249.0)
+    assert np.all(wear[:, :, 1][s > 51.0] == 0.0)
+    assert np.all(wear[:, :, 0][s > 251.0] == 0.0)
+    assert np.all(wear[s < 49.0] > 0.0)
     assert np.max(wear[:, 0, 0][in_curve[:, 0]]) > 10.0
 
 
@@ -241,9 +241,9 @@ def test_wheels_follow_a_slow_vertical_wave(coach):
     bodies = list(result.coordinates["body"])
     axles = [bodies.index(name) for name in result.coordinates["wheelset"]]
     z = result.body_position[:, axles, 2]
-    place = result.wheelset_distance
-    inside = (place > 40.0) & (place < 140.0)
-    wave = 3e-3 * np.sin(2.0 * np.pi * (place - 20.0) / 10.0)
+    s = result.wheelset_distance
+    inside = (s > 40.0) & (s < 140.0)
+    wave = 3e-3 * np.sin(2.0 * np.pi * (s - 20.0) / 10.0)
     assert np.max(np.abs(z - z[0] - wave)[inside]) < 5e-6
 
 

@@ -95,7 +95,7 @@ def steady_curve(request, coach):
 
 
 def test_wheel_forces_balance_the_bodies_in_a_steady_curve(steady_curve):
-    """Newton's law for the whole vehicle, each body at its own place: 0.1 % of the force.
+    """Newton's law for the whole vehicle, each body at its own position: 0.1 % of the force.
 
     sum F_rail = sum m (a - g), with a = V^2 kappa towards the curve's centre at each body's own
     radius; track axes of each wheelset and body.
@@ -117,9 +117,9 @@ def test_wheel_forces_balance_the_bodies_in_a_steady_curve(steady_curve):
     wheel = work.wheel
     # wheels of the end wheelsets stand at an angle to each other: force along the curve's normal
     assert wheel[..., W_Q].sum() == pytest.approx(Q, rel=1e-3)
-    places = system.frame_offset[system.bodies.frame[system.contact.body]]
-    lateral = (wheel[..., W_Y].sum(axis=1) * np.cos(places * kappa)).sum()
-    creep = (work.rail_force[system.contact.body, 0] * np.sin(-places * kappa)).sum()
+    offsets = system.frame_offset[system.bodies.frame[system.contact.body]]
+    lateral = (wheel[..., W_Y].sum(axis=1) * np.cos(offsets * kappa)).sum()
+    creep = (work.rail_force[system.contact.body, 0] * np.sin(-offsets * kappa)).sum()
     assert lateral + creep == pytest.approx(Y, rel=5e-3)
 
 

@@ -53,7 +53,7 @@ def test_vehicle_runs_through_the_curve(name):
 def test_wagon_comes_to_rest_after_a_disturbance_and_stays_there(scheme):
     """Bounce and sway die within seconds, then the pads stick: no creep over the next 10 s.
 
-    The body rests where friction holds it, off its nominal place, and keeps that place to 1 nm:
+    The body rests where friction holds it, off its nominal position, which it keeps to 1 nm:
     what still moves then is the elasticity of the sticking pads, damped by 3 %.  A scheme that
     brings the pads' force in a step late feeds just that motion.
     """
@@ -215,7 +215,7 @@ def test_wind_is_carried_by_the_rails(over, until, height):
     assert transfer == pytest.approx(force * height + shifted, rel=0.01)
 
 
-def test_gust_over_distance_is_that_over_time_at_the_place_of_its_body():
+def test_gust_over_distance_is_that_over_time_at_the_position_of_its_body():
     """The rear bogie's frame, 9.5 m behind, at constant speed: but for round-off the same."""
     rows = [[0.1, 0.0, 0.0, 0.0], [0.3, 0.0, 5e3, 0.0], [0.4, 0.0, 0.0, -2e3]]
     placed = [[5.0 - 9.5 + 20.0 * t, *force] for t, *force in rows]

@@ -1,4 +1,4 @@
-"""Depth of wear over the profile: areas are kept, places are those of the patches."""
+"""Depth of wear over the profile: areas are kept, positions are those of the patches."""
 
 import dataclasses
 
@@ -18,10 +18,10 @@ from railsim.studies.wear_loop import wear_loop
 
 @given(st.floats(-0.05, 0.05), st.floats(0.5e-3, 8e-3))
 @settings(max_examples=30)
-def test_half_ellipse_keeps_area_and_middle(place, width):
-    heights = spread(np.array([place]), np.array([width]), np.array([2e-6]))
+def test_half_ellipse_keeps_area_and_middle(middle, width):
+    heights = spread(np.array([middle]), np.array([width]), np.array([2e-6]))
     assert np.sum(heights) * SPACING == pytest.approx(2e-6, rel=1e-9)
-    assert np.sum(heights * grid()) * SPACING / 2e-6 == pytest.approx(place, abs=SPACING)
+    assert np.sum(heights * grid()) * SPACING / 2e-6 == pytest.approx(middle, abs=SPACING)
     # height in the middle: area/(pi b/2)
     if width > 2e-3:
         assert np.max(heights) == pytest.approx(2e-6 / (0.5 * np.pi * width), rel=0.02)

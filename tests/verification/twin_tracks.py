@@ -50,7 +50,7 @@ class Wave:
         return self.height * window * np.sin(2.0 * np.pi * u)
 
 
-def _places(wave):
+def _arc_lengths(wave):
     return BEGIN + PIECE * np.arange(round((wave.end - BEGIN) / PIECE) + 1)
 
 
@@ -60,7 +60,7 @@ def _slope(wave, order):
 
 
 def _elements(wave, kind, keys, values):
-    """Ramps between `values` at the places of a wave."""
+    """Ramps between `values` at the arc lengths of a wave."""
     return [
         {"type": kind, "length": PIECE, f"{keys}_start": a, f"{keys}_end": b}
         for a, b in pairwise(values)
@@ -101,7 +101,7 @@ def alignment(wave, curvature=0.0, cant=0.0):
     """The wave in the plan, and as lateral displacement of both rails."""
     level = {"cant": [{"type": "CST", "length": 1.0, "cant": cant}]}
     smooth = _track(wave, _base(wave, curvature), **level)
-    radii = _radii(curvature + _slope(wave, 2)(_places(wave)))
+    radii = _radii(curvature + _slope(wave, 2)(_arc_lengths(wave)))
     radii[0] = radii[-1] = _radii(np.array([curvature]))[0]
     ends = [{"type": "CIR", "radius": radii[0]}, {"type": "CIR", "radius": radii[0]}]
     if curvature == 0.0:
@@ -141,7 +141,7 @@ def _stations(wave):
 def level(wave, curvature=0.0):
     """The wave in the vertical profile (hollow = positive), and as height of both rails."""
     plan = _base(wave, curvature)
-    gradient = -_slope(wave, 1)(_places(wave))
+    gradient = -_slope(wave, 1)(_arc_lengths(wave))
     gradient[0] = gradient[-1] = 0.0
     ramps = _elements(wave, "LIR", "gradient", gradient.tolist())
     flat = [{"type": "CST", "length": BEGIN, "gradient": 0.0}]
@@ -154,7 +154,7 @@ def level(wave, curvature=0.0):
 def cross_level(wave, curvature=0.0, cant=0.0):
     """The wave in the cant (left rail higher = positive), and as heights of the single rails."""
     plan = _base(wave, curvature)
-    rise = wave(_places(wave))
+    rise = wave(_arc_lengths(wave))
     ramps = _elements(wave, "LIR", "cant", (cant + rise).tolist())
     flat = [{"type": "CST", "length": BEGIN, "cant": cant}]
     waved = _track(wave, plan, cant=[*flat, *ramps, {**flat[0], "length": AFTER}])
