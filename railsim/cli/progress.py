@@ -18,7 +18,7 @@ from railsim.cli.interrupts import obey
 PATIENCE = 5.0  # seconds without progress before the reason is printed
 FIRST_RUN = (
     "preparing: the first run after an installation compiles the time loop and builds the contact "
-    "tables of its profiles (up to a minute; kept for later runs)"
+    "tables of its profiles (one to five minutes; kept for later runs)"
 )
 
 

@@ -83,6 +83,7 @@ def design(
     from railsim.springs.design import design as designed
     from railsim.springs.summary import design_data, search_data
 
+    _check_out(out, overwrite)
     suspension = _loaded(file, assignments)
     with _faults_in(file, suspension):
         result = designed(suspension)
@@ -136,6 +137,7 @@ def verify(
     from railsim.springs.tolerance import ride_heights
     from railsim.springs.verification import verify as verified
 
+    _check_out(out, overwrite)
     suspension = _loaded(file, assignments)
     with _faults_in(file, suspension):
         result = verified(suspension)
@@ -180,6 +182,7 @@ def fatigue(
     from railsim.springs.verification import dynamic_loads
     from railsim.springs.verification import fatigue as fatigue_of
 
+    _check_out(out, overwrite)
     suspension = _loaded(file, assignments)
     with _faults_in(file, suspension):
         result = fatigue_of(suspension)
@@ -276,6 +279,12 @@ def _refuse(option: str, found: str, name: str, valid: Iterable[str]) -> NoRetur
     from railsim.errors import Fault, InputError, nearest
 
     raise InputError([Fault(option, "", found, nearest(name, valid))])
+
+
+def _check_out(out: str | None, overwrite: bool) -> None:
+    """Refuse a folder before anything is computed; the pictures' names are known when drawn."""
+    if out:
+        check_folder(Path(out), [REPORT], overwrite=overwrite)
 
 
 def _write_pages(

@@ -19,6 +19,8 @@ Source of the model: moving track models as of Iwnicki (2006), Handbook of Railw
 chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 """
 
+import numpy as np
+
 from railsim.kernels import compiled
 from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE
 
@@ -28,7 +30,8 @@ RATE, MEAN_RATE, MEAN_CHANGE, ACCELERATION = DOF, 2 * DOF, 3 * DOF, 4 * DOF
 SUPPORT_SIZE = 5 * DOF
 # what an evaluation does to the rails: nothing; settles them after a step of the fast scheme, see
 # `correct_support`; finds the rates of a massless track, see `settle_rates`
-AS_GIVEN, AFTER_STEP, BALANCED = range(3)
+# integers of numpy: a function called with literals of Python is compiled for each value
+AS_GIVEN, AFTER_STEP, BALANCED = map(np.int64, range(3))
 # share of the static wheel load by which forces may differ from those foreseen; imbalance of a
 # massless track (N, N m); evaluations allowed for either
 SETTLED, BALANCE = 2e-4, 1e-2

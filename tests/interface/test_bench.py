@@ -31,6 +31,7 @@ def found():
     return benchmark(TINY)
 
 
+@pytest.mark.further
 def test_a_run_is_timed_and_compared_with_the_reference(found):
     (run,) = found["runs"]
     assert run["status"] == "complete"
@@ -47,6 +48,7 @@ def test_the_reference_has_no_error_against_itself():
     assert set(errors(reference, reference).values()) == {0.0}
 
 
+@pytest.mark.further
 def test_parts_of_the_right_hand_side_are_positive_and_below_the_whole(found):
     parts = found["parts"]
     assert parts["patches"] == 8  # one tread contact a wheel on straight track
@@ -55,6 +57,7 @@ def test_parts_of_the_right_hand_side_are_positive_and_below_the_whole(found):
     assert [row["grid"] for row in found["fastsim"]] == [5, 10]
 
 
+@pytest.mark.further
 def test_several_runs_in_one_call_are_timed_together(found):
     one, three = found["ensembles"]
     assert (one["members"], three["members"]) == (1, 3)
@@ -63,6 +66,7 @@ def test_several_runs_in_one_call_are_timed_together(found):
         assert record["real_time_best"] >= record["real_time"] > 0.0
 
 
+@pytest.mark.further
 def test_json_and_tables_hold_what_was_found(found, monkeypatch, capsys):
     monkeypatch.setattr(report, "benchmark", lambda _plan, _progress: found)
     assert main(["bench", "--quick", "--json", "--quiet"]) == 0

@@ -90,6 +90,7 @@ def test_exact_patches_stand_beside_those_of_the_table(capsys):
 
 
 @pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.usefixtures("small_contact_tables")
 def test_left_and_right_may_differ(tmp_path, capsys):
     data = as_json(capsys, "--wheel", "cone_1in20", "--wheel", "cone_1in40")
     i = int(np.argmin(np.abs(np.array(data["lateral"]))))

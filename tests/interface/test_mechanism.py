@@ -187,6 +187,7 @@ def test_out_writes_a_self_contained_page_pictures_and_positions(tmp_path, capsy
 
 
 @pytest.mark.slow
+@pytest.mark.further
 def test_optimised_file_extends_the_searched_one_and_runs_to_the_same(tmp_path, capsys):
     folder = tmp_path / "out"
     changes = ["--set", "parameters.bore=0.2", *FEW]

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from selection import points
 
 import railsim
 from railsim.cli import main
@@ -128,7 +129,7 @@ def test_a_root_locus_as_named_arrays():
     assert float(mode["frequency"]) == pytest.approx(there.frequency)
 
 
-@pytest.mark.parametrize(
+@points(
     "found",
     [
         lambda coach: railsim.modes(coach),
@@ -136,6 +137,7 @@ def test_a_root_locus_as_named_arrays():
         lambda coach: railsim.curving(coach, radius=[600.0]),
         lambda coach: railsim.critical_speed(coach, methods=("linear",), low=20.0, high=30.0),
     ],
+    always=(1, 2),
 )
 def test_results_draw_themselves(found, tmp_path):
     result = found(railsim.load_vehicle("coach_manchester"))

@@ -153,7 +153,9 @@ def test_what_a_result_does_not_have_is_refused(file, tmp_path, selection, words
 
 
 @pytest.mark.parametrize("name", [".", "..", "/", ""])
-def test_folder_is_not_drawn(name, capsys):
+def test_folder_is_not_drawn(name, capsys, tmp_path, monkeypatch):
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
     assert main(["plot", name]) == 2
     assert "folder" in capsys.readouterr().err
 

@@ -95,6 +95,7 @@ def test_damaged_point_of_a_map_is_computed_again_and_told(capsys, tmp_path):
 
 
 @pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.further
 def test_map_over_any_key_of_the_files(capsys, tmp_path):
     """Cones twice as steep cost speed, a heavier car a little; both keys stand in each record."""
     folder = tmp_path / "map"

@@ -36,11 +36,12 @@ GRID = TableGrid(ds=1e-3, roll_max=0.006, droll=2e-3, n_w=2)
 
 
 @pytest.mark.slow
-def test_500_damaged_files_are_refused_or_usable(tmp_path):
+@pytest.mark.parametrize("number", [200, pytest.param(500, marks=pytest.mark.further)])
+def test_damaged_files_are_refused_or_usable(number, tmp_path):
     outcomes = {"refused": 0, "usable": 0}
     clean = {"wheel": points("S1002"), "rail": points("60E1")}
     partner = {"wheel": load_profile("60E1"), "rail": load_profile("S1002")}
-    for seed in range(500):
+    for seed in range(number):
         rng = np.random.default_rng(seed)
         kind = ("wheel", "rail")[seed % 2]
         writer, suffix = FORMATS[kind][rng.integers(5)]
@@ -60,4 +61,4 @@ def test_500_damaged_files_are_refused_or_usable(tmp_path):
         # a hang would be a loop without end, not a slow machine
         assert time.perf_counter() - start < 30.0, path
     # the damage is neither always fatal nor always harmless
-    assert min(outcomes.values()) > 100, outcomes
+    assert min(outcomes.values()) > number // 5, outcomes

@@ -43,6 +43,7 @@ def test_chosen_points_within_a_hundredth(curves):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [20, 30, 36])
+@pytest.mark.further
 def test_hardest_point_on_other_grids(curves, n):
     # most cells change sides several times before they settle: the iteration must wait for them
     chosen = np.flatnonzero(curves.case == "lat_spin_opp_ab3_12")

@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import matplotlib
 import pytest
+from selection import points
 
 import railsim.cli.info
 from railsim.cli import main
@@ -32,9 +33,10 @@ def called(arguments, shell="", **environment):
     return done
 
 
-@pytest.mark.parametrize(
+@points(
     ("shell", "status"),
     [("| head -1", 0), (">&-", 0), ("2>&-", 0), ("</dev/null >/dev/full", 1), ("<&- >&- 2>&-", 0)],
+    always=(0, 3, 4),
 )
 def test_closed_and_full_streams(shell, status):
     assert called(["info", "coach_manchester"], shell).returncode == status

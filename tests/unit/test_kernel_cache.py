@@ -79,6 +79,7 @@ def test_edited_callee_in_another_file_gives_the_new_number(copied_kernels):
 
 
 @pytest.mark.slow
+@pytest.mark.further
 def test_second_process_compiles_nothing(copied_kernels):
     folder = copied_kernels.parent.parent
     assert run(folder) == (0.0, 1)

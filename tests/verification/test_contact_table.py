@@ -59,6 +59,7 @@ def test_heights_agree_with_a_search_over_the_whole_wheel_surface():
 
 
 @points("seed", range(3), always=(0,))
+@pytest.mark.further
 def test_heights_of_worn_profiles_agree_too(seed):
     wheel, rail = worn(seed), rail_points(inclination=0.05)
     table = build_contact_table(wheel, load_profile("60E1"), inclination=0.05, grid=FINE_YAW)

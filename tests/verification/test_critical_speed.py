@@ -73,6 +73,7 @@ def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
     [("coach_manchester", "supercritical"), ("coach_flexicoil", "subcritical")],
     always=(1,),
 )
+@pytest.mark.further
 def test_a_diagram_alone_tells_how_hunting_begins(name, kind):
     """As continuation does; the hysteresis of the Flexicoil coach, 0.2 m/s, lies between steps."""
     critical = critical_speed(load_vehicle(name), RIGID, methods=("linear",)).linear["speed"]

@@ -238,6 +238,7 @@ def test_nothing_large_is_copied():
 
 
 @pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.further
 def test_different_wheels_have_their_tables_side_by_side():
     track = load_track("curve_r250")
     worn = "assemblies.bogie.assemblies.axle.wheelsets.wheelset.profile=cone_1in20"

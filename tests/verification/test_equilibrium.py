@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dynamics import Settings, load_track
+from selection import points
 
 import railsim.model.equilibrium
 from railsim.definitions.loading import load_vehicle_text
@@ -86,7 +87,7 @@ def hollow(depth, width=0.05):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("depth", [2e-3, 4e-3])
+@points("depth", [2e-3, 4e-3], always=(0,))
 @pytest.mark.usefixtures("small_contact_tables")
 def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
     coach = railsim.load_vehicle("coach_manchester")

@@ -106,11 +106,7 @@ def test_mass_is_the_sum_of_the_source(name):
     assert 1e-3 * mass(flatten(load_vehicle(name))) == pytest.approx(MASSES[name], abs=0.05)
 
 
-@points(
-    "name",
-    [n for n in library_files("vehicle") if not n.startswith(FRICTION)],
-    always=(0, 4, 9, 13),
-)
+@points("name", [n for n in library_files("vehicle") if not n.startswith(FRICTION)], always=(4, 13))
 def test_stable_at_110_per_cent_of_the_admissible_speed(name):
     """S1002 on 60E1 1:40, friction 0.4, lateral amplitudes of 3 mm: every oscillation decays."""
     vehicle = load_vehicle(name)
@@ -193,7 +189,7 @@ def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
 # runs ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@points(
     ("vehicle", "track", "until"),
     # of all combinations (docs/validation/vehicles_and_tracks.md) those that ask most: three axles
     # in the tightest curve, play and stops, friction at its limit, walls of the table, high speed
@@ -205,6 +201,7 @@ def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
         ("metro_b_motor", "s_curve_r150", 140.0),
         ("coach_crh380a", "straight", 200.0),
     ],
+    always=(0, 1, 3),
 )
 def test_vehicle_runs_its_track_at_the_permitted_speed(vehicle, track, until):
     (case,) = combinations([vehicle], [track], ["permitted"], until=until)

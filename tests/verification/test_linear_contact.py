@@ -122,6 +122,7 @@ def test_creep_coefficients_without_saturation_are_kalkers(coned):
     assert -slope("y", "yaw") * mass * speed / 2 == pytest.approx(2.03e4, rel=0.02)
 
 
+@pytest.mark.further
 def test_given_conicity_puts_the_vehicle_on_cones(coned):
     """Halving the slope of the wheels lowers hunting's frequency by sqrt(2) (Klingel)."""
     vehicle = load_vehicle("coach_manchester")

@@ -76,6 +76,7 @@ def test_runs_from_1_to_100_m_s(straight, speed):
     assert np.max(np.abs(result.dQ_over_Q0[result.time > 0.1])) < 5e-3
 
 
+@pytest.mark.further
 def test_jump_at_low_speed_is_off_by_the_square_of_the_step(straight):
     """Creep forces stiffen as 1/V: at 3 m/s a wheelset 2 mm aside falls into place in 0.1 s.
 
@@ -187,6 +188,7 @@ def test_start_in_a_curve_at_walking_speed_is_the_state_on_the_way(speed):
     np.testing.assert_allclose(here.Q[0], way.Q[-1], atol=2e-3 * np.max(way.Q[-1]))
 
 
+@pytest.mark.further
 def test_progress_of_a_run_counts_its_run_in():
     seen = []
     simulate(
@@ -227,9 +229,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(
+@points(
     ("name", "case"),
     [("articulated_three_bogies", "constant"), *(("two_axle_wagon", case) for case in CASES)],
+    always=(0, 3, 5),
 )
 def test_continued_run_gives_the_same_bytes(case, name, straight, tmp_path):
     """Through memory and through a file."""

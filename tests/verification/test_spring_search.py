@@ -81,12 +81,14 @@ def test_nests_are_ranked_and_name_their_active_limits(found):
 
 
 @pytest.mark.slow
+@pytest.mark.further
 def test_search_gives_the_same_twice():
     suspension = load_spring("turasas_axlebox", QUICK)
     assert search(suspension).nests == search(suspension).nests
 
 
 @pytest.mark.slow
+@pytest.mark.further
 def test_a_wider_space_never_gives_a_heavier_nest():
     best = []
     for widest in (0.255, 0.285):

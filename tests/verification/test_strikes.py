@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray
 from dynamics import Settings, load_track, load_vehicle
+from selection import points
 
 import railsim
 from railsim.simulation import simulate, simulate_together
@@ -30,9 +31,14 @@ def peak_values(result):
     return {(p.quantity.name, p.kind): p.value for p in railsim.peaks(result)}
 
 
-@pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])
-@pytest.mark.parametrize(
-    ("rail", "support"), [("left", "rigid"), ("both", "rigid"), ("left", "co-running")]
+@points(
+    ("rail", "support", "vehicle"),
+    [
+        (rail, support, vehicle)
+        for vehicle in ("coach_manchester", "coach_flexicoil")
+        for rail, support in (("left", "rigid"), ("both", "rigid"), ("left", "co-running"))
+    ],
+    always=(1, 2, 3),
 )
 def test_peaks_of_a_strike_are_those_of_the_reference(rail, support, vehicle):
     result = over_the_dip(rail, support, vehicle)

@@ -103,6 +103,7 @@ def losses(vehicle, h, duration, speed=15.0):
     return energy(model.system, start) - energy(model.system, end), work.total, work.stored(end)
 
 
+@pytest.mark.further
 def test_energy_lost_by_the_wagon_is_the_work_of_friction():
     """Its pads alone, without the viscous share that leaves and links have while they stick."""
     lost, work, stored = losses(undamped(test_vehicle("two_axle_wagon")), 0.25e-3, 1.0)
