@@ -383,6 +383,16 @@ REQUESTED: dict[str, Quantity] = _table(
         1e-3,
         "turned into heat in the contact, spin included, summed over the patches",
     ),
+    Quantity(
+        "axle_torque",
+        "torque of drives and brakes on the wheelset",
+        "M_d",
+        "N m",
+        ("time", "wheelset"),
+        "kN m",
+        1e-3,
+        "forwards positive",
+    ),
     Quantity("patch_N", "normal force of the patch", "N", "N", _PATCH, "kN", 1e-3),
     Quantity(
         "patch_pressure",

@@ -135,6 +135,8 @@ class Outputs(Definition):
     """Position, size, load, creep forces and pressure of every contact patch"""
     frictional_power: Flag = False
     """Power that each wheel's contact turns into heat"""
+    drives: Flag = False
+    """Torque of drives and brakes on each wheelset"""
     track: Flag = False
     """Curvature, cant, gradient and irregularities at each wheelset"""
 

@@ -48,31 +48,59 @@ def add_traction(drive, bodies, frames, speed, pose):
         pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
 
 
+@compiled(inline=True)
+def axle_torque(drives, e, time, s, frame_offset, bodies, speed, state):
+    """Torque of one drive or brake on its wheelset, forwards positive [N m]."""
+    w = drives.body[e, 1]
+    first, demand, end = drives.start[2 * e], drives.start[2 * e + 1], drives.start[2 * e + 2]
+    torque, _ = table_value_slope(drives.table[first:demand], speed)
+    if end > demand:
+        over_distance = drives.row[e, OVER_DISTANCE] > 0.0
+        at = s + frame_offset[bodies.frame[w]] if over_distance else time
+        factor, _ = table_value_slope(drives.table[demand:end], at)
+        torque *= factor
+    # forwards it turns about the negative y axis
+    rolling = -state[6 * bodies.kind.shape[0] + 6 * w + 4] * bodies.row[w, RADIUS]
+    if drives.row[e, BRAKES] > 0.0:
+        torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
+    if drives.row[e, SLIP_END] > 0.0:
+        begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
+        slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed
+        torque *= min(1.0, max(0.0, (gone - slip) / (gone - begin)))
+    return torque
+
+
 @compiled(merge=True)
 def add_axle_torques(drives, time, s, frame_offset, bodies, speed, state, pose):
     """Driving and braking torques on wheelsets, their reactions on the bodies that carry them."""
-    n = bodies.kind.shape[0]
     for e in range(drives.body.shape[0]):
         b, w = drives.body[e, 0], drives.body[e, 1]
-        first, demand, end = drives.start[2 * e], drives.start[2 * e + 1], drives.start[2 * e + 2]
-        torque, _ = table_value_slope(drives.table[first:demand], speed)
-        if end > demand:
-            over_distance = drives.row[e, OVER_DISTANCE] > 0.0
-            at = s + frame_offset[bodies.frame[w]] if over_distance else time
-            factor, _ = table_value_slope(drives.table[demand:end], at)
-            torque *= factor
-        # forwards it turns about the negative y axis
-        rolling = -state[6 * n + 6 * w + 4] * bodies.row[w, RADIUS]
-        if drives.row[e, BRAKES] > 0.0:
-            torque *= -min(1.0, max(-1.0, rolling / BRAKES_FULLY))
-        if drives.row[e, SLIP_END] > 0.0:
-            begin, gone = drives.row[e, SLIP_BEGIN], drives.row[e, SLIP_END]
-            slip = (rolling - speed) / speed if torque > 0.0 else (speed - rolling) / speed
-            torque *= min(1.0, max(0.0, (gone - slip) / (gone - begin)))
+        torque = axle_torque(drives, e, time, s, frame_offset, bodies, speed, state)
         for k in range(3):
             moment = torque * pose[w, 3 * k + 1]
             pose[w, MOMENT + k] -= moment
             pose[b, MOMENT + k] += moment
+
+
+@compiled(in_loop=False)
+def recorded_axle_torques(drives, frame_offset, bodies, states, torque):
+    """Torques of drives and brakes in recorded states, summed over those of a wheelset.
+
+    Parameters
+    ----------
+    drives, frame_offset, bodies
+        Of the system, see `railsim.kernels.system`.
+    states : float64[time, n_state]
+    torque : float64[time, body]
+        Forwards positive [N m] (output).
+    """
+    for i in range(states.shape[0]):
+        torque[i] = 0.0
+        time, s, speed = states[i, -3], states[i, -2], states[i, -1]
+        for e in range(drives.body.shape[0]):
+            torque[i, drives.body[e, 1]] += axle_torque(
+                drives, e, time, s, frame_offset, bodies, speed, states[i]
+            )
 
 
 @compiled(merge=True)

@@ -23,6 +23,7 @@ from railsim.kernels.contact_columns import (
     W_XI_Y,
     W_Y,
 )
+from railsim.kernels.driving import recorded_axle_torques
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Recorder
@@ -109,6 +110,20 @@ def frictional_power(values: Mapping[str, Floats], speed: Floats) -> Floats:
         [W]
     """
     return speed[:, None, None] * (values["T_gamma"] + values["T_gamma_spin"])
+
+
+def axle_torques(model: Model, state: Floats) -> Floats:
+    """Torque of drives and brakes on each wheelset, forwards positive, from recorded states.
+
+    Returns
+    -------
+    float64[time, wheelset]
+        [N m]
+    """
+    system, index = model.system, model.index
+    torque = np.empty((len(state), index.n_bodies))
+    recorded_axle_torques(system.drives, system.frame_offset, system.bodies, state, torque)
+    return torque[:, [index.bodies.index(name) for name in index.wheelsets]]
 
 
 def rail_deflection(model: Model, state: Floats) -> Floats:
@@ -258,6 +273,7 @@ class OutputPlan:
         prefixes = ["element_"] * bool(self.elements)
         prefixes += ["patch_"] * self._asked.contact_patches
         prefixes += ["frictional_power"] * self._asked.frictional_power
+        prefixes += ["axle_torque"] * self._asked.drives
         prefixes += ["track_", "rail_", "wheelset_"] * self._asked.track
         if self._sensors:
             prefixes += list(READINGS) if self._readings_only else ["sensor_"]
@@ -304,6 +320,8 @@ class OutputPlan:
             values |= _patches(recorder.patch[:rows])
         if self._asked.frictional_power:
             values["frictional_power"] = frictional_power(values, recorder.state[:rows, -1])
+        if self._asked.drives:
+            values["axle_torque"] = axle_torques(self._model, recorder.state[:rows])
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
             deflection = rail_deflection(self._model, recorder.state[:rows])

@@ -170,6 +170,7 @@ ANALYSES = {
 }
 
 
+@pytest.mark.further
 def test_analyses_are_columns_of_the_summary(tmp_path):
     outcome = railsim.study(
         "coach_manchester", "curve_r250", 20.0, analyses=ANALYSES, out=tmp_path, workers=1

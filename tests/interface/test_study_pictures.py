@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from example_result import example_result
+from selection import points
 from test_study import COACH, CURVE
 from test_study import simulated as simulated
 
@@ -23,7 +24,7 @@ def folder(tmp_path, simulated):
     return tmp_path / "s"
 
 
-@pytest.mark.parametrize("chosen", [[], ["--kind", "map"], ["Y_over_Q_abs", "--kind", "ranking"]])
+@points("chosen", [[], ["--kind", "map"], ["Y_over_Q_abs", "--kind", "ranking"]], always=(1,))
 def test_study_is_drawn(folder, capsys, chosen):
     assert main(["plot", str(folder), *chosen]) == 0
     assert capsys.readouterr().out.strip() == str(folder / "study.png")

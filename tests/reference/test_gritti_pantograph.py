@@ -318,7 +318,6 @@ def test_weighted_objectives_add_up_new():
 
 @pytest.mark.slow
 @points("seed", [1, 2, 3], always=(1,))
-@pytest.mark.further
 def test_a22_lift_5_that_fits_its_cylinder_from_every_seed_new(seed):
     fits = load_mechanism("atr95_lift_5", [*TO_WORK, "optimise.min_length=0.440"])
     found = optimise(fits, starts=2, seed=seed)

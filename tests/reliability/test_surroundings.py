@@ -42,7 +42,7 @@ def test_closed_and_full_streams(shell, status):
     assert called(["info", "coach_manchester"], shell).returncode == status
 
 
-@pytest.mark.parametrize(
+@points(
     "environment",
     [
         {"HOME": "", "XDG_CACHE_HOME": ""},
@@ -51,6 +51,7 @@ def test_closed_and_full_streams(shell, status):
         {"LC_ALL": "tr_TR.UTF-8", "LANGUAGE": "tr"},
         {"TERM": "", "COLUMNS": "1"},
     ],
+    always=(1, 2, 3),
     ids=["no home", "home is not there", "ascii", "Turkish", "no terminal"],
 )
 def test_odd_surroundings(environment, tmp_path):

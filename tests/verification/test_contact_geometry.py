@@ -19,7 +19,10 @@ PAIRS = {
 }
 
 
-@pytest.fixture(scope="module", params=PAIRS)
+@pytest.fixture(
+    scope="module",
+    params=["60E1 1:40", pytest.param("60E1 1:20", marks=pytest.mark.further), "benchmark"],
+)
 def pair(request):
     name, inclination, half_widths = PAIRS[request.param]
     geometry = contact_geometry(

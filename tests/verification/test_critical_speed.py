@@ -99,6 +99,7 @@ def test_without_critical_speed_in_the_range_the_least_damped_modes_are_told():
     assert any("unstable at the lower end" in remark for remark in unstable.remarks)
 
 
+@pytest.mark.further
 def test_the_critical_mode_is_undamped_there():
     coach = load_vehicle("coach_flexicoil")
     found = critical_speed(coach, RIGID, methods=("linear",), linearisation="harmonic")

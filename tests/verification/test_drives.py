@@ -66,7 +66,7 @@ def bogie(drive, bodies=None, elements=None):
 
 def run(vehicle, track="straight", speed=10.0, duration=4.0, friction=None, **settings):
     settings = railsim.Settings.model_validate(
-        {"outputs": {"contact_patches": True, "elements": ["*"]}, **settings}
+        {"outputs": {"contact_patches": True, "elements": ["*"], "drives": True}, **settings}
     )
     if isinstance(track, str):
         track = load_track(track)
@@ -140,6 +140,9 @@ def test_the_torque_follows_speed_and_demand():
     # less the rolling resistance of the spin creepage, 4 N
     assert on_wheels(result)[-1] == pytest.approx(0.25 * TORQUE / RADIUS, rel=3e-3)
     assert on_wheels(result)[0] == pytest.approx(0.0, abs=20.0)
+    assert result["axle_torque"][[0, -1]] == pytest.approx(
+        np.array([[0.0] * 2, [0.25 * TORQUE] * 2])
+    )
     beyond = traction(demand_table=[[20.0, 1.0], [20.001, 0.0]], over="distance")
     forces = on_wheels(run(bogie(beyond)))
     # wheelsets pass 20 m one after the other, 2.5 m apart
@@ -168,6 +171,8 @@ def test_slip_control_holds_the_creepage_near_the_optimum_on_low_friction():
     available = 0.1 * np.nansum(held["patch_N"][late], axis=(2, 3))
     assert np.all(force > 0.98 * available)
     assert np.all(force < 1.01 * available)
+    assert held["axle_torque"][-1] == pytest.approx(force[-1] * RADIUS, rel=0.01)
+    assert spinning["axle_torque"] == pytest.approx(20e3)
     assert np.min(np.abs(spinning["xi_x"][-1])) > 0.3
 
 
@@ -178,6 +183,7 @@ def test_a_brake_holds_a_locked_wheelset_and_does_not_turn_it_back():
     rim = (10.0 / RADIUS - spin) * RADIUS
     assert np.all((rim > -1e-3) & (rim < 0.1))
     assert on_wheels(result)[-1] == pytest.approx(-0.1 * np.sum(result["Q"][-1], axis=1), rel=0.02)
+    assert result["axle_torque"][-1] == pytest.approx(on_wheels(result)[-1] * RADIUS, rel=0.01)
 
 
 def test_nose_suspended_motor_carries_its_reaction():

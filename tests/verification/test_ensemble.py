@@ -161,6 +161,7 @@ def test_the_one_that_blows_up_ends_as_alone_and_the_others_go_on():
     assert "not finite" in results[1].attributes["status_reason"]
 
 
+@pytest.mark.further
 def test_steps_that_differ_part_the_runs():
     light = coach("assemblies.bogie.assemblies.axle.wheelsets.wheelset.mass=250")
     rigid = load_track("straight").replace(support={"preset": "rigid"})

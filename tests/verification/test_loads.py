@@ -117,6 +117,7 @@ def test_two_stage_spring_stands_on_its_second_stage_when_laden(straight):
     assert body[2] - z_axle == pytest.approx(x, rel=1e-5)
 
 
+@pytest.mark.further
 def test_levelled_air_springs_keep_the_height_of_the_car(straight):
     names = ("carbody", "front.frame", "front.outer.wheelset")
     z = {}
