@@ -78,5 +78,5 @@ def campaign(found: list[dict]) -> str:
 
 
 if __name__ == "__main__":
-    runs = read_index(Path(sys.argv[1]) / "study.json").runs
+    runs = [run.model_dump() for run in read_index(Path(sys.argv[1]) / "study.json").runs]
     fill_page(PAGE, {"campaign": lambda: campaign(runs)}, ["campaign"])
