@@ -14,6 +14,8 @@ from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
 
+LONGEST_BAR = 250.0  # per cent; longer ones are cut and say how long they are
+
 
 def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
     """Draw assessments of one standard, vehicles side by side; None where nothing is to draw."""
@@ -46,6 +48,12 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
             label = assessment.vehicle if ax is axes[0] else None
             ax.barh(rows, shares, 0.9 * width, color=DISTINCT[k % len(DISTINCT)], label=label)
             most = max(most, 1.1 * float(np.nanmax([0.0, *shares])))
+            for row, share in zip(rows, shares, strict=True):
+                if share > LONGEST_BAR:
+                    ax.text(
+                        0.98 * LONGEST_BAR, row, f"{share:.0f} %", color="w", size=7,
+                        ha="right", va="center",
+                    )  # fmt: skip
         ax.axvline(100.0, color=LIMIT, lw=1.0)
         ax.set_title(f"Zone {zone}")
         ax.set_xlabel("estimate / limit (%)")
@@ -53,7 +61,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     axes[0].set_yticks(range(len(rules)), [rule.words for rule in rules.values()])
     axes[0].invert_yaxis()
     for ax in axes:
-        ax.set_xlim(0.0, min(most, 250.0))
+        ax.set_xlim(0.0, min(most, LONGEST_BAR))
     verdicts = "; ".join(f"{a.vehicle}: {a.verdict}" for a in assessments)
     edition = next((a.limits.edition for a in assessments if a.limits), "")
     figure.suptitle(f"{edition}\n{verdicts}", x=0.012, ha="left", fontsize=10)
@@ -90,7 +98,9 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
                     _sections(ax, report, looks)
                 ax.axhline(100.0, color=LIMIT, lw=1.0)
                 ax.set_ylim(bottom=0.0)
-                ax.set_title(f"{assessment.vehicle}, zone {zone}", fontsize=9)
+                ax.set_title(f"zone {zone}", loc="right", fontsize=9)
+            # above the zones, and as wide as all of them
+            axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
             axes[0].set_ylabel("section value / limit (%)")
         for ax in grid[-1]:
             ax.set_xlabel("middle of the section (km)")
