@@ -73,6 +73,7 @@ def test_pictures_and_tables_are_written_and_kept(tmp_path, capsys):
     capsys.readouterr()
     assert cli.main(arguments) == 2
     assert "--overwrite" in capsys.readouterr().err
+    assert cli.main([*arguments, "--overwrite", "--quiet"]) == 0
 
 
 def test_exact_patches_stand_beside_those_of_the_table(capsys):
