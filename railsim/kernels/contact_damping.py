@@ -28,12 +28,15 @@ from railsim.kernels.support import (
     D_Z_SLIP,
     D_Z_Y,
     D_Z_Z,
+    FOOT_Y_STIFFNESS,
+    FOOT_Z_STIFFNESS,
     K_Y_ROLL,
     K_Y_Y,
     K_Y_Z,
     K_Z_ROLL,
     K_Z_Y,
     K_Z_Z,
+    STIFFNESS,
     SUPPORT_COLUMNS,
 )
 
@@ -99,6 +102,9 @@ def add_slopes(support, w, side, patch, k, across):
     support[w, side, D_Z_ROLL] += damping * f_z * lever - across * s * arm
     support[w, side, D_Y_SLIP] += across * c * c
     support[w, side, D_Z_SLIP] -= across * s * c
+    support[w, side, FOOT_Y_STIFFNESS] += stiffness * cy
+    support[w, side, FOOT_Z_STIFFNESS] += stiffness * cz
+    support[w, side, STIFFNESS] += stiffness
 
 
 @compiled(inline=True)

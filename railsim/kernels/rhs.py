@@ -54,7 +54,6 @@ from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
     AS_GIVEN,
-    MOST_CORRECTIONS,
     evaluations,
     locate_support,
     settle_rates,
@@ -423,23 +422,22 @@ def mechanics(system, work, state, derivative, rails):
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
     left = evaluations(system, state, rails)
+    as_given = left == 0
     keep_counts(work.events, 0, 2)
     while True:  # one call only: it becomes part of this function
         status, where, n_patches = wheel_rail(system, work, speed, state)
-        if left == 0 or status != RUNNING:
+        if as_given or status != RUNNING:
             break
         if rails == AFTER_STEP:
-            moved = correct_support(system, work, state, left == MOST_CORRECTIONS)
+            moved = correct_support(system, work, state, left)
         else:
-            moved = settle_rates(system, work, state)
+            moved = left > 0 and settle_rates(system, work, state)
         if not moved:
             break
         left -= 1
         if left == 0:
             work.parts[2] += 1
         keep_counts(work.events, 2, 0)
-    if rails == AFTER_STEP:
-        state[-4] = -abs(state[-4])
     if status != RUNNING:
         return status, where, n_patches
     dynamics(

@@ -35,6 +35,9 @@ AS_GIVEN, AFTER_STEP, BALANCED = map(np.int64, range(3))
 # share of the static wheel load by which forces may differ from those foreseen; imbalance of a
 # massless track (N, N m); evaluations allowed for either
 SETTLED, BALANCE = 2e-4, 1e-2
+# share of the static wheel load, lateral and vertical, up to which the forces' slopes say how the
+# forces change as the rails are corrected; beyond it the contact is evaluated again
+BY_SLOPES_Y, BY_SLOPES_Z = 5e-4, 2e-3
 MOST_CORRECTIONS, MOST_BALANCES = 10, 50
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
@@ -63,12 +66,15 @@ K_Y_Y, K_Y_Z, K_Y_ROLL, K_Z_Y, K_Z_Z, K_Z_ROLL = range(2, 8)
 D_Y_Y, D_Y_Z, D_Y_ROLL, D_Z_Y, D_Z_Z, D_Z_ROLL = range(8, 14)
 # and by a lateral slip that is no motion of wheel or rail, from the wheelset's yaw
 D_Y_SLIP, D_Z_SLIP = 14, 15
-SUPPORT_COLUMNS = 16
+# position of the contact from the wheelset's centre times its stiffness, and that stiffness
+FOOT_Y_STIFFNESS, FOOT_Z_STIFFNESS, STIFFNESS = 16, 17, 18
+SUPPORT_COLUMNS = 24  # whole cache lines
 # columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's motion
 # before the step, see `note_wheelset`, and the factors of pads and ballast
 MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
-# imbalance of the rails one correction ago, and what corrections are multiplied by
-BEFORE, STRETCH = DOF + 13, DOF + 17
+# imbalance of the rails one correction ago, what corrections are multiplied by, and whether one
+# waits for the next step
+BEFORE, STRETCH, WAITS = DOF + 13, DOF + 17, DOF + 19
 SUPPORT_STEP = 32
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
@@ -315,7 +321,7 @@ def rail_motions(system, work, state):
 def evaluations(system, state, rails):
     """How often the contact forces may be evaluated again for the rails: `rails` as `AS_GIVEN`."""
     if rails == AFTER_STEP and system.support.elastic and state[-4] > 0.0:
-        return MOST_CORRECTIONS  # the sign tells that the rails have not been settled
+        return MOST_CORRECTIONS  # a step has been taken
     if rails == BALANCED and system.support.elastic and system.support.massless:
         return MOST_BALANCES
     return 0

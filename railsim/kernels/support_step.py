@@ -13,19 +13,24 @@ linearisation affects only the change of u within one step.
 """
 
 from railsim.kernels import compiled
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rails import (
     ASIDE,
+    COSINE,
     MIDDLE_Y,
     MIDDLE_Z,
     RAIL_SLOPE,
     ROLL,
     ROLL_SLOPE,
+    SINE,
     SLOPE_Z,
     locate_displaced,
 )
 from railsim.kernels.support import (
     ACCELERATION,
     BEFORE,
+    BY_SLOPES_Y,
+    BY_SLOPES_Z,
     C_PAD_Y,
     C_PAD_Z,
     D_Y_ROLL,
@@ -39,6 +44,8 @@ from railsim.kernels.support import (
     DOF,
     F_Y,
     F_Z,
+    FOOT_Y_STIFFNESS,
+    FOOT_Z_STIFFNESS,
     K_PAD_Y,
     K_PAD_Z,
     K_Y_ROLL,
@@ -50,11 +57,14 @@ from railsim.kernels.support import (
     M_RAIL,
     MEAN_CHANGE,
     MEAN_RATE,
+    MOST_CORRECTIONS,
     MOTION,
     RATE,
     SETTLED,
+    STIFFNESS,
     STRETCH,
     SUPPORT_SIZE,
+    WAITS,
     imbalance,
     mass_of,
     solve_track,
@@ -79,6 +89,7 @@ def remember_track(system, work, state):
     """Initialise the memory of `step_support` from `state`."""
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
+        work.support_step[w, WAITS] = 0.0
         for k in range(DOF):
             state[first + MEAN_RATE + k] = state[first + RATE + k]
             state[first + MEAN_CHANGE + k] = 0.0
@@ -87,8 +98,15 @@ def remember_track(system, work, state):
 
 @compiled(merge=True)
 def note_wheelsets(system, work, state):
-    """Store the positions of the wheelsets in the planes of their rails before a step."""
+    """Store the positions of the wheelsets in the planes of their rails before a step.
+
+    Rails whose correction has waited for the step move now, see `correct_support`.
+    """
     for w in range(work.support.shape[0]):
+        track = work.support_step[w]
+        if track[WAITS] > 0.0:
+            move_rails(track, state, support_begin(system) + SUPPORT_SIZE * w, state[-4])
+            track[WAITS] = 0.0
         note_wheelset(system, work, state, w)
 
 
@@ -187,14 +205,14 @@ def step_support(system, work, state, h):
 
 
 @compiled(inline=True)
-def stretch_correction(track, i, stretch, first_time):
+def stretch_correction(track, i, stretch):
     """Multiply the imbalance of one rail so that the next correction does what the last missed.
 
     The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
-    dominates, convergence as with the secant.
+    dominates, convergence as with the secant.  A factor of zero asks for the first one.
     """
     y, z = track[i], track[i + 1]
-    if first_time:
+    if track[stretch] == 0.0:
         track[stretch] = 1.0
     else:
         d_y, d_z = y - track[BEFORE + i], z - track[BEFORE + i + 1]
@@ -206,8 +224,54 @@ def stretch_correction(track, i, stretch, first_time):
     track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
 
 
+@compiled(inline=True)
+def change_forces(system, work, w, h):
+    """Change the forces between wheelset `w` and its rails as moving the rails does, linearly.
+
+    The motion is the mean rate r in ``work.support_step[w, :4]`` over a step `h`: displacements
+    change by h r, rates by 1.5 r.  Forces on the wheelset act at its contacts; longitudinal creep
+    forces, creepages and patches remain those of the evaluation.
+    """
+    b = system.contact.body[w]
+    track, force = work.support_step[w], work.rail_force
+    sine, cosine = work.plane[w, SINE], work.plane[w, COSINE]
+    for side in range(2):
+        contact = work.support[w, side]
+        if contact[STIFFNESS] <= 0.0:
+            continue
+        r_y, r_z = track[2 * side], track[2 * side + 1]
+        f_y = -(
+            (h * contact[K_Y_Y] + 1.5 * contact[D_Y_Y]) * r_y
+            + (h * contact[K_Y_Z] + 1.5 * contact[D_Y_Z]) * r_z
+        )
+        f_z = -(
+            (h * contact[K_Z_Y] + 1.5 * contact[D_Z_Y]) * r_y
+            + (h * contact[K_Z_Z] + 1.5 * contact[D_Z_Z]) * r_z
+        )
+        contact[F_Y] += f_y
+        contact[F_Z] += f_z
+        work.wheel[w, side, W_Y] += f_y
+        work.wheel[w, side, W_Q] += f_z
+        moment = contact[FOOT_Y_STIFFNESS] * f_z - contact[FOOT_Z_STIFFNESS] * f_y
+        force[b, 1] -= cosine * f_y - sine * f_z
+        force[b, 2] -= cosine * f_z + sine * f_y
+        force[b, 3] -= moment / contact[STIFFNESS]
+
+
+@compiled(inline=True)
+def move_rails(track, state, first, h):
+    """Add the mean rate in ``track[:7]`` over a step `h` to the motion that led to `state`."""
+    for k in range(DOF):
+        r = track[k]
+        state[first + k] += h * r
+        state[first + RATE + k] += 1.5 * r
+        state[first + MEAN_RATE + k] += r
+        state[first + MEAN_CHANGE + k] += 1.5 / h * r
+        state[first + ACCELERATION + k] += 2.25 / h * r
+
+
 @compiled(merge=True)
-def correct_support(system, work, state, first_time):
+def correct_support(system, work, state, left):
     """One Newton step for the rails after a step of the fast scheme.
 
     `step_support` foresees the forces by the slopes of one evaluation.  Where the contact moves
@@ -215,10 +279,14 @@ def correct_support(system, work, state, first_time):
     without a correction the scheme has order one.  The rails' accelerations of the state are
     those of the forces foreseen, so that the imbalance F - M u'' - C u' - K u is the difference.
 
+    Imbalances up to `SETTLED` of the static wheel load stay.  Up to `BY_SLOPES_Y`, `BY_SLOPES_Z`
+    the forces change by their slopes, once those of all wheelsets are as small, and the rails move
+    before the next step: evaluated again, a state has the same forces, whatever shares the call.
+    Beyond, the rails move at once, as long as evaluations are `left`.
+
     Returns
     -------
-    bool : whether a wheelset's forces differed by more than `SETTLED` of the static wheel load; its
-        rails have moved then, and the forces are to be evaluated again.
+    bool : whether rails have moved, so that the forces are to be evaluated again.
     """
     h = state[-4]
     moved = False
@@ -226,21 +294,26 @@ def correct_support(system, work, state, first_time):
         first = support_begin(system) + SUPPORT_SIZE * w
         imbalance(system, work, state, w)
         track = work.support_step[w]
-        worst = 0.0
+        if left == MOST_CORRECTIONS:
+            track[STRETCH] = track[STRETCH + 1] = 0.0
         for k in range(DOF):
             track[k] -= mass_of(system.support.row, k) * state[first + ACCELERATION + k]
-            worst = max(worst, abs(track[k]))
-        if worst < SETTLED * system.contact.load[w]:
+        y, z = max(abs(track[0]), abs(track[2])), max(abs(track[1]), abs(track[3]))
+        load = system.contact.load[w]
+        small = left == 0 or (y < BY_SLOPES_Y * load and z < BY_SLOPES_Z * load)
+        track[WAITS] = 1.0 if small and max(y, z) >= SETTLED * load else 0.0
+        if small:
             continue
         moved = True
         for side in range(2):
-            stretch_correction(track, 2 * side, STRETCH + side, first_time)
+            stretch_correction(track, 2 * side, STRETCH + side)
         solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
-        for k in range(DOF):
-            r = track[k]
-            state[first + k] += h * r
-            state[first + RATE + k] += 1.5 * r
-            state[first + MEAN_RATE + k] += r
-            state[first + MEAN_CHANGE + k] += 1.5 / h * r
-            state[first + ACCELERATION + k] += 2.25 / h * r
+        move_rails(track, state, first, h)
+    for w in range(work.support.shape[0]):
+        if moved:
+            break
+        track = work.support_step[w]
+        if track[WAITS] > 0.0:
+            solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
+            change_forces(system, work, w, h)
     return moved

@@ -9,8 +9,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
     then 35w      of each wheelset on elastic rails: track under it, see `support`
-    -4            memory of the fast scheme: length of the last step (s), 0 where there was none;
-                  negative once elastic rails have been settled after it
+    -4            memory of the fast scheme: length of the last step (s), 0 where there was none
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve entries only `pitch` and u_2

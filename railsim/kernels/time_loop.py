@@ -252,7 +252,7 @@ def remember(system, work, state, derivative, h):
         state[first + 6 * n + i] = work.drive[i, 0]
     if system.support.elastic:
         remember_track(system, work, state)
-    state[-4] = -h
+    state[-4] = 0.0
 
 
 @compiled(inline=True)
@@ -272,6 +272,7 @@ def step_fast(system, work, state, derivative, decay, h):
     frames, half = work.frames, 0.5 * h * state[-1] * state[-1]
     if system.support.elastic:
         note_wheelsets(system, work, state)
+    # negative in results of earlier versions
     last = abs(state[-4]) if state[-4] != 0.0 else h
     shift = 0.5 * (last - h)
     for b in range(n):

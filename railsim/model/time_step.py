@@ -29,6 +29,8 @@ Situation = tuple[System, Floats]
 SCHEMES = {"fast": FAST, "rk4": RK4}
 # s; beyond them accuracy, not stability, decides
 LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
+# the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
+LONGEST_STEP_ELASTIC = {"fast": 1.0 / 600.0, "rk4": 0.5e-3}
 # m of track a step: the shortest waves of irregular track, 3 m, are followed in fifty steps
 LONGEST_TRAVEL = 0.06
 SHORTEST_STEP = 1e-6  # s
@@ -125,7 +127,8 @@ class Stability:
         self._flange: Situation | None = None
         self._settled = False
         self._allowed: dict[bool, float] = {}
-        self.longest = min(LONGEST_STEP[scheme], LONGEST_TRAVEL / float(state[-1]))
+        longest = LONGEST_STEP_ELASTIC if system.support.elastic else LONGEST_STEP
+        self.longest = min(longest[scheme], LONGEST_TRAVEL / float(state[-1]))
 
     def choose(self, interval: float) -> float:
         """Longest stable step that divides the output interval, with the margin.
