@@ -100,8 +100,12 @@ def factors(variation, s, out):
 
 @compiled(inline=True)
 def locate_support(system, work, s):
-    """Factors of stiffness and damping under each wheelset, the reference body being at `s`."""
+    """Factors of stiffness and damping under each wheelset, the reference body being at `s`.
+
+    No correction of the rails waits in an evaluation that has only begun.
+    """
     for w in range(work.support_step.shape[0]):
+        work.support_step[w, WAITS] = 0.0
         work.support_step[w, PADS] = 1.0
         work.support_step[w, BALLAST] = 1.0
         if system.support.variation.shape[0] > 0:
