@@ -6,9 +6,9 @@ from dynamics import Settings, evaluate, load_track, load_vehicle, steady
 
 from railsim.definitions.support import PRESETS
 from railsim.definitions.vehicle import Vehicle
-from railsim.kernels.contact_columns import W_Q
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
-from railsim.kernels.support import RATE, SUPPORT_SIZE
+from railsim.kernels.support import DOF, RATE, SUPPORT_SIZE, WAITS, support_begin
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.time_step import SCHEMES, empty_recorder
@@ -207,3 +207,50 @@ def test_support_that_varies_along_the_track():
     before = deflection[(s > 30.0) & (s < 40.0)].mean()
     behind = deflection[(s > 90.0) & (s < 100.0)].mean()
     assert behind == pytest.approx(0.5 * before, rel=0.01)
+
+
+def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_moved():
+    """On irregular rails; the state evaluated again has the same forces."""
+    track = on("ballasted", irregularities=[{"type": "random", "spectrum": "erri_b176_high"}])
+    balance = steady(load_vehicle("coach_manchester"), track, Settings(), 25.0)
+    model, state, h = balance.model, balance.state.copy(), 1.0 / 600.0
+    system, work = model.system, work_arrays(model.system)
+    derivative, stages = np.empty_like(state), np.empty((3, state.size))
+
+    def run(first, steps):
+        chunk = Chunk(first, steps, 1 << 40, int(first == 1), 1)
+        time_loop(
+            system,
+            work,
+            state,
+            derivative,
+            stages,
+            empty_recorder(model, 1),
+            SCHEMES["fast"],
+            h,
+            chunk,
+        )
+        return work.wheel[:, :, [W_Q, W_Y]].copy()
+
+    by_slopes, uncorrected = [], []
+    for n in range(1, 600):
+        forces = run(n, 1)
+        waits = work.support_step[:, WAITS] > 0.0
+        if not waits.any():
+            continue
+        r = work.support_step[:, :DOF].copy()
+        np.testing.assert_array_equal(run(n + 1, 0), forces)
+        before = evaluate(system, state)[0].wheel[:, :, [W_Q, W_Y]]
+        trial = state.copy()
+        for w in np.flatnonzero(waits):
+            u = support_begin(system) + SUPPORT_SIZE * w
+            trial[u : u + DOF] += h * r[w]
+            trial[u + RATE : u + RATE + DOF] += 1.5 * r[w]
+        there = evaluate(system, trial)[0].wheel[:, :, [W_Q, W_Y]]
+        by_slopes.append((forces - there)[waits])
+        uncorrected.append((before - there)[waits])
+    by_slopes, uncorrected = np.concatenate(by_slopes), np.concatenate(uncorrected)
+    assert len(by_slopes) > 100
+    assert np.abs(by_slopes).max() < 1e-4 * balance.Q0.mean()
+    rms = [np.sqrt(np.mean(x**2, axis=(0, 1))) for x in (by_slopes, uncorrected)]
+    assert np.all(rms[0] < 0.1 * rms[1])
