@@ -36,8 +36,10 @@
     NORMAL_Y,
     NORMAL_Z,
     PATCH_SPEED,
-) = range(32)
-PATCH_ROWS = 32
+    SLOPE_ALONG,
+    SLOPE_ACROSS,
+) = range(34)
+PATCH_ROWS = 34
 
 # columns of Work.wheel[w, side]
 W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL, W_T_GAMMA_SPIN = range(9)

@@ -41,27 +41,45 @@ from railsim.kernels.support import (
 )
 
 
-@compiled(inline=True)
-def creep_slopes(ab, c11, c22, c23, G, mu_N, xi_x, xi_y, phi):
-    """Slopes of the creep force along and across over the creepage in that direction [N].
+@compiled(ordered=True)
+def creep_slopes(n, patches, speed, G, along, across):
+    """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
     Those of the force mu N (1 - (1 - u/3)^3) in the direction of the linear one, u = |T_linear|/
     (mu N) <= 3 (Vermeulen and Johnson 1964, spin as in the linear theory): an estimate that serves
     the time step and does not enter the forces.
+
+    Parameters
+    ----------
+    n : int
+        Number of patches.
+    patches : Patches
+        Read only.
+    speed, G : float
+        Speed of travel [m/s]; shear modulus, reduced by the third body [Pa].
+    along, across : float64[>= n]
+        Written; zero without friction or load.
     """
-    x = G * ab * c11 * xi_x / mu_N
-    y = G * ab * (c22 * xi_y + c23 * sqrt(ab) * phi) / mu_N
-    square = x * x + y * y
-    u = sqrt(square)
-    secant, tangent = 1.0, 1.0
-    if u >= 3.0:
-        secant, tangent = 1.0 / u, 0.0
-    elif u > 1e-9:
-        secant, tangent = 1.0 - u / 3.0 + square / 27.0, (1.0 - u / 3.0) ** 2
-    share = x * x / (square + 1e-300)
-    along = share * tangent + (1.0 - share) * secant
-    across = share * secant + (1.0 - share) * tangent
-    return G * ab * c11 * along, G * ab * c22 * across
+    a, b, mu_N = patches.a, patches.b, patches.mu_N
+    c11, c22, c23 = patches.c11, patches.c22, patches.c23
+    xi_x, xi_y, phi = patches.xi_x, patches.xi_y, patches.phi
+    per_speed = 1.0 / speed
+    for i in range(n):
+        loaded = mu_N[i] > 0.0
+        limit = 1.0 / (mu_N[i] if loaded else 1.0)
+        ab = a[i] * b[i]
+        unit = G * ab
+        x = unit * c11[i] * xi_x[i] * limit
+        y = unit * (c22[i] * xi_y[i] + c23[i] * sqrt(ab) * phi[i]) * limit
+        square = x * x + y * y
+        u = sqrt(square)
+        slides = u >= 3.0
+        secant = 1.0 / u if slides else 1.0 - u / 3.0 + square / 27.0
+        tangent = 0.0 if slides else (1.0 - u / 3.0) * (1.0 - u / 3.0)
+        share = x * x / (square + 1e-300)
+        scale = unit * per_speed if loaded else 0.0
+        along[i] = scale * c11[i] * (share * tangent + (1.0 - share) * secant)
+        across[i] = scale * c22[i] * (share * secant + (1.0 - share) * tangent)
 
 
 @compiled(inline=True)

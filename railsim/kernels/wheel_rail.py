@@ -27,9 +27,6 @@ from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
     BEYOND,
-    C11,
-    C22,
-    C23,
     C_X,
     C_Y,
     C_Z,
@@ -37,12 +34,13 @@ from railsim.kernels.contact_columns import (
     J_ALONG_LEVER,
     J_YAW,
     M_Z,
-    MU_N,
     NORMAL,
     NORMAL_Y,
     NORMAL_Z,
     PATCH_SPEED,
     PHI,
+    SLOPE_ACROSS,
+    SLOPE_ALONG,
     T_X,
     T_Y,
     TURN_Y,
@@ -107,20 +105,7 @@ def add_creep_forces(system, work, n, speed):
             wheel[w, side, W_XI_X] = scale * patch[XI_X, k]
             wheel[w, side, W_XI_Y] = scale * patch[XI_Y, k]
             wheel[w, side, W_PHI] = scale * patch[PHI, k]
-        along, across = 0.0, 0.0
-        if patch[MU_N, k] > 0.0:
-            along, across = creep_slopes(
-                patch[A, k] * patch[B, k],
-                patch[C11, k],
-                patch[C22, k],
-                patch[C23, k],
-                contact.law.k_adhesion * contact.law.G,
-                patch[MU_N, k],
-                patch[XI_X, k],
-                patch[XI_Y, k],
-                patch[PHI, k],
-            )
-            along, across = along / speed, across / speed
+        along, across = patch[SLOPE_ALONG, k], patch[SLOPE_ACROSS, k]
         if system.support.elastic:
             add_slopes(work.support, w, side, patch, k, across)
             # a rail that gives way is in series with the creep force
@@ -181,5 +166,7 @@ def wheel_rail(system, work, speed, state):
             n, patches, patch[PATCH_SPEED], contact.friction_rest, contact.friction_decay
         )
     creep_forces(n, contact.law, patches, work.creep)
+    G = contact.law.k_adhesion * contact.law.G
+    creep_slopes(n, patches, speed, G, patch[SLOPE_ALONG], patch[SLOPE_ACROSS])
     add_creep_forces(system, work, n, speed)
     return RUNNING, 0, n
