@@ -100,18 +100,21 @@ class Pace:
                 ]
             )
         stability = self._stability(self._model, speed, self._states.get(speed))
-        if not stability.holds(given):
-            raise InputError(
-                [
-                    Fault(
-                        "settings",
-                        "step",
-                        f"found {given:g} s, unstable at {speed:g} m/s",
-                        f"at most {stability.choose(interval):g} s",
-                    )
-                ]
-            )
-        return given
+        if stability.holds(given):
+            return given
+        stable = stability.choose(interval)
+        if given < stable:  # friction about to slide grows, whatever the step
+            return given
+        raise InputError(
+            [
+                Fault(
+                    "settings",
+                    "step",
+                    f"found {given:g} s, unstable at {speed:g} m/s",
+                    f"at most {stable:g} s",
+                )
+            ]
+        )
 
     def _in_class(self, speed: float, step: float) -> bool:
         """Whether a step, with the margin, is stable for the class of a speed and the friction."""

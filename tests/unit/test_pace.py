@@ -4,6 +4,7 @@ import pytest
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
+from railsim.errors import InputError
 from railsim.simulation import pace
 from railsim.simulation.preparation import prepare
 
@@ -30,3 +31,22 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
     assert judged == [pytest.approx((1.2**16, 0.3)), pytest.approx((1.2**16, 0.4))]
     assert steps([0.35, 0.28, 0.21]) == forwards
     assert len(judged) == 2
+
+
+def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one(monkeypatch):
+    """Friction about to slide makes a short step look unstable, too."""
+
+    class OnlyOne(pace.Stability):
+        def holds(self, h, margin=1.0):
+            return h == 1.0 / 600.0
+
+    monkeypatch.setattr(pace, "Stability", OnlyOne)
+    vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
+
+    def step(given):
+        settings = Settings(step=given)
+        return prepare(vehicle, track, settings, 20.0, duration=1.0).pace.at(20.0)[0]
+
+    assert step(1e-3) == 1e-3
+    with pytest.raises(InputError, match=r"0\.0025 s, unstable at 20 m/s; at most 0\.00166667 s"):
+        step(2.5e-3)
