@@ -235,7 +235,7 @@ def _assumption_lines(case: "Case") -> list[str]:
     wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)
     wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
     inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
-    step = "chosen" if settings.step is None else f"{settings.step * 1e3:g} ms"
+    step = "chosen" if settings.step is None else f"{settings.step * 1e3:.4g} ms"
     return [
         f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)"
         f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
@@ -304,7 +304,7 @@ def _report_lines(result: "Result", path: Path) -> list[str]:
         end += "; at its start, before the first instant was recorded"
     lines = [
         f"  {end}",
-        f"  step {1e3 * float(facts['step']):g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
+        f"  step {1e3 * float(facts['step']):.4g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
         *(f"  remark: {remark}" for remark in result.remarks),
         "",
@@ -361,7 +361,7 @@ def _step_lines(result: "Result", differences: "Sequence[Comparison]") -> list[s
                 "" if isnan(relative) else f"{100.0 * relative:+.2g}",
             ]
         )
-    header = [f"Check of the step, {1e3 * step:g} ms", "", "value", "less that at half", "%"]
+    header = [f"Check of the step, {1e3 * step:.4g} ms", "", "value", "less that at half", "%"]
     return table(header, rows, numbers=2)
 
 

@@ -29,6 +29,8 @@ from railsim.simulation.settling import Progress
 Floats = NDArray[np.float64]
 
 CLASS = 1.2  # ratio of the speeds of a class
+# part of the output interval by which a given step may miss an integer fraction: six digits
+WRITTEN = 1e-5
 FRICTION_CLASS = 0.1  # difference of the coefficients of friction of a class
 MOST_JUDGED = 10_000
 # whether steps hold in classes that have been judged in this process, by a hash of all inputs
@@ -88,17 +90,20 @@ class Pace:
             stability = self._stability(self._model, speed, self._states.get(speed))
             longest = interval / max(1, math.ceil(interval / stability.longest * (1.0 - 1e-9)))
             return longest if self._in_class(speed, longest) else stability.choose(interval)
-        if not self.varies and abs(round(interval / given) * given - interval) > 1e-9 * interval:
-            raise InputError(
-                [
-                    Fault(
-                        "settings",
-                        "step",
-                        f"found {given:g} s",
-                        f"an integer fraction of the output interval {interval:g} s",
-                    )
-                ]
-            )
+        if not self.varies:
+            count = max(1, round(interval / given))
+            if abs(count * given - interval) > WRITTEN * interval:
+                raise InputError(
+                    [
+                        Fault(
+                            "settings",
+                            "step",
+                            f"found {given:g} s",
+                            f"an integer fraction of the output interval {interval:g} s",
+                        )
+                    ]
+                )
+            given = interval / count
         stability = self._stability(self._model, speed, self._states.get(speed))
         if stability.holds(given):
             return given

@@ -48,5 +48,6 @@ def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one
         return prepare(vehicle, track, settings, 20.0, duration=1.0).pace.at(20.0)[0]
 
     assert step(1e-3) == 1e-3
+    assert step(1.66667e-3) == 5e-3 / 3  # as it is printed
     with pytest.raises(InputError, match=r"0\.0025 s, unstable at 20 m/s; at most 0\.00166667 s"):
         step(2.5e-3)
