@@ -282,7 +282,7 @@ def correct_support(system, work, state, left):
     Imbalances up to `SETTLED` of the static wheel load stay.  Up to `BY_SLOPES_Y`, `BY_SLOPES_Z`
     the forces change by their slopes, once those of all wheelsets are as small, and the rails move
     before the next step: evaluated again, a state has the same forces, whatever shares the call.
-    Beyond, the rails move at once, as long as evaluations are `left`.
+    Beyond, the rails move at once; where no evaluation is `left`, the slopes serve there, too.
 
     Returns
     -------
@@ -309,11 +309,11 @@ def correct_support(system, work, state, left):
             stretch_correction(track, 2 * side, STRETCH + side)
         solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
         move_rails(track, state, first, h)
+    if moved:
+        return True
     for w in range(work.support.shape[0]):
-        if moved:
-            break
         track = work.support_step[w]
         if track[WAITS] > 0.0:
             solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
             change_forces(system, work, w, h)
-    return moved
+    return False

@@ -30,7 +30,7 @@ SCHEMES = {"fast": FAST, "rk4": RK4}
 # s; beyond them accuracy, not stability, decides
 LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
 # the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
-LONGEST_STEP_ELASTIC = {"fast": 1.0 / 600.0, "rk4": 0.5e-3}
+LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 1.0 / 600.0}
 # m of track a step: the shortest waves of irregular track, 3 m, are followed in fifty steps
 LONGEST_TRAVEL = 0.06
 SHORTEST_STEP = 1e-6  # s

@@ -108,7 +108,8 @@ class Pace:
         if stability.holds(given):
             return given
         stable = stability.choose(interval)
-        if given < stable:  # friction about to slide grows, whatever the step
+        # a step is too long or not: growth at a shorter one comes from differences across a kink
+        if given < stable:
             return given
         raise InputError(
             [

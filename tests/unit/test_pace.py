@@ -34,7 +34,7 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
 
 
 def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one(monkeypatch):
-    """Friction about to slide makes a short step look unstable, too."""
+    """Differences across a kink of the forces make a short step look unstable, too."""
 
     class OnlyOne(pace.Stability):
         def holds(self, h, margin=1.0):

@@ -8,6 +8,7 @@ from railsim.definitions.support import PRESETS
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
+from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, RATE, SUPPORT_SIZE, WAITS, support_begin
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
@@ -219,17 +220,9 @@ def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_move
 
     def run(first, steps):
         chunk = Chunk(first, steps, 1 << 40, int(first == 1), 1)
-        time_loop(
-            system,
-            work,
-            state,
-            derivative,
-            stages,
-            empty_recorder(model, 1),
-            SCHEMES["fast"],
-            h,
-            chunk,
-        )
+        recorder = empty_recorder(model, 1)
+        loop = system, work, state, derivative, stages, recorder, SCHEMES["fast"], h, chunk
+        assert time_loop(*loop)[0] == RUNNING
         return work.wheel[:, :, [W_Q, W_Y]].copy()
 
     by_slopes, uncorrected = [], []
