@@ -25,6 +25,7 @@ from types import TracebackType
 from typing import Self
 
 from railsim.errors import Fault, InputError, argument_fault
+from railsim.text import LONGEST_FILE, shortened
 
 RESULTS = (".h5", ".hdf5")
 PICTURES = (".png", ".svg", ".pdf", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
@@ -146,8 +147,7 @@ def _impossible(path: Path) -> str:
         return "the name holds a zero byte"
     except OSError as error:
         if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
-            shown = str(path) if len(str(path)) < 60 else f"{str(path)[:57]}..."
-            return f"{shown}: {os.strerror(error.errno)}"
+            return f"{shortened(str(path), LONGEST_FILE)}: {os.strerror(error.errno)}"
     return ""
 
 

@@ -7,6 +7,19 @@ these characters and does nothing.  Pages escape theirs by themselves (jinja2).
 from collections.abc import Iterable, Sequence
 from html import escape
 
+LONGEST_VALUE, LONGEST_FILE = 60, 300  # characters of a value, of a file's name, in a message
+
+
+def shortened(text: str, longest: int = LONGEST_VALUE) -> str:
+    """Return a text for a message; of a longer one the beginning.
+
+    Examples
+    --------
+    >>> shortened("0123456789", 8)
+    '01234...'
+    """
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
 
 def printable(text: str) -> str:
     r"""Return text without characters that steer a terminal; ends of lines stay.

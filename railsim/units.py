@@ -58,3 +58,17 @@ def range_values(text: str) -> list[float] | None:
 def rounded(value: float) -> float:
     """Return a number without the round-off of its making, to 12 digits."""
     return float(f"{value:.12g}")
+
+
+def duration_in_words(seconds: float) -> str:
+    """Return an estimated duration in words.
+
+    Examples
+    --------
+    >>> duration_in_words(300.0), duration_in_words(3e5), duration_in_words(1e9)
+    ('5 minutes', '3 days', '32 years')
+    """
+    for unit, length in (("years", 3.16e7), ("days", 86400.0), ("hours", 3600.0)):
+        if seconds >= 2.0 * length:
+            return f"{seconds / length:,.0f} {unit}"
+    return f"{seconds / 60.0:.0f} minutes"

@@ -123,7 +123,7 @@ def _number_of_steps(distance: float, step: float) -> int:
     ]
     if faults:
         raise InputError(faults)
-    steps = round(distance / step)
+    steps = round(min(distance / step, MOST_STEPS + 1.0))
     if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
         found = f"found {step:g} km with a distance of {distance:g} km"
         allowed = f"the distance divided by a whole number from 1 to {MOST_STEPS}"

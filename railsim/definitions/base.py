@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NoReturn, Self
 
 import tomli_w
 from pydantic import (
@@ -77,11 +77,29 @@ AutoOrNumber = Annotated[_Auto | Annotated[Finite, Tag("value")], Discriminator(
 AutoOrVector = Annotated[_Auto | Annotated[Vector, Tag("value")], Discriminator(_word_or_value)]
 
 
+class FrozenDict(dict[Any, Any]):
+    """A dictionary that does not change: two definitions may share it, and keep what follows."""
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError("a definition does not change; with_values() and replace() return new ones")
+
+    __setitem__ = __delitem__ = clear = pop = popitem = setdefault = update = __ior__ = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FrozenDict, (dict(self),)
+
+
 class Definition(BaseModel):
     """Base of everything that a user may write."""
 
     # built when first used: a part of a vehicle is built as part of it, not once more by itself
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    def model_post_init(self, _: Any) -> None:
+        """Keep the tables of a definition from being changed."""
+        for name, value in self.__dict__.items():
+            if type(value) is dict:
+                self.__dict__[name] = FrozenDict(value)
 
     def __copy__(self) -> Self:
         """Return a copy without what was worked out from the values: those of the copy may differ.

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Tag, ValidationError
 from railsim.definitions.base import meanings
 from railsim.definitions.sources import Source
 from railsim.errors import Fault, nearest
+from railsim.text import shortened
 
 
 def validation_faults(
@@ -94,12 +95,12 @@ def _wording(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
             return "unknown key", nearest(str(detail["loc"][-1]), fields)
         case "union_tag_invalid":
             tags = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
-            found = f"unknown {context['discriminator']} {context['tag']!r}"
+            found = f"unknown {context['discriminator']} {_shown(context['tag'])}"
             return found, nearest(context["tag"], tags)
         case "union_tag_not_found":
             return f"no key {context['discriminator']}", "it tells what the table describes"
         case "string_pattern_mismatch":
-            return repr(value), "a name: letters, digits, _ and -, beginning with a letter"
+            return _shown(value), "a name: letters, digits, _ and -, beginning with a letter"
         case "tuple_type":
             return _shown(value), _list_of(_annotation_at(model, detail["loc"]))
         case "too_long" | "too_short" if isinstance(value, list | tuple):
@@ -129,8 +130,7 @@ def _missing(detail: Any, model: type[BaseModel]) -> tuple[str, str]:
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return shortened(repr(value))
 
 
 def _counted(value: Sequence[object]) -> str:

@@ -17,6 +17,7 @@ from railsim.definitions.given_elements import AxleTorque
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
 from railsim.definitions.offered import offers
+from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
 from railsim.errors import Fault, InputError
 
@@ -172,6 +173,17 @@ def _frames(
             yield from _frames(assembly, frame.inner(name, placement))
 
 
+def check_types(vehicles: Sequence[object], *tracks: object) -> None:
+    """Raise TypeError where a name or a file is given instead of what it stands for."""
+    for kind, wanted, given in [
+        *(("vehicle", Vehicle, vehicle) for vehicle in vehicles),
+        *(("track", Track, track) for track in tracks),
+    ]:
+        if not isinstance(given, wanted):
+            found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
+            raise TypeError(f"the {kind} is {found}; give what railsim.load_{kind} returns")
+
+
 @offers
 def flatten(vehicle: Vehicle) -> FlatVehicle:
     """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
@@ -179,7 +191,9 @@ def flatten(vehicle: Vehicle) -> FlatVehicle:
     Raises
     ------
     InputError : names that mean nothing or are used twice, parts that do not fit together.
+    TypeError : something else than a vehicle.
     """
+    check_types([vehicle])
     kept: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
     if KEPT not in kept:
         faults = vehicle_faults(vehicle)

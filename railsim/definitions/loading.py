@@ -45,6 +45,7 @@ from railsim.definitions.track import TRACK_FORMAT, Track
 from railsim.definitions.vehicle import VEHICLE_FORMAT, Vehicle
 from railsim.errors import Fault, InputError
 from railsim.files import is_file
+from railsim.text import shortened
 
 D = TypeVar("D", bound=FileDefinition)
 
@@ -336,7 +337,7 @@ def _validated(model: type[D], source: Source, known: Format) -> D:
 
 
 def _format_fault(file: str, found: object, allowed: Iterable[str]) -> Fault:
-    named = "missing" if found is None else repr(found)
+    named = "missing" if found is None else shortened(repr(found))
     return Fault(file, "format", named, "allowed: " + ", ".join(allowed))
 
 

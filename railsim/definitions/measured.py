@@ -17,6 +17,7 @@ from railsim.definitions.irregularity import COLUMNS, READING, Measured
 from railsim.definitions.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, InputError, counted, nearest
 from railsim.files import TABLE_BYTES, is_file, read_text
+from railsim.text import LONGEST_FILE, shortened
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
 # what a column adds to y_left, z_left, y_right, z_right
@@ -61,7 +62,7 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
         path = Path(table["file"])
         key = f"irregularities.{index}.file"
         if not is_file(path):
-            shown = table["file"] if len(table["file"]) < 60 else f"{table['file'][:57]}..."
+            shown = shortened(table["file"], LONGEST_FILE)
             faults.append(Fault("", key, f"no file '{shown}'", "a CSV beside the track file"))
             continue
         if path.suffix.lower() != ".csv":

@@ -10,10 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from railsim.errors import Fault, nearest
+from railsim.units import duration_in_words
 
 Scope = tuple[str, ...]
 SIDES = ("left", "right")
 MOST_PARTS = 5000  # a train of twenty coaches has some 2000
+MOST_WHEELSETS = 200
+# to find the static equilibrium [s], by the square of the number of wheelsets
+SECONDS_PER_SQUARE = 4e-3
 DEEPEST_ASSEMBLY = 10
 
 
@@ -66,7 +70,7 @@ def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
 
     Counts without placing anything: ten nested assemblies of ten placements each are 1e10.
     """
-    total = 0
+    total = wheelsets = 0
     level: list[tuple[Mapping[str, Any], tuple[str, ...], int]] = [(parts, (), 1)]
     while level:
         inner = []
@@ -75,6 +79,7 @@ def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
                 _members(group, key) for key in ("bodies", "wheelsets", "axleboxes", "elements")
             )
             total += copies * sum(len(table) for table in tables)
+            wheelsets += copies * len(_members(group, "wheelsets"))
             if total > MOST_PARTS or len(path) > 2 * DEEPEST_ASSEMBLY:
                 key = ".".join(path)
                 found = "assemblies nested too deeply"
@@ -86,6 +91,10 @@ def size_faults(parts: Mapping[str, Any]) -> list[Fault]:
                 total += placed  # also an empty one takes time
                 inner.append((assembly, (*path, "assemblies", name), copies * placed))
         level = inner
+    if wheelsets > MOST_WHEELSETS:
+        time = duration_in_words(SECONDS_PER_SQUARE * wheelsets**2)
+        found = f"{wheelsets} wheelsets, whose static equilibrium alone takes some {time}"
+        return [Fault("", "assemblies", found, f"{MOST_WHEELSETS} at most")]
     return []
 
 

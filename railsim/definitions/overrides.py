@@ -15,6 +15,7 @@ from typing import Any
 from railsim.definitions.paths import descend, full_path, key_path
 from railsim.definitions.sources import Source, replace_origin
 from railsim.errors import Fault, InputError
+from railsim.text import shortened
 from railsim.units import number_with_unit
 
 OVERRIDE = "--set"
@@ -138,10 +139,10 @@ def _value(written: str, text_expected: bool) -> Any:
         value = tomllib.loads(f"value = {written}")["value"]
     except tomllib.TOMLDecodeError:
         if not written or written[0] in "[{\"'":
-            raise KeyError(f"the value '{written[:60]}' is no TOML") from None
+            raise KeyError(f"the value '{shortened(written)}' is not TOML") from None
         return written if text_expected or (found := number_with_unit(written)) is None else found
     except (ValueError, RecursionError):  # an integer of 5000 digits, a thousand brackets
-        raise KeyError(f"the value '{written[:60]}...' is out of range") from None
+        raise KeyError(f"the value '{shortened(written)}' is out of range") from None
     return written if text_expected and not isinstance(value, str | list | dict) else value
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from railsim.errors import nearest
 
 AXES = ("x", "y", "z")
+LONGEST_KEY = 1000  # characters; the deepest key of a vehicle has some hundred
 
 
 def key_path(key: str) -> list[str]:
@@ -27,14 +28,14 @@ def key_path(key: str) -> list[str]:
     ------
     KeyError : it is no key.
     """
-    try:
-        node = tomllib.loads(f"{key} = 0")
-    except (ValueError, RecursionError):
-        raise KeyError("a dotted path of keys such as bodies.carbody.mass") from None
     parts = []
-    while isinstance(node, dict):
-        ((part, node),) = node.items()
-        parts.append(part)
+    try:
+        node = tomllib.loads(f"{key} = 0") if len(key) <= LONGEST_KEY else {}
+        while isinstance(node, dict):
+            ((part, node),) = node.items()
+            parts.append(part)
+    except (ValueError, RecursionError):  # no TOML; a comment; several lines
+        raise KeyError("a dotted path of keys such as bodies.carbody.mass") from None
     return parts
 
 

@@ -16,6 +16,7 @@ from typing import Any
 from railsim.definitions.paths import descend, key_path
 from railsim.errors import Fault, InputError, nearest
 from railsim.files import DEFINITION_BYTES, is_file, read_text
+from railsim.text import shortened
 
 PACKAGE = Path(__file__).resolve().parent.parent
 FOLDERS = {
@@ -213,12 +214,19 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
 
 
 def _depth(data: Any) -> int:
-    """Return how deeply tables and lists are nested; at most one more than `DEEPEST`."""
+    """Return how deeply tables and lists are nested; at most one more than `DEEPEST`.
+
+    Raises
+    ------
+    ValueError : a whole number that needs more than TOML's 64 bits.
+    """
     level, depth = [data], 0
     while level and depth <= DEEPEST:
         inner: list[Any] = []
         for node in level:
             members = node.values() if isinstance(node, dict) else node
+            if any(isinstance(member, int) and member.bit_length() > 63 for member in members):
+                raise ValueError("a whole number of more than 64 bits")
             inner += [member for member in members if isinstance(member, dict | list)]
         level, depth = inner, depth + 1
     return depth
@@ -280,9 +288,13 @@ def _without_extends(
     removed = data.pop("remove", [])
     faults = []
     if base is not None and not isinstance(base, str):
-        faults.append(Fault(str(path), "extends", repr(base), "a path or the name of a file"))
+        faults.append(
+            Fault(str(path), "extends", shortened(repr(base)), "a path or the name of a file")
+        )
     if not isinstance(removed, list) or not all(isinstance(key, str) for key in removed):
-        faults.append(Fault(str(path), "remove", repr(removed), "a list of dotted key paths"))
+        faults.append(
+            Fault(str(path), "remove", shortened(repr(removed)), "a list of dotted key paths")
+        )
     elif removed and base is None:
         faults.append(Fault(str(path), "remove", "no 'extends'", "'remove' goes with 'extends'"))
     if faults:
@@ -327,7 +339,7 @@ def _remove(base: Source, key: str, file: str) -> list[Fault]:
         parent, last = descend(base.data, path)
         del parent[last]
     except KeyError as missing:
-        found = f"no key '{key}' in {base.file}"
+        found = f"no key {key!r} in {base.file}"
         return [Fault(file, "remove", found, str(missing.args[0]))]
     return []
 

@@ -18,11 +18,12 @@ from scipy.optimize import Bounds, minimize
 
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.mechanism_values import number
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
 from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of, own_choice
+from railsim.units import duration_in_words
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +43,9 @@ EVERY = 5
 """Share of the positions that every start is first judged at."""
 FINALISTS = 3
 """Starts that are followed to the end, at all positions."""
+MOST_STARTS = 10_000
+SECONDS_PER_START = 1.0
+"""At a rough guess, of one core."""
 DRAWS = 60
 """Draws for each start until the links can be assembled."""
 REFUSED = 1e6
@@ -72,6 +76,10 @@ def optimise(
         raise InputError([fault])
     wanted = definition.optimise
     count = wanted.starts if starts is None else starts
+    if count > MOST_STARTS:
+        time = duration_in_words(SECONDS_PER_START * count / workers)
+        fault = argument_fault("starts", "", f"{count:,}, some {time}", f"{MOST_STARTS:,} at most")
+        raise InputError([fault])
     chosen_seed = wanted.seed if seed is None else seed
     judge = Judge(definition)
     begins = first_points(judge, count, chosen_seed)

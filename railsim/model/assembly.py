@@ -17,7 +17,7 @@ from railsim.contact.creep import creep_law
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
-from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
+from railsim.definitions.flatten import FlatBody, FlatVehicle, check_types, flatten
 from railsim.definitions.layout import is_straight_and_level
 from railsim.definitions.settings import Drive as DriveDefinition
 from railsim.definitions.settings import Settings
@@ -142,11 +142,14 @@ def assemble(
     ------
     InputError
         A profile cannot be read.
+    TypeError
+        Something else than a vehicle, a track, profiles by name.
     ModelError
         The wheels do not fit on the rails.
     """
+    check_types([vehicle], track)
     flat = flatten(vehicle)
-    book = _ProfileBook(dict(profiles or {}))
+    book = _ProfileBook(_profiles_by_name(profiles))
     check_fixed(flat, track, settings.drive.mode)
     shared = shared or SharedTables()
     if shared.track is None:
@@ -354,6 +357,17 @@ class SharedTables:
     def __init__(self) -> None:
         self.track: TrackTables | None = None
         self.contact: dict[tuple[Any, ...], ContactTable] = {}
+
+
+def _profiles_by_name(profiles: Mapping[str, Profile] | None) -> dict[str, Profile]:
+    """Return the profiles of a call; TypeError where they are no mapping of names to profiles."""
+    if profiles is None:
+        return {}
+    if not isinstance(profiles, Mapping) or not all(
+        isinstance(profile, Profile) for profile in profiles.values()
+    ):
+        raise TypeError("profiles: give a mapping of names to what railsim.load_profile returns")
+    return dict(profiles)
 
 
 class _ProfileBook:

@@ -18,6 +18,7 @@ from railsim.errors import Fault, InputError, nearest
 from railsim.files import is_file
 from railsim.profiles.builtin import DEFINITIONS, builtin_profile
 from railsim.profiles.profile import Kind, Profile
+from railsim.text import LONGEST_FILE, shortened
 
 __all__ = ["Profile", "load_profile"]
 
@@ -61,7 +62,7 @@ def load_profile(name_or_path: str, kind: Kind | None = None) -> Profile:
         raise InputError(
             [
                 Fault(
-                    name_or_path if len(name_or_path) < 60 else f"{name_or_path[:57]}...",
+                    shortened(name_or_path, LONGEST_FILE),
                     "",
                     "no such profile",
                     nearest(name_or_path, DEFINITIONS) + " or the path of a file",

@@ -13,14 +13,17 @@ The left side is the mirror image.
 
 from dataclasses import dataclass, field
 from html import escape
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.text import printable
+from railsim.errors import Fault, InputError
+from railsim.text import printable, shortened
 
 Kind = Literal["wheel", "rail"]
+
+FEWEST_POINTS = 3
 
 FLANGE_BACK = -0.070
 """Lateral position of the flange back from the nominal rolling circle [m] (EN 13715: 70 mm)."""
@@ -63,6 +66,16 @@ class Profile:
             values = np.array(getattr(self, name), dtype=np.float64)
             values.setflags(write=False)
             object.__setattr__(self, name, values)
+        if self.y.ndim != 1 or self.y.shape != self.z.shape or self.y.size < FEWEST_POINTS:
+            found = f"arrays of shape {self.y.shape} and {self.z.shape}"
+            allowed = f"two rows of equal length, {FEWEST_POINTS} points at least"
+            raise InputError([Fault(f"profile '{self.name}'", "y, z", found, allowed)])
+        if not np.isfinite([self.y, self.z]).all():
+            found = "values that are not finite"
+            raise InputError([Fault(f"profile '{self.name}'", "y, z", found, "numbers in m")])
+        if self.kind not in get_args(Kind):
+            found = shortened(repr(self.kind))
+            raise InputError([Fault(f"profile '{self.name}'", "kind", found, "wheel or rail")])
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Profile):

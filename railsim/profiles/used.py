@@ -8,6 +8,7 @@ from railsim.definitions.vehicle import Assembly, Vehicle
 from railsim.errors import Fault, InputError
 from railsim.profiles import load_profile
 from railsim.profiles.profile import Kind
+from railsim.text import LONGEST_FILE, shortened
 
 
 def used_profiles(definition: FileDefinition) -> Iterator[tuple[str, str, Kind]]:
@@ -27,7 +28,7 @@ def profile_faults(definition: FileDefinition, file: str) -> list[Fault]:
         try:
             load_profile(name, kind)
         except InputError as error:
-            shown = name if len(name) < 60 else f"{name[:57]}..."
+            shown = shortened(name, LONGEST_FILE)
             for fault in error.faults:
                 location = f", {fault.key}" if fault.key else ""
                 found = f"profile '{shown}'{location}: {fault.found}"

@@ -466,7 +466,5 @@ class FrozenArrays(Mapping[str, Array]):
 
 
 def frozen(array: Any) -> Array:
-    """Return a float64 view of `array` that cannot be written to."""
-    view = np.asarray(array, dtype=np.float64).view()
-    view.flags.writeable = False
-    return view
+    """Return `array` as float64 that cannot be written to, nor made so."""
+    return np.asarray(np.asarray(array, dtype=np.float64).data.toreadonly())

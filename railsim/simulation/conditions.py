@@ -1,8 +1,8 @@
 """What the runs of one call have in common, checked: speed, start, end, the state to go on from."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.result import Result
+from railsim.text import shortened
 
 Floats = NDArray[np.float64]
 SPEED_RANGE = (0.5, 150.0)  # m/s
@@ -41,20 +42,22 @@ class Inputs:
         until: float | None,
     ) -> "Inputs":
         """Return the inputs; raise InputError with all faults of speed, start and end."""
+        check_numbers(speed=speed, start=start, duration=duration, until=until)
         speed = initial_speed(settings, speed, start)
         check_range(track, speed, start, duration, until)
-        return cls(track, settings, speed, start, duration, until)
+        # of another type of number the time loop would be compiled anew
+        return cls(track, settings, float(speed), float(start), duration, until)
 
 
-def check_types(vehicles: Sequence[object], track: object) -> None:
-    """Raise TypeError where a name or a file is given instead of what it stands for."""
-    for kind, wanted, given in [
-        *(("vehicle", Vehicle, vehicle) for vehicle in vehicles),
-        ("track", Track, track),
-    ]:
-        if not isinstance(given, wanted):
-            found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
-            raise TypeError(f"the {kind} is {found}; give what railsim.load_{kind} returns")
+def check_numbers(**given: object) -> None:
+    """Raise InputError with everything among the arguments that is neither None nor a number."""
+    faults = [
+        argument_fault(name, "", f"found {shortened(repr(value))}", "a number")
+        for name, value in given.items()
+        if value is not None and (not isinstance(value, Real) or isinstance(value, bool))
+    ]
+    if faults:
+        raise InputError(faults)
 
 
 def initial_speed(settings: Settings, speed: float | None, start: float) -> float:
@@ -113,7 +116,12 @@ def state_before(
         not give what an undisturbed run gives.
     """
     if not isinstance(resume, Result):
-        return np.array(resume, dtype=float)
+        given = np.asarray(resume)
+        if given.dtype.kind != "f" or given.ndim != 1 or not np.isfinite(given).all():
+            found = "not finite numbers in a row"
+            allowed = 'a result, or its state: result.groups["state"]["end"]'
+            raise InputError([argument_fault("resume", "", found, allowed, "--continue")])
+        return given.astype(float)
     faults = []
     if "end" not in resume.groups.get("state", {}):
         faults.append(

@@ -11,14 +11,16 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.flatten import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault
 from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.simulation.advance import advance
-from railsim.simulation.conditions import Inputs, check_types, state_before
+from railsim.simulation.conditions import Inputs, state_before
 from railsim.simulation.ending import end
 from railsim.simulation.preparation import begin
 from railsim.simulation.settling import DOING
@@ -93,6 +95,10 @@ def simulate(
     settings = settings or Settings()
     before = None if resume is None else state_before(vehicle, track, settings, resume)
     if before is not None:
+        if speed is not None or start:
+            found, allowed = "given together with `resume`", "the state's own is used"
+            name = "start" if speed is None else "speed"
+            raise InputError([argument_fault(name, "", found, allowed)])
         speed, start = float(before[-1]), float(before[-2])
     inputs = Inputs.checked(track, settings, speed, start, duration, until)
     told = Told(progress, 1, inputs)

@@ -8,14 +8,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.flatten import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault
 from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.simulation.advance import Run, advance
-from railsim.simulation.conditions import Inputs, check_types
+from railsim.simulation.conditions import Inputs
 from railsim.simulation.ending import end
 from railsim.simulation.preparation import begin
 from railsim.simulation.settling import DOING
@@ -109,6 +111,10 @@ def outcomes(
 ) -> list[Result | Exception]:
     """As `simulate_together`, but with the error instead of the result of a vehicle that fails."""
     check_types(vehicles, track)
+    if not vehicles or (sinks is not None and len(sinks) != len(vehicles)):
+        count = "no vehicle" if not vehicles else f"{len(sinks or ())} for {len(vehicles)} vehicles"
+        name = "sinks" if vehicles else "vehicles"
+        raise InputError([argument_fault(name, "", count, "one vehicle at least, a sink for each")])
     settings = settings or Settings()
     inputs = Inputs.checked(track, settings, speed, start, duration, until)
     shared = SharedTables()

@@ -24,7 +24,7 @@ from railsim.studies.case import Case, short_name
 from railsim.studies.combine import load_case, name_faults
 from railsim.studies.journal import Record
 from railsim.studies.keep import Keep
-from railsim.studies.points import Point, check_number
+from railsim.studies.points import ROUGH_DURATION, Point, check_number
 from railsim.studies.rows import in_a_name
 from railsim.version import __version__
 
@@ -151,7 +151,9 @@ def scenario_cases(
     """
     faults: list[Fault] = []
     cases: list[Case] = []
-    check_number([vehicles, list(scenario.parts), *scenario.grid.values()], cores(), lambda: 60.0)
+    check_number(
+        [vehicles, list(scenario.parts), *scenario.grid.values()], cores(), lambda: ROUGH_DURATION
+    )
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:
         own = [a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")]

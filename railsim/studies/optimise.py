@@ -21,6 +21,7 @@ from railsim.definitions.loading import load_study
 from railsim.definitions.study import Study
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, is_file, make_folder, read_text, whole_file
+from railsim.studies.carry_out import cores
 from railsim.studies.chosen import chosen_vehicles
 from railsim.studies.designs import (
     INPUTS,
@@ -33,6 +34,7 @@ from railsim.studies.designs import (
     with_unit,
 )
 from railsim.studies.front import hypervolume, knee, non_dominated
+from railsim.studies.points import ROUGH_DURATION, check_number
 from railsim.studies.search import Task, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 from railsim.studies.summary import unit_of
@@ -162,6 +164,8 @@ def optimise(
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
     given = {name: value for name, value in changes.items() if value is not None}
     wanted = _changed(definition.optimise, given)
+    runs = (range(wanted.evaluations), range(definition.runs))
+    check_number(runs, workers or cores(), lambda: ROUGH_DURATION)
     folder = Path(out)
     check_folder(folder)
     _check_folder(folder, definition, resume=resume, overwrite=overwrite)

@@ -19,12 +19,14 @@ from typing import Any
 from railsim.definitions import sources
 from railsim.errors import Fault, InputError
 from railsim.files import TABLE_BYTES, is_file, read_bytes
+from railsim.units import duration_in_words
 from railsim.version import __version__
 
 Grid = Mapping[str, Sequence[str]]
 Overrides = tuple[str, ...]
 
 MOST_RUNS = 200_000
+ROUGH_DURATION = 60.0  # s; simulated time of a run that has not been looked at
 # what a run takes at a rough guess: simulated seconds per second of one core, and seconds besides
 REAL_TIME_FACTOR, SECONDS_BESIDES = 60.0, 0.5
 
@@ -154,13 +156,5 @@ def check_number(
     if number <= MOST_RUNS:
         return
     each = seconds() / REAL_TIME_FACTOR + SECONDS_BESIDES
-    found = f"{number:,} runs, some {_words(number * each / cores)} on {cores} cores"
+    found = f"{number:,} runs, some {duration_in_words(number * each / cores)} on {cores} cores"
     raise InputError([Fault("study", "", found, f"at most {MOST_RUNS:,}; give fewer values")])
-
-
-def _words(seconds: float) -> str:
-    """Return a duration in words: 3 days, 5 years."""
-    for unit, length in (("years", 3.16e7), ("days", 86400.0), ("hours", 3600.0)):
-        if seconds >= 2.0 * length:
-            return f"{seconds / length:,.0f} {unit}"
-    return f"{seconds / 60.0:.0f} minutes"

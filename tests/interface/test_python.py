@@ -1,6 +1,8 @@
 """What a notebook gets: public names, tables, pictures, changed values, frames of pandas."""
 
+import copy
 import math
+import pickle
 import subprocess
 import sys
 
@@ -103,3 +105,64 @@ def test_static_loads_carry_the_weight(coach):
     assert loads.Q0.sum() == pytest.approx(coach.mass * 9.81, rel=1e-6)
     assert loads.axle_load.shape == (4,)
     assert "axle load (kN)" in loads._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"speed": True}, "speed: found True; a number"),
+        ({"speed": 1j}, "speed: found 1j; a number"),
+        ({"speed": None, "resume": 3.0}, "resume: not finite numbers in a row"),
+        ({"speed": None, "resume": np.full(60, np.nan)}, "resume: not finite numbers in a row"),
+        ({"speed": None, "resume": np.ones(60, complex)}, "resume: not finite numbers in a row"),
+        ({"speed": 20.0, "resume": np.ones(60)}, "speed: given together with `resume`"),
+    ],
+)
+def test_a_wrong_argument_is_one_clear_error(given, words, coach):
+    with pytest.raises(InputError) as caught:
+        railsim.simulate(coach, railsim.load_track("straight"), **given)
+    assert str(caught.value).startswith(words)
+
+
+def test_one_vehicle_at_least_and_a_sink_for_each_run_together(coach):
+    track = railsim.load_track("straight")
+    with pytest.raises(InputError, match="vehicles: no vehicle"):
+        railsim.simulate_together([], track, speed=20.0)
+    with pytest.raises(InputError, match="sinks: 0 for 1 vehicles"):
+        railsim.simulate_together([coach], track, speed=20.0, sinks=[])
+
+
+def test_names_instead_of_what_they_stand_for_are_told(coach):
+    track = railsim.load_track("straight")
+    for analysis in (railsim.modes, railsim.critical_speed, railsim.static_loads):
+        with pytest.raises(TypeError, match="the vehicle is 'coach'; give what"):
+            analysis("coach")
+    with pytest.raises(TypeError, match="the track is 'straight'"):
+        railsim.simulate(coach, "straight", speed=20.0)
+    with pytest.raises(TypeError, match="profiles: give a mapping of names"):
+        railsim.simulate(coach, track, speed=20.0, profiles=["S1002"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"y": [0.0, 1.0, math.nan]}, "values that are not finite"),
+        ({"y": [0.0, 1.0]}, "arrays of shape (2,) and (3,)"),
+        ({"kind": "wheels"}, "'wheels'; wheel or rail"),
+    ],
+)
+def test_points_that_are_no_profile_are_refused(changes, words):
+    values = {"name": "own", "kind": "wheel", "y": [0.0, 0.1, 0.2], "z": [0.0, 0.0, 0.0]}
+    with pytest.raises(InputError) as caught:
+        railsim.Profile(**{**values, **changes})
+    assert words in str(caught.value)
+
+
+def test_definitions_and_results_cannot_be_changed(coach, result):
+    with pytest.raises(TypeError, match="does not change"):
+        coach.bodies["carbody"] = None
+    with pytest.raises(TypeError, match="does not change"):
+        coach.assemblies.clear()
+    assert pickle.loads(pickle.dumps(coach)) == coach == copy.deepcopy(coach)
+    with pytest.raises(ValueError, match="WRITEABLE"):
+        result.Q.setflags(write=True)
