@@ -18,12 +18,6 @@ from railsim.profiles.profile import Profile
 MOST_OPEN = 16  # stored tables that a process keeps open, mapped and checked
 
 
-def cache_folder() -> Path | None:
-    """Folder of the stored tables; None where none may be used, see `railsim.kernels.cache`."""
-    base = cache.cache_base()
-    return cache.safe_folder(base and base / "tables")
-
-
 def generator_hash() -> str:
     """Hash of the sources that decide what a table holds."""
     digest = hashlib.sha256()
@@ -63,7 +57,7 @@ def cached_contact_table(
     digest.update(repr((numbers, grid)).encode())
     digest.update(wheel.key())
     digest.update(rail.key())
-    folder = cache_folder()
+    folder = cache.own_folder("tables")
     path = folder and folder / f"{digest.hexdigest()[:32]}.npy"
     if path and (stored := _stored_table(path)):
         return stored
@@ -102,16 +96,19 @@ def _checked_table(path: Path, text: str | bytes, stamp: tuple[int, ...]) -> Con
         facts = json.loads(text)
         crc = facts.pop("crc32")
         table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
+        whole = zlib.crc32(table.values.data) == crc
     except (OSError, ValueError, TypeError, KeyError, EOFError):
-        cache.discard(path)
-        return None
-    if zlib.crc32(table.values.data) != crc:
-        cache.discard(path)
-        return None
-    return table
+        whole = False
+    if whole:
+        return table
+    for part in (path, path.with_suffix(".json")):
+        cache.discard(part)
+    return None
 
 
 def _store_table(table: ContactTable, path: Path) -> None:
+    if cache.stored(path.with_suffix(".json")):  # meanwhile, by another process
+        return  # on a network disk a file that others have mapped must not be replaced
     facts = {name: getattr(table, name) for name in ContactTable.__dataclass_fields__}
     facts["crc32"] = zlib.crc32(facts.pop("values").data)
 

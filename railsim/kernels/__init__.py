@@ -2,7 +2,8 @@
 
 Only math, numpy, numba and each other are imported here.  Compiled code is cached on disk in a
 folder named after a hash of *all* kernel sources: numba itself notices an edit only in the file
-that holds the compiled function, so that a caller would keep running an old callee.
+that holds the compiled function, so that a caller would keep running an old callee.  Only `cache`
+is left out, in which nothing is compiled.
 
 `compiler` fences what is used of numba's inside.
 """
@@ -10,16 +11,14 @@ that holds the compiled function, so that a caller would keep running an old cal
 import functools
 import hashlib
 import os
-import shutil
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
 import llvmlite
 import numba
 
-from railsim.kernels.cache import cache_base, safe_folder
+from railsim.kernels.cache import drop_old, own_folder
 from railsim.kernels.compiler import PRIVATE, compiled_by
 
 # The subset of fastmath that keeps NaN and infinity visible to the blow-up checks.
@@ -29,11 +28,11 @@ ORDERED = {"nsz"}
 
 
 def source_hash(folder: Path) -> str:
-    """Hash of all kernel sources in `folder` and of the versions that compile them."""
+    """Hash of the kernel sources in `folder`, and of the versions that compile them."""
     versions = f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag}"
     versions += "" if PRIVATE else " plain"
     digest = hashlib.sha256(versions.encode())
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted(set(folder.glob("*.py")) - {folder / "cache.py"}):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
@@ -41,26 +40,13 @@ def source_hash(folder: Path) -> str:
 
 def _cache_folder() -> Path | None:
     """Folder of these sources' compiled code; None where it must not or cannot be used."""
-    own = os.environ.get("NUMBA_CACHE_DIR")  # a user's choice comes first
-    base = Path(own) if own else cache_base()
+    given = os.environ.get("NUMBA_CACHE_DIR")  # a user's choice comes first
     hashed = source_hash(Path(__file__).parent)
-    folder = safe_folder(base and (base / "kernels" / hashed))
+    folder = own_folder("kernels", hashed, base=Path(given) if given else None)
     if folder is not None:
         with suppress(OSError):
-            _drop_old(folder)
+            drop_old(folder)
     return folder
-
-
-def _drop_old(folder: Path) -> None:
-    """Remove code of sources that nobody has used for a month, and files never finished."""
-    now = folder.stat().st_mtime
-    for old in folder.parent.iterdir():
-        # another version of railsim may be in use beside this one
-        if old != folder and old.is_dir() and old.stat().st_mtime < now - 30 * 24 * 3600.0:
-            shutil.rmtree(old, ignore_errors=True)
-    for part in folder.glob("*.part"):
-        if part.stat().st_mtime < time.time() - 3600.0:
-            part.unlink(missing_ok=True)
 
 
 _FOLDER = _cache_folder()

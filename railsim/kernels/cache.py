@@ -1,5 +1,9 @@
 """What is kept on disk between runs: compiled code and contact tables.
 
+The cache has a folder of its own, `railsim`; each folder that railsim makes there carries a mark.
+Nothing without the mark is ever changed or removed, and in folders with it only what railsim has
+written.
+
 Compiled code is loaded and executed.  So nothing is taken from a folder or a file that another
 user could have written, and nothing that is not, byte for byte, what was stored: every file begins
 with the length and CRC-32 of the rest.  A folder that is refused, cannot be written to or is full
@@ -26,6 +30,14 @@ _HEAD = re.compile(rb"railsim-cache ([0-9a-f]{8}) ([0-9]{15})\n")
 _HEAD_BYTES = 39
 _unwritable: set[Path] = set()
 
+MARK = "CACHEDIR.TAG"  # the name and its first line are known to programs for backups
+_MARK_TEXT = b"""Signature: 8a477f597d28d172789f06886806bc55
+# This folder was made by railsim, which may change and remove it.
+"""
+_OF_SOURCES = re.compile("[0-9a-f]{16}")
+_OWN_FILES = (".nbc", ".nbi", ".part")
+HOUR, MONTH = 3600.0, 30 * 24 * 3600.0
+
 
 def notice(sentence: str) -> None:
     """Say something about the cache, once."""
@@ -34,76 +46,170 @@ def notice(sentence: str) -> None:
         _LOG.warning(sentence)
 
 
-def cache_base() -> Path | None:
-    """Return $RAILSIM_CACHE_DIR or the user's cache folder; None where a user has no home."""
-    given = os.environ.get("RAILSIM_CACHE_DIR")
-    if given:
-        return Path(given)
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return None if base.startswith("~") else Path(base) / "railsim"
+def own_folder(*names: str, base: Path | None = None) -> Path | None:
+    """Return a folder of the cache, made if it is not there; None where none can be used.
 
-
-def safe_folder(folder: Path | None) -> Path | None:
-    """Return a folder of the cache, made if it is not there; None where it must not be used.
+    The cache is the folder `railsim` below `base`, else below $RAILSIM_CACHE_DIR, else in the
+    user's folder for caches.
 
     Parameters
     ----------
-    folder : Path or None
-        The folder; it and what it is made in are for this user only (0700).
+    *names : str
+        Folder in the cache and those below it.
+    base : Path, optional
+        Where the user wants this part of the cache.
     """
-    if folder is None:
-        return None
+    given = base or os.environ.get("RAILSIM_CACHE_DIR")
+    top = Path(given or _user_cache(), "railsim")
+    folder = top.joinpath(*names)
     try:
-        if not folder.exists():
-            os.makedirs(folder.parent, mode=0o700, exist_ok=True)
-            os.makedirs(folder, mode=0o700, exist_ok=True)
-        folder = folder.resolve()
-        for path in (folder, *folder.parents):
-            if reason := _distrust(path, below=path != folder):
-                notice(
-                    f"the cache {folder} is not used: {reason}; remove it, or choose another by "
-                    "RAILSIM_CACHE_DIR"
-                )
-                return None
+        reason = _prepared(top, names, reserved=not given)
+        if not reason:
+            folder = folder.resolve()
+            reason = _distrust(folder, top.resolve())
     except (OSError, RuntimeError) as error:
-        words = getattr(error, "strerror", None) or error
-        notice(f"the cache {folder} cannot be used ({words}); compiled code is not kept")
+        reason = str(getattr(error, "strerror", None) or error)
+    if reason:
+        notice(
+            f"the cache {folder} is not used, each start compiles anew: {reason}; choose another "
+            "folder by RAILSIM_CACHE_DIR"
+        )
         return None
-    with suppress(OSError):
-        if folder.stat().st_uid == os.geteuid() and stat.S_IMODE(folder.stat().st_mode) != 0o700:
-            folder.chmod(0o700)
     if not os.access(folder, os.W_OK):
         _unwritable.add(folder)
     return folder
 
 
-def _distrust(path: Path, *, below: bool = False) -> str:
-    """Say why another user could have written into a folder, or to what lies below it."""
-    facts = os.lstat(path)
-    if facts.st_uid not in (os.geteuid(), 0):
-        return f"{path} belongs to another user"
-    others = facts.st_mode & stat.S_IWOTH
-    # a group of the same number as its user is that user's own
-    group = facts.st_mode & stat.S_IWGRP and facts.st_gid not in (0, facts.st_uid)
-    if (others or group) and not (below and facts.st_mode & stat.S_ISVTX):
-        return f"other users may write to {path}"
+def _user_cache() -> Path:
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    return Path(given if os.path.isabs(given) else os.path.expanduser("~/.cache"))
+
+
+def _prepared(top: Path, names: tuple[str, ...], *, reserved: bool) -> str:
+    """Make the folders of the cache, each for this user only; say why they must not be used.
+
+    In the user's folder for caches the name `railsim` is reserved for railsim (XDG base directory
+    specification).  Elsewhere a folder of this name may be anything.
+    """
+    if reserved and not top.is_absolute():
+        return "this user has no home"
+    path = top = top.absolute()
+    for above in reversed(top.parents):
+        if not above.is_dir():
+            _make(above)
+    _make_marked(top, reserved=reserved)
+    if not (reserved or _is_marked(top)):
+        return f"{top} is not a cache of railsim's"
+    for name in names:
+        path /= name
+        _make_marked(path)
     return ""
+
+
+def _make(folder: Path) -> None:
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+
+
+def _make_marked(folder: Path, *, reserved: bool = False) -> None:
+    """Make and mark a folder; put right the permissions of one that is marked."""
+    _make(folder)
+    if reserved or not os.listdir(folder):
+        with suppress(OSError):
+            handle = os.open(folder / MARK, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with open(handle, "wb") as file:
+                file.write(_MARK_TEXT)
+    facts = folder.stat()
+    if facts.st_uid != os.geteuid() or facts.st_mode & 0o777 == 0o700:
+        return
+    if _is_marked(folder):
+        with suppress(OSError):
+            folder.chmod(0o700)
+            if facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+                for index in folder.rglob("*.nbi"):  # numba's own would be loaded as they are
+                    index.unlink()
+
+
+def _is_marked(folder: Path) -> bool:
+    return _content(folder / MARK) == _MARK_TEXT
+
+
+def _distrust(folder: Path, top: Path) -> str:
+    """Say why another user could have written into a folder of the cache."""
+    for path in (folder, *folder.parents):
+        facts = os.lstat(path)
+        if facts.st_uid not in (os.geteuid(), 0):
+            return f"{path} belongs to another user"
+        others = bool(facts.st_mode & stat.S_IWOTH)
+        if path == folder or path.is_relative_to(top):
+            # a group of the same number as its user is that user's own
+            shared = facts.st_gid not in (0, facts.st_uid)
+            others |= shared and bool(facts.st_mode & stat.S_IWGRP)
+        elif facts.st_mode & stat.S_ISVTX:
+            others = False
+        # who shares a group may exchange the folder, but not make one that belongs to this user
+        if others:
+            return f"other users may write to {path}"
+    return ""
+
+
+def drop_old(folder: Path) -> None:
+    """Remove code of other sources that nobody has used for a month, and files never finished.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sources in use; the others lie beside it.  Another version of railsim may be
+        in use there.
+    """
+    if not _is_marked(folder):
+        return
+    os.utime(folder / MARK)  # the time of the last use, by the clock of the disk
+    now = (folder / MARK).stat().st_mtime
+    for part in folder.glob("*.part"):
+        if part.stat().st_mtime < now - HOUR:
+            part.unlink(missing_ok=True)
+    for old in folder.parent.iterdir():
+        if not _OF_SOURCES.fullmatch(old.name) or old.is_symlink() or not _is_marked(old):
+            continue
+        if (old / MARK).stat().st_mtime < now - MONTH:
+            _remove(old)
+
+
+def _remove(folder: Path) -> None:
+    """Remove from a marked folder what railsim has put there, and the folder if that was all."""
+    for where, _, names in os.walk(folder, topdown=False):
+        for name in names:
+            if name.endswith(_OWN_FILES):
+                os.unlink(os.path.join(where, name))
+        if Path(where) != folder:
+            with suppress(OSError):  # not empty
+                os.rmdir(where)
+    if os.listdir(folder) == [MARK]:
+        (folder / MARK).unlink()
+        folder.rmdir()
+
+
+def _content(path: Path) -> bytes | None:
+    """Return the content of a regular file that only this user or root can have written."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        with open(handle, "rb") as file:
+            facts = os.fstat(file.fileno())
+            others = facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+            if not stat.S_ISREG(facts.st_mode) or others:
+                return None
+            return file.read() if facts.st_uid in (os.geteuid(), 0) else None
+    except OSError:
+        return None
 
 
 def stored(path: Path) -> bytes | None:
     """Return what was stored under a name; None where there is nothing, or it is damaged."""
-    try:
-        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError:
+    text = _content(path)
+    if text is None:
         return None
-    try:
-        with open(handle, "rb") as file:
-            facts = os.fstat(file.fileno())
-            if not stat.S_ISREG(facts.st_mode) or facts.st_uid not in (os.geteuid(), 0):
-                return None
-            head, data = _HEAD.fullmatch(file.read(_HEAD_BYTES)), file.read()
-    except OSError:
-        return None
+    head, data = _HEAD.fullmatch(text[:_HEAD_BYTES]), text[_HEAD_BYTES:]
     if head and (int(head[1], 16), int(head[2])) == (zlib.crc32(data), len(data)):
         return data
     discard(path)

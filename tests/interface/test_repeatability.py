@@ -32,7 +32,7 @@ def test_calls_within_an_output_interval_change_nothing(monkeypatch):
 def test_run_with_a_new_contact_table_equals_the_run_with_the_stored_one(tmp_path, monkeypatch):
     monkeypatch.setenv("RAILSIM_CACHE_DIR", str(tmp_path))  # kernels stay where they are
     new, stored = run(), run()
-    assert len(list((tmp_path / "tables").glob("*.npy"))) == 1
+    assert len(list((tmp_path / "railsim" / "tables").glob("*.npy"))) == 1
     for name in new:
         assert new[name].tobytes() == stored[name].tobytes(), name
 

@@ -1,14 +1,20 @@
-"""The cache under damage: what comes out is what went in, or nothing."""
+"""The cache: what comes out is what went in, or nothing; nobody else's files are touched."""
 
 import errno
 import os
+import shutil
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from cases import tried
 from mutations import bytes_damaged
 
+import railsim.kernels
 from railsim.kernels import cache
+
+AGO = time.time() - 60 * 24 * 3600.0  # two months
 
 
 @pytest.fixture(autouse=True)
@@ -55,3 +61,197 @@ def test_full_disk_costs_nothing_but_time(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
     (said,) = cache.notices
     assert "cannot be written (No space left on device)" in said
+
+
+def tree(folder):
+    """Every path below a folder with its kind, permissions and size."""
+    return {
+        path: (path.lstat().st_mode, path.lstat().st_size if path.is_file() else 0)
+        for path in folder.rglob("*")
+    }
+
+
+def aged(folder):
+    for path in (*folder.rglob("*"), folder):
+        os.utime(path, (AGO, AGO), follow_symlinks=False)
+
+
+@pytest.fixture
+def variable(tmp_path, monkeypatch):
+    """The folder that RAILSIM_CACHE_DIR names."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("RAILSIM_CACHE_DIR", str(tmp_path / "given"))
+    return tmp_path / "given"
+
+
+@pytest.mark.parametrize("name", ["RAILSIM_CACHE_DIR", "NUMBA_CACHE_DIR"])
+def test_folders_of_others_are_neither_removed_nor_changed(name, tmp_path, monkeypatch):
+    """Whatever they are called, as old as they may be, beside the cache and inside it."""
+    monkeypatch.setenv(name, str(tmp_path))
+    own = railsim.kernels._cache_folder()
+    for folder in (tmp_path / "kernels", tmp_path / "tables", own.parent):
+        for other in ("linux-6.1", "0123456789abcdef"):
+            (folder / other).mkdir(parents=True, exist_ok=True)
+            (folder / other / "thesis.tex").write_text("years of work")
+    (own.parent / "fedcba9876543210").symlink_to(tmp_path / "kernels" / "linux-6.1")
+    aged(tmp_path)
+    os.utime(own)
+    before = tree(tmp_path)
+    assert railsim.kernels._cache_folder() == own
+    assert tree(tmp_path) == before
+
+
+def test_code_of_sources_unused_for_a_month_is_removed(variable):
+    recent, old, full = (cache.own_folder("kernels", 16 * digit) for digit in "123")
+    for folder in (recent, old, full):
+        (folder / "plain" / "rhs_1").mkdir(parents=True)
+        for name in ("rhs.step-1.nbc", "rhs.step-2.nbc1.part", "plain/rhs_1/rhs.step.nbi"):
+            (folder / name).touch()
+    (full / "notes.txt").write_text("somebody's")
+    for folder in (recent, old, full):
+        aged(folder)
+    os.utime(recent / cache.MARK)  # compiled long ago, and in use
+    current = railsim.kernels._cache_folder()
+    assert {path.name for path in current.parent.iterdir() if path.is_dir()} == {
+        current.name, recent.name, full.name
+    }  # fmt: skip
+    assert {path.name for path in full.iterdir()} == {cache.MARK, "notes.txt"}
+    assert (recent / "plain" / "rhs_1" / "rhs.step.nbi").exists()
+
+
+def test_files_never_finished_are_removed_after_an_hour(variable):
+    own = railsim.kernels._cache_folder()
+    cache.store(own / "code", b"data")
+    for name, age in (("old.part", 2 * 3600.0), ("new.part", 60.0)):
+        (own / name).touch()
+        os.utime(own / name, 2 * (time.time() - age,))
+    railsim.kernels._cache_folder()
+    assert {path.name for path in own.iterdir()} == {cache.MARK, "code", "new.part"}
+
+
+def test_folder_of_that_name_with_other_files_is_not_taken_for_the_cache(variable):
+    """As the clone of a repository would be, with folders `kernels` and `tables` of its own."""
+    (variable / "railsim" / "kernels").mkdir(parents=True)
+    (variable / "railsim" / "README.md").touch()
+    before = tree(variable)
+    assert cache.own_folder("kernels", 16 * "0") is None
+    assert tree(variable) == before
+    (said,) = cache.notices
+    assert "is not a cache of railsim's; choose another folder by RAILSIM_CACHE_DIR" in said
+
+
+def test_every_missing_folder_is_made_for_its_user_only(variable):
+    before = os.umask(0o002)
+    try:
+        folder = cache.own_folder("kernels", 16 * "0")
+    finally:
+        os.umask(before)
+    for path in (variable, variable / "railsim", folder.parent, folder):
+        assert path.stat().st_mode & 0o777 == 0o700
+    for path in (variable / "railsim", folder.parent, folder):
+        assert (path / cache.MARK).read_text().startswith("Signature: 8a477f597d28d172789f0688")
+    assert not (variable / cache.MARK).exists()
+
+
+@pytest.mark.parametrize("mode", [0o755, 0o775, 0o777, 0o2775])
+def test_own_folder_is_put_right(variable, mode):
+    folder = cache.own_folder("kernels", 16 * "0")
+    for path in (folder, folder.parent, folder.parent.parent):
+        path.chmod(mode)
+    assert cache.own_folder("kernels", 16 * "0") == folder
+    for path in (folder, folder.parent, folder.parent.parent):
+        assert path.stat().st_mode & 0o7777 == 0o700
+    assert not cache.notices
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
+def test_shared_primary_group_and_umask_002(tmp_path, monkeypatch):
+    """As on clusters; also the folder that an earlier railsim has made there, without a mark."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.delenv("RAILSIM_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home" / ".cache"))
+    home = tmp_path / "home"
+    home.mkdir()
+    os.chown(home, -1, 54321)
+    home.chmod(0o2775)  # all that is made here belongs to the group
+    before = os.umask(0o002)
+    try:
+        (home / ".cache" / "railsim" / "kernels").mkdir(parents=True)
+        folder = railsim.kernels._cache_folder()
+    finally:
+        os.umask(before)
+    assert not cache.notices
+    assert folder.is_relative_to(home)
+    assert folder.parent.stat().st_gid == 54321
+    assert (home / ".cache" / "railsim").stat().st_mode & 0o777 == 0o700
+    assert (home / ".cache").stat().st_mode & 0o777 == 0o775  # not railsim's
+
+
+def test_folder_above_that_everybody_may_write_to_is_refused(variable):
+    variable.mkdir()
+    variable.chmod(0o777)
+    assert cache.own_folder("tables") is None
+    (said,) = cache.notices
+    assert f"other users may write to {variable}" in said
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
+def test_cache_of_another_user_is_refused(variable):
+    folder = cache.own_folder("tables")
+    cache.store(folder / "code", b"mine")
+    os.chown(folder / "code", 54321, 54321)
+    assert cache.stored(folder / "code") is None
+    os.chown(folder, 54321, 54321)
+    assert cache.own_folder("tables") is None
+    (said,) = cache.notices
+    assert f"{folder} belongs to another user" in said
+
+
+def test_file_that_others_may_write_to_is_not_loaded(tmp_path):
+    cache.store(tmp_path / "code", b"data")
+    (tmp_path / "code").chmod(0o664)
+    assert cache.stored(tmp_path / "code") is None
+    cache.store(tmp_path / "code", b"data")
+    assert cache.stored(tmp_path / "code") == b"data"
+
+
+def test_cache_on_a_read_only_disk_is_used_as_it_is(variable, monkeypatch):
+    folder = cache.own_folder("tables")
+    cache.store(folder / "code", b"data")
+
+    def refused(path, *_, **__):
+        if not Path(path).exists():
+            raise OSError(errno.EROFS, "Read-only file system")
+        raise FileExistsError
+
+    monkeypatch.setattr(os, "mkdir", refused)
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    assert cache.own_folder("tables") == folder
+    assert cache.stored(folder / "code") == b"data"
+    cache.store(folder / "new", b"data")
+    assert not (folder / "new").exists()
+    assert not cache.notices
+    assert cache.own_folder("kernels") is None  # is not there
+    (said,) = cache.notices
+    assert "Read-only file system" in said
+    assert "choose another folder by RAILSIM_CACHE_DIR" in said
+
+
+def test_relative_folder_for_caches_is_ignored(tmp_path, monkeypatch):
+    """As the base directory specification of XDG asks for."""
+    monkeypatch.delenv("RAILSIM_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "caches")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert cache.own_folder("tables") == tmp_path / ".cache" / "railsim" / "tables"
+
+
+def test_only_the_source_of_the_cache_is_left_out_of_the_hash(tmp_path):
+    kernels = tmp_path / "kernels"
+    shutil.copytree(Path(railsim.kernels.__file__).parent, kernels)
+    before = railsim.kernels.source_hash(kernels)
+    for path in sorted(kernels.glob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        path.write_text(f"{text}#", encoding="utf-8")
+        assert (railsim.kernels.source_hash(kernels) == before) == (path.name == "cache.py")
+        path.write_text(text, encoding="utf-8")

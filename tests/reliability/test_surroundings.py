@@ -13,7 +13,6 @@ from selection import points
 import railsim.cli.info
 from railsim.cli import main
 from railsim.cli.assess import assessment_csv
-from railsim.kernels import cache
 
 sys.path.append(str(Path(__file__).parents[1] / "interface"))
 from example_result import ROOT, example_result
@@ -152,35 +151,6 @@ def test_ten_thousand_dips_are_told_with_what_is_allowed(tmp_path, capsys):
     (tmp_path / "dips.toml").write_text(f"{head}irregularities=[{dips}]\n")
     assert main(["validate", str(tmp_path / "dips.toml")]) == 2
     assert "10000 values; a list of 1000 at most" in capsys.readouterr().err
-
-
-def test_cache_is_for_its_user_only(tmp_path):
-    folder = cache.safe_folder(tmp_path / "railsim" / "kernels")
-    assert folder.stat().st_mode & 0o777 == 0o700
-    folder.chmod(0o755)
-    assert cache.safe_folder(folder).stat().st_mode & 0o777 == 0o700
-
-
-@pytest.mark.parametrize("mode", [0o777, 0o702, 0o1777])
-def test_cache_that_others_may_write_to_is_refused(tmp_path, mode):
-    folder = cache.safe_folder(tmp_path / "cache")
-    folder.chmod(mode)
-    cache.notices.clear()
-    assert cache.safe_folder(folder) is None
-    assert [text for text in cache.notices if "other users may write" in text]
-    cache.notices.clear()
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
-def test_cache_of_another_user_is_refused(tmp_path):
-    folder = cache.safe_folder(tmp_path / "cache")
-    cache.store(folder / "code", b"mine")
-    os.chown(folder / "code", 54321, 54321)
-    assert cache.stored(folder / "code") is None
-    os.chown(folder, 54321, 54321)
-    cache.notices.clear()
-    assert cache.safe_folder(folder) is None
-    cache.notices.clear()
 
 
 def test_commands_print_by_the_function_that_escapes():
