@@ -10,15 +10,17 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from railsim import load_track, load_vehicle, simulate
-from railsim.notation import QUANTITIES, Quantity
+import numpy as np
+
+from railsim import Result, Settings, load_track, load_vehicle, simulate
+from railsim.notation import QUANTITIES, REQUESTED, Quantity
 
 DOCS = Path(__file__).parent
 PAGES = (DOCS.parent / "README.md", DOCS / "notation.md", DOCS / "validation" / "curving.md")
 TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
-from curving_study import COACHES, RIGID, measured, published  # noqa: E402
+from curving_study import COACHES, MID_CURVE, RIGID, measured, published  # noqa: E402
 
 
 def tables() -> dict[str, str]:
@@ -48,7 +50,8 @@ def curving_table(coach: str) -> str:
     """Comparison of one coach with the published curving study, on rigid and on elastic rails."""
     track, vehicle = load_track("curve_r250"), load_vehicle(f"coach_{coach}")
     rigid = simulate(vehicle, track.replace(support=RIGID), speed=20.0)
-    elastic = simulate(vehicle, track, speed=20.0)
+    deflected = Settings.model_validate({"outputs": {"track": True}})
+    elastic = simulate(vehicle, track, speed=20.0, settings=deflected)
     rows = []
     for name, expected in published(coach).items():
         quantity, found = QUANTITIES[name], measured(rigid, name)
@@ -57,8 +60,21 @@ def curving_table(coach: str) -> str:
         values = (expected, found, measured(elastic, name))
         numbers = [_digits(quantity.scale * value) for value in values]
         rows.append((f"{quantity.words}, {where}", *numbers[:2], difference, numbers[2]))
+    rows += _beside(elastic)
     head = ("leading wheelset", "published", "rigid rails", "difference", "elastic rails")
     return table(head, rows)
+
+
+def _beside(elastic: Result) -> list[tuple[str, ...]]:
+    """What elastic rails add to the wheelset's lateral displacement: without a published value."""
+    middle = int(np.argmin(np.abs(elastic["time"] - MID_CURVE)))
+    left, right = elastic["rail_deflection_lateral"][middle, 0]
+    aside = REQUESTED["wheelset_lateral_on_track"]
+    values = (
+        ("of this, half the widening of the gauge under load (mm)", 0.5 * (left - right)),
+        (f"{aside.words}", measured(elastic, aside.name)),
+    )
+    return [(words, "", "", "", _digits(aside.scale * value)) for words, value in values]
 
 
 def _digits(value: float) -> str:

@@ -210,8 +210,8 @@ QUANTITIES: dict[str, Quantity] = _table(
         _AXLE,
         "mm",
         1e3,
-        "of the wheelset relative to the track at its position, positive to the right; on elastic "
-        "rails less the mean of their deflections",
+        "from the middle of the irregular, deflected rails under the wheelset, along the line over "
+        "their tops, positive to the right",
     ),
     Quantity(
         "wheelset_roll",
@@ -221,8 +221,8 @@ QUANTITIES: dict[str, Quantity] = _table(
         _AXLE,
         "mrad",
         1e3,
-        "relative to the track plane, positive with the right wheel down; on elastic rails "
-        "relative to the deflected rails",
+        "relative to the line over the tops of the irregular, deflected rails, positive with the "
+        "right wheel down",
     ),
     Quantity(
         "wheelset_yaw",
@@ -517,14 +517,24 @@ REQUESTED: dict[str, Quantity] = _table(
         "from its position in the nominal vehicle, in the track frame of its body",
     ),
     Quantity(
-        "wheelset_lateral_on_rails",
-        "wheelset lateral displacement on its rails",
-        "y_{rel}",
+        "wheelset_lateral_on_track",
+        "wheelset lateral displacement from the design track",
+        "y_0",
         "m",
         _AXLE,
         "mm",
         1e3,
-        "relative to the middle of the irregular rails under it, positive to the right",
+        "of the wheelset's centre in the track frame, positive to the right",
+    ),
+    Quantity(
+        "wheelset_roll_on_track",
+        "wheelset roll angle against the design track",
+        r"\varphi_0",
+        "rad",
+        _AXLE,
+        "mrad",
+        1e3,
+        "relative to the canted track plane, positive with the right wheel down",
     ),
     Quantity(
         "track_curvature",

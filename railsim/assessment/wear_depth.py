@@ -23,7 +23,7 @@ ROUNDING = 0.1  # largest share of the worn area that the points of the profile 
 WORN = " worn"
 DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the profile meanwhile
 NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", "patch_T_x",
-          "patch_T_y", "wheelset_roll")  # fmt: skip
+          "patch_T_y", "body_position")  # fmt: skip
 
 
 def grid() -> Floats:
@@ -66,8 +66,9 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
     forces = np.hypot(result["patch_T_x"][at], result["patch_T_y"][at])
     total = forces.sum(axis=-1, keepdims=True)
     shares = np.where(total > 0.0, forces / np.where(total > 0.0, total, 1.0), 0.0)
-    roll = result["wheelset_roll"][:, wheelset, None]
-    # to the axes of the wheelset
+    body = result.bodies.index(result.wheelsets[wheelset])
+    roll = result["body_position"][:, body, 3, None]
+    # from the axes of the track to those of the wheelset
     across = result["patch_y"][at] + roll * result["patch_z"][at]
     centres = (-1.0, 1.0)[side] * across - tape
     widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))

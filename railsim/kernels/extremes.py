@@ -9,7 +9,9 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
-from railsim.kernels.support import HALF_BASE, SUPPORT_SIZE, support_begin
+from railsim.kernels.rails import against_rails
+from railsim.kernels.support import SUPPORT_SIZE, support_begin
+from railsim.kernels.system import Z_0
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
 (
@@ -42,8 +44,11 @@ def note_unloaded(wheel, h, unloaded):
 
 
 @compiled(inline=True)
-def note_extremes(system, wheel, state, present, extremes):
-    """Take the values of this instant into the extremes; `present` is scratch of their size."""
+def note_extremes(system, wheel, plane, state, present, extremes):
+    """Take the values of this instant into the extremes; `present` is scratch of their size.
+
+    `wheel` and `plane` are those of the state: wheel forces and planes of the rails.
+    """
     time, s = state[-3], state[-2]
     body = system.contact.body
     rails = support_begin(system)
@@ -59,14 +64,16 @@ def note_extremes(system, wheel, state, present, extremes):
         left, right = present[X_Y], present[X_Y_RIGHT]
         present[X_SUM_Y] = left + right
         present[X_SUM_ABS_Y] = abs(left) + abs(right)
-        present[X_LATERAL] = state[b + 1]
-        present[X_ROLL] = state[b + 3]
-        present[X_YAW] = state[b + 5]
+        left_y, left_z, right_y, right_z = 0.0, 0.0, 0.0, 0.0
         if system.support.elastic:
-            # relative to the rails where they are
             i = rails + SUPPORT_SIZE * w
-            present[X_LATERAL] -= 0.5 * (state[i] + state[i + 2])
-            present[X_ROLL] -= (state[i + 3] - state[i + 1]) / (2.0 * system.support.row[HALF_BASE])
+            left_y, left_z, right_y, right_z = state[i], state[i + 1], state[i + 2], state[i + 3]
+        height = system.bodies.row[body[w], Z_0]
+        y, z, roll = state[b + 1], state[b + 2] + height, state[b + 3]
+        present[X_LATERAL], present[X_ROLL] = against_rails(
+            plane, w, y, z, roll, left_y, left_z, right_y, right_z
+        )
+        present[X_YAW] = state[b + 5]
         for k in range(X_YAW + 1):
             value = present[k]
             if value > extremes[MAX, w, k]:

@@ -20,6 +20,8 @@ which the wheel slips.  On rigid rails all four are zero.
 
 from math import asin, sqrt
 
+import numpy as np
+
 from railsim.kernels import compiled
 from railsim.kernels.track_frame import (
     MU_LEFT,
@@ -142,3 +144,63 @@ def foresee(track, s, speed, w, plane, rail, state, own, h, coming):
         coming[side, COMING_Y] = change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[own + 1]
         coming[side, COMING_Z] = change * (now - z_slope) + h * state[own + 2]
         coming[side, COMING_ROLL] = h * state[own + 3]
+
+
+@compiled(inline=True)
+def against_rails(plane, w, y, z, roll, left_y, left_z, right_y, right_z):
+    """Lateral displacement and roll of wheelset `w` against its irregular, deflected rails.
+
+    The displacement is that of the wheelset's centre from the middle of the rails, along the line
+    over their tops; the roll is that against this line.
+
+    Parameters
+    ----------
+    plane : float64[w, PLANE_SIZE]
+    y, z, roll : float
+        Centre of the wheelset in the track frame, z from the rail tops [m], and its roll [rad].
+    left_y, left_z, right_y, right_z : float
+        What the rails yield, in the axes of their plane [m].
+    """
+    sine, cosine = plane[w, SINE], plane[w, COSINE]
+    y -= plane[w, MIDDLE_Y]
+    z -= plane[w, MIDDLE_Z]
+    lean = (right_z - left_z) / CANT_BASE
+    across = cosine * y + sine * z - 0.5 * (left_y + right_y)
+    up = cosine * z - sine * y - 0.5 * (left_z + right_z)
+    return across + lean * up, roll - plane[w, ROLL] - lean
+
+
+@compiled(in_loop=False)
+def recorded_against_rails(track, body, offset, height, first, size, states, plane, rail, found):
+    """`against_rails` of all wheelsets in recorded states.
+
+    Parameters
+    ----------
+    track : TrackTables
+    body : int64[w]
+        Body of each wheelset.
+    offset, height : float64[w]
+        Of each wheelset from the reference body along the track and from the rail tops [m].
+    first, size : int
+        Where the rails of the first wheelset stand in a state, and how far the next ones are from
+        them; a size of 0: rails are rigid.
+    states : float64[time, n_state]
+    plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
+        Scratch; the planes as those of smooth rails.
+    found : float64[time, w, 2]
+        Lateral displacement [m] and roll [rad] (output).
+    """
+    yielded = np.zeros(4)
+    for i in range(states.shape[0]):
+        for w in range(body.shape[0]):
+            if track.has_irregularity:
+                cell, u = cell_of(track, states[i, -2] + offset[w])
+                if cell >= 0:
+                    locate_displaced(track.rail, cell, u, w, plane, rail)
+            if size > 0:
+                yielded = states[i, first + size * w : first + size * w + 4]
+            b = 6 * body[w]
+            y, z, roll = states[i, b + 1], states[i, b + 2] + height[w], states[i, b + 3]
+            found[i, w, 0], found[i, w, 1] = against_rails(
+                plane, w, y, z, roll, yielded[0], yielded[1], yielded[2], yielded[3]
+            )

@@ -438,7 +438,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
         else:
             status, where, patches = mechanics(system, work, state, derivative, AFTER_STEP)
         if status == RUNNING:
-            note_extremes(system, work.wheel, state, work.present, work.extremes)
+            note_extremes(system, work.wheel, work.plane, state, work.present, work.extremes)
             if scheme == RK4:
                 internal_rates(system, work, state, derivative)
                 support_rates(system, work, state, derivative)

@@ -56,7 +56,7 @@ def work_arrays(system: System) -> Work:
         laws=aligned_zeros(9 * LANES),
         decay=aligned_zeros(len(system.internal.kind)),
         contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
-        plane=_smooth_planes(n_wheelsets),
+        plane=smooth_planes(n_wheelsets),
         rail=aligned_zeros((n_wheelsets, 2, RAIL_SIZE)),
         rail_motion=aligned_zeros((n_wheelsets, 2, MOTION_SIZE)),
         above=aligned_zeros(10),
@@ -84,7 +84,7 @@ def work_arrays(system: System) -> Work:
     )
 
 
-def _smooth_planes(n_wheelsets: int) -> Floats:
+def smooth_planes(n_wheelsets: int) -> Floats:
     """Planes of rails that are not displaced: they turn nothing."""
     plane = aligned_zeros((n_wheelsets, PLANE_SIZE))
     plane[:, COSINE] = 1.0

@@ -36,6 +36,13 @@ NUMBERS = (
 )  # fmt: skip
 STATES = ("complete", "derailed", "stopped")
 
+OLDER = {
+    "railsim-result/1": "The file has the older format railsim-result/1: wheelset_lateral and "
+    "wheelset_roll are relative to the design track, on elastic rails less the deflection of the "
+    "rails, instead of relative to the irregular rails."
+}
+"""Older formats that are read, and the remark on what they hold."""
+
 MOST_MEMBERS = 1000
 FILTERS = {h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 DEFLATE_RATIO = 100  # what compression may save at most, over the whole file
@@ -190,9 +197,9 @@ class _Reader:
     def result(self, *, whole: bool) -> Result:
         file = self._file
         facts = self._attributes(file, "")
-        if facts.get("format") != FORMAT:
-            found = f"found {facts.get('format', 'nothing')}"
-            raise self.fault("format", found, f"a result says '{FORMAT}'")
+        known = facts.get("format")
+        if known not in (FORMAT, *OLDER):
+            raise self.fault("format", f"found {known or 'nothing'}", f"a result says '{FORMAT}'")
         members = dict(self._members(file, ""))
         groups = {name: group for name, group in members.items() if isinstance(group, h5py.Group)}
         inner = {name: dict(self._members(group, f"{name}/")) for name, group in groups.items()}
@@ -205,6 +212,9 @@ class _Reader:
             self._check_digest(facts)
         facts.pop(DIGEST, None)
         self._check_facts(facts)
+        if known in OLDER:
+            remarks = [*str(facts.get("remarks", "")).splitlines(), OLDER[known]]
+            facts["remarks"] = "\n".join(dict.fromkeys(remarks))
         datasets = {name: each for name, each in members.items() if name not in groups}
         coordinates, quantities = self._described(datasets)
         profiles = {

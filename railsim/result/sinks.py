@@ -24,7 +24,7 @@ from railsim.profiles.profile import Profile
 from railsim.result.data import Array, Attributes, Result
 from railsim.version import __version__
 
-FORMAT = "railsim-result/1"
+FORMAT = "railsim-result/2"
 ALWAYS = tuple(QUANTITIES.values())
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 

@@ -6,7 +6,6 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.constants import CANT_BASE
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -24,11 +23,13 @@ from railsim.kernels.contact_columns import (
     W_Y,
 )
 from railsim.kernels.driving import recorded_axle_torques
+from railsim.kernels.rails import RAIL_SIZE, recorded_against_rails
 from railsim.kernels.support import RAIL_DOF, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS
+from railsim.kernels.system import N_SCALARS, Z_0
 from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model
 from railsim.model.time_step import empty_recorder
+from railsim.model.work import smooth_planes
 from railsim.notation import COMPONENTS, PATCHES, QUANTITIES, REQUESTED, Quantity
 from railsim.result.sensors import all_sensors, motions, readings
 from railsim.track.alignment import alignment_of
@@ -63,12 +64,7 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     # a wheel that carries nothing has no derailment quotient
     loaded = np.where(Q > 0.0, Q, np.nan)
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
-    lateral, roll = position[:, axles, LATERAL], position[:, axles, ROLL]
-    if model.system.support.elastic:
-        deflection = rail_deflection(model, state)
-        left, right = deflection[:, :, 0], deflection[:, :, 1]
-        lateral = lateral - _of_both(deflection[..., 0]) / 2.0
-        roll = roll - (right[..., 1] - left[..., 1]) / CANT_BASE
+    on_rails = against_rails(model, state)
     return {
         "time": state[:, -3],
         "distance": state[:, -2],
@@ -78,8 +74,8 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "dQ_over_Q0": (Q - Q0) / Q0,
         "sum_Y": _of_both(Y),
         "sum_abs_Y": _of_both(np.abs(Y)),
-        "wheelset_lateral": lateral,
-        "wheelset_roll": roll,
+        "wheelset_lateral": on_rails[..., 0],
+        "wheelset_roll": on_rails[..., 1],
         "wheelset_yaw": position[:, axles, YAW],
         "wheelset_distance": state[:, -2, None] + offsets + position[:, axles, 0],
         "xi_x": wheel[..., W_XI_X],
@@ -91,6 +87,37 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
     }
+
+
+def against_rails(model: Model, state: Floats) -> Floats:
+    """Lateral displacement and roll of each wheelset against its rails, from recorded states.
+
+    Returns
+    -------
+    float64[time, wheelset, 2]
+        [m], [rad]
+    """
+    system = model.system
+    axles, elastic = system.contact.body, system.support.elastic
+    found = np.empty((len(state), len(axles), 2))
+    recorded_against_rails(
+        system.track,
+        axles,
+        system.frame_offset[system.bodies.frame[axles]],
+        system.bodies.row[axles, Z_0],
+        _first_rail(model, state),
+        SUPPORT_SIZE if elastic else 0,
+        state,
+        smooth_planes(len(axles)),
+        np.zeros((len(axles), 2, RAIL_SIZE)),
+        found,
+    )
+    return found
+
+
+def _first_rail(model: Model, state: Floats) -> int:
+    """Index of the first wheelset's elastic rails in a state."""
+    return int(state.shape[1] - N_SCALARS - len(model.index.wheelsets) * SUPPORT_SIZE)
 
 
 def _of_both(values: Floats) -> Floats:
@@ -137,8 +164,8 @@ def rail_deflection(model: Model, state: Floats) -> Floats:
     rows, wheelsets = len(state), len(model.index.wheelsets)
     if not model.system.support.elastic:
         return np.zeros((rows, wheelsets, 2, 2))
-    end = state.shape[1] - N_SCALARS
-    track = state[:, end - wheelsets * SUPPORT_SIZE : end].reshape(rows, wheelsets, SUPPORT_SIZE)
+    first = _first_rail(model, state)
+    track = state[:, first:-N_SCALARS].reshape(rows, wheelsets, SUPPORT_SIZE)
     return track[..., :RAIL_DOF].reshape(rows, wheelsets, 2, 2)
 
 
@@ -325,12 +352,12 @@ class OutputPlan:
         if self._asked.track:
             values |= self._track(values["wheelset_distance"])
             deflection = rail_deflection(self._model, recorder.state[:rows])
+            axles = self._model.system.contact.body
             values |= {
                 "rail_deflection_lateral": deflection[..., 0],
                 "rail_deflection_vertical": deflection[..., 1],
-                "wheelset_lateral_on_rails": (
-                    values["wheelset_lateral"] - values["rail_lateral"].mean(axis=-1)
-                ),
+                "wheelset_lateral_on_track": values["body_position"][:, axles, LATERAL],
+                "wheelset_roll_on_track": values["body_position"][:, axles, ROLL],
             }
         distance = values["distance"]
         later = {

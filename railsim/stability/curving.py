@@ -37,6 +37,7 @@ from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
 from railsim.model.work import work_arrays
 from railsim.profiles import Profile
+from railsim.simulation.outputs import against_rails
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -403,7 +404,7 @@ class _Search:
             "dQ_over_Q0": (Q - self.Q0) / self.Q0,
             "T_gamma": wheel[:, :, W_T_GAMMA],
             "contact_y": _contact_positions(solver, len(wheelsets)),
-            "lateral": state[6 * wheelsets + 1],
+            "lateral": against_rails(self.model, state[None])[0, :, 0],
             "attack": state[6 * wheelsets + 5],
             "sum_Y": Y.sum(axis=1),
             "steering": state[[6 * b + 5 for b in frames]],

@@ -20,6 +20,7 @@ from railsim.linear.circle import POSITION
 from railsim.linear.vehicle import LinearVehicle
 from railsim.model.time_step import SCHEMES, Stability, empty_recorder
 from railsim.model.work import work_arrays
+from railsim.simulation.outputs import against_rails
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class Stretch:
     time : float64[k]
         From the beginning of the stretch [s].
     lateral : float64[k, wheelset]
-        Lateral displacements of the wheelsets [m].
+        Lateral displacements of the wheelsets from the middle of their rails [m].
     sum_Y : float64[k, wheelset]
         Lateral forces of the wheelsets on the track [N]; zero where a system has none.
     """
@@ -174,6 +175,6 @@ class VehicleMotion:
         return Stretch(
             state,
             offset + self.step * self.every * np.arange(rows),
-            self._recorder.state[:rows][:, self._indices].copy(),
+            against_rails(self.model, self._recorder.state[:rows])[..., 0],
             wheel.sum(axis=2),
         )

@@ -15,6 +15,7 @@ from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import CONSTANT_SPEED, work_arrays
+from railsim.simulation.outputs import against_rails
 from railsim.stability.motion import VehicleMotion
 
 Floats = NDArray[np.float64]
@@ -125,7 +126,7 @@ class VehicleFlow:
 
     def amplitude(self, state: Floats, duration: float, speed: float) -> float:
         """Half the largest lateral travel of a wheelset within `duration` [m]."""
-        y = self._seen(state, duration, speed)[:, 6 * self._system.contact.body + 1]
+        y = against_rails(self._motion.model, self._seen(state, duration, speed))[..., 0]
         return float(0.5 * np.max(np.ptp(y, axis=0)))
 
     def scale(self, state: Floats, duration: float, speed: float, amplitude: float) -> Floats:

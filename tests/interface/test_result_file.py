@@ -53,7 +53,7 @@ def test_root_attributes_are_plain_text_and_numbers(written):
             assert isinstance(file.attrs[name], str)
         for name in ("wall_time", "cpu_time", "real_time_factor"):
             assert isinstance(file.attrs[name], float)
-        assert file.attrs["format"] == "railsim-result/1"
+        assert file.attrs["format"] == "railsim-result/2"
 
 
 def test_file_opens_in_xarray_with_coordinates_by_name(written):
@@ -219,9 +219,26 @@ def test_result_that_lacks_something_is_refused(written, tmp_path, change, found
     assert f"{path}: {found}" in str(caught.value)
 
 
+def test_older_format_is_read_with_a_remark_on_what_has_changed(written, tmp_path):
+    """Until railsim-result/1 `wheelset_lateral` was relative to the design track."""
+    path, again = tmp_path / "old.h5", tmp_path / "again.h5"
+    path.write_bytes(written.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file.attrs["format"] = "railsim-result/1"
+        file.attrs["digest"] = content_digest(file)
+    result = open_run(path)
+    (remark,) = result.remarks
+    assert "railsim-result/1" in remark
+    assert "relative to the design track" in remark
+    # a copy keeps format and remark
+    result.to_hdf5(again)
+    assert open_run(again).remarks == (remark,)
+    assert open_run(again).attributes["format"] == "railsim-result/1"
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "no such file"), (b"no HDF5", "not an HDF5 file"), ("hdf5", "'railsim-result/1'")],
+    [(None, "no such file"), (b"no HDF5", "not an HDF5 file"), ("hdf5", "'railsim-result/2'")],
 )
 def test_what_is_not_a_result_is_refused(tmp_path, content, words):
     path = tmp_path / "other.h5"

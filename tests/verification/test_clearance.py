@@ -1,7 +1,7 @@
 """Wide gauges and narrow wheelsets: the contact table covers the whole clearance."""
 
 import pytest
-from dynamics import changed, load_track, load_vehicle
+from dynamics import Settings, changed, load_any_track, load_track, load_vehicle
 from selection import points
 
 from railsim import simulate
@@ -29,3 +29,26 @@ def test_coach_runs_in_a_curve_with_more_clearance(gauge, back_to_back, widening
     added = 0.5 * (gauge - 1.435 + 1.360 - back_to_back + widening)
     # to the left, with the flange on the outer rail: R 250 m with the usual clearance -6.3 mm
     assert result.wheelset_lateral[-1, 0] == pytest.approx(-6.3e-3 - added, abs=1.0e-3)
+
+
+@pytest.mark.parametrize("coach", ["coach_manchester", "coach_flexicoil"])
+def test_flanging_wheelset_on_elastic_rails_lies_farther_out_by_half_of_what_the_gauge_widens(
+    coach,
+):
+    """Its displacement is that from the middle of the rails where they are, along their tops.
+
+    0.05 mm: the outer rail settles by 0.5 mm more than the inner one, and leans the axle by 0.4
+    mrad; if the displacement were along the design track, its centre, 0.46 m above the rails,
+    would be 0.17 mm off.
+    """
+    settings = Settings(outputs={"track": True})
+    rigid, elastic = (
+        simulate(load_vehicle(coach), track, speed=20.0, start=380.0, until=396.0,
+                 settings=settings)
+        for track in (load_track("curve_r250"), load_any_track("curve_r250"))
+    )  # fmt: skip
+    left, right = elastic["rail_deflection_lateral"][-1, 0]
+    widened = 0.5 * (right - left)
+    assert widened > 0.8e-3
+    further = rigid.wheelset_lateral[-1, 0] - elastic.wheelset_lateral[-1, 0]
+    assert further == pytest.approx(widened, abs=0.05e-3)

@@ -188,12 +188,17 @@ def runs(vehicle, tracks, speed, until=None, settings=None):
 def differences(one, two, begin=BEGIN):
     """Largest difference over largest change of each quantity of the two runs.
 
-    Forces of wheels and wheelsets, accelerations of the car body (those that change by 1e-3 m/s2 or
+    Forces of wheels and wheelsets, displacement and roll of these against their rails (those that
+    change by 1e-5 at least), accelerations of the car body (those that change by 1e-3 m/s2 or
     rad/s2 at least); what hardly changes is measured against a tenth of the largest of its kind.
     """
     rows = one.distance > begin - 15.0
     assert np.allclose(one.distance, two.distance, atol=0.01)
-    forces = {name: (one[name][rows], two[name][rows]) for name in ("Q", "Y", "sum_Y")}
+
+    def of_both(*names):
+        return {name: (one[name][rows], two[name][rows]) for name in names}
+
+    forces = of_both("Q", "Y", "sum_Y")
     moved = {
         f"{name} acceleration": tuple(run.body_acceleration[rows][:, 0, k] for run in (one, two))
         for k, name in enumerate(("lateral", "vertical", "roll", "pitch", "yaw"), start=1)
@@ -204,7 +209,10 @@ def differences(one, two, begin=BEGIN):
         for name in list(moved)
         if not name.startswith(("lateral", "vertical"))
     }
-    return _ratios(forces) | _ratios(moved) | _ratios(turned)
+    found = _ratios(forces) | _ratios(moved) | _ratios(turned)
+    for name, pair in of_both("wheelset_lateral", "wheelset_roll").items():
+        found |= _ratios({name: pair} if np.ptp(pair[0]) > 1e-5 else {})
+    return found
 
 
 def _ratios(pairs):
