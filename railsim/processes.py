@@ -10,10 +10,12 @@ themselves.
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import BaseContext
+from types import ModuleType
 
 from railsim.threads import one_thread_each
 
@@ -29,19 +31,36 @@ def begin_server() -> None:
     """Let the server begin, to be there when workers are wanted; once is enough."""
     if _environment:
         return
-    before = dict(os.environ)
     _environment.update(_that_matter())
-    # the folder in which a command is given may hold modules of anybody
-    os.environ["PYTHONSAFEPATH"] = "1"
-    resource_tracker.ensure_running()  # its beginning unblocks signals
-    try:
+    with workers_begin():
+        resource_tracker.ensure_running()  # its beginning unblocks signals
         # it outlives what ends its copies, to say how they ended
-        with signals_later(REQUESTS), one_thread_each():
+        with signals_later(REQUESTS):
             multiprocessing.set_forkserver_preload([PRELOADED])
             forkserver.ensure_running()
+
+
+@contextmanager
+def workers_begin() -> Iterator[None]:
+    """Let processes that begin within the block use one thread each, and run railsim's code only.
+
+    The folder in which a command is given may hold modules of anybody, such as a received study,
+    which Python would import first.  And the script that calls railsim would be run again in each
+    process, where it calls railsim again unless it has Python's guard: workers do not need it.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    script = sys.modules["__main__"]
+    os.environ["PYTHONSAFEPATH"] = "1"
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        with one_thread_each():
+            yield
     finally:
-        del os.environ["PYTHONSAFEPATH"]
-        os.environ |= before
+        sys.modules["__main__"] = script
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 def worker_context() -> BaseContext:

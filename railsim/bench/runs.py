@@ -11,9 +11,9 @@ import numpy as np
 
 from railsim.bench.machine import SPIN, quietness
 from railsim.bench.scenarios import STUDY, Scenario
+from railsim.processes import workers_begin
 from railsim.result import Result, mid_curves
 from railsim.result.extremes import peak
-from railsim.threads import one_thread_each
 
 RELATIVE = ("Q", "Y", "sum_Y", "wheelset_lateral", "wheelset_yaw", "Y_over_Q")
 
@@ -93,12 +93,12 @@ def two_cores(
     """
     context = multiprocessing.get_context("spawn")
     batch = [scenario for _ in range(repetitions) for scenario in runs]
-    with one_thread_each(), ProcessPoolExecutor(2, context) as pool:
+    with workers_begin(), ProcessPoolExecutor(2, context) as pool:
         _start(pool, runs, 2)
         before = quietness(pool, spins)
         wall_two, cpu_two, loop_two = _batch(pool, batch)
         after = quietness(pool, spins)
-    with one_thread_each(), ProcessPoolExecutor(1, context) as pool:
+    with workers_begin(), ProcessPoolExecutor(1, context) as pool:
         _start(pool, runs, 1)
         wall_one, cpu_one, loop_one = _batch(pool, batch)
     return {

@@ -164,7 +164,7 @@ def command(
 
     DIR receives one HDF5 file per run, summary.csv and study.json.  A finished run with the
     same inputs is not computed again, so the same command can be repeated after an interruption.
-    --resume alone continues the study in DIR.
+    --resume alone continues the study in DIR; --quantities must be given again.
 
     \b
     Example:
@@ -207,7 +207,8 @@ def command(
     if file is not None:
         inputs = _of_file(file, inputs)
     base = Path.cwd()
-    if resume and not any(inputs.values()):
+    if resume and not any(value for name, value in inputs.items() if name != "quantities"):
+        from railsim.studies.own import repeated
         from railsim.studies.study import stored_inputs
 
         stored, base = stored_inputs(Path(out))
@@ -225,7 +226,9 @@ def command(
                     as_json=as_json,
                     quiet=quiet,
                 )
+        function = repeated(stored.quantities, inputs["quantities"])
         inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
+        inputs["quantities"] = function
         for name in ("keep", "compress", "single"):
             how.pop(name)
     elif file is None:

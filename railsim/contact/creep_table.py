@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from railsim.contact.kalker import kalker_coefficients
 from railsim.kernels.creep_table import N_PSI, N_RATIO, N_T, N_THETA, RATIO_MAX, T_HALF
-from railsim.threads import one_thread_each
+from railsim.processes import workers_begin
 
 # the generator's solver; a run reads the finished table only
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ def build_nodes(folder: Path, workers: int = 2) -> Iterator[tuple[int, int]]:
         return
     # "spawn": a fork of a process that has run compiled code with threads may hang
     with (
-        one_thread_each(),
+        workers_begin(),
         ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool,
     ):
         for future in as_completed(pool.submit(_stored_row, folder, i, j) for i, j in missing):

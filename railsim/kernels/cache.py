@@ -71,7 +71,7 @@ def own_folder(*names: str, base: Path | None = None) -> Path | None:
         reason = str(getattr(error, "strerror", None) or error)
     if reason:
         notice(
-            f"the cache {folder} is not used, each start compiles anew: {reason}; choose another "
+            f"the cache {folder} is not used, each start compiles again: {reason}; choose another "
             "folder by RAILSIM_CACHE_DIR"
         )
         return None

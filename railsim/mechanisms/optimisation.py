@@ -23,6 +23,7 @@ from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
 from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of, own_choice
+from railsim.processes import workers_begin
 from railsim.units import duration_in_words
 
 Floats = NDArray[np.float64]
@@ -142,7 +143,8 @@ def _search(definition: Mechanism, judge: Judge, jobs: Sequence[Any], workers: i
         rough = Judge(definition, EVERY)
         found = [_run(rough, index, begin, choice, SEARCH) for _, index, begin, choice in jobs]
         return _finished(judge, found, [_run(judge, *job) for job in _finals(judge, found)])
-    with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as pool:
+    context = get_context("forkserver")
+    with workers_begin(), ProcessPoolExecutor(workers, mp_context=context) as pool:
         found = list(pool.map(_run_job, [(*job, SEARCH, EVERY) for job in jobs], chunksize=1))
         finals = [(definition, *job, 1) for job in _finals(judge, found)]
         return _finished(judge, found, list(pool.map(_run_job, finals, chunksize=1)))

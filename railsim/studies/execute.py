@@ -29,7 +29,7 @@ from typing import Any
 from railsim.errors import Fault, InputError, ModelError, RailsimError, words_of
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
-from railsim.processes import hear_requests, signals_later, worker_context
+from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
 from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.studies.analyses import analysed
@@ -38,7 +38,6 @@ from railsim.studies.journal import Record
 from railsim.studies.keep import EVERYTHING, Keep
 from railsim.studies.run import can_share_a_call, run_case, run_cases
 from railsim.studies.summary import analysed_record, failed_record, finished_record, stopped_record
-from railsim.threads import one_thread_each
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
@@ -261,7 +260,7 @@ class _Pool:
 
     def _submit(self, indices: Sequence[int]) -> set[Future[list[Record]]]:
         new = set()
-        with signals_later(), one_thread_each():  # inherited by the processes
+        with signals_later(), workers_begin():  # inherited by the processes
             for index in indices:
                 future = self._pool.submit(_work, index, self._batches[index])
                 self._index_of[future] = index

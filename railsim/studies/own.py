@@ -50,6 +50,23 @@ def named(function: "str | Function | None") -> str | None:
     return whole
 
 
+def repeated(stored: str | None, given: str | None) -> str | None:
+    """Return the function of a study that is continued, as `named`.
+
+    The folder of a study may come from somebody else, and a function is code: the one that the
+    folder names is never loaded because of that.
+
+    Raises
+    ------
+    InputError : the study has a function, and none is given; as `named`.
+    """
+    if stored and not given:
+        found = f"the study in this folder calls the function {stored}"
+        allowed = f"read it, then give {OPTION} FILE.py:FUNCTION too: it runs with your rights"
+        raise InputError([Fault("--resume", "", found, allowed)])
+    return named(given)
+
+
 def fingerprint(name: str | None) -> str:
     """Return a hash of the file of a function, empty if there is no function."""
     if name is None:

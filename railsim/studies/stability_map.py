@@ -19,9 +19,9 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, RailsimError
+from railsim.processes import workers_begin
 from railsim.stability.critical_speed import critical_speed
 from railsim.studies.kept import Record, keep, read_kept
-from railsim.threads import one_thread_each
 from railsim.version import __version__
 
 Progress = Callable[[float], None]
@@ -108,7 +108,7 @@ def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
         return
     # "spawn": a fork of a process that has run compiled code with threads may hang
     context = multiprocessing.get_context("spawn")
-    with one_thread_each(), ProcessPoolExecutor(workers, context) as pool:
+    with workers_begin(), ProcessPoolExecutor(workers, context) as pool:
         futures = {pool.submit(point_record, *jobs[number]): number for number in waiting}
         try:
             for future in as_completed(futures):

@@ -432,6 +432,27 @@ def test_processes_give_the_same_arrays_as_one_run(tmp_path):
 
 
 @pytest.mark.slow
+def test_script_without_a_guard_runs_once_and_nothing_of_the_folder_it_is_started_in(tmp_path):
+    """Workers run railsim's code only, neither the script again nor modules that lie there."""
+    here = tmp_path / "received"
+    here.mkdir()
+    for name in ("socket", "pickle", "signal", "numpy", "multiprocessing"):
+        (here / f"{name}.py").write_text(f"open('{name}.loaded', 'w')")
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import railsim; print('begin');"
+        f"outcome = railsim.study('{COACH}', '{STRAIGHT}', [20.0, 21.0], until=1.0,"
+        "    workers=2, out='s');"
+        "print(*(record['status'] for record in outcome.records))"
+    )
+    command = [sys.executable, str(script)]
+    done = subprocess.run(command, cwd=here, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["begin", "complete complete"]
+    assert done.stderr == ""
+    assert not list(here.glob("*.loaded"))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False], ids=["compiled before", "first run"])
 def test_first_run_compiles_alone(tmp_path, monkeypatch, compiled):
     events = []

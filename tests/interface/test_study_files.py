@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from railsim.cli import main
 from railsim.definitions.loading import load_study, load_track, load_vehicle
 from railsim.definitions.study import Sample, Spread
 from railsim.errors import InputError
+from railsim.studies import own
 from railsim.studies.combine import combinations
 from railsim.studies.rows import made_rows, quantile, sampled
 
@@ -168,12 +170,39 @@ def test_own_quantities_stand_in_record_and_summary_and_follow_their_file(tmp_pa
     result = railsim.open_result(out / f"{COACH}_{CURVE}_10.h5")
     assert float(rows(out)[0]["twice"]) == 2.0 * result.Q.max()
     file.write_text("def mine(result):\n    return {'thrice': 3.0 * result.Q.max()}\n")
-    from railsim.studies.own import _loaded
-
-    _loaded.cache_clear()  # another process would load it anew
+    own._loaded.cache_clear()  # another process would load it anew
     assert main(arguments(out, 10, more=more)) == 0
     assert float(rows(out)[0]["thrice"]) == 3.0 * result.Q.max()
     assert simulated == [10.0]  # the run itself is kept
+
+
+@pytest.mark.parametrize("computed", [True, False])
+def test_function_that_a_received_study_names_is_not_loaded(
+    tmp_path, simulated, capsys, monkeypatch, computed
+):
+    """Whether or not there is a run left to compute; a function that the user gives is."""
+    received, mine = tmp_path / "received", tmp_path / "mine"
+    mine.mkdir()
+    (tmp_path / "q.py").write_text("def f(result):\n    return {'x': 1.0}\n")
+    arguments_ = arguments(received, 10, more=["--quantities", f"{tmp_path / 'q.py'}:f"])
+    assert main(arguments_) == 0
+    (tmp_path / "q.py").write_text(f"open({str(tmp_path / 'loaded')!r}, 'w')\nf = dict\n")
+    shutil.copy(tmp_path / "q.py", received)
+    if not computed:
+        (received / f"{COACH}_{CURVE}_10.h5").unlink()
+    own._loaded.cache_clear()
+    monkeypatch.chdir(mine)
+    before = sorted(path.stat().st_mtime_ns for path in received.iterdir())
+    resume = ["study", "--resume", "--out", str(received), "--workers", "1"]
+    assert main(resume) == 2
+    assert f"calls the function {tmp_path / 'q.py'}:f" in capsys.readouterr().err
+    assert not (tmp_path / "loaded").exists()
+    assert sorted(path.stat().st_mtime_ns for path in received.iterdir()) == before
+    # the user's own of this name, not the one in the folder of the study
+    (mine / "q.py").write_text("def f(result):\n    return {'y': 2.0}\n")
+    assert main([*resume, "--quantities", "q.py:f"]) == 0
+    assert float(rows(received)[0]["y"]) == 2.0
+    assert not (tmp_path / "loaded").exists()
 
 
 def test_own_quantities_that_go_wrong_fail_their_run_only(tmp_path, simulated, capsys):
