@@ -65,7 +65,7 @@ def nanoseconds(law, n, grid, inputs, rounds=25):
     return 1e9 * best / times / n
 
 
-def step_microseconds(rounds=200):
+def step_microseconds(rounds):
     """Least time of a step of the fast scheme by law, measured in turns; and the chosen steps."""
     vehicle, track, speed, distance = CURVE
     never = 1 << 40
@@ -92,6 +92,7 @@ def step_microseconds(rounds=200):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--patches", type=int, default=10)
+    parser.add_argument("--rounds", type=int, default=200)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     inputs = patches(options.patches)
@@ -105,7 +106,7 @@ def main():
             for law in ("table", "fastrip", "polach", "linear")
         },
     }
-    found["step_us"], found["step_s"] = step_microseconds()
+    found["step_us"], found["step_s"] = step_microseconds(options.rounds)
     if options.json:
         print(json.dumps(found))
         return

@@ -19,8 +19,9 @@ import numpy as np
 from exudyn_contact import OUTPUT, forces_of
 
 from railsim.definitions.flatten import flatten
-from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.loading import load_vehicle
 from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.status import RUNNING
 from railsim.model.work import work_arrays
@@ -61,9 +62,9 @@ class Records(NamedTuple):
 class ExudynCoach:
     """The coach on a track, ready to be solved once."""
 
-    def __init__(self, track: str, speed: float, until: float) -> None:
+    def __init__(self, track: Track, speed: float, until: float) -> None:
         vehicle = simplified_coach()
-        prepared = prepare(vehicle, load_track(track), Settings(), speed, until=until)
+        prepared = prepare(vehicle, track, Settings(), speed, until=until)
         self.duration = until / speed
         self.speed = speed
         self.Q0 = prepared.balance.Q0

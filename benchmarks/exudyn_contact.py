@@ -11,6 +11,7 @@ from math import asin, atan2, cos, sin
 import numba
 import numpy as np
 
+from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rhs import kinematics, locate_frames
 from railsim.kernels.status import RUNNING
@@ -20,6 +21,16 @@ from railsim.kernels.wheel_rail import wheel_rail
 
 HOLD_STIFFNESS, HOLD_DAMPING = 1e7, 1e6  # N/m, N s/m: keeps the car body at V t
 OUTPUT = 0.005  # s
+
+
+@compiled
+def contact(system, work, speed, state):
+    """`wheel_rail` as a function to call from code that numba compiles in its usual way.
+
+    `wheel_rail` is put into its caller, and with it views of arrays that railsim's kernels do not
+    count.  A caller that counts references would free them, and the arrays behind them, in use.
+    """
+    return wheel_rail(system, work, speed, state)
 
 
 @numba.njit(cache=True)
@@ -114,7 +125,7 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
         state[j + 4] = -sy * cr * u[0] + cy * cr * u[1] + sr * u[2]
         state[j + 5] = sy * sr * u[0] - cy * sr * u[1] + cr * u[2]
     kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
-    status, _, _ = wheel_rail(system, work, speed, state)
+    status, _, _ = contact(system, work, speed, state)
     if status != RUNNING:
         return status
     for c in range(system.contact.body.shape[0]):

@@ -9,6 +9,7 @@ CPU time and peak memory are those of the process.
 import argparse
 import json
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -77,10 +78,10 @@ def evaluation(vehicle: Vehicle, settings: Settings) -> dict[str, Any]:
     }
 
 
-def output_rates() -> list[dict[str, Any]]:
+def output_rates(rates: Sequence[float]) -> list[dict[str, Any]]:
     vehicle, track = load_vehicle("coach_manchester"), load_track("curve_r250")
     found = []
-    for rate in RATES:
+    for rate in rates:
         settings = Settings(output_rate=rate)
         runs = [simulate(vehicle, track, speed=SPEED, settings=settings) for _ in range(3)]
         best = min(runs, key=lambda run: float(run.attributes["cpu_time"]))
@@ -138,14 +139,18 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", default="growth.json")
     parser.add_argument("--lengths", type=float, nargs="*", default=LENGTHS)
+    parser.add_argument("--coaches", type=int, nargs="*", default=COACHES)
+    parser.add_argument("--grids", type=int, nargs="*", default=GRIDS)
+    parser.add_argument("--rates", type=float, nargs="*", default=RATES)
     options = parser.parse_args()
     coach = load_vehicle("coach_manchester")
     found: dict[str, Any] = {"hardware": hardware(), "versions": versions()}
-    found["wheelsets"] = [evaluation(train(coaches), Settings()) for coaches in COACHES]
+    found["wheelsets"] = [evaluation(train(coaches), Settings()) for coaches in options.coaches]
     found["cells"] = [
-        {"grid": grid, **evaluation(coach, Settings(fastsim_grid=(grid, grid)))} for grid in GRIDS
+        {"grid": grid, **evaluation(coach, Settings(fastsim_grid=(grid, grid)))}
+        for grid in options.grids
     ]
-    found["output"] = output_rates()
+    found["output"] = output_rates(options.rates)
     with TemporaryDirectory() as name:
         found["length"] = [long_run(length, Path(name)) for length in options.lengths]
     text = json.dumps(found, indent=2, default=float)

@@ -1,11 +1,12 @@
 """Speed of the tool for linkages: kinematics with force, search, the whole command.
 
-    python benchmarks/mechanisms.py
+    python benchmarks/mechanisms.py [--starts 20]
 
 Times are CPU times of this process where one does the work, else wall times; the machine is told.
 A loop of Python with the closed form of lift 5 and its force is the peer in the same run.
 """
 
+import argparse
 import os
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
 from railsim.mechanisms.optimisation import optimise
 
-POSITIONS, REPEATS, STARTS = 1000, 20, 20
+POSITIONS, REPEATS = 1000, 20
 
 
 def best(function):
@@ -58,11 +59,11 @@ def closed_form_in_python():
     return best(loop)
 
 
-def search(workers):
+def search(starts, workers):
     """Wall time of a search, and CPU time of this process alone [s]."""
     mechanism = load_mechanism("atr95_lift_5")
     begin, busy = time.perf_counter(), time.process_time()
-    optimise(mechanism, starts=STARTS, workers=workers)
+    optimise(mechanism, starts=starts, workers=workers)
     return time.perf_counter() - begin, time.process_time() - busy
 
 
@@ -86,6 +87,9 @@ def command():
 
 
 def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--starts", type=int, default=20)
+    starts = parser.parse_args().starts
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     positions, with_force = kinematics()
     loop = closed_form_in_python()
@@ -93,8 +97,8 @@ def main():
     print(f"closed form of the lift alone in a loop of Python: {loop / positions:.1f} times that")
     whole, version = command()
     print(f"whole command {whole:.2f} s of CPU, --version {version:.2f} s")
-    print(f"{STARTS} starts of lift 5 in one process: {search(1)[1]:.1f} s of CPU")
-    print(f"the same on 2 cores: {search(2)[0]:.1f} s of wall time")
+    print(f"{starts} starts of lift 5 in one process: {search(starts, 1)[1]:.1f} s of CPU")
+    print(f"the same on 2 cores: {search(starts, 2)[0]:.1f} s of wall time")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """railsim and its peers side by side in one run.
 
     pip install -e ".[bench]"
-    python benchmarks/peers.py [--out peers.json] [--until 450]
+    python benchmarks/peers.py [--out peers.json] [--until 450] [--small]
 
-The Manchester coach through the R 250 m curve at 20 m/s, 10 x 10 FASTSIM at every contact and
-every evaluation, the same compiled kernels everywhere:
+The Manchester coach through the R 250 m curve at 20 m/s on rigid rails, 10 x 10 FASTSIM at every
+contact and every evaluation, the same compiled kernels everywhere:
 
 - railsim's default settings;
 - scipy `solve_ivp` over the same compiled right-hand side, several methods and tolerances;
@@ -17,11 +17,14 @@ curve's track is smooth and straight, which steps of variable length cross in no
 Of each peer the fastest setting counts whose error against the converged solution is within what
 railsim's default run is allowed, or within railsim's own error where that is larger.  CPU times of
 the integration alone, of one core; all candidates of a peer run once, the best one and railsim
-three times, the least time counts.
+three times, the least time counts.  `--small` runs 20 m with one setting of each peer, to see that
+the script works.
 """
 
 import argparse
 import json
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +60,6 @@ EXUDYN = (
     ("GeneralizedAlpha", 1.25e-3),
     ("TrapezoidalIndex2", 0.5e-3),
 )
-REPETITIONS = 3
 # typical sizes of the states: absolute tolerances are these times the relative one
 LENGTH, VELOCITY, FORCE = 1e-3, 1e-2, 1e3
 
@@ -123,18 +125,30 @@ def best_of(records: list[dict[str, Any]]) -> dict[str, Any]:
     return max(records, key=lambda record: float(record["real_time"]))
 
 
+@dataclass(frozen=True)
+class Extent:
+    """How far the runs go [m]; how many settings of a peer are tried, and how often the best."""
+
+    scipy: float | None
+    exudyn: float
+    settings: int | None
+    repetitions: int
+
+
 def railsim_record(
-    vehicle: Any, track: Any, until: float | None = None
+    vehicle: Any, track: Any, until: float | None, repetitions: int
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     reference = railsim_run(vehicle, track, until, scheme="rk4", step=0.125e-3)["outputs"]
-    runs = [railsim_run(vehicle, track, until) for _ in range(REPETITIONS)]
+    runs = [railsim_run(vehicle, track, until) for _ in range(repetitions)]
     return judge(best_of(runs), reference), reference
 
 
-def scipy_candidates(track: Any, choice: tuple[tuple[str, float], ...]) -> dict[str, Any]:
+def scipy_candidates(
+    track: Any, choice: tuple[tuple[str, float], ...], extent: Extent
+) -> dict[str, Any]:
     vehicle = load_vehicle("coach_manchester")
-    ours, reference = railsim_record(vehicle, track)
-    peer = Peer.of(vehicle, track, SPEED)
+    ours, reference = railsim_record(vehicle, track, extent.scipy, extent.repetitions)
+    peer = Peer.of(vehicle, track, SPEED, extent.scipy)
     n = peer.prepared.model.index.n_bodies
     size = np.concatenate(
         [
@@ -160,22 +174,27 @@ def scipy_candidates(track: Any, choice: tuple[tuple[str, float], ...]) -> dict[
         )
         return found
 
-    candidates = [solve(method, tolerance) for method, tolerance in choice]
+    candidates = [solve(method, tolerance) for method, tolerance in choice[: extent.settings]]
     best = fastest(candidates)
     if best is not None:
-        again = [solve(best["method"], best["options"]["tolerance"]) for _ in range(2)]
+        again = [
+            solve(best["method"], best["options"]["tolerance"])
+            for _ in range(extent.repetitions - 1)
+        ]
         best = best_of([best, *again])
     return {"candidates": candidates, "best": best, "railsim": ours}
 
 
-def exudyn_candidates(until: float) -> dict[str, Any]:
+def exudyn_candidates(track: Any, extent: Extent) -> dict[str, Any]:
     from exudyn_coach import ExudynCoach, simplified_coach
 
+    until = extent.exudyn
+
     def solve(method: str, step: float) -> dict[str, Any]:
-        return ExudynCoach(TRACK, SPEED, until).solve(method, step)
+        return ExudynCoach(track, SPEED, until).solve(method, step)
 
     reference = solve("RK44", 0.25e-3)["outputs"]
-    ours, own = railsim_record(simplified_coach(), load_track(TRACK), until)
+    ours, own = railsim_record(simplified_coach(), track, until, extent.repetitions)
 
     def judged(method: str, step: float) -> dict[str, Any]:
         found = judge(solve(method, step), reference, ours)
@@ -190,10 +209,10 @@ def exudyn_candidates(until: float) -> dict[str, Any]:
         )
         return found
 
-    candidates = [judged(method, step) for method, step in EXUDYN]
+    candidates = [judged(method, step) for method, step in EXUDYN[: extent.settings]]
     best = fastest(candidates)
     if best is not None:
-        again = [judged(best["method"], best["step"]) for _ in range(2)]
+        again = [judged(best["method"], best["step"]) for _ in range(extent.repetitions - 1)]
         best = best_of([best, *again])
     return {
         "candidates": candidates,
@@ -212,17 +231,27 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", default="peers.json")
     parser.add_argument("--until", type=float, default=420.0, help="end of the Exudyn run (m)")
+    parser.add_argument("--small", action="store_true", help="20 m and one setting of each peer")
     options = parser.parse_args()
+    extent = Extent(20.0, 20.0, 1, 1) if options.small else Extent(None, options.until, None, 3)
     found: dict[str, Any] = {"hardware": hardware(), "versions": versions(("exudyn",))}
-    found["fastsim"] = measure_fastsim()
-    curve = load_track(TRACK)
-    rough = load_track("straight").replace(
-        irregularities=[{"type": "random", "spectrum": "erri_b176_low"}]
+    if not options.small:
+        found["fastsim"] = measure_fastsim()
+    curve = load_track(TRACK).with_values({"support.preset": "rigid"})
+    rough = (
+        load_track("straight")
+        .replace(irregularities=[{"type": "random", "spectrum": "erri_b176_low"}])
+        .with_values({"support.preset": "rigid"})
     )
-    found["scipy"] = scipy_candidates(curve, SCIPY)
-    found["scipy, irregular track"] = scipy_candidates(rough, SCIPY_ROUGH)
-    found["exudyn"] = exudyn_candidates(options.until)
+    found["scipy"] = scipy_candidates(curve, SCIPY, extent)
+    found["scipy, irregular track"] = scipy_candidates(rough, SCIPY_ROUGH, extent)
+    if find_spec("exudyn"):
+        found["exudyn"] = exudyn_candidates(curve, extent)
+    else:
+        print("exudyn is not installed: left out")
     for name in ("scipy", "scipy, irregular track", "exudyn"):
+        if name not in found:
+            continue
         ours, best = found[name]["railsim"], found[name]["best"]
         found[name]["ratio"] = ours["real_time"] / best["real_time"] if best else None
         print(name, "ratio", found[name]["ratio"], "railsim", ours, flush=True)

@@ -15,7 +15,7 @@ import numpy as np
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.time_loop import RK4, Chunk, time_loop
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import work_arrays
@@ -25,16 +25,20 @@ from railsim.simulation.outputs import quantities
 
 
 @numba.njit(cache=True)
-def rate(models, state, derivative):
-    """Right-hand side of the model in a typed list of one."""
+def rate(models, states, derivatives):
+    """Right-hand side of the model in a typed list of one; one state, one row."""
     system, work = models[0]
-    status, _, _ = right_hand_side(system, work, state, derivative)
+    status, _, _ = right_hand_sides(system, work, states, derivatives)
     return status
 
 
 @dataclass
 class Peer:
-    """A run ready for `solve_ivp`."""
+    """A run ready for `solve_ivp`.
+
+    On rigid rails: massless elastic rails make the motion a differential-algebraic system, which
+    none of scipy's methods integrates.
+    """
 
     prepared: Preparation
     duration: float
@@ -42,8 +46,8 @@ class Peer:
     calls: int = 0
 
     @classmethod
-    def of(cls, vehicle: Vehicle, track: Track, speed: float) -> "Peer":
-        prepared = prepare(vehicle, track, Settings(), speed)
+    def of(cls, vehicle: Vehicle, track: Track, speed: float, until: float | None = None) -> "Peer":
+        prepared = prepare(vehicle, track, Settings(), speed, until=until)
         duration = prepared.end_distance / speed
         times = np.linspace(0.0, duration, round(200.0 * duration) + 1)
         return cls(prepared, duration, times)
@@ -62,14 +66,15 @@ class Peer:
 
         system = self.prepared.model.system
         models = numba.typed.List([(system, work_arrays(system))])
-        state, derivative = self.prepared.state.copy(), np.zeros_like(self.prepared.state)
+        states = self.prepared.state[None].copy()
+        derivatives = np.zeros_like(states)
         kept = self.kept
-        rate(models, state, derivative)
+        rate(models, states, derivatives)
 
         def function(t, y):
-            state[kept] = y
-            rate(models, state, derivative)
-            return derivative[kept]
+            states[0, kept] = y
+            rate(models, states, derivatives)
+            return derivatives[0, kept]
 
         begin = time.process_time()
         solution = solve_ivp(

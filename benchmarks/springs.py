@@ -3,6 +3,7 @@
 Cold start (a new process, imports included) and warm calls apart; one core, best of five.
 """
 
+import argparse
 import platform
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from railsim.springs.search import candidates, search
 from railsim.springs.verification import verify
 
 
-def best(function: Callable[[], object], times: int = 5) -> float:
+def best(function: Callable[[], object], times: int) -> float:
     """Shortest time of some calls [s]."""
     spent = []
     for _ in range(times):
@@ -45,16 +46,19 @@ def command() -> None:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--repeats", type=int, default=5)
+    times = parser.parse_args().repeats
     suspension = load_spring("turasas_axlebox")
     task = task_of(suspension)
     sample = candidates(task.limits, task.wires)
     print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
     for name, seconds in (
-        ("design", best(lambda: design(suspension))),
-        ("verify, five loads", best(lambda: verify(suspension))),
-        ("verify with pictures and page", best(whole_page)),
-        ("the same as a command", best(command, 3)),
-        (f"evaluate {len(sample.H0)} nests", best(lambda: evaluate(task, sample))),
-        (f"search, {len(sample.H0)} candidates", best(lambda: search(suspension), 2)),
+        ("design", best(lambda: design(suspension), times)),
+        ("verify, five loads", best(lambda: verify(suspension), times)),
+        ("verify with pictures and page", best(whole_page, times)),
+        ("the same as a command", best(command, times)),
+        (f"evaluate {len(sample.H0)} nests", best(lambda: evaluate(task, sample), times)),
+        (f"search, {len(sample.H0)} candidates", best(lambda: search(suspension), 1)),
     ):
         print(f"{name:32} {seconds:8.4f} s")

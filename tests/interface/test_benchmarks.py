@@ -1,0 +1,62 @@
+"""Every script in `benchmarks/` runs, in a small form: what no test runs does not run for long."""
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+SMALL = {
+    "creep_laws.py": ["--patches", "4", "--rounds", "1"],
+    "fastsim_benchmark.py": [],
+    "growth.py": ["--coaches", "1", "--grids", "5", "--rates", "--lengths"],
+    "journal.py": ["40"],
+    "mechanisms.py": ["--starts", "1"],
+    "optimise.py": ["out", "small.toml", "--side", "3", "--seeds", "0"],
+    "peers.py": ["--small"],
+    "springs.py": ["--repeats", "1"],
+    "study_cost.py": ["out", "--vehicles", "coach_manchester", "--tracks", "straight",
+                      "--speeds", "1", "--frictions", "2", "--duration", "1", "--workers", "1"],
+}  # fmt: skip
+IMPORTED = {"exudyn_coach.py", "exudyn_contact.py", "numpy_fastsim.py", "scipy_peer.py"}
+WRITES_THE_MANUAL = {"tables.py"}  # from the figures in `benchmarks/results`
+STUDY = """
+format = "railsim-study/1"
+name = "two designs, one second"
+vehicles = ["coach_manchester"]
+tracks = ["straight"]
+speeds = [20.0]
+duration = 1.0
+
+[optimise.variables]
+"vehicle.assemblies.bogie.elements.secondary_lateral_damper.damping" = { low = 2e4, high = 4e4 }
+"vehicle.assemblies.bogie.elements.secondary_vertical_damper.damping" = { low = 1e4, high = 3e4 }
+
+[[optimise.objectives]]
+quantity = "Q_peak"
+"""
+
+
+def test_every_script_is_tried():
+    scripts = {path.name for path in BENCHMARKS.glob("*.py")}
+    assert scripts == {*SMALL, *IMPORTED, *WRITES_THE_MANUAL}
+
+
+@pytest.mark.parametrize("script", SMALL)
+def test_script_runs_in_its_small_form(script, tmp_path):
+    (tmp_path / "small.toml").write_text(STUDY)
+    done = subprocess.run(
+        [sys.executable, str(BENCHMARKS / script), *SMALL[script]],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(BENCHMARKS.parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout
+    if script == "peers.py" and not find_spec("exudyn"):
+        assert "exudyn is not installed: left out" in done.stdout
