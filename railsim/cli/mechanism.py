@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +96,10 @@ def command(
         for file, mechanism in zip(files, mechanisms, strict=True):
             with _faults_in(file, mechanism):
                 results.append(_analysed(mechanism, case))
-    found = [_values_at(result, at) for result in results]
+    found = []
+    for file, mechanism, result in zip(files, mechanisms, results, strict=True):
+        with _faults_in(file, mechanism):
+            found.append(_values_at(result, at))
     cases = {} if searched else _cases(files[0], mechanisms[0], results[0])
     written: list[Path] = []
     if out is not None:
@@ -111,7 +113,9 @@ def command(
     for line in _lines(results, found, optimum):
         echo(line)
     if not quiet:
-        for remark in dict.fromkeys(r for result in results for r in result.definition.remarks):
+        from railsim.mechanisms.remarks import remarks
+
+        for remark in dict.fromkeys(r for result in results for r in remarks(result)):
             echo(f"remark: {remark}", err=True)
         for path in written:
             echo(str(path))
@@ -162,14 +166,18 @@ def _optimised(
 
 @contextmanager
 def _faults_in(file: str, mechanism: "Mechanism") -> Iterator[None]:
-    """Let faults that computing finds name the file instead of the mechanism."""
+    """Let faults that computing finds name the file of the key, as those of loading do."""
+    from railsim.definitions.sources import find_file, read_source
     from railsim.errors import InputError
 
     try:
         yield
     except InputError as error:
+        source = read_source(find_file(file, "mechanism"), "mechanism")
         raise InputError(
-            replace(fault, file=file) if fault.file in ("", mechanism.name) else fault
+            source.fault(fault.key, fault.found, fault.allowed)
+            if fault.file in ("", mechanism.name)
+            else fault
             for fault in error.faults
         ) from None
 
@@ -235,7 +243,8 @@ def _lines(
 
 def _result_lines(result: "Analysis", at: Sequence[dict[str, Any]]) -> list[str]:
     from railsim.mechanisms import tables
-    from railsim.mechanisms.selection import checks, selection
+    from railsim.mechanisms.checks import checks
+    from railsim.mechanisms.selection import selection
     from railsim.mechanisms.tolerance import scatter
 
     definition = result.definition

@@ -188,6 +188,14 @@ class CatalogueRow(Definition):
     """Progression"""
     extended: tuple[Quantity, Quantity] | None = None
     """Extended length as factor times stroke plus constant [1, m]"""
+    F1_tolerance: tuple[tuple[Quantity, Quantity, Quantity], ...] | None = None
+    """Rows [up to F1, minus, plus] of the maker's tolerance [N]"""
+    unlock: Quantity = 0.0
+    """Travel beyond the range of use that unlocks it [m]"""
+    lock_extension: Quantity | None = None
+    """Force that it holds locked against extension [N]"""
+    lock_compression: Quantity | None = None
+    """Force that it holds locked against compression, over F1"""
 
     @model_validator(mode="after")
     def _one(self) -> Self:

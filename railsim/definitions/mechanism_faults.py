@@ -315,6 +315,9 @@ def _value_fault(key: str, quantity: float | str, value: float, allowed: str) ->
 
 def _gas_faults(key: str, gas: GasSpring, values: Mapping[str, Any]) -> list[Fault]:
     faults = []
+    if gas.rod_end is not None and gas.rod_end not in gas.gas_spring:
+        allowed = " or ".join(gas.gas_spring)
+        faults.append(Fault("", f"{key}.rod_end", f"'{gas.rod_end}' is no end of it", allowed))
     for field, least, allowed in (
         ("progression", 1.0, "1 or greater: the gas is compressed"),
         ("temperature", ABSOLUTE_ZERO, f"above {ABSOLUTE_ZERO:g} C"),

@@ -216,8 +216,8 @@ class Cylinder(Definition):
     """Cylinders side by side"""
     supply_pressure: Quantity
     """Available pressure [Pa]"""
-    acts: Literal["push", "pull"] = "push"
-    """Chamber under pressure"""
+    acts: Literal["push", "pull", "both"] = "push"
+    """Chamber under pressure; with 'both' the one that is needed"""
     pin_to_pin: Quantity | None = None
     """Shortest length of the cylinder between its pins less its stroke [m]"""
     bores: tuple[Quantity, ...] = (0.032, 0.04, 0.05, 0.063, 0.08, 0.1, 0.125, 0.16, 0.2)
@@ -381,6 +381,8 @@ class GasSpring(Definition):
     """Temperature of the gas [C]"""
     rod: Quantity | None = None
     """Diameter of the rod [m], for the pressure of the gas"""
+    rod_end: PointName | None = None
+    """Point at which the rod is; it should be the lower one when compressed"""
     service: tuple[Quantity, Quantity] = (-30.0, 80.0)
     """Lowest and highest temperature in service [C]"""
 

@@ -7,9 +7,10 @@ import numpy as np
 
 from railsim.definitions.mechanism_values import ends
 from railsim.errors import InputError
-from railsim.mechanisms.analysis import Analysis, actuator_of
+from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.outputs import actuator_of
 from railsim.mechanisms.targets import Positions, follow_error, heights_and_ratios
 
 POINTS = 215
@@ -49,6 +50,7 @@ def compare(results: Sequence[Analysis]) -> Comparison:
         values = {
             "stroke": result.stroke,
             "max_force": result.max_force,
+            "peak_force": result.peak_force,
             "length_start": float(result.output.get("length", [np.nan])[0]),
             "min_angle": min(
                 (v for n, v in result.min_angles.items() if result.definition.angles[n].limited),

@@ -140,9 +140,8 @@ def driven_motion(whole: Motion) -> TimedMotion:
     _, slope, bend = motion.length(pair)
     s1 = speed / slope
     s2 = (acceleration - bend * s1**2) / slope
-    sense = int(np.sign(model.end - model.start))
     unknown = law.unknown or law.actuator
-    force = actuator_force(motion, unknown, Rates(s1, s2, sense))
+    force = actuator_force(motion, unknown, Rates(s1, s2, model.sense))
     return TimedMotion(time, motion, s1, s2, force)
 
 

@@ -292,7 +292,10 @@ def pressure_for(motion: Motion, name: str, force: Any) -> Any:
     """Pressure at which an actuator has a force [Pa]; NaN where it has none."""
     actuator = motion.model.definition.actuators[name]
     if isinstance(actuator, Cylinder):
-        return force / _area(motion, actuator)
+        if actuator.acts == "both":
+            pushes = force / _area(motion, actuator, "push")
+            return np.where(np.real(force) < 0.0, -force / _area(motion, actuator, "pull"), pushes)
+        return force / _area(motion, actuator, actuator.acts)
     assert isinstance(actuator, AirSpring)
     return table_of(motion, actuator).pressure(motion.length(actuator.air_spring)[0], force)
 
@@ -301,23 +304,23 @@ def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
     """Force of an actuator at a pressure [N]; NaN where it has none."""
     actuator = motion.model.definition.actuators[name]
     if isinstance(actuator, Cylinder):
-        return pressure * _area(motion, actuator) + 0.0 * motion.s
+        return pressure * _area(motion, actuator, actuator.acts) + 0.0 * motion.s
     assert isinstance(actuator, AirSpring)
     return table_of(motion, actuator).force(motion.length(actuator.air_spring)[0], pressure)
 
 
-def _area(motion: Motion, cylinder: Cylinder) -> Any:
+def _area(motion: Motion, cylinder: Cylinder, acts: str) -> Any:
     n = motion.model.number
-    return cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), cylinder.acts)
+    return cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), acts)
 
 
-def contact_force(motion: Motion, name: str, force: Any) -> Any:
+def contact_force(motion: Motion, name: str, force: Any, rates: Rates = AT_REST) -> Any:
     """Static force of the output upwards at a given actuator force, `(F w + Q)/y'` [N]."""
     model = motion.model
     assert model.definition.output is not None
     _, r1, _ = motion.point(model.definition.output.point)
     work = unit_work(motion, model.definition.actuators[name])
-    return (force * work + generalised_force(motion)) / r1[..., 1]
+    return (force * work + generalised_force(motion, rates)) / r1[..., 1]
 
 
 def applied(motion: Motion, forces: dict[str, Any], rates: Rates = AT_REST) -> Any:

@@ -14,6 +14,8 @@ Quantity = Callable[[Motion], tuple[Any, Any]]
 """A quantity and its derivative by the driver, of a motion."""
 
 ITERATIONS = 30
+ZOOMS, ZOOMED = 7, 9
+"""Times that the neighbourhood of a largest value is searched, with so many positions each."""
 
 
 def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
@@ -103,3 +105,34 @@ def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
     if len(known) and known[-1] == 0.0:
         found.append(float(motion.s[-1]))
     return found
+
+
+def largest(motion: Motion, function: Callable[[Motion], Any], known: Any) -> tuple[float, float]:
+    """Largest value of a function of the motion between its positions: driver's value, value.
+
+    The neighbourhood of the largest of the known values is searched in ever smaller steps; the
+    function need not be smooth.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions dense enough to have the largest value between neighbours of the largest known.
+    function : callable
+        The function of a motion, shape (position,).
+    known : array_like, shape (position,)
+        Its values at the positions of the motion.
+    """
+    s, values = motion.s, np.asarray(known)
+    if not np.any(np.isfinite(values)):
+        return float(s[0]), float("nan")
+    k = int(np.nanargmax(values))
+    best = float(s[k]), float(values[k])
+    for _ in range(ZOOMS):
+        s = np.linspace(s[max(k - 1, 0)], s[min(k + 1, len(s) - 1)], ZOOMED)
+        values = np.asarray(function(solve(motion.model, s)))
+        if not np.any(np.isfinite(values)):
+            break
+        k = int(np.nanargmax(values))
+        if values[k] > best[1]:
+            best = float(s[k]), float(values[k])
+    return best

@@ -6,10 +6,14 @@ The objectives of `[optimise]` are sums of squares of residuals, but for the pea
     constant        ratio less a wanted one
     linear          ratio less one that changes linearly with the height
     constant_force  force over its mean, less 1
-    peak_force      largest force
+    peak_force      largest amount of the force
+
+Constraints that hold at every position are kept at a few of them, and where `Judge.least` finds
+their least values between these: the exchange method of semi-infinite programming (R. Hettich,
+K. O. Kortanek, Semi-infinite programming, SIAM Review 35, 1993).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,17 +21,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.mechanism import Mechanism, Optimise
+from railsim.definitions.mechanism_parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism_values import ends, number, parameter_values
 from railsim.errors import Fault, InputError
-from railsim.mechanisms.analysis import actuator_of
-from railsim.mechanisms.forces import generalised_force, unit_work
+from railsim.mechanisms.forces import STROKE_EDGE, Rates, generalised_force, rubs, unit_work
+from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents
 from railsim.mechanisms.model import Model, build, with_lanes
+from railsim.mechanisms.outputs import actuator_of
 from railsim.mechanisms.targets import Positions, drivers_at_heights, positions
 
 Floats = NDArray[np.float64]
 GRID = 17
 """Positions over the whole travel at which constraints are held."""
+DENSE = 201
+"""Positions from which the least values between them are looked for."""
 SLOWEST = 0.05
 """Smallest rate of the actuator against its mean: keeps a search away from dead points."""
 
@@ -93,22 +101,20 @@ class Judge:
 
     def __init__(self, definition: Mechanism, every: int = 1) -> None:
         assert definition.optimise is not None
-        assert definition.output is not None
+        assert definition.solve is not None
         self.definition = definition
         self.wanted: Optimise = definition.optimise
         self.names = list(self.wanted.bounds)
         self.values = parameter_values(definition)
         bounds = [[number(b, self.values) for b in self.wanted.bounds[n]] for n in self.names]
         self.lower, self.upper = np.array(bounds, dtype=float).T
+        self.unknown = definition.actuators[definition.solve.unknown]
         name = actuator_of(definition)
-        pair = ends(definition.actuators[name]) if name is not None else None
-        if name is None or pair is None:
-            found = "no actuator between two points"
-            raise InputError([Fault(definition.name, "optimise", found, "[solve] must name one")])
-        self.actuator, self.pair = name, pair
-        self.output = definition.output.point
+        self.pair = ends(definition.actuators[name]) if name is not None else None
+        self.output = definition.output.point if definition.output is not None else None
         kind = self.wanted.objective
         self.weights = {kind: 1.0} if isinstance(kind, str) else dict(kind)
+        self._check_length()
         full = positions(definition)
         self.every = every
         self.positions = Positions(full.s[::every], full.height[::every], full.ratio[::every])
@@ -119,16 +125,39 @@ class Judge:
             if not isinstance(written, str) and n not in self.names
         }
 
+    def _check_length(self) -> None:
+        """Refuse what needs the length of an actuator or an output where there is none."""
+        wanted, found = self.wanted, []
+        if self.pair is None or self.output is None:
+            missing = "no actuator between two points, or no [output]"
+            ratios = self.weights.keys() & {"follow", "constant", "linear"}
+            found = [("objective", f"'{kind}': {missing}") for kind in sorted(ratios)]
+        if self.pair is None:
+            found += [
+                (key, "no actuator between two points")
+                for key in ("min_length", "max_stroke")
+                if getattr(wanted, key) is not None
+            ]
+        if found:
+            remedy = "[solve] must name one; 'peak_force' and 'constant_force' do without"
+            name = self.definition.name
+            raise InputError(
+                [Fault(name, f"optimise.{key}", words, remedy) for key, words in found]
+            )
+
     def model(self, x: Sequence[float] | Floats, choice: dict[str, float]) -> Model:
         """The model with its lanes for values of the parameters that may change."""
         values = dict(zip(self.names, map(float, x), strict=True))
         return build(self.definition, {**self.fixed, **choice, **with_lanes(values)})
 
-    def grid(self, model: Model) -> Floats:
-        """Values of the driver at which constraints are held."""
-        return np.linspace(model.start, model.end, GRID)
+    def grid(self, model: Model, extra: Sequence[float] = ()) -> Floats:
+        """Values of the driver at which constraints are held; `extra` are shares of the travel."""
+        shares = np.sort(np.concatenate((np.linspace(0.0, 1.0, GRID), extra)))
+        return model.start + shares * (model.end - model.start)
 
-    def __call__(self, x: Floats, choice: dict[str, float]) -> Judgement:
+    def __call__(
+        self, x: Floats, choice: dict[str, float], extra: Sequence[float] = ()
+    ) -> Judgement:
         """Judge values of the parameters.
 
         Raises
@@ -137,28 +166,63 @@ class Judge:
         """
         moved = self.model(x, choice)
         model = moved.real()
-        grid = self.grid(model)
-        s = drivers_at_heights(model, self.positions.height, self.positions.s)
+        grid = self.grid(model, extra)
+        s = self._zone_drivers(model)
         both = np.concatenate((grid, s))
         order = np.argsort(both, kind="stable")
         if model.end < model.start:
             order = order[::-1]
         motion = tangents(solve(model, both[order]), moved, second=False)
         rank = np.argsort(order, kind="stable")
-        return self._judged(motion, model, rank[:GRID], rank[GRID:])
+        return self._judged(motion, model, rank[: len(grid)], rank[len(grid) :])
+
+    def _zone_drivers(self, model: Model) -> Floats:
+        """Values of the driver at the positions of the objective."""
+        if self.output is None:
+            return model.start + (model.end - model.start) * self.positions.share
+        return drivers_at_heights(model, self.positions.height, self.positions.s)
+
+    def least(
+        self, x: Floats, choice: dict[str, float], near: float = 0.02
+    ) -> dict[str, tuple[float, float]]:
+        """Least margin of every constraint over the travel, and the share of the travel there.
+
+        Parameters
+        ----------
+        x, choice
+            As when judging.
+        near : float
+            Margin above which the least known value is not refined.
+        """
+        values = dict(zip(self.names, map(float, x), strict=True))
+        model = build(self.definition, {**self.fixed, **choice, **values})
+        motion = solve(model, np.linspace(model.start, model.end, DENSE))
+        found: dict[str, tuple[float, float]] = {}
+        for i, (name, _, known) in enumerate(self._everywhere(motion)):
+
+            def less(m: Motion, i: int = i) -> Any:
+                return -next(row for k, row in enumerate(self._everywhere(m)) if k == i)[2]
+
+            k = int(np.argmin(known))
+            at, margin = float(motion.s[k]), float(known[k])
+            if margin < near:
+                at, negative = largest(motion, less, -known)
+                margin = -negative
+            if name not in found or margin < found[name][0]:
+                found[name] = margin, (at - model.start) / (model.end - model.start)
+        return found
 
     def _judged(self, motion: Motion, model: Model, grid: Any, zone: Any) -> Judgement:
-        length, rate, _ = motion.length(self.pair)
-        _, r1, _ = motion.point(self.output)
-        definition = motion.model.definition
-        assert definition.solve is not None
-        unknown = definition.solve.unknown
-        work = unit_work(motion, definition.actuators[unknown])
-        force = -generalised_force(motion) / work
-        ratio = r1[..., 1] / rate
+        force = self._force(motion)
+        ratio = 0.0 * force
+        if self.pair is not None and self.output is not None:
+            ratio = motion.point(self.output)[1][..., 1] / motion.length(self.pair)[1]
         ratio, force_zone = self._at_height(motion, model, zone, ratio, force)
-        residuals, peak = self._objective(ratio, force_zone, force[..., grid])
-        margins = self._margins(motion, grid, length[..., grid], rate[..., grid], force[..., grid])
+        whole = [force[..., grid]]
+        if rubs(model):
+            whole.append(self._force(motion, -1)[..., grid])
+        residuals, peak = self._objective(ratio, force_zone, np.concatenate(whole, axis=-1))
+        margins = self._margins(motion, grid)
         return Judgement(
             np.real(residuals)[0],
             derivative(residuals).T,
@@ -175,6 +239,8 @@ class Judge:
 
         `d/dp at constant y = d/dp - (d/ds) (dy/dp)/y'`.
         """
+        if self.output is None:
+            return ratio[..., zone], force[..., zone]
         r, _, _ = motion.point(self.output)
         first = motion.point(self.output)[0][..., :1, 1]
         drift = np.imag(r[..., zone, 1] - first)
@@ -182,19 +248,20 @@ class Judge:
             return ratio[..., zone], force[..., zone]
         real = solve(model, np.real(motion.s[0, zone]))
         _, y1, y2 = real.point(self.output)
-        _, w, w1 = real.length(self.pair)
-        slope = (y2[:, 1] * w - y1[:, 1] * w1) / w**2
+        slope: Any = 0.0
+        if self.pair is not None:
+            _, w, w1 = real.length(self.pair)
+            slope = (y2[:, 1] * w - y1[:, 1] * w1) / w**2
         shift = drift / y1[:, 1]
         h = 1e-6 * (motion.model.end - motion.model.start)
         known = [self._force(solve(real.model, real.s + d)) for d in (-h, h)]
         bend = (known[1] - known[0]) / (2.0 * h)
         return ratio[..., zone] - 1j * slope * shift, force[..., zone] - 1j * bend * shift
 
-    def _force(self, motion: Motion) -> Any:
-        definition = motion.model.definition
-        assert definition.solve is not None
-        work = unit_work(motion, definition.actuators[definition.solve.unknown])
-        return -generalised_force(motion) / work
+    def _force(self, motion: Motion, way: int = 1) -> Any:
+        """Unknown force on the way from start to end, or back, shape (lane, position)."""
+        rates = Rates(friction=way * motion.model.sense, trial=True)
+        return -generalised_force(motion, rates) / unit_work(motion, self.unknown)
 
     def _objective(self, ratio: Any, force: Any, whole: Any) -> tuple[Any, Any]:
         """Residuals, shape (lane, residual), and what is added to their squares, (lane,)."""
@@ -215,47 +282,79 @@ class Judge:
                 parts.append(root * (force / np.mean(force, axis=-1, keepdims=True) - 1.0))
             else:
                 both = np.concatenate((whole, force), axis=-1)
-                peak = peak + weight * both[:, int(np.argmax(np.real(both[0])))]
+                k = int(np.argmax(np.abs(np.real(both[0]))))
+                peak = peak + weight * np.sign(np.real(both[0, k])) * both[:, k]
         if not parts:
             parts = [np.zeros((len(ratio), 1), dtype=complex)]
         return np.concatenate(parts, axis=-1), peak
 
-    def _margins(self, motion: Motion, grid: Any, length: Any, rate: Any, force: Any) -> Any:
+    def _margins(self, motion: Motion, grid: Any) -> Any:
         """Margins of all constraints, shape (lane, constraint), and their labels."""
-        found: list[tuple[str, float, Any]] = []
-        model = motion.model
-        n = model.number
-        wanted = self.wanted
-        if wanted.min_transmission_angle is not None:
-            limit = n(wanted.min_transmission_angle)
-            for name, angle in model.definition.angles.items():
-                if angle.limited:
-                    sine = np.sin(motion.angle(name)[..., grid])
-                    # (sin^2 mu - sin^2 limit)/sin(2 limit): smooth, and the angle near the limit
-                    margin = (sine * sine - np.sin(limit) ** 2) / np.sin(2.0 * limit)
-                    found.append((name, 1.0, margin))
-        if wanted.min_length is not None:
-            found.append(("min_length", 1.0, length - n(wanted.min_length)))
-        if wanted.max_stroke is not None:
-            stroke = np.where(np.real(length[:, -1:] - length[:, :1]) > 0.0, 1.0, -1.0) * (
-                length[:, -1:] - length[:, :1]
-            )
-            found.append(("max_stroke", 1.0, n(wanted.max_stroke) - stroke))
-        if wanted.available_force is not None:
-            limit = n(wanted.available_force)
-            scale = float(np.ravel(np.real(limit))[0])
-            found.append(("available_force", scale, (limit - force) / scale))
-        mean = np.mean(rate, axis=-1, keepdims=True)
-        found.append(("dead_point", 1.0, rate / mean - SLOWEST))
-        for i, box in enumerate(wanted.envelope):
-            for point in box.points:
-                r = motion.point(point)[0][..., grid, :]
-                for axis, limits in ((0, box.x), (1, box.y)):
-                    if limits is not None:
-                        low, high = (n(x) for x in limits)
-                        found.append((f"envelope.{i}", 1.0, r[..., axis] - low))
-                        found.append((f"envelope.{i}", 1.0, high - r[..., axis]))
+        found = [(name, scale, m[..., grid]) for name, scale, m in self._everywhere(motion)]
+        if self.wanted.max_stroke is not None:
+            assert self.pair is not None
+            length = motion.length(self.pair)[0][..., grid]
+            stroke = length[..., -1:] - length[..., :1]
+            stroke = np.where(np.real(stroke) > 0.0, 1.0, -1.0) * stroke
+            limit = motion.model.number(self.wanted.max_stroke)
+            found.append(("max_stroke", 1.0, limit - stroke))
         self.labels = [
             (name, scale) for name, scale, margin in found for _ in range(margin.shape[-1])
         ]
         return np.concatenate([margin for _, _, margin in found], axis=-1)
+
+    def _everywhere(self, motion: Motion) -> Iterator[tuple[str, float, Any]]:
+        """Constraints at all positions: name, scale, margins of shape (..., position)."""
+        n, wanted = motion.model.number, self.wanted
+        if wanted.min_transmission_angle is not None:
+            limit = n(wanted.min_transmission_angle)
+            for name, angle in motion.model.definition.angles.items():
+                if angle.limited:
+                    sine = np.sin(motion.angle(name))
+                    # (sin^2 mu - sin^2 limit)/sin(2 limit): smooth, and the angle near the limit
+                    yield name, 1.0, (sine * sine - np.sin(limit) ** 2) / np.sin(2.0 * limit)
+        if self.pair is not None:
+            length, rate, _ = motion.length(self.pair)
+            if wanted.min_length is not None:
+                yield "min_length", 1.0, length - n(wanted.min_length)
+            mean = (length[..., -1:] - length[..., :1]) / (motion.s[..., -1:] - motion.s[..., :1])
+            yield "dead_point", 1.0, rate / mean - SLOWEST
+        work = unit_work(motion, self.unknown)
+        yield "dead_point", 1.0, work / work[..., :1] - SLOWEST
+        yield from self._forces(motion)
+        yield from self._strokes(motion)
+        for i, box in enumerate(wanted.envelope):
+            for point in box.points:
+                r = motion.point(point)[0]
+                for axis, limits in ((0, box.x), (1, box.y)):
+                    if limits is not None:
+                        low, high = (n(x) for x in limits)
+                        yield f"envelope.{i}", 1.0, r[..., axis] - low
+                        yield f"envelope.{i}", 1.0, high - r[..., axis]
+
+    def _forces(self, motion: Motion) -> Iterator[tuple[str, float, Any]]:
+        """The available force in both senses; what can only push must not pull."""
+        limit, unknown = self.wanted.available_force, self.unknown
+        one_sided = isinstance(unknown, AirSpring) or (
+            isinstance(unknown, Cylinder) and unknown.acts != "both"
+        )
+        if limit is None:
+            return
+        available = motion.model.number(limit)
+        scale = float(np.ravel(np.real(available))[0])
+        for way in (1, -1) if rubs(motion.model) else (1,):
+            force = self._force(motion, way)
+            yield "available_force", scale, (available - force) / scale
+            if one_sided:
+                yield "pulls", scale, force / scale
+            else:
+                yield "available_force", scale, (available + force) / scale
+
+    def _strokes(self, motion: Motion) -> Iterator[tuple[str, float, Any]]:
+        """Gas springs that what is searched for may take beyond their strokes."""
+        n = motion.model.number
+        for name, part in self.definition.elements.items():
+            if isinstance(part, GasSpring):
+                compressed = n(part.extended) - motion.length(part.gas_spring)[0]
+                yield f"{name}_stroke", 1.0, compressed + STROKE_EDGE * n(part.stroke)
+                yield f"{name}_stroke", 1.0, n(part.stroke) * (1.0 + STROKE_EDGE) - compressed

@@ -6,7 +6,7 @@ Complex models give complex results, whose imaginary parts are derivatives by pa
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +16,15 @@ from railsim.definitions.mechanism_parts import Angle
 from railsim.errors import Fault, InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel
+from railsim.mechanisms.assembly import assembled, constraints, dead_loop, open_loop
 from railsim.mechanisms.model import STEP, Model
 
 Floats = NDArray[np.float64]
 Triple = tuple[Any, Any, Any]
+ASTRAY = 1.0
+"""Turn from the given pose beyond which the nearest assembly is looked for instead [rad]."""
+BEYOND = 1e-3
+"""Share of the rest of the range, behind a limit position, at which the open loop is sought."""
 
 
 @dataclass(frozen=True)
@@ -141,24 +146,68 @@ def solve(model: Model, s: ArrayLike, near: Motion | None = None) -> Motion:
     InputError : lost assembly, dead point, jump of branch, roller off its cam: where, which joint.
     """
     wanted = np.atleast_1d(np.asarray(s, dtype=float))
-    linkage = model.linkage
-    start, pose, arc_start = model.start, model.pose, linkage.joint[:, 4].copy()
+    start, pose, arc_start = model.start, model.pose, model.linkage.joint[:, 4].copy()
     if near is not None:
         start, pose, arc_start = near.s[-1], near.q[-1], near.arcs[-1].copy()
     values = np.concatenate(([start], wanted))
-    shape = (len(values), linkage.n_bodies + 1, 3)
+    tracked = _track(model, values, pose, arc_start)
+    astray = np.max(np.abs(tracked.q[0, :, 2] - pose[:, 2])) > ASTRAY
+    if near is None and (tracked.status == kernel.NO_ASSEMBLY or astray):
+        found = assembled(model, start, pose, arc_start)
+        if found is not None:
+            tracked = _track(model, values, found, arc_start)
+    if tracked.status != kernel.OK:
+        raise InputError([_fault(model, tracked, values, pose)])
+    return Motion(model, wanted, tracked.q[1:], tracked.q1[1:], tracked.q2[1:], tracked.arcs[1:])
+
+
+class _Tracked(NamedTuple):
+    """What the kernel gives: status, valid positions, where and in which joint it failed."""
+
+    status: int
+    valid: int
+    q: Floats
+    q1: Floats
+    q2: Floats
+    arcs: NDArray[np.int64]
+    failure: Floats
+
+
+def _track(model: Model, s: Floats, pose: Floats, arc_start: NDArray[np.int64]) -> _Tracked:
+    linkage = model.linkage
+    shape = (len(s), linkage.n_bodies + 1, 3)
     q, q1, q2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    arcs = np.zeros((len(values), len(linkage.joint)), dtype=np.int64)
+    arcs = np.zeros((len(s), len(linkage.joint)), dtype=np.int64)
     failure = np.zeros(2)
-    status, _ = motion_kernel.track(linkage, values, pose, arc_start, q, q1, q2, arcs, failure)
-    if status != kernel.OK:
-        raise InputError([_fault(model, status, *failure)])
-    return Motion(model, wanted, q[1:], q1[1:], q2[1:], arcs[1:])
+    status, valid = motion_kernel.track(linkage, s, pose, arc_start, q, q1, q2, arcs, failure)
+    return _Tracked(status, valid, q, q1, q2, arcs, failure)
 
 
-def _fault(model: Model, status: int, at: float, joint: float) -> Fault:
-    name = kernel_joint_names(model)[int(joint)]
+def _fault(model: Model, tracked: _Tracked, s: Floats, pose: Floats) -> Fault:
+    """Why a motion cannot be continued: the loop that cannot close, or is at a dead point."""
+    at = float(tracked.failure[0])
+    name = kernel_joint_names(model)[int(tracked.failure[1])]
+    q, arcs = pose, model.linkage.joint[:, 4].copy()
+    if tracked.valid:
+        q, arcs = tracked.q[tracked.valid - 1], tracked.arcs[tracked.valid - 1]
+    status = tracked.status
+    if status == kernel.NO_ASSEMBLY and (closed := assembled(model, at, q, arcs)) is not None:
+        status, q = kernel.DEAD_POINT, closed
     sentence = kernel.STATUS[status].format(joint=f"'{name}'")
+    if status in (kernel.NO_ASSEMBLY, kernel.LOST_ASSEMBLY):
+        far = at if status == kernel.NO_ASSEMBLY else float(s[-1])
+        loop = open_loop(model, at + BEYOND * (far - at), q, arcs)
+        if loop is not None:
+            # behind the limit the gap is still small: the end of the range says more
+            end = ""
+            if far != at and (last := open_loop(model, far, q, arcs, loop)) is not None:
+                loop, end = last, f" at {driver_words(model, far)}"
+            name = loop.blamed
+            sentence = f"{sentence.partition(' (joint')[0]}; {loop}{end}"
+    elif status != kernel.BEYOND_CAM:
+        loop_names = dead_loop(model, at, q, arcs)
+        name = loop_names[-1] if name not in loop_names else name
+        sentence = f"{sentence.partition(' (joint')[0]} (joints {', '.join(loop_names)})"
     where = f"driver at {driver_words(model, at)}"
     remedy = {
         kernel.NO_ASSEMBLY: "other lengths, or a pose in [start] nearer to the assembly",
@@ -190,29 +239,38 @@ def check_freedom(model: Model) -> None:
     ------
     InputError : the joints concerned, and the degrees of freedom that are left.
     """
-    s, pose = np.array([model.start]), model.pose[None]
-    arcs = model.linkage.joint[:, 4][None].copy()
+    arcs = model.linkage.joint[:, 4].copy()
     lost: InputError | None = None
     try:
-        motion = solve(model, s)
-        pose, arcs = motion.q, motion.arcs
+        motion = solve(model, [model.start])
+        pose, arcs = motion.q[0], motion.arcs[0]
     except InputError as error:
         lost = error
+        found = assembled(model, model.start, model.pose, arcs)
+        pose = model.pose if found is None else found
+    left, rank = _held(model, model.start, pose, arcs)
     rows = 3 * model.linkage.n_bodies
-    residual, jacobian = np.zeros((1, rows)), np.zeros((1, rows, rows))
-    motion_kernel.jacobians(model.linkage, s, pose, arcs, residual, jacobian)
-    joints = jacobian[0, :-1]
-    left, singular, _ = np.linalg.svd(joints)
-    rank = int(np.sum(singular > 1e-9 * singular[0]))
+    if rank < rows - 1 and lost is not None:
+        # a dead point at the start alone is no joint too many
+        beyond = model.start + 0.01 * (model.end - model.start)
+        other = assembled(model, beyond, pose, arcs)
+        if other is not None and _held(model, beyond, other, arcs)[1] == rows - 1:
+            raise lost
     if rank == rows - 1:
         if lost is not None:
             raise lost
         return
     weight = np.abs(left[:, rank:]).max(axis=1)
     names = [n for n, (a, b) in model.joint_rows.items() if weight[a:b].max() > 1e-6]
-    found = f"hold the same freedom twice: {rows - rank} degrees of freedom left"
-    where = f"joints {', '.join(names)} {found}"
+    words = f"hold the same freedom twice: {rows - rank} degrees of freedom left"
+    where = f"joints {', '.join(names)} {words}"
     raise InputError([Fault(model.definition.name, "joints", where, "1 is needed")])
+
+
+def _held(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> tuple[Any, int]:
+    """Left singular vectors and rank of the joints' Jacobian."""
+    left, singular, _ = np.linalg.svd(constraints(model, s, pose, arcs)[1][:-1])
+    return left, int(np.sum(singular > 1e-9 * singular[0]))
 
 
 def tangents(motion: Motion, moved: Model, *, second: bool = True) -> Motion:

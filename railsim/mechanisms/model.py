@@ -82,6 +82,11 @@ class Model:
         return replace(self, values=values, linkage=self.linkage._replace(**arrays))
 
     @property
+    def sense(self) -> int:
+        """Sense of the driver's motion from start to end."""
+        return 1 if self.end > self.start else -1
+
+    @property
     def joints(self) -> list[str]:
         """Names of the joints."""
         return list(self.definition.joints)

@@ -19,6 +19,7 @@ from scipy.optimize import Bounds, minimize
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.mechanism_values import number
 from railsim.errors import Fault, InputError, argument_fault
+from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.model import build
@@ -40,6 +41,8 @@ class Effort:
 
 SEARCH = Effort(2, 20, 1e-2)
 FINISH = Effort(4, 25, 1e-3)
+EXCHANGES = 6
+"""Times that positions of broken constraints are added, until none is broken between positions."""
 EVERY = 5
 """Share of the positions that every start is first judged at."""
 FINALISTS = 3
@@ -133,7 +136,7 @@ def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
         motion = solve(model, judge.grid(model))
     except InputError:
         return False
-    rate = motion.length(judge.pair)[1]
+    rate = unit_work(motion, judge.unknown)
     return bool(np.all(rate * rate[0] > 0.0))
 
 
@@ -192,8 +195,10 @@ def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) ->
             found.append(replace(end, begin=start.begin, evaluations=count))
         else:
             x = np.array([start.end[name] for name in judge.names])
-            judged = judge(x, {name: start.end[name] for name in judge.wanted.assemblies})
-            found.append(replace(start, objective=judged.objective, violation=judged.violation))
+            choice = {name: start.end[name] for name in judge.wanted.assemblies}
+            judged = judge(x, choice)
+            violation = max(judged.violation, _between(judge, x, choice)[0])
+            found.append(replace(start, objective=judged.objective, violation=violation))
     return found
 
 
@@ -202,6 +207,7 @@ class _Problem:
 
     def __init__(self, judge: Judge, choice: dict[str, float]) -> None:
         self.judge, self.choice = judge, choice
+        self.extra: list[float] = []
         self.span = judge.upper - judge.lower
         self.evaluations = 0
         self.known: tuple[bytes, Judgement | None] = (b"", None)
@@ -212,7 +218,7 @@ class _Problem:
         if self.known[0] != key:
             self.evaluations += 1
             try:
-                found = self.judge(self.judge.lower + u * self.span, self.choice)
+                found = self.judge(self.judge.lower + u * self.span, self.choice, self.extra)
                 self.known = (
                     key,
                     Judgement(
@@ -228,6 +234,18 @@ class _Problem:
                 self.known = key, None
         return self.known[1]
 
+    def add(self, shares: Sequence[float]) -> None:
+        """Hold constraints at further positions."""
+        self.extra += shares
+        self.known = b"", None
+
+
+def _between(judge: Judge, x: Floats, choice: dict[str, float]) -> tuple[float, list[float]]:
+    """Largest breach of a constraint at any position, and where constraints are broken."""
+    found = judge.least(x, choice)
+    breach = max((-margin for margin, _ in found.values()), default=0.0)
+    return breach, [share for margin, share in found.values() if margin < -0.1 * FEASIBLE]
+
 
 def _run(
     judge: Judge, index: int, begin: Floats, choice: dict[str, float], effort: Effort
@@ -240,6 +258,33 @@ def _run(
         nan = float("nan")
         named = dict(zip(judge.names, map(float, begin), strict=True)) | choice
         return Start(index, named, named, nan, nan, problem.evaluations)
+    u, here = _rounds(problem, u, here, effort)
+    violation = here.violation
+    for _ in range(EXCHANGES if effort is FINISH else 0):
+        breach, shares = _between(judge, judge.lower + u * problem.span, choice)
+        violation = max(here.violation, breach)
+        if not shares or here.violation > FEASIBLE:
+            break
+        problem.add(shares)
+        judged = problem(u)
+        if judged is None:
+            break
+        u, here = _rounds(problem, u, judged, effort)
+    x = judge.lower + u * problem.span
+    return Start(
+        index,
+        dict(zip(judge.names, map(float, begin), strict=True)) | choice,
+        dict(zip(judge.names, map(float, x), strict=True)) | choice,
+        here.objective,
+        violation,
+        problem.evaluations,
+    )
+
+
+def _rounds(
+    problem: _Problem, u: Floats, here: Judgement, effort: Effort
+) -> tuple[Floats, Judgement]:
+    """Rounds of the search until nothing improves."""
     for _ in range(effort.rounds):
         new = _round(problem, u, here, effort.steps)
         after = problem(new)
@@ -256,15 +301,7 @@ def _run(
             break
     if here.violation > FEASIBLE:
         u, here = _least_breach(problem, u, here)
-    x = judge.lower + u * problem.span
-    return Start(
-        index,
-        dict(zip(judge.names, map(float, begin), strict=True)) | choice,
-        dict(zip(judge.names, map(float, x), strict=True)) | choice,
-        here.objective,
-        here.violation,
-        problem.evaluations,
-    )
+    return u, here
 
 
 def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats:

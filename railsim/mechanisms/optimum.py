@@ -131,7 +131,8 @@ def optimum_of(
     """Return the best of all starts with what is active there."""
     x = np.array([best.end[name] for name in judge.names])
     choice = {name: best.end[name] for name in judge.wanted.assemblies}
-    judged = judge(x, choice)
+    least = judge.least(x, choice)
+    judged = judge(x, choice, [share for margin, share in least.values() if margin < ACTIVE])
     listed = {
         name: tuple(names) for name, names in definition.provenance.items() if name != "optimised"
     }
@@ -142,11 +143,13 @@ def optimum_of(
     try:
         before: Analysis | None = analyse(definition)
         own = np.array([float(judge.values[name]) for name in judge.names])
-        objective_before = judge(own, own_choice(judge)).objective
-        judge(x, choice)
+        objective_before = Judge(definition)(own, own_choice(judge)).objective
     except InputError:
         before, objective_before = None, float("nan")
-    breaches: dict[str, float] = {}
+    scales = dict(judge.labels)
+    breaches = {
+        name: -margin * scales[name] for name, (margin, _) in least.items() if margin < -FEASIBLE
+    }
     for (name, scale), margin in zip(judge.labels, judged.margins, strict=True):
         if margin < -FEASIBLE:
             breaches[name] = max(breaches.get(name, 0.0), -float(margin) * scale)
@@ -156,7 +159,7 @@ def optimum_of(
         after,
         judged.objective,
         objective_before,
-        best.feasible,
+        best.feasible and not breaches,
         breaches,
         _active(judge, judged, x),
         starts,

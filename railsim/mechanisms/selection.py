@@ -1,36 +1,17 @@
-"""Checks and the choice of components: every row of a catalogue fits, or why not."""
+"""Choice of components: every row of a catalogue fits, or why not, and what it does."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from railsim.definitions.mechanism import CatalogueRow
 from railsim.definitions.mechanism_parts import Cylinder, GasSpring
-from railsim.mechanisms.analysis import Analysis, actuator_of
-from railsim.mechanisms.components import cylinder_area, lid_force, next_size
-
-ROUNDING = 1e-5
-"""Share of a limit by which rounding may miss it: dimensions have six or seven digits."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """A value against its limit; `sense` says on which side it must be."""
-
-    name: str
-    value: float
-    limit: float
-    sense: str
-    unit: str
-    note: str
-
-    @property
-    def ok(self) -> bool:
-        """Whether it is met; on the limit counts as met."""
-        margin = ROUNDING * abs(self.limit)
-        if self.sense == "above":
-            return self.value >= self.limit - margin
-        return self.value <= self.limit + margin
+from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.checks import ROUNDING, force_range
+from railsim.mechanisms.components import gas_temperature_factor, next_size
+from railsim.mechanisms.forces import Rates, actuator_force
+from railsim.mechanisms.kinematics import Motion
 
 
 @dataclass(frozen=True)
@@ -44,85 +25,19 @@ class Choice:
     fits : bool
     reasons : tuple of str
         Why it does not fit; of a row that fits, what was chosen.
+    values : dict of str to float
+        Of a gas spring that fits: stroke, extended length, body, rod, progression, tolerance of F1
+        (`F1_low`, `F1_high`), force of the lock; the unknown force with it (`force_least`,
+        `force_most`), and the same over temperatures in service and tolerances of F1
+        (`force_lowest`, `force_highest`); the gas pressure over the outside (`pressure_least`,
+        `pressure_most`).
     """
 
     catalogue: str
     name: str
     fits: bool
     reasons: tuple[str, ...]
-
-
-def checks(result: Analysis) -> list[Check]:
-    """Everything that a mechanism must keep, as far as its file says so."""
-    definition, model = result.definition, result.model
-    found: list[Check] = []
-    limits = definition.optimise
-    name = actuator_of(definition)
-    actuator = definition.actuators.get(name or "")
-    if isinstance(actuator, Cylinder) and definition.solve and definition.solve.unknown == name:
-        available = model.number(actuator.supply_pressure) * _area(result, actuator)
-        note = "largest force against bore and supply pressure"
-        found.append(Check("available_force", result.max_force, available, "below", "N", note))
-    if limits is not None and limits.min_transmission_angle is not None:
-        limit = model.number(limits.min_transmission_angle)
-        for angle, value in result.min_angles.items():
-            if definition.angles[angle].limited:
-                note = "smallest over the whole travel, folded to 90 deg"
-                found.append(Check(angle, value, limit, "above", "rad", note))
-    if "length" in result.output:
-        shortest = float(np.min(result.output["length"]))
-        if limits is not None and limits.min_length is not None:
-            least, note = model.number(limits.min_length), "shortest length wanted"
-            found.append(Check("min_length", shortest, least, "above", "m", note))
-        if limits is not None and limits.max_stroke is not None:
-            most, note = model.number(limits.max_stroke), "stroke wanted at most"
-            found.append(Check("max_stroke", result.stroke, most, "below", "m", note))
-        if isinstance(actuator, Cylinder) and actuator.pin_to_pin is not None:
-            strokes = [model.number(s) for s in actuator.strokes]
-            stroke = next_size(strokes, result.stroke)
-            if stroke is not None:
-                least = model.number(actuator.pin_to_pin) + stroke
-                note = f"shortest length against pin to pin and the stroke of {stroke * 1e3:g} mm"
-                found.append(Check("pin_to_pin", shortest, least, "above", "m", note))
-    for element, part in definition.elements.items():
-        if isinstance(part, GasSpring):
-            found.append(_service(result, element, part))
-    if (lid := definition.lid) is not None:
-        spring = definition.elements[lid.element]
-        assert isinstance(spring, GasSpring)
-        n = model.number
-        least = lid_force(n(lid.mass), n(lid.centre), n(lid.lever), n(lid.springs), n(lid.factor))
-        note = "F1 against the makers' quick formula G D/(b n) 9.8 alpha"
-        found.append(Check(f"lid_{lid.element}", n(spring.F1), least, "above", "N", note))
-    if result.contact is not None:
-        values = list(result.contact.force.values())
-        note = "static contact force in the zone: the head must not come down"
-        found.append(Check("contact_force", float(np.min(values)), 0.0, "above", "N", note))
-    return found
-
-
-def _service(result: Analysis, name: str, spring: GasSpring) -> Check:
-    """The temperature of a gas spring against the nearer end of its service range."""
-    n = result.model.number
-    value, (low, high) = n(spring.temperature), (n(x) for x in spring.service)
-    above = value < 0.5 * (low + high)
-    limit, sense = (low, "above") if above else (high, "below")
-    note = "temperature against the range in service"
-    return Check(f"{name}_temperature", value, limit, sense, "C", note)
-
-
-def _area(result: Analysis, cylinder: Cylinder, bore: float | None = None) -> float:
-    n = result.model.number
-    size = n(cylinder.bore) if bore is None else bore
-    return float(cylinder_area(size, n(cylinder.rod), n(cylinder.count), cylinder.acts))
-
-
-def needed_bore(result: Analysis, cylinder: Cylinder) -> float:
-    """Smallest bore that gives the largest force at the supply pressure [m]."""
-    n = result.model.number
-    area = result.max_force / n(cylinder.supply_pressure) / n(cylinder.count)
-    rod = n(cylinder.rod) if cylinder.acts == "pull" else 0.0
-    return float(np.sqrt(4.0 * area / np.pi + rod * rod))
+    values: dict[str, float]
 
 
 def selection(result: Analysis) -> list[Choice]:
@@ -141,27 +56,46 @@ def selection(result: Analysis) -> list[Choice]:
     return found
 
 
+def needed_bore(result: Analysis, cylinder: Cylinder) -> float:
+    """Smallest bore that gives the largest force of each chamber at the supply pressure [m]."""
+    n = result.model.number
+    least, most = force_range(result)
+    rod = n(cylinder.rod)
+    chambers = {"push": [(most, 0.0)], "pull": [(most, rod)], "both": [(most, 0.0), (-least, rod)]}
+    bores = [0.0]
+    for force, rod in chambers[cylinder.acts]:
+        area = max(force, 0.0) / n(cylinder.supply_pressure) / n(cylinder.count)
+        bores.append(float(np.sqrt(4.0 * area / np.pi + rod * rod)))
+    return max(bores)
+
+
 def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
     n = result.model.number
     bore, stroke = needed_bore(result, cylinder), result.stroke
-    shortest = float(np.min(result.output["length"]))
+    shortest = result.extremes("length").least
     made = next_size([n(s) for s in cylinder.strokes], stroke)
+    least, _ = force_range(result)
+    wrong = cylinder.acts != "both" and -least > ROUNDING * result.peak_force
     found = []
     for size in (n(b) for b in cylinder.bores):
         why = []
+        if wrong:
+            other = "pull" if cylinder.acts == "push" else "push"
+            why.append(f"must {other} {-least:.0f} N: pressure in the other chamber too")
         if size < bore * (1.0 - ROUNDING):
             why.append(f"bore {bore * 1e3:.2f} mm needed")
         if made is None:
             why.append(f"stroke {stroke * 1e3:.1f} mm is not made")
         elif cylinder.pin_to_pin is not None:
-            least = n(cylinder.pin_to_pin) + made
-            if shortest < least * (1.0 - ROUNDING):
+            shortest_made = n(cylinder.pin_to_pin) + made
+            if shortest < shortest_made * (1.0 - ROUNDING):
                 why.append(
-                    f"{shortest * 1e3:.1f} mm at the shortest, {least * 1e3:g} mm from pin to pin"
+                    f"{shortest * 1e3:.1f} mm at the shortest, {shortest_made * 1e3:g} mm from "
+                    "pin to pin"
                 )
         chosen = (f"stroke {made * 1e3:g} mm",) if made is not None else ()
         name = f"bore {size * 1e3:g} mm"
-        found.append(Choice("cylinder", name, not why, tuple(why) or chosen))
+        found.append(Choice("cylinder", name, not why, tuple(why) or chosen, {}))
     return found
 
 
@@ -170,9 +104,9 @@ def _gas_spring(
 ) -> Choice:
     """A series of a catalogue for a gas spring: its stroke, force and length."""
     n = result.model.number
-    lengths = result.output[f"{name}_length"]
-    needed = float(np.ptp(lengths))
-    longest, shortest, F1 = float(np.max(lengths)), float(np.min(lengths)), float(n(spring.F1))
+    lengths = result.extremes(f"{name}_length")
+    F1, unlock = float(n(spring.F1)), n(row.unlock)
+    needed = lengths.most - lengths.least + unlock
     strokes = _strokes(result, row, needed)
     why = []
     low, high = (n(f) for f in row.F1)
@@ -182,17 +116,30 @@ def _gas_spring(
         largest = n(row.stroke[1]) if row.stroke is not None else n((row.strokes or (0.0,))[-1])
         why.append(f"stroke {needed * 1e3:.1f} mm is needed, {largest * 1e3:g} mm the largest")
     chosen = strokes[0] if strokes else None
+    extended = n(spring.extended)
     if chosen is not None and row.extended is not None:
         factor, constant = (n(x) for x in row.extended)
         fitting = [
-            c for c in strokes if factor * c + constant >= longest and
-            (factor - 1.0) * c + constant <= shortest
+            c for c in strokes if factor * c + constant >= lengths.most + unlock and
+            (factor - 1.0) * c + constant <= lengths.least
         ]  # fmt: skip
         chosen = fitting[0] if fitting else None
         if chosen is None:
-            why.append(f"{shortest * 1e3:.1f} to {longest * 1e3:.1f} mm is no range of its lengths")
+            least, most = lengths.least * 1e3, lengths.most * 1e3
+            why.append(f"{least:.1f} to {most:.1f} mm is no range of its lengths")
+        else:
+            extended = factor * chosen + constant
+    elif chosen is not None:
+        # made to the length that the file asks for: what it is compressed by must be in the stroke
+        compressed = extended - lengths.least
+        chosen = next((c for c in strokes if c >= compressed * (1.0 - ROUNDING)), None)
+        if chosen is None:
+            why.append(f"compressed by {compressed * 1e3:.1f} mm, {strokes[-1] * 1e3:g} mm at most")
     said = () if chosen is None else (f"stroke {chosen * 1e3:g} mm",)
-    return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why) or said)
+    values: dict[str, float] = {}
+    if not why and chosen is not None:
+        values = _with_row(result, name, spring, row, chosen, extended)
+    return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why) or said, values)
 
 
 def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
@@ -204,3 +151,80 @@ def _strokes(result: Analysis, row: CatalogueRow, needed: float) -> list[float]:
     low, high = n(row.stroke[0]), n(row.stroke[1])
     first = max(low, needed)
     return [] if first > high else list(np.linspace(first, high, 101))
+
+
+def _with_row(
+    result: Analysis,
+    name: str,
+    spring: GasSpring,
+    row: CatalogueRow,
+    stroke: float,
+    extended: float,
+) -> dict[str, float]:
+    """What the mechanism does with a row of a catalogue in place of its gas spring."""
+    n = result.model.number
+    F1 = float(n(spring.F1))
+    progression = n(spring.progression if row.progression is None else row.progression)
+    minus, plus = F1_band(result, row, F1)
+    values = {"stroke": stroke, "extended": extended, "progression": progression, "F1": F1}
+    values |= {"F1_low": F1 - minus, "F1_high": F1 + plus}
+    rod = spring.rod if row.rod is None else row.rod
+    known = {"body": row.body, "rod": rod, "lock_extension": row.lock_extension}
+    values |= {key: float(n(value)) for key, value in known.items() if value is not None}
+    if row.lock_compression is not None:
+        values["lock_compression"] = n(row.lock_compression) * F1
+    if rod is not None:
+        section = 0.25 * np.pi * n(rod) ** 2
+        values["pressure_least"], values["pressure_most"] = (
+            F1 / section, F1 * progression / section,
+        )  # fmt: skip
+    if result.definition.solve is None:
+        return values
+    made = {"stroke": stroke, "extended": extended, "progression": progression, "rod": rod}
+    cold, hot = (n(x) for x in spring.service)
+    for (low, high), corners in {
+        ("force_least", "force_most"): [(F1, n(spring.temperature))],
+        ("force_lowest", "force_highest"): [(F1 - minus, cold), (F1 + plus, hot)],
+    }.items():
+        forces = []
+        for force, temperature in corners:
+            changes: dict[str, Any] = {**made, "F1": force, "temperature": temperature}
+            forces += _unknown_forces(result, name, spring.model_copy(update=changes), temperature)
+        values[low], values[high] = float(np.min(forces)), float(np.max(forces))
+    values["F_cold"] = gas_temperature_factor(cold) * (F1 - minus)
+    values["F_hot"] = gas_temperature_factor(hot) * (F1 + plus)
+    return values
+
+
+def F1_band(result: Analysis, row: CatalogueRow, F1: float) -> tuple[float, float]:
+    """Tolerance of the force F1 that a row states: minus and plus [N]."""
+    n = result.model.number
+    for limit, minus, plus in row.F1_tolerance or ():
+        if n(limit) >= F1:
+            return float(n(minus)), float(n(plus))
+    return 0.0, 0.0
+
+
+def _unknown_forces(
+    result: Analysis, name: str, spring: GasSpring, temperature: float
+) -> list[Any]:
+    """The unknown force at all positions with another gas spring, on the way and back.
+
+    All gas springs have the same temperature.
+    """
+    definition = result.definition
+    assert definition.solve is not None
+    elements = {
+        key: part.model_copy(update={"temperature": temperature})
+        if isinstance(part, GasSpring)
+        else part
+        for key, part in definition.elements.items()
+    }
+    elements[name] = spring
+    model = replace(result.model, definition=definition.model_copy(update={"elements": elements}))
+    motion: Motion = replace(result.motion, model=model, known={})
+    senses = (model.sense, -model.sense)
+    return [
+        actuator_force(motion, definition.solve.unknown, Rates(friction=k, trial=True))
+        for k in senses
+    ]

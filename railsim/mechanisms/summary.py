@@ -9,8 +9,10 @@ import numpy as np
 
 from railsim.definitions.mechanism import Mechanism
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
-from railsim.mechanisms.selection import checks, selection
+from railsim.mechanisms.remarks import remarks
+from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ def analysis_data(result: Analysis) -> Data:
         "name": definition.name,
         "case": result.case,
         "source": definition.source,
-        "remarks": list(definition.remarks),
+        "remarks": remarks(result),
         "parameters": parameter_data(result),
         "provenance": provenance_data(definition),
         "travel": result.travel,
@@ -50,13 +52,16 @@ def analysis_data(result: Analysis) -> Data:
         data["stroke"] = result.stroke
         data["length_start"], data["length_end"] = float(length[0]), float(length[-1])
     if "force" in result.output:
-        force = result.output["force"]
-        at = int(np.argmax(force))
-        data["max_force"], data["min_force"] = float(force[at]), float(np.min(force))
-        data["max_force_at"] = float(result.motion.s[at])
+        force = result.extremes("force")
+        data["max_force"], data["min_force"] = force.most, force.least
+        data["max_force_at"], data["min_force_at"] = force.most_at, force.least_at
+        data["peak_force"] = result.peak_force
         data["force_zeros"] = list(result.force_zeros)
-    if result.equilibria:
-        data["equilibria"] = [{"travel": s, "stable": ok} for s, ok in result.equilibria]
+    if result.rests:
+        data["equilibria"] = [
+            {"travel": rest.at, "stable": rest.stable, "from": rest.low, "to": rest.high}
+            for rest in result.rests
+        ]
     data["min_transmission_angles"] = result.min_angles
     data["published"] = published_data(result)
     data["output"] = {name: _list(array) for name, array in result.output.items()}
@@ -71,9 +76,14 @@ def analysis_data(result: Analysis) -> Data:
         data["contact"] = {
             "pressure": result.contact.pressure,
             "force": dict(result.contact.force),
+            "force_rising": dict(result.contact.rising),
+            "force_falling": dict(result.contact.falling),
             "curve": _list(result.contact.curve),
             "equilibria": [
-                {"height": y, "stable": stable} for y, stable in result.contact.equilibria
+                {"height": y, "stable": stable, "from": low, "to": high}
+                for (y, stable), (low, high) in zip(
+                    result.contact.equilibria, result.contact.heights, strict=True
+                )
             ],
             "reason": result.contact.reason or None,
         }
@@ -92,7 +102,13 @@ def analysis_data(result: Analysis) -> Data:
     }
     data["transitions"] = [dict(vars(one)) for one in result.transitions]
     data["selection"] = [
-        {"catalogue": c.catalogue, "name": c.name, "fits": c.fits, "reasons": list(c.reasons)}
+        {
+            "catalogue": c.catalogue,
+            "name": c.name,
+            "fits": c.fits,
+            "reasons": list(c.reasons),
+            **c.values,
+        }
         for c in selection(result)
     ]
     if definition.tolerances:
@@ -126,8 +142,7 @@ def published_data(result: Analysis) -> dict[str, Data]:
         ours |= {"stroke": result.stroke, "length_start": float(length[0])}
         ours["length_end"] = float(length[-1])
     if "force" in result.output:
-        force = result.output["force"]
-        ours |= {"max_force": float(np.max(force)), "min_force": float(np.min(force))}
+        ours |= {"max_force": result.max_force, "min_force": result.min_force}
     return {
         name: {"published": float(result.model.number(value)), "ours": ours[name]}
         for name, value in definition.published.items()

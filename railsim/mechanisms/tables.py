@@ -1,15 +1,17 @@
 """Results as tables of texts in the field's units, for the terminal and for the page."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.checks import Check
 from railsim.mechanisms.comparison import Comparison
+from railsim.mechanisms.contact import Contact, moved
 from railsim.mechanisms.kinematics import folded
 from railsim.mechanisms.quantities import SHOWN, quantity, shown
-from railsim.mechanisms.selection import Check, Choice
+from railsim.mechanisms.selection import Choice
 from railsim.mechanisms.summary import parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
 
@@ -82,23 +84,40 @@ def check_table(checks: Sequence[Check]) -> Texts:
     rows = []
     for check in checks:
         unit, scale = SHOWN.get(check.unit, (check.unit, 1.0))
-        sign = ">=" if check.sense == "above" else "<="
+        sign = {"above": ">=", "below": "<="}.get(check.sense, "about")
         rows.append(
             [
                 check.name,
                 f"{check.value * scale:.2f}",
                 f"{sign} {check.limit * scale:.2f}",
                 unit,
-                "yes" if check.ok else "NO",
+                "-" if check.sense == "about" else "yes" if check.ok else "NO",
             ]
         )
     return ["check", "value", "must be", "unit", "met"], rows
 
 
 def selection_table(choices: Sequence[Choice]) -> Texts:
-    """One row for each row of a catalogue."""
-    rows = [[c.catalogue, c.name, "yes" if c.fits else "no", "; ".join(c.reasons)] for c in choices]
-    return ["catalogue", "row", "fits", "stroke, or why not"], rows
+    """One row for each row of a catalogue, with the force that the mechanism then needs."""
+    rows = []
+    for c in choices:
+        v = {key: f"{value:.1f}" for key, value in c.values.items() if key.startswith(("F", "f"))}
+        sizes = [f"{c.values[key] * 1e3:g}" for key in ("body", "rod") if key in c.values]
+        rows.append(
+            [
+                c.catalogue,
+                c.name,
+                "yes" if c.fits else "no",
+                "; ".join(c.reasons),
+                "/".join(sizes) or "-",
+                f"{c.values['progression']:.2f}" if c.values else "-",
+                f"{v['F1_low']} to {v['F1_high']}" if c.values else "-",
+                f"{v['force_least']} to {v['force_most']}" if "force_least" in v else "-",
+                f"{v['force_lowest']} to {v['force_highest']}" if "force_least" in v else "-",
+            ]
+        )
+    header = ["catalogue", "row", "fits", "stroke, or why not", "body/rod / mm", "p", "F1 / N"]
+    return [*header, "unknown force / N", "over temperature and F1 / N"], rows
 
 
 def reaction_table(result: Analysis) -> Texts:
@@ -122,10 +141,19 @@ def sentences(result: Analysis) -> list[str]:
     if "length" in result.output:
         stroke = f"stroke {result.stroke * 1e3:.4f} mm"
         found.append(f"{stroke} over a travel of {driver(result.travel)}")
+    if "force" in result.output:
+        found.append(_force_sentence(result, driver))
     if result.force_zeros:
         found.append(f"force zero at {', '.join(driver(s) for s in result.force_zeros)}")
-    for s, stable in result.equilibria:
-        found.append(f"at rest at {driver(s)}, {'stable' if stable else 'unstable'}")
+    for rest in result.rests:
+        where = driver(rest.at)
+        if rest.low < rest.high:
+            where = f"{driver(rest.low)} to {driver(rest.high)} (friction)"
+        found.append(f"at rest at {where}, {'stable' if rest.stable else 'unstable'}")
+    if result.definition.solve is None and moved(result.motion) and not result.rests:
+        found.append(
+            f"no position of rest from {driver(result.model.start)} to {driver(result.model.end)}"
+        )
     for change in result.transitions:
         jump = change.rate_after / change.rate_before - 1.0
         found.append(
@@ -134,15 +162,7 @@ def sentences(result: Analysis) -> list[str]:
             f"{round(jump * 100.0, 3) + 0.0:.3f} %"
         )
     if (contact := result.contact) is not None:
-        forces = ", ".join(
-            f"{name} {value:.2f} N" if np.isfinite(value) else f"{name} no value"
-            for name, value in contact.force.items()
-        )
-        found.append(f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces}")
-        found += [contact.reason] if contact.reason else []
-        for y, stable in contact.equilibria:
-            word = "stable" if stable else "unstable"
-            found.append(f"rests at a height of {y * 1e3:.1f} mm without contact, {word}")
+        found += _contact_sentences(contact)
     if (timed := result.timed) is not None:
         found.append(
             f"motion in {timed.time[-1]:.3f} s: force {timed.force[0]:.2f} N at first, "
@@ -157,12 +177,48 @@ def sentences(result: Analysis) -> list[str]:
     return found
 
 
+def _force_sentence(result: Analysis, driver: Callable[[float], str]) -> str:
+    """Least and largest unknown force, on the way back too where there is friction."""
+    assert result.definition.solve is not None
+    unit = quantity("force", result.definition).shown
+    found = []
+    for name, words in (("force", ""), ("force_back", "on the way back ")):
+        if name in result.output:
+            ends = result.extremes(name)
+            found.append(
+                f"{words}{ends.least:.2f} {unit} at {driver(ends.least_at)} to {ends.most:.2f} "
+                f"{unit} at {driver(ends.most_at)}"
+            )
+    largest = f"largest amount {result.peak_force:.2f} {unit}"
+    return f"force of '{result.definition.solve.unknown}' {'; '.join(found)}; {largest}"
+
+
+def _contact_sentences(contact: Contact) -> list[str]:
+    def forces(values: Mapping[str, float]) -> str:
+        return ", ".join(
+            f"{name} {value:.2f} N" if np.isfinite(value) else f"{name} no value"
+            for name, value in values.items()
+        )
+
+    found = [f"contact force at {contact.pressure / 1e6:.5f} MPa: {forces(contact.force)}"]
+    if contact.rising != contact.falling:
+        found[0] += f" (mean); rising {forces(contact.rising)}; falling {forces(contact.falling)}"
+    found += [contact.reason] if contact.reason else []
+    for (low, high), rest in zip(contact.heights, contact.rests, strict=True):
+        word = "stable" if rest.stable else "unstable"
+        height = f"{low * 1e3:.1f}" + (f" to {high * 1e3:.1f}" if rest.low < rest.high else "")
+        found.append(f"rests at a height of {height} mm without contact, {word}")
+    if not contact.rests and not contact.reason:
+        found.append("rests nowhere within the travel without contact")
+    return found
+
+
 def comparison_table(comparison: Comparison) -> Texts:
     """One row for each mechanism; the first is the reference of the error."""
     scales = {
         "stroke": ("stroke / mm", 1e3, 4),
         "length_start": ("length closed / mm", 1e3, 3),
-        "max_force": ("largest force / N", 1.0, 1),
+        "peak_force": ("largest force / N", 1.0, 1),
         "work_force": ("at work / N", 1.0, 1),
         "zone_spread": ("spread in the zone / %", 100.0, 2),
         "min_angle": ("least angle / deg", float(np.degrees(1.0)), 3),

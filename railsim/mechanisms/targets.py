@@ -11,10 +11,10 @@ from railsim.definitions.loading import load_mechanism
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.mechanism_values import ends, parameter_values
 from railsim.errors import Fault, InputError
-from railsim.mechanisms.analysis import actuator_of, height_drivers, zone_drivers
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve
 from railsim.mechanisms.model import Model, build
+from railsim.mechanisms.outputs import actuator_of, height_drivers, height_of, zone_drivers
 
 Floats = NDArray[np.float64]
 DENSE = 401
@@ -37,6 +37,12 @@ class Positions:
     s: Floats
     height: Floats
     ratio: Floats
+
+    @property
+    def share(self) -> Floats:
+        """Share of the whole range at which they are; of positions over the whole range."""
+        found: Floats = (self.s - self.s[0]) / (self.s[-1] - self.s[0])
+        return found
 
 
 def reference_of(definition: Mechanism) -> Mechanism | None:
@@ -81,7 +87,14 @@ def positions(definition: Mechanism) -> Positions:
     dense = solve(model, np.linspace(model.start, model.end, DENSE))
     name = actuator_of(source)
     pair = ends(source.actuators[name]) if name is not None else None
-    if pair is None or source.output is None:
+    if source.output is None or (pair is None and optimise.range == "travel"):
+        # without a length or an output: equal steps of the whole travel
+        s = np.linspace(model.start, model.end, optimise.points)
+        height = np.zeros(len(s))
+        if source.output is not None:
+            height = height_of(solve(model, s))[0]
+        return Positions(s, height, np.full(len(s), np.nan))
+    if pair is None:
         found = f"{source.name} has no length of an actuator, or no output"
         raise InputError([Fault(definition.name, "optimise", found, "both are needed")])
     edges = np.array([model.start, model.end])

@@ -12,10 +12,10 @@ import numpy as np
 
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.mechanism_values import ends, number, parameter_values
-from railsim.mechanisms.analysis import actuator_of
-from railsim.mechanisms.forces import generalised_force, unit_work
+from railsim.mechanisms.forces import Rates, generalised_force, unit_work
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents
 from railsim.mechanisms.model import build
+from railsim.mechanisms.outputs import actuator_of, zone_drivers
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,6 @@ def sensitivities(
     s = [model.start, model.end]
     labels = ["start", "end"]
     if definition.zone is not None:
-        from railsim.mechanisms.analysis import zone_drivers
-
         dense = solve(model, np.linspace(model.start, model.end, 401))
         zone, drivers = zone_drivers(dense)
         s = [model.start, float(drivers[zone.index("work")]), model.end]
@@ -84,7 +82,7 @@ def sensitivities(
 
 def _force(motion: Motion, unknown: str) -> Any:
     work = unit_work(motion, motion.model.definition.actuators[unknown])
-    return -generalised_force(motion) / work
+    return -generalised_force(motion, Rates(friction=motion.model.sense)) / work
 
 
 def scatter(definition: Mechanism) -> list[Scatter]:

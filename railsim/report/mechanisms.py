@@ -21,10 +21,12 @@ from matplotlib.figure import Figure
 from railsim.definitions.mechanism_parts import AirSpring
 from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.quantities import quantity
-from railsim.mechanisms.selection import checks, selection
+from railsim.mechanisms.remarks import remarks
+from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import Texts
 from railsim.mechanisms.tolerance import Scatter, scatter
 from railsim.plot import mechanisms as pictures
@@ -339,7 +341,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         title=f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else ""),
         lead=f"{source}. Written by railsim {__version__}.",
         verdict=_verdict(result),
-        remarks=definition.remarks,
+        remarks=remarks(result),
         player=player(result),
         sections=[s for s in sections if s.texts or s.tables or s.figures],
         method=METHOD,

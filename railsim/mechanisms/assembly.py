@@ -1,0 +1,184 @@
+"""Assembly where Newton's method finds none, and the loop of links that cannot close.
+
+Residuals of the joints are made small in the sense of least squares (Levenberg and Marquardt;
+scipy), which also converges from poses near a dead point.  Where links cannot be assembled the
+residuals of the least sum of squares obey `Phi_q^T Phi = 0`: they are in balance like forces in
+the joints, and therefore differ from zero in the joints of that loop only which cannot close.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.mechanism_parts import Link, Prismatic, Revolute
+from railsim.kernels import linkage_motion as motion_kernel
+from railsim.mechanisms.model import Model
+
+Floats = NDArray[np.float64]
+CLOSED = 1e-9
+"""Residual, as a share of the mechanism's size, of a closed loop."""
+TRIES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5)
+"""Amounts by which the pose's angles are moved in turn: it may itself be a dead point [rad]."""
+TIGHT = 1e3
+"""Weight of the other joints where the gap of one joint is sought."""
+IN_LOOP = 1e-3
+"""Share of the largest residual from which a joint counts as one of the loop."""
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """A loop that cannot close.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Its joints, in the order of the file.
+    blamed : str
+        The rod of the loop, else the joint that is furthest open.
+    gap : float
+        How far that joint stays open with all others closed; of a rod, distance of its points less
+        its length [m].
+    rod : bool
+        Whether the blamed joint is a rod.
+    """
+
+    joints: tuple[str, ...]
+    blamed: str
+    gap: float
+    rod: bool
+
+    def __str__(self) -> str:
+        loop = ", ".join(f"'{name}'" for name in self.joints)
+        gap = f"{abs(self.gap) * 1e3:.3f} mm"
+        side = "short" if self.gap > 0.0 else "long"
+        found = f"is {gap} too {side}" if self.rod else f"stays {gap} open"
+        return f"loop {loop}: '{self.blamed}' {found}"
+
+
+def assembled(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> Floats | None:
+    """The assembly at a value of the driver near a pose; None where there is none.
+
+    Parameters
+    ----------
+    model : Model
+        A real model.
+    s : float
+        Driver [rad or m].
+    pose : float64, shape (n_bodies + 1, 3)
+        Where it is looked for.
+    arcs : int64, shape (joint,)
+        Arc of every cam's roller.
+    """
+    generator = np.random.default_rng(0)
+    for amount in TRIES:
+        begin = pose.copy()
+        begin[1:, 2] += amount * generator.uniform(-1.0, 1.0, len(pose) - 1)
+        q, residual = _closest(model, s, begin, arcs, _scales(model))
+        if np.max(np.abs(residual)) < CLOSED * model.linkage.size:
+            return q
+    return None
+
+
+def open_loop(
+    model: Model, s: float, pose: Floats, arcs: NDArray[np.int64], known: OpenLoop | None = None
+) -> OpenLoop | None:
+    """The loop that cannot close at a value of the driver; None where all of them close.
+
+    With `known`, which opened first on the way there, no other loop is blamed.
+    """
+    scales = _scales(model)
+    q, residual = _closest(model, s, pose, arcs, scales)
+    sizes = {
+        name: float(np.max(np.abs(residual[a:b]))) for name, (a, b) in model.joint_rows.items()
+    }
+    largest = max(sizes.values())
+    if largest < CLOSED * model.linkage.size:
+        return None
+    loop = [name for name, size in sizes.items() if size > IN_LOOP * largest]
+    if known is not None:
+        loop = list(known.joints)
+    joints = model.definition.joints
+
+    def rank(name: str) -> tuple[bool, bool, float]:
+        joint = joints[name]
+        return isinstance(joint, Link), not isinstance(joint, Revolute | Prismatic), sizes[name]
+
+    blamed = max(loop, key=rank) if known is None else known.blamed
+    a, b = model.joint_rows[blamed]
+    weights = TIGHT * scales
+    weights[a:b] = scales[a:b]
+    _, last = _closest(model, s, q, arcs, weights)
+    gap = float(np.linalg.norm(last[a:b]))
+    joint = joints[blamed]
+    if isinstance(joint, Link):
+        length = float(model.number(joint.length))
+        gap = float(np.sqrt(max(length**2 + 2.0 * length * last[a], 0.0))) - length
+    if abs(gap) < CLOSED * model.linkage.size:
+        return None
+    return OpenLoop(tuple(loop), blamed, gap, isinstance(joint, Link))
+
+
+def dead_loop(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> tuple[str, ...]:
+    """Joints whose constraints depend on each other at a dead point, with the driver given."""
+    _, jacobian = constraints(model, s, pose, arcs)
+    left, _, _ = np.linalg.svd(jacobian / _scales(model, columns=True))
+    weight = np.abs(left[:, -1])
+    return tuple(
+        name
+        for name, (a, b) in model.joint_rows.items()
+        if np.max(weight[a:b]) > IN_LOOP * np.max(weight)
+    )
+
+
+def _scales(model: Model, *, columns: bool = False) -> Floats:
+    """Factors that make residuals, or coordinates, of angles comparable with those of lengths."""
+    linkage = model.linkage
+    scales = np.ones(3 * linkage.n_bodies)
+    if columns:
+        scales[2::3] = linkage.size
+        return scales
+    for name, (_, b) in model.joint_rows.items():
+        if isinstance(model.definition.joints[name], Prismatic):
+            scales[b - 1] = linkage.size
+    if model.definition.driver.angle is not None:
+        scales[-1] = linkage.size
+    return scales
+
+
+def constraints(
+    model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Residuals, shape (n,), and Jacobian, shape (n, n), of joints and driver at a pose."""
+    n = 3 * model.linkage.n_bodies
+    residual, jacobian = np.zeros((1, n)), np.zeros((1, n, n))
+    at = np.ascontiguousarray(pose[None])
+    motion_kernel.jacobians(model.linkage, np.array([s]), at, arcs[None], residual, jacobian)
+    return residual[0], jacobian[0]
+
+
+def _closest(
+    model: Model, s: float, pose: Floats, arcs: NDArray[np.int64], weights: Floats
+) -> tuple[Floats, Floats]:
+    """Pose with the least sum of squares of the weighted residuals, and its residuals."""
+    from scipy.optimize import least_squares  # imported where it is needed: it takes a while
+
+    columns = _scales(model, columns=True)
+
+    def at(x: Floats) -> Floats:
+        q = pose.copy()
+        q[1:] = (x / columns).reshape(-1, 3)
+        return q
+
+    def residual(x: Floats) -> Floats:
+        return weights * constraints(model, s, at(x), arcs)[0]
+
+    def slope(x: Floats) -> Any:
+        return weights[:, None] * constraints(model, s, at(x), arcs)[1] / columns
+
+    found = least_squares(
+        residual, pose[1:].ravel() * columns, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
+    q = at(found.x)
+    return q, constraints(model, s, q, arcs)[0]

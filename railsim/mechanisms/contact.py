@@ -1,0 +1,196 @@
+"""Positions of rest, and the static contact force of the output at a held pressure."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.expressions import Expression
+from railsim.definitions.mechanism_parts import AUTO
+from railsim.mechanisms.forces import (
+    Rates,
+    contact_force,
+    force_at_pressure,
+    generalised_force,
+    pressure_for,
+    rubs,
+    unit_work,
+)
+from railsim.mechanisms.inversion import zeros
+from railsim.mechanisms.kinematics import Motion, solve
+from railsim.mechanisms.outputs import height_of
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A position of rest, with dry friction a range of positions.
+
+    Attributes
+    ----------
+    at : float
+        Value of the driver, the middle of the range [rad or m].
+    low, high : float
+        Ends of the range; equal without friction.
+    stable : bool
+        Whether the mechanism comes back to it from either side.
+    """
+
+    at: float
+    low: float
+    high: float
+    stable: bool
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Static contact force of the output.
+
+    Attributes
+    ----------
+    pressure : float
+        Pressure held [Pa]; by default what gives the wanted force at work height without friction,
+        the mean of the forces of a rising and a falling output.
+    force : dict of str to float
+        At low, work and high height without friction; NaN where the actuator has no value [N].
+    rising, falling : dict of str to float
+        The same with friction, for the output on its way from start to end and back.
+    curve : ndarray, shape (position,)
+        At all positions, without friction [N].
+    bounds : tuple of two ndarray, shape (position,)
+        The same with friction, rising and falling.
+    rests : tuple of Rest
+        Where the mechanism rests without a contact force.
+    heights : tuple of (low, high)
+        Heights of these positions [m].
+    reason : str
+        Why values are missing.
+    """
+
+    pressure: float
+    force: Mapping[str, float]
+    rising: Mapping[str, float]
+    falling: Mapping[str, float]
+    curve: Floats
+    bounds: tuple[Floats, Floats]
+    rests: tuple[Rest, ...]
+    heights: tuple[tuple[float, float], ...]
+    reason: str = ""
+
+    @property
+    def equilibria(self) -> tuple[tuple[float, bool], ...]:
+        """Heights (the middle of each range) at which it rests, and whether they are stable."""
+        return tuple(
+            (0.5 * (low + high), rest.stable)
+            for (low, high), rest in zip(self.heights, self.rests, strict=True)
+        )
+
+
+Force = Callable[[Motion, int], Any]
+"""Generalised force of a motion with friction in a sense of the driver: 1, -1, or 0 for none."""
+
+
+def positions_of_rest(dense: Motion) -> tuple[Rest, ...]:
+    """Where a mechanism without an unknown rests under its own weights and elements."""
+    if dense.model.definition.solve is not None:
+        return ()
+    return rests(dense, lambda m, sense: generalised_force(m, Rates(friction=sense)))
+
+
+def moved(motion: Motion) -> bool:
+    """Whether weights or elements act on a mechanism at all."""
+    return bool(np.any(generalised_force(motion)))
+
+
+def rests(dense: Motion, force: Force) -> tuple[Rest, ...]:
+    """Where a generalised force is not larger than the friction.
+
+    Without friction these are its zeros, stable where it falls along the driver.  With friction the
+    mechanism rests where the force that moves it on is not positive and the one that moves it back
+    not negative.
+    """
+    model = dense.model
+    if not np.any(force(dense, 0)):
+        return ()
+    if rubs(model):
+        return _rest_ranges(dense, force)
+    span = model.end - model.start
+    low, high = sorted((model.start, model.end))
+    found = []
+    for s in zeros(dense, lambda m: force(m, 0)):
+        h = 1e-6 * abs(span)
+        before, after = force(solve(model, [max(s - h, low), min(s + h, high)]), 0)
+        found.append(Rest(s, s, s, bool(after < before)))
+    return tuple(found)
+
+
+def _rest_ranges(dense: Motion, force: Force) -> tuple[Rest, ...]:
+    model = dense.model
+    edges = [(float(s), 0) for s in (model.start, model.end)]
+    for sense in (1, -1):
+        edges += [(s, sense) for s in zeros(dense, lambda m, k=sense: force(m, k))]  # type: ignore[misc]
+    edges.sort()
+    found: list[Rest] = []
+    for (low, kind), (high, other) in pairwise(edges):
+        if high - low < 1e-12 * abs(model.end - model.start):
+            continue
+        middle = solve(model, [0.5 * (low + high)])
+        if force(middle, 1)[0] <= 0.0 <= force(middle, -1)[0]:
+            # not stable where it is moved away: back from below the range, on from above it
+            found.append(Rest(0.5 * (low + high), low, high, kind != -1 and other != 1))
+    return tuple(found)
+
+
+def held_pressure(dense: Motion, work: float) -> float:
+    """Pressure of `[contact]`: given, or what gives the wanted force at work height [Pa]."""
+    definition = dense.model.definition
+    contact, solve_for = definition.contact, definition.solve
+    assert contact is not None
+    assert solve_for is not None
+    assert definition.output is not None
+    given = contact.pressure
+    automatic = isinstance(given, Expression) and bool(given.names & definition.automatic)
+    if given != AUTO and not automatic:
+        return float(dense.model.number(given))
+    at = solve(dense.model, [work])
+    _, r1, _ = at.point(definition.output.point)
+    wanted = dense.model.number(contact.force) * r1[:, 1] - generalised_force(at)
+    force = wanted / unit_work(at, definition.actuators[solve_for.unknown])
+    return float(pressure_for(at, solve_for.unknown, force)[0])
+
+
+def contact_of(dense: Motion, motion: Motion, at_zone: tuple[list[str], Floats]) -> Contact | None:
+    """Static contact force that `[contact]` asks for, at the zone's heights and all positions."""
+    definition = dense.model.definition
+    if definition.contact is None or definition.solve is None:
+        return None
+    names, drivers = at_zone
+    unknown = definition.solve.unknown
+    pressure = held_pressure(dense, drivers[names.index("work")])
+    sense = dense.model.sense
+
+    def force(positions: Motion, friction: int) -> Any:
+        held = force_at_pressure(positions, unknown, pressure)
+        return np.asarray(contact_force(positions, unknown, held, Rates(friction=friction)))
+
+    def generalised(positions: Motion, friction: int) -> Any:
+        push = force_at_pressure(positions, unknown, pressure)
+        work = unit_work(positions, definition.actuators[unknown])
+        return push * work + generalised_force(positions, Rates(friction=friction))
+
+    found = rests(dense, generalised)
+    edges = [height_of(solve(dense.model, [rest.low, rest.high]))[0] for rest in found]
+    in_zone = solve(dense.model, drivers)
+    at_heights = {k: force(in_zone, k * sense) for k in (0, 1, -1)}
+    zone, up, down = (
+        dict(zip(names, map(float, values), strict=True)) for values in at_heights.values()
+    )
+    curve, rising, falling = (force(motion, k * sense) for k in (0, 1, -1))
+    missing = not (np.all(np.isfinite(curve)) and np.all(np.isfinite(list(zone.values()))))
+    reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
+    heights = tuple((float(min(y)), float(max(y))) for y in edges)
+    return Contact(pressure, zone, up, down, curve, (rising, falling), found, heights, reason)

@@ -1,0 +1,126 @@
+"""What is allowed but unusual in the results of a mechanism: rules of thumb, narrow margins."""
+
+import numpy as np
+
+from railsim.definitions.mechanism_parts import GasSpring, HandForce, HandTorque, Link
+from railsim.definitions.mechanism_values import parameter_values
+from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
+from railsim.mechanisms.kinematics import solve
+
+GAS_PRESSURES = (20e5, 250e5)
+"""Usual pressures of gas springs over the outside [Pa] (makers' catalogues; Merci, 2017)."""
+NEAR = 0.05
+"""Difference of a rod and its crank, as a share of the crank, below which they are nearly equal."""
+
+
+def remarks(result: Analysis) -> list[str]:
+    """Remarks of the file, and on what its results are."""
+    return [
+        *result.definition.remarks,
+        *_forces(result),
+        *_rods(result),
+        *_gas_springs(result),
+        *_lid(result),
+        *_bounds(result),
+    ]
+
+
+def _forces(result: Analysis) -> list[str]:
+    """A hand that has to hold back."""
+    solve_for = result.definition.solve
+    if solve_for is None:
+        return []
+    unknown = result.definition.actuators[solve_for.unknown]
+    least = runs_ahead(result)
+    if not isinstance(unknown, HandForce | HandTorque) or least >= 0.0:
+        return []
+    unit = "N" if isinstance(unknown, HandForce) else "N m"
+    return [f"'{solve_for.unknown}' holds back with up to {-least:.2f} {unit}: the load runs ahead"]
+
+
+def _rods(result: Analysis) -> list[str]:
+    """A rod hardly longer than its crank: close to a dead point when they lie on each other."""
+    model = result.model
+    joints = result.definition.joints
+    cranks = {p for j in joints.values() for p in getattr(j, "revolute", ()) if "ground." in p}
+    pivots = {
+        body: point
+        for joint in joints.values()
+        for point, body in _on_ground(getattr(joint, "revolute", ()))
+    }
+    slides = {
+        point.partition(".")[0]
+        for joint in joints.values()
+        for point in getattr(joint, "prismatic", ())
+    }
+    found = []
+    for name, joint in joints.items():
+        if not isinstance(joint, Link) or not cranks:
+            continue
+        bodies = [point.partition(".")[0] for point in joint.link]
+        for end, other in ((0, 1), (1, 0)):
+            if bodies[end] not in pivots or bodies[other] not in slides:
+                continue
+            motion = solve(model, [model.start])
+            d = motion.point(joint.link[end])[0] - motion.point(pivots[bodies[end]])[0]
+            crank, rod = float(np.hypot(*d[0])), float(model.number(joint.length))
+            if abs(rod - crank) < NEAR * crank:
+                longer = f"{abs(rod - crank) * 1e3:.3f} mm {'longer' if rod > crank else 'shorter'}"
+                found.append(
+                    f"rod '{name}' is only {longer} than its crank of {crank * 1e3:.3f} mm: close "
+                    "to a dead point, sensitive to every tolerance"
+                )
+    return found
+
+
+def _on_ground(pair: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Point and body of a revolute joint with the ground."""
+    if len(pair) != 2 or not any(point.startswith("ground.") for point in pair):
+        return []
+    return [(p, p.partition(".")[0]) for p in pair if not p.startswith("ground.")]
+
+
+def _gas_springs(result: Analysis) -> list[str]:
+    found = []
+    low, high = GAS_PRESSURES
+    for name, part in result.definition.elements.items():
+        if not isinstance(part, GasSpring):
+            continue
+        if f"{name}_pressure" in result.output:
+            pressure = result.extremes(f"{name}_pressure")
+            if pressure.least < low or pressure.most > high:
+                found.append(
+                    f"gas pressure of '{name}' {pressure.least / 1e5:.1f} to "
+                    f"{pressure.most / 1e5:.1f} bar, usual {low / 1e5:g} to {high / 1e5:g} bar"
+                )
+        if part.rod_end is None and (drop := rod_drop(result, name)):
+            lower = part.gas_spring[0] if drop > 0.0 else part.gas_spring[1]
+            found.append(f"'{name}' belongs with its rod at {lower}, the lower end when compressed")
+    return found
+
+
+def _lid(result: Analysis) -> list[str]:
+    """The makers' rule of thumb for lids."""
+    return [
+        f"makers' rule of thumb for lids, G D/(b n) 9.8 alpha: F1 of "
+        f"'{check.name.removeprefix('lid_')}' {check.limit:.1f} N; here {check.value:.1f} N"
+        for check in checks(result)
+        if check.sense == "about"
+    ]
+
+
+def _bounds(result: Analysis) -> list[str]:
+    """Bounds of the search that exclude the file's own values."""
+    definition, n = result.definition, result.model.number
+    if definition.optimise is None:
+        return []
+    values = parameter_values(definition)
+    found = []
+    for name, (low, high) in definition.optimise.bounds.items():
+        if not n(low) <= values[name] <= n(high):
+            found.append(
+                f"optimise.bounds.{name}: {n(low):.6g} to {n(high):.6g} exclude the file's own "
+                f"{values[name]:.6g}; the first start begins at the nearer bound"
+            )
+    return found

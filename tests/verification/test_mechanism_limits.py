@@ -1,0 +1,295 @@
+"""Limits of a mechanism: both senses of a force, friction, loops that cannot close, dead points."""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.loading import load_mechanism
+from railsim.errors import InputError
+from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.checks import checks
+from railsim.mechanisms.remarks import remarks
+from railsim.mechanisms.selection import selection
+from railsim.mechanisms.tables import sentences
+from railsim.mechanisms.tolerance import scatter
+
+G = 9.81
+# an arm with its weight at the end, turned over the top by a cylinder: m g l cos(theta) changes sign
+ARM = """
+format = "railsim-mechanism/1"
+name = "arm"
+[parameters]
+mass = 100.0
+begin = {begin}
+end = {end}
+friction = {friction}
+[ground.points]
+hinge = [0.0, 0.0]
+foot = [0.5, -0.2]
+[bodies.arm]
+points = {{ hinge = [0.0, 0.0], pin = [0.3, 0.0], tip = [1.0, 0.0] }}
+mass = "mass"
+centre = [1.0, 0.0]
+[joints.hinge]
+revolute = ["ground.hinge", "arm.hinge"]
+[driver]
+angle = "arm"
+start = "begin"
+end = "end"
+[output]
+point = "arm.tip"
+[elements.rub]
+joint_friction = "arm"
+moment = "friction"
+[actuators.lift]
+{lift}
+[solve]
+unknown = "lift"
+[tolerances]
+mass = 1.0
+"""
+CYLINDER = """cylinder = ["ground.foot", "arm.pin"]
+bore = 0.08
+rod = 0.03
+supply_pressure = 1.0e6
+acts = "{acts}"
+"""
+TORQUE = 'turn = "arm"'
+
+
+@pytest.fixture
+def arm(tmp_path):
+    def made(lift, begin=1.3, end=2.6, friction=0.0, more=""):
+        path = tmp_path / "arm.toml"
+        text = ARM.format(lift=lift, begin=begin, end=end, friction=friction)
+        path.write_text(text + more)
+        return load_mechanism(path)
+
+    return made
+
+
+def by_name(result):
+    return {check.name: check for check in checks(result)}
+
+
+def test_a_cylinder_that_must_pull_does_not_pass(arm):
+    result = analyse(arm(CYLINDER.format(acts="push")))
+    found = by_name(result)
+    assert result.max_force > 0.0 > -2.0 * result.max_force > result.min_force
+    assert result.peak_force == -result.min_force
+    assert found["available_force"].ok  # the push alone would do
+    assert not found["pulls"].ok
+    assert found["pulls"].value == result.min_force
+    assert not found["runs_ahead"].ok
+    rows = [row for row in selection(result) if row.catalogue == "cylinder"]
+    assert not any(row.fits for row in rows)
+    assert all("must pull" in row.reasons[0] for row in rows)
+
+
+def test_a_double_acting_cylinder_is_held_against_both_chambers(arm):
+    result = analyse(arm(CYLINDER.format(acts="both")))
+    found = by_name(result)
+    ring = 0.25 * np.pi * (0.08**2 - 0.03**2)
+    assert found["available_pull"].value == -result.min_force
+    assert found["available_pull"].limit == pytest.approx(1e6 * ring)
+    assert "pulls" not in found
+    pressure = result.output["pressure"]
+    pull = result.output["force"] < 0.0
+    assert pressure[pull] * ring == pytest.approx(-result.output["force"][pull])
+    assert np.all(pressure >= 0.0)
+    bore = 0.0
+    for row in selection(result):
+        if row.fits:
+            bore = float(row.name.split()[1]) * 1e-3
+            break
+    assert 1e6 * 0.25 * np.pi * (bore**2 - 0.03**2) >= -result.min_force
+
+
+def test_peak_force_of_a_search_is_an_amount(arm):
+    from railsim.mechanisms.judgement import Judge
+
+    search = """
+[optimise]
+objective = "peak_force"
+range = "travel"
+sample = "travel"
+available_force = 500.0
+[optimise.bounds]
+mass = [50.0, 150.0]
+"""
+    definition = arm(CYLINDER.format(acts="push"), begin=1.8, end=2.6, more=search)
+    judge = Judge(definition)
+    judged = judge(np.array([100.0]), {})
+    peak = analyse(definition).peak_force
+    assert judged.peak == pytest.approx(peak, rel=1e-3)  # at 17 + 215 positions
+    assert judged.peak_gradient == pytest.approx([judged.peak / 100.0])  # proportional to the mass
+    assert judged.violation == pytest.approx(peak / 500.0, rel=1e-3)  # it cannot pull at all
+
+
+def test_friction_counts_in_every_force_of_a_page(arm):
+    definition = arm(TORQUE, begin=0.2, end=1.0, friction=40.0)
+    result = analyse(definition)
+    start = 100.0 * G * np.cos(0.2) + 40.0
+    assert result.output["force"][0] == pytest.approx(start)
+    found = {one.name: one for one in scatter(definition)}
+    assert found["force_start"].value == pytest.approx(start)  # was the value without friction
+    assert found["force_start"].random == pytest.approx(G * np.cos(0.2))
+    assert any("largest amount 1001.45 N m" in text for text in sentences(result))
+
+
+def test_with_friction_an_arm_rests_in_a_range_of_angles(arm):
+    moment = 300.0
+    text = arm(TORQUE, begin=-2.5, end=2.5, friction=moment)
+    result = analyse(text.model_copy(update={"solve": None}))
+    half = np.arcsin(moment / (100.0 * G))
+    (hanging, standing) = result.rests
+    assert (hanging.stable, standing.stable) == (True, False)
+    assert (hanging.low, hanging.high) == pytest.approx((-np.pi / 2 - half, -np.pi / 2 + half))
+    assert (standing.low, standing.high) == pytest.approx((np.pi / 2 - half, np.pi / 2 + half))
+
+
+def test_no_position_of_rest_is_said(arm):
+    text = arm(TORQUE, begin=-1.0, end=1.0)
+    result = analyse(text.model_copy(update={"solve": None}))
+    assert not result.rests
+    assert any(
+        "no position of rest from -57.2958 deg to 57.2958 deg" in t for t in sentences(result)
+    )
+
+
+def test_contact_force_with_friction_is_that_of_a_rising_and_a_falling_head():
+    moment = 60.0
+    rub = f"elements.rub={{joint_friction='boom',moment={moment}}}"
+    plain, rubbed = (
+        analyse(load_mechanism("atr95_lift_5", ["sampling.points=51", *more])).contact
+        for more in ([], [rub])
+    )
+    assert rubbed.force == pytest.approx(plain.force)  # the mean
+    result = analyse(load_mechanism("atr95_lift_5", ["sampling.points=51"]))
+    slope = result.zone["work"]["ratio"] * result.zone["work"]["rate"]
+    assert plain.force["work"] - rubbed.rising["work"] == pytest.approx(moment / slope, rel=1e-6)
+    assert rubbed.falling["work"] - plain.force["work"] == pytest.approx(moment / slope, rel=1e-6)
+    # where it rested at one height it now rests between two
+    assert all(low < high for low, high in rubbed.heights)
+
+
+# --- loops that cannot close ----------------------------------------------------------------------
+
+SLIDER_CRANK = """
+format = "railsim-mechanism/1"
+[parameters]
+crank = 0.1
+rod = {rod}
+end = {end}
+[ground.points]
+o = [0.0, 0.0]
+[bodies.crank]
+points = {{ pin = [0.0, 0.0], end = ["crank", 0.0] }}
+[bodies.slide]
+points = {{ pin = [0.0, 0.0] }}
+[start]
+slide = {{ x = 0.2, y = 0.0 }}
+[joints.crank]
+revolute = ["ground.o", "crank.pin"]
+[joints.guide]
+prismatic = ["slide.pin", "ground.o"]
+[joints.rod]
+link = ["crank.end", "slide.pin"]
+length = "rod"
+[driver]
+angle = "crank"
+start = 0.3
+end = "end"
+"""
+
+
+def refused(mechanism):
+    with pytest.raises(InputError) as error:
+        analyse(mechanism)
+    (fault,) = error.value.faults
+    return fault
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "joint", "loop"),
+    [
+        ("atr95_lift_5", "a3=0.40", "rocker", "'boom_hinge', 'boom_pin', 'rocker'"),
+        ("atr95_lift_4", "a2=0.03", "push_rod", "'boom_hinge', 'slide', 'push_rod'"),
+    ],
+)
+def test_the_loop_that_cannot_close_is_named(name, change, joint, loop):
+    fault = refused(load_mechanism(name, [f"parameters.{change}"]))
+    assert fault.key == f"joints.{joint}"
+    assert f"loop {loop}: '{joint}' is" in fault.found
+
+
+def test_the_gap_of_a_short_rod_is_that_of_its_triangle(tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text(SLIDER_CRANK.format(rod=0.08, end=1.5))
+    fault = refused(load_mechanism(path))
+    assert fault.key == "joints.rod"
+    # the slider stands below the crank's end: the rod would have to be as long as its height
+    missing = (0.1 * np.sin(1.5) - 0.08) * 1e3
+    assert f"'rod' is {missing:.3f} mm too short at 85.9437 deg" in fault.found
+
+
+def test_a_rod_hardly_longer_than_its_crank_is_remarked(tmp_path):
+    path = tmp_path / "hardly.toml"
+    for rod, said in ((0.1001, True), (0.25, False)):
+        path.write_text(SLIDER_CRANK.format(rod=rod, end=1.2))
+        told = [r for r in remarks(analyse(load_mechanism(path))) if "close to a dead point" in r]
+        assert bool(told) is said
+        assert not said or "only 0.100 mm longer than its crank of 100.000 mm" in told[0]
+
+
+def test_bounds_that_exclude_the_files_own_values_are_remarked():
+    own = ["optimise.bounds.a1=[0.2,0.25]", "sampling.points=51"]
+    told = [r for r in remarks(analyse(load_mechanism("atr95_lift_4", own))) if "bounds" in r]
+    (remark,) = told
+    assert remark.startswith("optimise.bounds.a1: 0.2 to 0.25 exclude the file's own 0.129297")
+
+
+FOUR_BAR = """
+format = "railsim-mechanism/1"
+[parameters]
+base = 1.0
+arm = 0.4
+rocker = {rocker}
+[ground.points]
+left = [0.0, 0.0]
+right = ["base", 0.0]
+[bodies.crank]
+points = {{ pin = [0.0, 0.0], end = ["arm", 0.0] }}
+[bodies.coupler]
+points = {{ begin = [0.0, 0.0], end = ["base", 0.0] }}
+[bodies.rocker]
+points = {{ pin = [0.0, 0.0], end = ["rocker", 0.0] }}
+[joints.left]
+revolute = ["ground.left", "crank.pin"]
+[joints.right]
+revolute = ["ground.right", "rocker.pin"]
+[joints.begin]
+revolute = ["crank.end", "coupler.begin"]
+[joints.end]
+revolute = ["coupler.end", "rocker.end"]
+[driver]
+angle = "crank"
+end = {end}
+"""
+
+
+@pytest.mark.parametrize("rocker", [0.401, 0.402, 0.405, 0.42])
+def test_a_near_parallelogram_is_assembled_from_a_pose_at_its_dead_point(tmp_path, rocker):
+    """All angles are 0 by default: a dead point, some degrees away from the assembly."""
+    path = tmp_path / "near.toml"
+    path.write_text(FOUR_BAR.format(rocker=rocker, end=0.2))
+    motion = analyse(load_mechanism(path)).motion
+    # cosine rule at the rocker's pivot: crank's end 0.6 away, coupler 1.0
+    turn = np.pi - np.arccos((0.6**2 + rocker**2 - 1.0) / (2.0 * 0.6 * rocker))
+    assert abs(motion.q[0, 3, 2]) == pytest.approx(turn, rel=1e-9)
+
+
+def test_an_exact_parallelogram_stretched_out_is_a_dead_point(tmp_path):
+    path = tmp_path / "flat.toml"
+    path.write_text(FOUR_BAR.format(rocker=0.4, end=0.2))
+    fault = refused(load_mechanism(path))
+    assert "a dead point" in fault.found  # was: joints hold the same freedom twice
