@@ -319,8 +319,9 @@ class Judge:
                 yield "min_length", 1.0, length - n(wanted.min_length)
             mean = (length[..., -1:] - length[..., :1]) / (motion.s[..., -1:] - motion.s[..., :1])
             yield "dead_point", 1.0, rate / mean - SLOWEST
-        work = unit_work(motion, self.unknown)
-        yield "dead_point", 1.0, work / work[..., :1] - SLOWEST
+        if self.pair is None or ends(self.unknown) != self.pair:
+            work = unit_work(motion, self.unknown)
+            yield "dead_point", 1.0, work / np.mean(work, axis=-1, keepdims=True) - SLOWEST
         yield from self._forces(motion)
         yield from self._strokes(motion)
         for i, box in enumerate(wanted.envelope):

@@ -11,6 +11,7 @@ from railsim.definitions.mechanism import Mechanism
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
+from railsim.mechanisms.contact import Contact
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
@@ -73,20 +74,7 @@ def analysis_data(result: Analysis) -> Data:
     if result.timed is not None:
         data["motion"] = motion_data(result)
     if result.contact is not None:
-        data["contact"] = {
-            "pressure": result.contact.pressure,
-            "force": dict(result.contact.force),
-            "force_rising": dict(result.contact.rising),
-            "force_falling": dict(result.contact.falling),
-            "curve": _list(result.contact.curve),
-            "equilibria": [
-                {"height": y, "stable": stable, "from": low, "to": high}
-                for (y, stable), (low, high) in zip(
-                    result.contact.equilibria, result.contact.heights, strict=True
-                )
-            ],
-            "reason": result.contact.reason or None,
-        }
+        data["contact"] = contact_data(result.contact)
     if result.release is not None:
         released = result.release
         data["release"] = {
@@ -128,6 +116,23 @@ def analysis_data(result: Analysis) -> Data:
     ]
     data["ok"] = all(check.ok for check in made)
     return data
+
+
+def contact_data(contact: Contact) -> Data:
+    """The static contact force as plain numbers."""
+    equilibria = zip(contact.equilibria, contact.heights, strict=True)
+    return {
+        "pressure": contact.pressure,
+        "force": dict(contact.force),
+        "force_rising": dict(contact.rising),
+        "force_falling": dict(contact.falling),
+        "curve": _list(contact.curve),
+        "equilibria": [
+            {"height": y, "stable": stable, "from": low, "to": high}
+            for (y, stable), (low, high) in equilibria
+        ],
+        "reason": contact.reason or None,
+    }
 
 
 def published_data(result: Analysis) -> dict[str, Data]:

@@ -13,7 +13,7 @@ from railsim.mechanisms.tables import sentences
 from railsim.mechanisms.tolerance import scatter
 
 G = 9.81
-# an arm with its weight at the end, turned over the top by a cylinder: m g l cos(theta) changes sign
+# an arm with its weight at the end, turned over the top: m g l cos(theta) changes its sign
 ARM = """
 format = "railsim-mechanism/1"
 name = "arm"

@@ -1,0 +1,83 @@
+"""Searches with known answers: limits between the positions, forces by hand, catalogues."""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.loading import load_mechanism
+from railsim.mechanisms.analysis import analyse
+from railsim.mechanisms.checks import checks
+from railsim.mechanisms.kinematics import folded, solve
+from railsim.mechanisms.optimisation import optimise
+from railsim.mechanisms.selection import selection
+
+# an arm against a torque; the rod's angle at the pin is largest, asin(d/r), within the travel
+ARM = """
+format = "railsim-mechanism/1"
+name = "arm"
+[parameters]
+r = 0.3
+d = 0.1
+[ground.points]
+hinge = [0.0, 0.0]
+foot = ["d", 0.0]
+[bodies.arm]
+points = { hinge = [0.0, 0.0], pin = ["r", 0.0] }
+[joints.hinge]
+revolute = ["ground.hinge", "arm.hinge"]
+[driver]
+angle = "arm"
+start = 0.4
+end = 2.4
+[output]
+point = "arm.pin"
+[elements.load]
+torque = "arm"
+size = -100.0
+[actuators.lift]
+piston = ["ground.foot", "arm.pin"]
+[solve]
+unknown = "lift"
+[angles.mu]
+between = [["ground.foot", "arm.pin"], ["ground.hinge", "arm.pin"]]
+offset = "pi / 2"
+[optimise]
+objective = "peak_force"
+range = "travel"
+sample = "travel"
+min_transmission_angle = 0.8726646259971648        # 50 deg
+starts = 1
+[optimise.bounds]
+d = [0.05, 0.25]
+"""
+
+
+def test_an_optimum_keeps_its_limits_between_the_positions_too(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM)
+    best = optimise(load_mechanism(path))
+    # the longest lever with the rod's angle at the pin 40 degrees at most: d = r sin(40 deg);
+    # held at 17 positions only it was 0.19291 and the angle 49.982 degrees
+    assert best.parameters["d"] == pytest.approx(0.3 * np.sin(np.radians(40.0)), rel=1e-6)
+    assert best.feasible
+    assert [active.name for active in best.active] == ["mu"]
+    fine = solve(best.after.model, np.linspace(0.4, 2.4, 20001))
+    assert np.degrees(folded(fine.angle("mu"))).min() > 50.0 - 1e-4
+    (check,) = (c for c in checks(best.after) if c.name == "mu")
+    assert np.degrees(check.value) == pytest.approx(50.0, abs=1e-5)
+
+
+def test_the_final_check_decides_whether_a_start_keeps_its_limits(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM.replace("d = [0.05, 0.25]", "d = [0.19287, 0.25]"))
+    best = optimise(load_mechanism(path))
+    assert not best.feasible  # at 17 positions 0.19287 passes
+    gap = np.arcsin(0.19287 / 0.3) - np.radians(40.0)
+    assert best.breaches["mu"] == pytest.approx(gap, rel=1e-2)
+
+
+def test_the_least_angle_is_that_between_the_positions(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM + "\n[sampling]\npoints = 5\n")
+    result = analyse(load_mechanism(path))
+    exact = np.pi / 2 - np.arcsin(0.1 / 0.3)
+    assert result.min_angles["mu"] == pytest.approx(exact, abs=1e-9)
