@@ -8,7 +8,6 @@ from railsim.mechanisms.analysis import analyse
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.kinematics import folded, solve
 from railsim.mechanisms.optimisation import optimise
-from railsim.mechanisms.selection import selection
 
 # an arm against a torque; the rod's angle at the pin is largest, asin(d/r), within the travel
 ARM = """
