@@ -1,7 +1,7 @@
 """Texts from files of other sources, shown literally: in a terminal, a picture, a spreadsheet.
 
 A vehicle may be called ``$x^$``, ``=1+1`` or hold escape sequences; wherever it is shown, it is
-these characters and does nothing.  Pages escape theirs by themselves (jinja2).
+these characters and does nothing.  For pages see `railsim.page`.
 """
 
 from collections.abc import Iterable, Sequence

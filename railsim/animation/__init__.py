@@ -2,7 +2,7 @@
 
 ==============  ============================================================================
 `scene.py`      a result, or a mode of ``railsim modes``, as bodies, poses, track and forces
-`page.py`       a scene as one self-contained HTML page (``page.html`` is its template)
+`page.py`       a scene as one self-contained HTML page (``page.html``, ``.css``, ``.js``)
 `movie.py`      a scene as GIF or MP4
 ==============  ============================================================================
 

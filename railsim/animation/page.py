@@ -1,8 +1,5 @@
 """A scene as one HTML page without anything from elsewhere: plays, scrubs, zooms, turns."""
 
-import html
-import json
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +7,7 @@ import numpy as np
 
 from railsim.animation.scene import Scene
 from railsim.files import check_file, whole_file
+from railsim.page import rendered
 
 
 def write_page(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -21,11 +19,14 @@ def write_page(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Pa
     """
     path = Path(path)
     check_file(path, overwrite=overwrite, endings=(".html", ".htm"))
-    template = files("railsim.animation").joinpath("page.html").read_text(encoding="utf-8")
-    # "</" would end the script
-    data = json.dumps(scene_data(scene), separators=(",", ":"), allow_nan=False)
-    text = template.replace("@TITLE@", html.escape(scene.title))
-    text = text.replace("@SCENE@", data.replace("</", "<\\/"))
+    text = rendered(
+        "railsim.animation",
+        "page.html",
+        title=scene.title,
+        styles=["page.css"],
+        scripts=["page.js"],
+        data=scene_data(scene),
+    )
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
     return path

@@ -5,17 +5,13 @@
 """
 
 import csv
-import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from io import BytesIO, StringIO
 from typing import TYPE_CHECKING, Any
 
-import jinja2
 import numpy as np
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from railsim.definitions.mechanism_parts import AirSpring
@@ -29,6 +25,7 @@ from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import Texts
 from railsim.mechanisms.tolerance import Scatter, scatter
+from railsim.page import rendered
 from railsim.plot import mechanisms as pictures
 from railsim.plot.style import styled
 from railsim.version import __version__
@@ -247,8 +244,8 @@ def _told(result: Analysis, s: float) -> str:
     return f"driver at {s * what.scale:.1f} {what.shown.replace('deg', '°')}"
 
 
-def player(result: Analysis) -> dict[str, Any]:
-    """Data of the player: lines as SVG coordinates in mm, y downwards."""
+def player(result: Analysis) -> tuple[str, dict[str, Any]]:
+    """The view box of the player and its data: lines as SVG coordinates in mm, y downwards."""
     model = result.model
     motion = solve(model, np.linspace(model.start, model.end, FRAMES))
     drawn = drawing.lines(motion)
@@ -281,11 +278,7 @@ def player(result: Analysis) -> dict[str, Any]:
         "whole": [round(float(v), 1) for v in whole],
         "near": [round(float(v), 1) for v in (a, -d, b - a, d - c)],
     }
-    return {
-        "box": " ".join(f"{v:.1f}" for v in whole),
-        "last": FRAMES - 1,
-        "data": Markup(json.dumps(data).replace("</", "<\\/")),  # our own numbers
-    }
+    return " ".join(f"{v:.1f}" for v in whole), data
 
 
 def _sentences(result: Analysis, s: Any) -> list[str]:
@@ -334,15 +327,20 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
         sections.append(_tolerances(scatter(definition)))
     made = tables.parameter_table(result)
     sections.append(Section("Parameters", [], [_table(made, words=frozenset({0, 2}))]))
-    template = files("railsim.report").joinpath("templates/mechanisms.html").read_text("utf-8")
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     source = definition.source or "no source given"
-    return environment.from_string(template).render(
+    box, data = player(result)
+    return rendered(
+        "railsim.report",
+        "templates/document.html",
         title=f"Mechanism: {definition.name}" + (f", {result.case}" if result.case else ""),
+        styles=["templates/document.css"],
+        scripts=["templates/player.js"],
+        data=data,
+        box=box,
+        last=FRAMES - 1,
         lead=f"{source}. Written by railsim {__version__}.",
         verdict=_verdict(result),
         remarks=remarks(result),
-        player=player(result),
         sections=[s for s in sections if s.texts or s.tables or s.figures],
         method=METHOD,
     )

@@ -4,19 +4,17 @@
 The page loads no other files; its plots are drawn by uPlot (`vendor/`).
 """
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.notation import QUANTITIES
+from railsim.page import rendered
 from railsim.report.curves import cells_of, curve_data, groups
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.report.limits import limit_tables
@@ -104,31 +102,20 @@ def page(
         sections.append(published)
     sections.append(_what_was_run(records, results))
     sections.append(_remarks(records, remarks))
-    shown = {
-        "title": printable(title),
-        "lead": _lead(records, results),
-        "verdict": _verdict(records, exceeded),
-        "sections": [section for section in sections if section],
-        "foot": f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
+    return rendered(
+        "railsim.report",
+        "templates/runs.html",
+        title=title,
+        styles=["vendor/uPlot.min.css", "templates/runs.css"],
+        scripts=["vendor/uPlot.iife.min.js", "templates/runs.js"],
+        data=data,
+        schemes="light dark",
+        lead=_lead(records, results),
+        verdict=_verdict(records, exceeded),
+        sections=[section for section in sections if section],
+        foot=f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
         "Values in customary units; files and the Python interface use SI units.",
-    }
-    folder = files("railsim.report")
-
-    def text(name: str) -> str:
-        return folder.joinpath(name).read_text("utf-8")
-
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    raw = {
-        # "</" would end the script
-        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
-        "style": text("templates/runs.css"),
-        "script": text("templates/runs.js"),
-        "plot_style": text("vendor/uPlot.min.css"),
-        "plot_script": text("vendor/uPlot.iife.min.js"),
-    }
-    safe = {name: Markup(value) for name, value in raw.items()}
-    return environment.from_string(text("templates/runs.html")).render(
-        page=shown, wrap=Markup("_<wbr>"), **safe
+        wrap=Markup("_<wbr>"),
     )
 
 

@@ -7,16 +7,15 @@ import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
 from railsim.definitions.spring import TrailingArmSuspension
 from railsim.errors import InputError
+from railsim.page import rendered
 from railsim.plot import springs as pictures
 from railsim.plot.style import styled
 from railsim.springs.design import Design, design
@@ -191,16 +190,16 @@ def page(results: Collected, drawn: Mapping[str, bytes]) -> str:
         "ok": not failed,
         "text": f"Not met: {', '.join(failed)}." if failed else f"All {count} checks are met.",
     }
-    template = files("railsim.report").joinpath("templates/springs.html").read_text("utf-8")
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    text = environment.from_string(template).render(
+    return rendered(
+        "railsim.report",
+        "templates/document.html",
         title=f"Primary suspension: {suspension.name}",
+        styles=["templates/document.css"],
         lead=f"{suspension.source or 'no source given'}. Written by railsim {__version__}.",
         verdict=verdict,
         sections=sections,
         method=[*METHOD, FORMS[suspension.arm.equilibrium], *results.remarks],
     )
-    return text
 
 
 def _picture(drawn: Mapping[str, bytes], name: str, caption: str) -> list[Picture]:

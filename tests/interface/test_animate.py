@@ -58,9 +58,8 @@ def test_wheels_stand_on_their_rails(result):
 def test_page_needs_nothing_from_elsewhere(result, tmp_path):
     page = write_page(result_scene(result, frames=40), tmp_path / "run.html").read_text()
     assert not re.search(r"(src|href)=|https?://|@import|url\(", page)
-    data = json.loads(re.search(r"const scene = (.*);\n", page).group(1).replace("<\\/", "</"))
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
     assert data["forces"]["Q"][0][0] == [68.8, 68.8]
-    assert "@TITLE@" not in page
 
 
 def test_part_of_a_run(result):
