@@ -149,7 +149,7 @@ def verify(
             data["ride_height"] = ride_height_data(heights)
         print_json(data)
         return
-    for line in _verification_lines(result):
+    for line in _verification_lines(suspension, result):
         echo(line)
     for line in _ride_height_lines(heights):
         echo(line)
@@ -401,10 +401,15 @@ def _search_lines(result: "SearchResult") -> list[str]:
     ]
 
 
-def _verification_lines(result: "Verification") -> list[str]:
-    from railsim.springs.tables import case_table, check_table
+def _verification_lines(suspension: "TrailingArmSuspension", result: "Verification") -> list[str]:
+    from railsim.springs.datasheet import data_sheets
+    from railsim.springs.tables import case_table, check_table, loaded_table, sheet_table
 
-    return [*table(*case_table(result)), "", *table(*check_table(result.checks))]
+    sheets = data_sheets(suspension, result)
+    tables = (
+        case_table(result), loaded_table(sheets), sheet_table(sheets), check_table(result.checks)
+    )  # fmt: skip
+    return [line for texts in tables for line in (*table(*texts), "")][:-1]
 
 
 def _ride_height_lines(results: Sequence["RideHeight"]) -> list[str]:

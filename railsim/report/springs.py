@@ -18,14 +18,17 @@ from railsim.errors import InputError
 from railsim.page import rendered
 from railsim.plot import springs as pictures
 from railsim.plot.style import styled
+from railsim.springs.datasheet import data_sheets
 from railsim.springs.design import Design, design
 from railsim.springs.tables import (
     Texts,
     case_table,
     check_table,
     fatigue_table,
+    loaded_table,
     ride_height_table,
     search_table,
+    sheet_table,
 )
 from railsim.springs.tolerance import RideHeight, ride_heights
 from railsim.springs.verification import Fatigue, Verification, dynamic_loads, fatigue, verify
@@ -178,6 +181,7 @@ def page(results: Collected, drawn: Mapping[str, bytes]) -> str:
     if results.design is not None:
         sections.append(_design(suspension, results.design, drawn))
     sections += [_cases(results.verification, drawn), _checks(results.verification)]
+    sections.append(_sheets(suspension, results.verification))
     if results.fatigue is not None:
         sections.append(_fatigue(suspension, results.fatigue, drawn))
     if results.ride_heights is not None:
@@ -266,6 +270,19 @@ def _cases(result: Verification, drawn: Mapping[str, bytes]) -> Section:
         *_picture(drawn, "arm", "The arm in its load cases, to scale, seen from the side."),
     ]
     return Section("Load cases", [], [_typeset(case_table(result))], pictures_shown)
+
+
+def _sheets(suspension: TrailingArmSuspension, result: Verification) -> Section:
+    sheets = data_sheets(suspension, result)
+    text = (
+        "In the manner of EN 13298: dimensions, stiffness, mass and natural frequency of the coils "
+        "(EN 13906-1), and each spring under each load. Stresses without (tau) and with the factor "
+        "for curvature of the wire and lateral load (tau_k). Lateral stiffness after Grossi (used "
+        "here), EN 13906-1 and Wahl without his load factor C_l, whose chart is not free, nor are "
+        "the equations of Gross and Sparing."
+    )
+    shown = [_typeset(sheet_table(sheets)), _typeset(loaded_table(sheets))]
+    return Section("Data sheets of the springs", [text], shown)
 
 
 def _checks(result: Verification) -> Section:

@@ -8,6 +8,7 @@ arm                an axlebox arm on concentric springs: equilibrium, energy, al
 design             the inverse: stiffnesses from two wanted deflections; why there are none
 checks             solid height, stresses, Goodman-Smith line: pure functions
 verification       a file's suspension under all its loads, against all limits; fatigue
+datasheet          data sheet of each spring: mass, surge frequency, stresses, lateral stiffnesses
 nests              thousands of nests in one call: what they do, how far from each limit
 search             feasible nests ranked by mass or fatigue margin, with the limits that are active
 tolerance          scatter of the ride height from wire, coils, heights, material, bush

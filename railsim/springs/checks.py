@@ -143,3 +143,21 @@ def mass(d: ArrayLike, D: ArrayLike, n_t: ArrayLike, density: float) -> Values:
     """
     length = np.pi * np.asarray(D) * np.asarray(n_t)
     return density * 0.25 * np.pi * np.asarray(d) ** 2 * length
+
+
+def surge_frequency(
+    d: ArrayLike, D: ArrayLike, n: ArrayLike, G: ArrayLike, density: ArrayLike
+) -> Values:
+    """Lowest natural frequency of the coils between two held seats [Hz].
+
+    `f_e = d/(2 pi n D^2) sqrt(G/(2 rho))`, that of a rod of the spring's stiffness and the mass of
+    its active coils; EN 13906-1:2013 prints it as `3560 d/(n D^2) sqrt(G/rho)` in mm, N/mm^2 and
+    kg/dm^3.
+
+    Examples
+    --------
+    >>> round(float(surge_frequency(0.041, 0.230, 3.6, 78.5e9, 7850.0)), 1)
+    76.6
+    """
+    slenderness = np.asarray(d) / (2.0 * np.pi * np.asarray(n) * np.asarray(D) ** 2)
+    return slenderness * np.sqrt(np.asarray(G) / (2.0 * np.asarray(density)))

@@ -219,6 +219,25 @@ def lateral_stiffness(
     return lateral_factor(H0, dz) * beam_lateral_stiffness(K_V, D, H0, dz, nu)
 
 
+def lateral_stiffness_wahl(
+    K_V: ArrayLike, D: ArrayLike, H0: ArrayLike, dz: ArrayLike, nu: ArrayLike
+) -> Values:
+    """Lateral stiffness after Wahl without his load factor, `1/(H_s/S + H_s^3/(12 B))` [N/m].
+
+    That of the column of the height under load as if it bore no load: an upper bound.  Wahl's
+    chart of the load factor `C_l >= 1`, which divides it, is not free.
+    Parameters and errors as in `beam_lateral_stiffness`.
+
+    Notes
+    -----
+    For steel this is Wahl's `d^4 / (n D (0.204 H_s^2 + 0.265 D^2))` 10^6 psi.
+    Source: A. M. Wahl, Mechanical springs (1944, 1963), lateral loading.
+    """
+    height = np.asarray(H0) - np.asarray(dz)
+    B, S = beam_rigidities(K_V, D, height, nu)
+    return 1.0 / (height / S + height**3 / (12.0 * B))
+
+
 def tilting_stiffness(
     K_V: ArrayLike, D: ArrayLike, H0: ArrayLike, dz: ArrayLike, nu: ArrayLike
 ) -> Values:

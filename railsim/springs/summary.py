@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from railsim.definitions.spring import TrailingArmSuspension
+from railsim.springs.datasheet import Sheet, data_sheets
 from railsim.springs.design import Design
 from railsim.springs.helical import active_coils
 from railsim.springs.nests import EN_10060
@@ -69,8 +70,23 @@ def verification_data(suspension: TrailingArmSuspension, result: Verification) -
         },
         "mounting_deflection": float(result.arm.coils[0].start),
         "cases": [case_data(case) for case in result.cases],
+        "springs": sheet_data(data_sheets(suspension, result)),
         "checks": [check_data(check) for check in result.checks],
         "ok": all(check.ok for check in result.checks),
+    }
+
+
+def sheet_data(sheets: Mapping[str, Sheet]) -> Data:
+    """Data sheets of the springs as plain numbers."""
+    return {
+        name: {
+            **sheet.values,
+            "loads": {
+                load: {**vars(state), "lateral": dict(state.lateral)}
+                for load, state in sheet.loads.items()
+            },
+        }
+        for name, sheet in sheets.items()
     }
 
 

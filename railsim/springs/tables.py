@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from railsim.springs.datasheet import LATERAL, Sheet
 from railsim.springs.tolerance import RideHeight
 from railsim.springs.verification import Fatigue, Verification
 from railsim.springs.verification_checks import Check
@@ -56,6 +57,49 @@ def case_table(result: Verification) -> Texts:
         for case in result.cases
     ]
     return header, rows
+
+
+def sheet_table(sheets: Mapping[str, Sheet]) -> Texts:
+    """Return one row for each quantity of the springs' data sheets, a column a spring."""
+    shown = {
+        "d": ("wire diameter d / mm", 1e3, 2),
+        "D": ("mean coil diameter D / mm", 1e3, 2),
+        "D_outer": ("outside diameter / mm", 1e3, 2),
+        "D_inner": ("inside diameter / mm", 1e3, 2),
+        "index": ("spring index D/d", 1.0, 3),
+        "n": ("active coils n", 1.0, 3),
+        "n_total": ("total coils", 1.0, 3),
+        "H0": ("free height / mm", 1e3, 2),
+        "L_solid": ("solid height / mm", 1e3, 2),
+        "K_V": ("vertical stiffness / (N/mm)", 1e-3, 3),
+        "mass": ("mass / kg", 1.0, 2),
+        "surge_frequency": ("surge frequency / Hz", 1.0, 1),
+        "tau_solid": ("stress at solid height / MPa", 1e-6, 1),
+    }
+    rows = [
+        [label, *(f"{sheet.values[name] * scale:.{digits}f}" for sheet in sheets.values())]
+        for name, (label, scale, digits) in shown.items()
+    ]
+    return ["spring", *sheets], rows
+
+
+def loaded_table(sheets: Mapping[str, Sheet]) -> Texts:
+    """Return one row for each spring and load: force, height, stresses, lateral stiffnesses."""
+    rows = [
+        [
+            f"{load}, {name}",
+            f"{state.force * 1e-3:.3f}",
+            f"{state.height * 1e3:.2f}",
+            f"{state.tau * 1e-6:.1f}",
+            f"{state.tau_k * 1e-6:.1f}",
+            *(f"{state.lateral[m] * 1e-3:.2f}" if m in state.lateral else "-" for m in LATERAL),
+        ]
+        for load in next(iter(sheets.values())).loads
+        for name, sheet in sheets.items()
+        for state in (sheet.loads[load],)
+    ]
+    lateral = [f"K_L {method} / (N/mm)" for method in LATERAL]
+    return ["load, spring", "F / kN", "H / mm", "tau / MPa", "tau_k / MPa", *lateral], rows
 
 
 def check_table(checks: Sequence[Check]) -> Texts:

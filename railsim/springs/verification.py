@@ -237,7 +237,7 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
     _, (highest, lowest) = load_cases(suspension, loads, "fatigue")
     results = {}
     for name, spring in suspension.springs.items():
-        at_highest, at_lowest = (_stress(spring, case.springs[name]) for case in (highest, lowest))
+        at_highest, at_lowest = (stress(spring, case.springs[name]) for case in (highest, lowest))
         tau_min, tau_max = sorted((at_highest, at_lowest))
         limit = float(checks.goodman_limit(goodman, tau_min))
         results[name] = Fatigue(tau_max, tau_min, limit, limit / tau_max)
@@ -257,7 +257,8 @@ def dynamic_loads(suspension: TrailingArmSuspension) -> dict[str, float]:
     }
 
 
-def _stress(spring: HelicalSpring, state: CoilState) -> float:
+def stress(spring: HelicalSpring, state: CoilState) -> float:
+    """Largest corrected shear stress of a spring under load [Pa]."""
     d, _ = built(spring)
     shear = state.K_L * state.lateral
     return float(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from railsim.definitions.loading import load_spring
+from railsim.springs.datasheet import LATERAL, data_sheets
 from railsim.springs.design import design
 from railsim.springs.verification import verify
 
@@ -98,6 +99,34 @@ def test_lateral_stiffness_of_the_coach_models(cases):
     assert lateral == pytest.approx(851e3, abs=0.5e3)
     bending = tare.K_C - tare.K_L * tare.springs["outer"].height ** 2 / 4
     assert bending == pytest.approx(9e3, abs=0.5e3)
+
+
+# figure 48: lateral stiffness of the outer spring at two loads in kg, kg/mm
+FIGURE_48 = {7380: 77.3736, 3505: 63.6890}
+
+
+@pytest.mark.parametrize(
+    ("coils", "apart"), [((3.6, 6.0), 2.7e-3), ((3.58968, 6.03626), 4e-4)], ids=["built", "design"]
+)
+def test_lateral_stiffness_of_figure_48(coils, apart):
+    """0.26 % apart as built; 0.03 to 0.04 % with the design's stiffnesses, as it was drawn."""
+    changes = [f"{s}.active_coils={n}" for s, n in zip(("outer", "inner"), coils, strict=True)]
+    changes += [f"loads.{kg}={kg * 9.81}" for kg in FIGURE_48]
+    found = {case.name: case for case in verify(load_spring("turasas_axlebox", changes)).cases}
+    rows = table("Lateral stiffness of the outer spring, K_L1, kg/mm")
+    for kg, printed in FIGURE_48.items():
+        K_L = found[str(kg)].springs["outer"].K_L / KG_PER_MM
+        assert pytest.approx(printed, rel=apart) == K_L
+        page = rows[str(kg)][1 if coils[0] == 3.6 else 2]
+        assert shown(K_L, page) == page
+
+
+def test_page_shows_lateral_stiffness_by_several_methods(suspension):
+    rows = table("Lateral stiffness by several methods, outer spring, kg/mm")
+    sheet = data_sheets(suspension, verify(suspension))["outer"]
+    for load, cells in rows.items():
+        for method, page in zip(LATERAL, cells, strict=True):
+            assert shown(sheet.loads[load].lateral[method] / KG_PER_MM, page) == page
 
 
 def table(heading):
