@@ -233,6 +233,28 @@ def test_mean_comfort_of_three_tones(rate):
     )
 
 
+def test_mean_comfort_seated_and_standing_by_hand():
+    """EN 12299 with the gains of ISO 2631-1 (Wd 1.011 at 1 Hz, 0.253 at 8 Hz; Wc 0.891 at 8 Hz) and
+    of Wb (0.8218 at 4 Hz), of tones that are twice as large in the last tenth of 60 blocks.
+
+    Half the blocks lie below the values of the first nine tenths, 95 % below twice these.
+    """
+    larger = np.where(np.arange(round(300.0 * 200.0)) < 270.0 * 200.0, 1.0, 2.0)
+    x, y, z = (
+        larger * sine(f, 300.0, 200.0, amplitude)
+        for f, amplitude in ((8.0, 0.10), (1.0, 0.20), (4.0, 0.30))
+    )
+    found = en12299_mean_comfort(np.stack([x, y, z], axis=-1), 200.0)
+    floor_x, back_x = 0.10 * 0.253 / math.sqrt(2.0), 0.10 * 0.891 / math.sqrt(2.0)
+    seat_y, seat_z = 0.20 * 1.011 / math.sqrt(2.0), 0.30 * 0.8218 / math.sqrt(2.0)
+    seated = 4.0 * 2 * seat_z + 2.0 * 2 * math.hypot(seat_y, seat_z) + 4.0 * 2 * back_x
+    standing = 3.0 * math.sqrt(16.0 * floor_x**2 + 4.0 * seat_y**2 + seat_z**2) + 5.0 * 2 * seat_y
+    assert (seated, standing) == (pytest.approx(2.8005, abs=1e-4), pytest.approx(2.4572, abs=1e-4))
+    assert pytest.approx(seated, rel=4e-3) == found.N_VA
+    assert pytest.approx(standing, rel=4e-3) == found.N_VD
+    # with Wd in place of Wc the seat back would give 0.36 less
+
+
 def test_iso_2631_of_a_tone():
     found = iso2631_vibration(np.stack([0 * sine(5.0), 0 * sine(5.0), sine(5.0)], axis=-1), RATE)
     assert found.total == pytest.approx(1.0388 / np.sqrt(2.0), rel=2e-3)
