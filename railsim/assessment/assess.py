@@ -1,48 +1,26 @@
 """`assess`: results against limits; the function that the command line and studies call."""
 
-import hashlib
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from railsim.assessment.comfort_report import PointComfort, comfort_report, short_of_blocks
-from railsim.assessment.en14363 import SectionValues, section_values
+from railsim.assessment.conditions import Condition, SectionRow
 from railsim.assessment.record import Record
+from railsim.assessment.rules import Assessed
+from railsim.assessment.running import Options, Running, assessed_runs, group_key
 from railsim.assessment.safety_report import SafetyReport, safety_report
-from railsim.assessment.sections import TestSection, track_sections
-from railsim.assessment.track_quality import TrackQuality, quality_class
-from railsim.assessment.verdict import (
-    DERAILED,
-    FAIL,
-    INCOMPLETE,
-    PASS,
-    Assessed,
-    ZoneReport,
-    zone_reports,
-)
+from railsim.assessment.verdict import DERAILED, FAIL, Verdict, overall
 from railsim.assessment.wear_report import WheelWear, wear_report
+from railsim.assessment.zones import ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits, load_running_limits
-from railsim.definitions.vehicle import Service, Vehicle
+from railsim.definitions.vehicle import Service
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.result import Result
 
 RUNNING = ("en14363", "uic518")
 STANDARDS = (*RUNNING, "comfort", "wear", "safety")
-ZONES = ("1", "2", "3", "4")
-
-
-@dataclass(frozen=True)
-class Quality:
-    """Track quality of one section [m] and its class after UIC 518."""
-
-    run: str
-    begin: float
-    end: float
-    alignment: float
-    level: float
-    quality: str
 
 
 @dataclass(frozen=True)
@@ -57,11 +35,18 @@ class Assessment:
     runs : tuple of str
         Names of the runs.
     verdict : str
-        ``pass``, ``fail``, ``incomplete`` or ``derailed``; empty where the standard has none.
-    reasons : tuple of str
-        Reasons why it is not a pass.
+        ``pass``, ``fail``, ``incomplete``, ``not assessed`` or ``derailed``: the worst of the
+        verdicts that decide; empty where the standard has none.
+    verdicts : dict
+        Verdicts on ``safety``, ``loading`` and ``ride``.
     zones : tuple of ZoneReport
-    quality : tuple of Quality
+        For each population its zones.
+    conditions : tuple of Condition
+        Conditions of the test.
+    sections : tuple of SectionRow
+        Sections of all runs.
+    hunting_frequency : float or None
+        Frequency at which the instability is judged [Hz].
     comfort : dict
         Comfort at the measuring points, by run.
     wear : dict
@@ -77,9 +62,11 @@ class Assessment:
     standard: str
     runs: tuple[str, ...]
     verdict: str = ""
-    reasons: tuple[str, ...] = ()
+    verdicts: Mapping[str, Verdict] = field(default_factory=dict)
     zones: tuple[ZoneReport, ...] = ()
-    quality: tuple[Quality, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+    sections: tuple[SectionRow, ...] = ()
+    hunting_frequency: float | None = None
     comfort: Mapping[str, Sequence[PointComfort]] = field(default_factory=dict)
     wear: Mapping[str, Sequence[WheelWear]] = field(default_factory=dict)
     safety: Mapping[str, SafetyReport] = field(default_factory=dict)
@@ -92,17 +79,31 @@ class Assessment:
         return self.verdict in (FAIL, DERAILED)
 
     @property
+    def reasons(self) -> tuple[str, ...]:
+        """Reasons why it is not a pass, of all verdicts."""
+        found = [why for verdict in self.verdicts.values() for why in verdict.reasons]
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def quality(self) -> tuple[SectionRow, ...]:
+        """Sections that count."""
+        return tuple(row for row in self.sections if row.counts)
+
+    @property
     def worst(self) -> tuple[Assessed, ...]:
         """For each zone and quantity, the value with the largest share of its limit."""
-        found: list[Assessed] = []
-        for zone in self.zones:
-            by_name: dict[str, Assessed] = {}
-            for row in zone.rows:
-                before = by_name.get(row.rule.name)
-                if before is None or not row.share <= before.share:
-                    by_name[row.rule.name] = row
-            found.extend(by_name.values())
-        return tuple(found)
+        names = sorted({zone.zone for zone in self.zones})
+        return tuple(row for name in names for _, row in self.worst_in(name).values())
+
+    def worst_in(self, zone: str) -> dict[str, tuple[ZoneReport, Assessed]]:
+        """By quantity, the value with the largest share of its limit in a zone, and where it is."""
+        found: dict[str, tuple[ZoneReport, Assessed]] = {}
+        for report in self.zones:
+            for row in report.rows if report.zone == zone else ():
+                before = found.get(row.rule.name)
+                if before is None or not row.rank <= before[1].rank:
+                    found[row.rule.name] = report, row
+        return found
 
     def record(self) -> dict[str, object]:
         """Return the assessment as plain numbers and strings, SI."""
@@ -118,8 +119,12 @@ class Assessment:
             "runs": list(self.runs),
             "verdict": self.verdict or None,
             "reasons": list(self.reasons),
+            "verdicts": {name: verdict.record() for name, verdict in self.verdicts.items()},
+            "deciding": list(getattr(limits, "deciding", ())),
+            "conditions": [condition.record() for condition in self.conditions],
             "zones": [zone.record() for zone in self.zones],
-            "track_quality": [dict(q.__dict__) for q in self.quality],
+            "hunting_frequency": self.hunting_frequency,
+            "sections": [row.record() for row in self.sections],
             "comfort": comfort,
             "wear": {run: [w.record() for w in wheels] for run, wheels in self.wear.items()},
             "safety": {run: report.record() for run, report in self.safety.items()},
@@ -185,8 +190,7 @@ def assess(
         )
     groups: dict[str, dict[str, Result]] = {}
     for name, result in results.items():
-        text = str(result.attributes["vehicle_toml"])
-        groups.setdefault(hashlib.sha256(text.encode()).hexdigest(), {})[name] = result
+        groups.setdefault(group_key(result), {})[name] = result
     found = []
     for runs in groups.values():
         if standard in RUNNING:
@@ -194,111 +198,28 @@ def assess(
             if law.standard != standard:
                 fault = Fault(str(limits), "standard", repr(law.standard), f"wanted: '{standard}'")
                 raise InputError([fault])
-            found.append(_running(runs, law, service, method, causal, coarse, all_sections))
+            options = Options(method, causal, coarse, all_sections)
+            done = assessed_runs(runs, law, service, options)
+            found.append(_running(runs, law, done))
         else:
             found.append(_other(runs, standard, limits, coarse))
     return found
 
 
-def _running(
-    runs: Mapping[str, Result],
-    limits: RunningLimits,
-    given: Service | None,
-    method: str,
-    causal: bool,
-    coarse: bool,
-    all_sections: bool,
-) -> Assessment:
-    first = next(iter(runs.values()))
-    vehicle = first.vehicle()
-    service = given or _service(vehicle, next(iter(runs)))
-    derailed = {name: r for name, r in runs.items() if r.status not in ("complete",)}
-    values: list[SectionValues] = []
-    sections: list[TestSection] = []
-    quality: list[Quality] = []
-    remarks: list[str] = []
-    for name, result in runs.items():
-        if name in derailed:
-            continue
-        record = Record(result, name, coarse=coarse)
-        remarks += record.remarks()
-        own = track_sections(result.track(), limits, service, record.covered(), record.speed_at)
-        sections += own
-        counting = [s for s in own if s.zone and (all_sections or not s.reason)]
-        values += section_values(record, counting, causal=causal)
-        quality += _quality(name, result, counting, service)
-    reports = zone_reports(values, sections, vehicle, service, limits, first["Q0"], method)
-    if not sections and not derailed:
-        raise InputError([Fault(
-            next(iter(runs)), "distance", "too short for one section",
-            "a longer run, or other sections in the limits file (--limits)",
-        )])  # fmt: skip
-    verdict, why = _verdict(reports, sections, derailed)
-    if not all(row.checked for report in reports for row in report.rows):
-        remarks.append(f"limits of {limits.edition} not checked against the printed standard")
+def _running(runs: Mapping[str, Result], limits: RunningLimits, done: Running) -> Assessment:
     return Assessment(
-        vehicle.name, limits.standard, tuple(runs), verdict, tuple(why), tuple(reports),
-        tuple(quality), remarks=tuple(dict.fromkeys(remarks)), limits=limits,
-    )  # fmt: skip
-
-
-def _service(vehicle: Vehicle, name: str) -> Service:
-    if vehicle.service is None:
-        raise InputError([Fault(
-            name, "vehicle.service", "the vehicle has no service table",
-            "add [service] with admissible_speed and cant_deficiency to its file, or give "
-            "--admissible-speed and --cant-deficiency",
-        )])  # fmt: skip
-    return vehicle.service
-
-
-def _quality(
-    name: str, result: Result, sections: Sequence[TestSection], service: Service
-) -> list[Quality]:
-    track = result.track()
-    if not sections or not track.irregularities:
-        return []
-    there = TrackQuality(track, sections[0].begin, sections[-1].end)
-    found = []
-    for section in sections:
-        alignment, level = there.deviations(section.begin, section.end)
-        quality = quality_class(min(section.speed, service.admissible_speed), alignment, level)
-        found.append(Quality(name, section.begin, section.end, alignment, level, quality))
-    return found
-
-
-def _verdict(
-    reports: Sequence[ZoneReport], sections: Sequence[TestSection], derailed: Mapping[str, Result]
-) -> tuple[str, list[str]]:
-    """Verdict, and the reasons why it is not a pass."""
-    why = [f"{name}: {result.status}, {result.attributes.get('status_reason', '')}"
-           for name, result in derailed.items()]  # fmt: skip
-    failed = False
-    for report in reports:
-        rows = [row for row in report.exceeded if not math.isnan(row.share)]
-        failed = failed or bool(rows)
-        why += [
-            f"zone {report.zone}: {row.rule.words}, {row.place}: {100.0 * row.share:.0f} % of the "
-            "limit"
-            for row in rows
-        ]
-    incomplete = []
-    there = {report.zone: report for report in reports}
-    for zone in ZONES:
-        if zone not in there:
-            incomplete.append(f"zone {zone}: no sections")
-        elif not there[zone].complete:
-            incomplete += [f"zone {zone}: {note}" for note in there[zone].notes]
-        elif any(math.isnan(row.share) for row in there[zone].rows):
-            incomplete.append(f"zone {zone}: too few values for an estimate")
-    odd = {s.reason for s in sections if not s.zone}
-    incomplete += sorted(odd) if incomplete else []
-    why += incomplete
-    if derailed:
-        return DERAILED, why
-    if failed:
-        return FAIL, why
-    return (INCOMPLETE, why) if incomplete else (PASS, why)
+        next(iter(runs.values())).vehicle().name,
+        limits.standard,
+        tuple(runs),
+        overall(done.verdicts, limits.deciding),
+        done.verdicts,
+        done.zones,
+        done.conditions,
+        done.sections,
+        done.hunting_frequency,
+        remarks=done.remarks,
+        limits=limits,
+    )
 
 
 def _other(

@@ -6,8 +6,11 @@ Filters and section values (order 4, zero phase by default):
 quantity                              filter            then            value of a section
 ====================================  ================  ==============  =====================
 ``sum_Y``, ``Y_over_Q``               low pass 20 Hz    2 m mean        0.15 and 99.85 %
-``Q``                                 low pass 20 Hz                    99.85 %
-``Y_qst``, ``Q_qst``, ``body_y_qst``  low pass 20 Hz                    50 %
+``Q``, ``Q_low``                      low pass 20 Hz                    99.85 %; 0.15 %
+``Y_max``, ``B_max``                  low pass 20 Hz                    99.85 %
+``Y_qst``, ``Q_qst``, ``B_qst``,      low pass 20 Hz                    50 %
+``T_qst``, ``body_y_qst``
+``overturning``                       low pass 1.5 Hz                   99.85 %
 ``body_y``, ``body_z``, ``..._rms``   0.4 to 10 Hz                      0.15, 99.85 %; rms
 ``body_y_safety``                     low pass 6 Hz                     0.15, 99.85 %
 ``body_z_safety``                     0.4 to 4 Hz                       0.15, 99.85 %
@@ -16,11 +19,13 @@ quantity                              filter            then            value of
 ====================================  ================  ==============  =====================
 
 Y/Q: both forces are filtered, divided, then averaged.  Where the filtered Q <= 0 the wheel is
-lifted; the length over which it is lifted is reported.  Signs: in curves an outward force is
-positive, and so is the lateral acceleration with cant deficiency; the outer wheel is assessed; left
-and right curves are pooled.  On straight track both percentiles of a signed quantity are values.
-A window of 2 m lies within its section; the window of the instability has the length of the section
-where this is shorter than 100 m.
+lifted: Y/Q has no value there, its percentile is that of the other windows, and the length over
+which the wheel is lifted is kept for the verdict.  B = |Y| + 0.83 |Q|.  Signs: in curves an outward
+force is positive, and so is the lateral acceleration with cant deficiency; the outer wheel is
+assessed; left and right curves are pooled.  On straight track both percentiles of a signed quantity
+are values.  A window of 2 m lies within its section.  The instability is judged in zones 1 and 2;
+its window has the length of the section where this is shorter than 100 m, and f0 is that of the
+vehicle, see `hunting_frequency`.
 """
 
 import math
@@ -30,6 +35,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from railsim.assessment.record import Record
+from railsim.assessment.safety import overturning
 from railsim.assessment.sections import TestSection
 from railsim.result.filters import Floats, band_passed, distance_means, low_passed, window_centres
 
@@ -40,10 +46,15 @@ RIDE = (0.4, 10.0)  # Hz
 SAFETY_Y, SAFETY_Z, FRAME = 6.0, (0.4, 4.0), 10.0  # Hz
 HALF_BAND, LOWEST = 2.0, 0.4  # Hz, of the instability filter
 HUNTING = (0.4, 20.0)  # Hz, range of the dominant frequency
+FREQUENCIES = np.arange(HUNTING[0], HUNTING[1], 0.01)  # Hz, of mean spectra
+HUNTING_ZONES = ("1", "2")
+ROLLING_OVER = 1.5  # Hz
+RAIL_LOADING = 0.83  # B = |Y| + 0.83 |Q|
 RMS_LENGTH, RMS_STEP = 100.0, 10.0  # m
 MARGIN = 16.0  # s on either side of a part, for the filter of 0.4 Hz
 LONGEST = 60.0  # s, duration of the sections that are evaluated together
 
+NEEDED = ("Q", "Y", "wheelset_distance")
 Key = tuple[str, str]
 
 
@@ -60,7 +71,7 @@ class SectionValues:
     lifted : dict
         Length without load by wheel [m].
     frequencies : dict
-        Dominant frequency of the track shifting force by wheelset [Hz].
+        Middle of the band of the instability by wheelset [Hz].
     """
 
     section: TestSection
@@ -70,7 +81,11 @@ class SectionValues:
 
 
 def section_values(
-    record: Record, sections: Sequence[TestSection], *, causal: bool = False
+    record: Record,
+    sections: Sequence[TestSection],
+    *,
+    f0: float | None = None,
+    causal: bool = False,
 ) -> list[SectionValues]:
     """Values of the given sections of a run.
 
@@ -80,18 +95,21 @@ def section_values(
         Run with Q, Y and wheelset distances, and accelerations or body motions.
     sections : sequence of TestSection
         In the order of the track.
+    f0 : float, optional
+        Frequency of the instability [Hz]; without it the instability is not judged.
     causal : bool
         Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
     """
-    needed = ["Q", "Y", "wheelset_distance"]
-    record.need(needed, f"settings.outputs.quantities with {', '.join(needed)}")
+    record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
     found = []
     for group in _stretches(sections):
         part = _Part(record, group[0].begin, group[-1].end, causal=causal)
         for section in group:
             values = SectionValues(section)
             _forces(part, values)
-            _instability(part, values)
+            _overturning(part, values)
+            if f0 is not None and section.zone in HUNTING_ZONES:
+                _instability(part, values, f0)
             _accelerations(part, values)
             found.append(values)
     return found
@@ -132,9 +150,22 @@ class _Part:
         both = low_passed(both, rate, FORCE_FILTER, causal=causal)
         self.Q = both[:, : 2 * n].reshape(-1, n, 2)
         self.Y = both[:, 2 * n :].reshape(-1, n, 2)
+        known = "T_gamma" in record.result
+        self.T_gamma = record.result.part("T_gamma", rows)[inner] if known else None
+        self.rolling_over = self._overturning(Q)[inner]
         self.s_forces = self.s_wheelset[inner]
         self.sum_Y = self.Y.sum(axis=-1)
         self._accelerations(record, rows, inner)
+
+    def _overturning(self, Q: Floats) -> Floats:
+        """Overturning coefficient of each bogie."""
+        bogies: dict[str, list[int]] = {}
+        for w, name in enumerate(self.record.result.wheelsets):
+            bogies.setdefault(name.split(".")[0], []).append(w)
+        self.bogies = bogies
+        low = low_passed(Q.reshape(len(Q), -1), self.rate, ROLLING_OVER, causal=self.causal)
+        low = low.reshape(Q.shape)
+        return np.stack([overturning(low[:, own]) for own in bogies.values()], axis=-1)
 
     def _near(self, record: Record, begin: float, end: float, rows: slice) -> slice:
         """Rows of this part with a margin that suffices for 20 Hz."""
@@ -193,20 +224,43 @@ def _forces(part: _Part, found: SectionValues) -> None:
         means = distance_means(s[around], part.sum_Y[around, w], centres, MEAN)
         # the force on the rails points outwards where it points away from the curve's centre
         found.values["sum_Y", label] = _signed(means, -turn)
-        sides = (0, 1) if turn == 0 else ((0,) if turn > 0 else (1,))
-        for side in sides:
-            wheel = label + (" outer" if turn else (" left", " right")[side])
+        for side in (0, 1):
+            outer = turn == 0 or side == (0 if turn > 0 else 1)
+            where = ("outer" if outer else "inner") if turn else ("left", "right")[side]
+            wheel = f"{label} {where}"
             Q = part.Q[inside, w, side]
-            found.values["Q", wheel] = [float(np.percentile(Q, HIGH))]
+            found.values["Q_low", wheel] = [float(np.percentile(Q, LOW))]
+            _lifted(part, found, w, side, wheel)
+            if not outer:
+                continue
+            guiding = (-1.0, 1.0)[side] * part.Y[inside, w, side]
+            loading = np.abs(guiding) + RAIL_LOADING * np.abs(Q)
+            for name, values in (("Q", Q), ("Y_max", guiding), ("B_max", loading)):
+                found.values[name, wheel] = [float(np.percentile(values, HIGH))]
+            if turn:
+                found.values["B_qst", wheel] = [float(np.median(loading))]
+                if part.T_gamma is not None:
+                    found.values["T_qst", wheel] = [float(np.median(part.T_gamma[inside, w, side]))]
             _quotient(part, found, w, side, centres, wheel)
         if turn:
             _quasi_static(part, found, w, inside, label)
 
 
+def _lifted(part: _Part, found: SectionValues, w: int, side: int, wheel: str) -> None:
+    """Length over which a wheel is without load [m]."""
+    s = part.s_forces[:, w]
+    around = _around(s, found.section.begin, found.section.end)
+    unloaded = part.Q[around, w, side] <= 0.0
+    if unloaded.any():
+        found.lifted[wheel] = float(np.sum(np.gradient(s[around])[unloaded]))
+
+
 def _quotient(
     part: _Part, found: SectionValues, w: int, side: int, centres: Floats, wheel: str
 ) -> None:
-    """Y/Q of one wheel: 2 m means, and the length without load [m]."""
+    """Y/Q of one wheel: 2 m means, without windows in which it has no load."""
+    if not found.section.turn:
+        return
     s = part.s_forces[:, w]
     around = _around(s, found.section.begin, found.section.end)
     Q, Y, s = part.Q[around, w, side], part.Y[around, w, side], s[around]
@@ -214,11 +268,21 @@ def _quotient(
     quotient = np.where(loaded, (1.0, -1.0)[side == 0] * Y / np.where(loaded, Q, 1.0), 0.0)
     means = distance_means(s, quotient, centres, MEAN)
     if not loaded.all():
-        found.lifted[wheel] = float(np.sum(np.gradient(s)[~loaded]))
         share = distance_means(s, np.where(loaded, 0.0, 1.0), centres, MEAN)
         means = means[share <= 0.0]
-    if found.section.turn and len(means):
+    if len(means):
         found.values["Y_over_Q", wheel] = [float(np.percentile(means, HIGH))]
+
+
+def _overturning(part: _Part, found: SectionValues) -> None:
+    """Share of the load that has moved to one side: in curves the outer one."""
+    section = found.section
+    for k, (name, own) in enumerate(part.bogies.items()):
+        s = np.mean(part.s_forces[:, own], axis=1)
+        there = part.rolling_over[_between(s, section.begin, section.end), k]
+        # positive on the left, which is outside in a right-hand curve
+        values = section.turn * there if section.turn else np.abs(there)
+        found.values["overturning", name] = [float(np.percentile(values, HIGH))]
 
 
 def _quasi_static(part: _Part, found: SectionValues, w: int, inside: slice, label: str) -> None:
@@ -236,7 +300,7 @@ def _quasi_static(part: _Part, found: SectionValues, w: int, inside: slice, labe
     found.values["Y_over_Q_inner", f"{label} inner"] = [inner_mean]
 
 
-def _instability(part: _Part, found: SectionValues) -> None:
+def _instability(part: _Part, found: SectionValues, f0: float) -> None:
     section = found.section
     begin, end = section.begin, section.end
     length = min(RMS_LENGTH, end - begin)
@@ -246,7 +310,6 @@ def _instability(part: _Part, found: SectionValues) -> None:
         # two seconds on either side, for a band of 4 Hz
         near = _between(s, begin - 2.0 * section.speed, end + 2.0 * section.speed)
         force = part.sum_Y_raw[near, w]
-        f0 = dominant_frequency(force, part.rate)
         band = band_passed(
             force, part.rate, max(f0 - HALF_BAND, LOWEST), f0 + HALF_BAND, causal=part.causal
         )
@@ -257,17 +320,37 @@ def _instability(part: _Part, found: SectionValues) -> None:
         found.frequencies[label] = f0
 
 
-def dominant_frequency(x: Floats, rate: float) -> float:
-    """Frequency of the largest spectral component between 0.4 and 20 Hz [Hz].
-
-    Hann window over the whole record, zero-padded to four times its length.
-    """
+def _spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Frequencies [Hz] and power: Hann window, zero-padded to four times the length."""
     n = len(x)
-    power = np.abs(np.fft.rfft((x - np.mean(x)) * np.hanning(n), 4 * n)) ** 2
-    f = np.fft.rfftfreq(4 * n, 1.0 / rate)
+    power = np.abs(np.fft.rfft((x - np.mean(x)) * np.hanning(n), 4 * n)) ** 2 / n
+    return np.asarray(np.fft.rfftfreq(4 * n, 1.0 / rate), dtype=np.float64), power
+
+
+def dominant_frequency(x: Floats, rate: float) -> float:
+    """Frequency of the largest spectral component between 0.4 and 20 Hz [Hz]."""
+    f, power = _spectrum(x, rate)
     searched = np.flatnonzero((f >= HUNTING[0]) & (f <= HUNTING[1]))
-    peak = int(searched[np.argmax(power[searched])])
-    return float(f[peak])
+    return float(f[searched[np.argmax(power[searched])]])
+
+
+def hunting_spectrum(record: Record, sections: Sequence[TestSection]) -> Floats:
+    """Power of the track shifting forces of all wheelsets in zones 1 and 2, over `FREQUENCIES`."""
+    found = np.zeros(len(FREQUENCIES))
+    for group in _stretches([s for s in sections if s.zone in HUNTING_ZONES]):
+        rows = record.rows_between(group[0].begin, group[-1].end, 0.0)
+        for force in record.result.part("Y", rows).sum(axis=-1).T:
+            found += np.interp(FREQUENCIES, *_spectrum(force, record.rate))
+    return found
+
+
+def hunting_frequency(spectra: Sequence[Floats]) -> float | None:
+    """Frequency f0 of a vehicle: the largest component of all its runs [Hz].
+
+    None where it has no sections in zones 1 and 2.
+    """
+    power = np.sum(spectra, axis=0) if len(spectra) else np.zeros(1)
+    return float(FREQUENCIES[np.argmax(power)]) if np.any(power) else None
 
 
 def _accelerations(part: _Part, found: SectionValues) -> None:

@@ -5,12 +5,51 @@ as the cant deficiency, with the upper prediction bound at the target condition.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
 
 from railsim.result.filters import Floats
+
+
+@dataclass(frozen=True)
+class Line:
+    """Regression line a + b x and its upper bound.
+
+    Attributes
+    ----------
+    level, slope : float
+        a and b.
+    error : float
+        Standard error of the regression.
+    target : float
+        x0, at which the bound is the estimate.
+    quantile : float
+        One-sided quantile of Student's distribution.
+    N : int
+        Number of values.
+    middle, squares : float
+        Mean of x and sum (x - mean)^2.
+    """
+
+    level: float
+    slope: float
+    error: float
+    target: float
+    quantile: float
+    N: int
+    middle: float
+    squares: float
+
+    def at(self, x: float | Floats) -> Floats:
+        """Value of the line."""
+        return np.asarray(self.level + self.slope * np.asarray(x))
+
+    def bound(self, x: float | Floats) -> Floats:
+        """Upper bound of a further value."""
+        spread = 1.0 + 1.0 / self.N + (np.asarray(x) - self.middle) ** 2 / self.squares
+        return np.asarray(self.at(x) + self.quantile * self.error * np.sqrt(spread))
 
 
 @dataclass(frozen=True)
@@ -22,12 +61,13 @@ class Estimate:
     N : int
         Number of values.
     mean, deviation : float
-        Mean and standard deviation (N - 1) of the values; in the two-dimensional method the value
-        of the regression line at the target and the standard error of the regression.
+        Mean and standard deviation (N - 1) of the values.
     value : float
         Estimate; nan where there are too few values.
-    method : {'one', 'two'}
-        Dimensions.
+    method : {'one', 'two', 'largest', 'smallest'}
+        Dimensions, or that it is no estimate but a value of the sections.
+    line : Line or None
+        Of the two-dimensional method.
     """
 
     N: int
@@ -35,6 +75,7 @@ class Estimate:
     deviation: float
     value: float
     method: str
+    line: Line | None = None
 
 
 def one_dimensional(x: Floats, k: float) -> Estimate:
@@ -83,13 +124,25 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     >>> [round(two_dimensional(x, y, 150.0, P).value, 3) for P in (0.95, 0.99)]
     [37.254, 38.007]
     """
-    n = len(x)
+    n, plain = len(x), one_dimensional(y, 0.0)
     if n < 3 or float(np.ptp(x)) == 0.0:
-        return Estimate(n, math.nan, math.nan, math.nan, "two")
+        return replace(plain, value=math.nan, method="two")
     slope, level = np.polynomial.polynomial.polyfit(x, y, 1)[::-1]
     error = float(np.sqrt(np.sum((y - level - slope * x) ** 2) / (n - 2)))
     middle = float(np.mean(x))
-    spread = 1.0 + 1.0 / n + (x0 - middle) ** 2 / float(np.sum((x - middle) ** 2))
-    line = float(level + slope * x0)
+    squares = float(np.sum((x - middle) ** 2))
     t = float(stdtrit(n - 2, probability))  # quantile of Student's t
-    return Estimate(n, line, error, line + t * error * math.sqrt(spread), "two")
+    line = Line(float(level), float(slope), error, x0, t, n, middle, squares)
+    return replace(plain, value=float(line.bound(x0)), method="two", line=line)
+
+
+def extreme(x: Floats, method: str) -> Estimate:
+    """Largest or smallest value, with mean and deviation beside it; no estimate.
+
+    Parameters
+    ----------
+    x : float64[section]
+    method : {'largest', 'smallest'}
+    """
+    value = float(np.max(x) if method == "largest" else np.min(x))
+    return replace(one_dimensional(x, 0.0), value=value, method=method)

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from railsim.assessment import Assessment
-    from railsim.assessment.verdict import Assessed
+    from railsim.assessment.rules import Assessed
     from railsim.definitions.vehicle import Service
     from railsim.result import Result
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
-FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sections.png")
+SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
+FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sections.png",
+         "assessment_regression.png")  # fmt: skip
 
 
 @click.command()
@@ -159,7 +161,7 @@ def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list
     import json
 
     from railsim.cli.common import plain
-    from railsim.plot.assessment import assessment_figure, sections_figure
+    from railsim.plot.assessment import assessment_figure, regression_figure, sections_figure
     from railsim.plot.style import save
 
     make_folder(folder)
@@ -170,7 +172,8 @@ def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list
     with whole_file(rows) as partial:
         partial.write_text(assessment_csv(assessments), encoding="utf-8")
     written = [record, rows]
-    for path, draw in zip(pictures, (assessment_figure, sections_figure), strict=True):
+    drawn = (assessment_figure, sections_figure, regression_figure)
+    for path, draw in zip(pictures, drawn, strict=True):
         figure = draw(assessments)
         if figure is not None:
             save(figure, path, overwrite=True)
@@ -187,8 +190,9 @@ def assessment_csv(assessments: "Sequence[Assessment]") -> str:
     rows: list[dict[str, Any]] = []
     for assessment in assessments:
         head = {"vehicle": assessment.vehicle, "standard": assessment.standard}
-        rows += [{**head, "zone": zone.zone, **row.record()}
-                 for zone in assessment.zones for row in zone.rows]  # fmt: skip
+        rows += [{**head, "zone": zone.zone, "population": zone.population.name, **row.record()}
+                 for zone in assessment.zones
+                 for row in (*zone.rows, *zone.information)]  # fmt: skip
         data = assessment.record()
         for kind in ("comfort", "wear"):
             table_of: Any = data[kind]
@@ -221,15 +225,13 @@ def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[s
     edition = f", {assessment.limits.edition}" if assessment.limits else ""
     runs = f"{len(assessment.runs)} run{'s' * (len(assessment.runs) > 1)}"
     lines = [f"{assessment.vehicle}{edition}, {runs}"]
-    if assessment.verdict:
-        lines.append(f"verdict: {assessment.verdict}")
-        lines += [f"  {reason}" for reason in assessment.reasons]
+    lines += _verdict_lines(assessment)
     for zone in assessment.zones:
         header = [
-            f"zone {zone.zone}: {len(zone.values)} of {zone.needed} sections", "location", "unit",
-            "N", "mean", "s", "estimate", "limit", "% of limit",
+            f"{zone.title}: {len(zone.values)} of {zone.needed} sections", "location", "unit",
+            "N", "mean", "s", "method", "estimate", "limit", "% of limit",
         ]  # fmt: skip
-        rows = [_row(row) for row in assessment.worst if row in zone.rows]
+        rows = [_row(row) for row in zone.nearest]
         lines += ["", *table(header, rows, numbers=3)]
     lines += _comfort_lines(assessment) + _wear_lines(assessment) + _safety_lines(assessment)
     if not quiet:
@@ -237,16 +239,31 @@ def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[s
     return lines
 
 
+def _verdict_lines(assessment: "Assessment") -> list[str]:
+    """Overall verdict, and each of its parts with its reasons; a reason of several parts once."""
+    from railsim.assessment.rules import WORDS
+
+    if not assessment.verdict:
+        return []
+    deciding = getattr(assessment.limits, "deciding", ())
+    lines = [f"verdict: {assessment.verdict}"]
+    for name, verdict in assessment.verdicts.items():
+        told = "" if name in deciding else " (for information)"
+        lines.append(f"  {WORDS[name]}{told}: {verdict.value}")
+    lines += [f"    {reason}" for reason in assessment.reasons]
+    return lines
+
+
 def _row(row: "Assessed") -> list[str]:
-    scale, estimate = row.rule.scale, row.estimate
-
-    def shown(value: float) -> str:
-        return f"{scale * value:.3f}" if scale == 1.0 else f"{scale * value:.2f}"
-
+    estimate, shown = row.estimate, row.rule.text
+    value = shown(estimate.value)
+    if row.uncorrected is not None:
+        value += f" (uncorrected {shown(row.uncorrected.value)})"
     return [
         row.rule.words, row.place, row.rule.unit, str(estimate.N), shown(estimate.mean),
-        shown(estimate.deviation), shown(estimate.value), shown(row.limit),
-        f"{100.0 * row.share:.1f}",
+        shown(estimate.deviation), SHORT[estimate.method], value,
+        "" if row.limit != row.limit else shown(row.limit),
+        "" if row.limit != row.limit else f"{100.0 * row.share:.1f}",
     ]  # fmt: skip
 
 

@@ -68,6 +68,7 @@ def write_report(
     results = found.results(worst_runs(with_files, curves))
     names = ", ".join(dict.fromkeys(Path(file).resolve().stem for file in files[:4]))
     more = f" and {len(files) - 4} more" if len(files) > 4 else ""
-    text = page(title or names + more, found.records, results, found.remarks)
+    every = found.results([record["name"] for record in with_files])
+    text = page(title or names + more, found.records, results, found.remarks, every)
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")

@@ -184,6 +184,42 @@ class Statistics(Sourced):
     """Probabilities of the upper bound, two-dimensional [1]"""
 
 
+class ConicityClasses(Sourced):
+    """Equivalent conicity of the wheelsets on the test track, amplitude 3 mm."""
+
+    low: Positive
+    """Some sections of zone 1 have this one at most [1]"""
+    high: Rows
+    """Rows [admissible speed up to m/s, some sections have this one at least]"""
+    high_above: Positive
+    """Beyond the last row [1]"""
+
+
+class TrackTarget(Sourced):
+    """Target of the track's quality: 90 % values of the standard deviations in D1."""
+
+    rows: Annotated[
+        tuple[tuple[Positive, Positive, Positive, Positive, Positive], ...],
+        Field(min_length=1),
+        AfterValidator(_rising_rows),
+    ]
+    """Rows [speed up to m/s, smallest and largest of alignment m, smallest and largest of level
+    m]"""
+
+    def ends(self, speed: float) -> tuple[float, float, float, float]:
+        """Return smallest and largest alignment and level for a speed [m]."""
+        row = next((row for row in self.rows if speed <= row[0] * (1.0 + 1e-3)), self.rows[-1])
+        return row[1:]
+
+    def middle(self, speed: float) -> tuple[float, float]:
+        """Return the middle of alignment and of level for a speed [m]."""
+        low_y, high_y, low_z, high_z = self.ends(speed)
+        return 0.5 * (low_y + high_y), 0.5 * (low_z + high_z)
+
+
+Criteria = Literal["safety", "loading", "ride"]
+
+
 class RunningLimits(FileDefinition):
     """Limits of running tests: EN 14363 or UIC 518."""
 
@@ -193,8 +229,16 @@ class RunningLimits(FileDefinition):
     """Which evaluation it belongs to"""
     edition: Text
     """Edition of the standard"""
+    deciding: tuple[Criteria, ...] = ("safety", "loading")
+    """Verdicts that decide; the others are for information"""
     zones: dict[ZoneName, Zone] = Field(min_length=1)
     """Test zones 1 to 4"""
+    conicity: ConicityClasses | None = None
+    """Low and high conicity in zone 1"""
+    track_quality: TrackTarget | None = None
+    """Quality of the track in each zone"""
+    friction: Constant | None = None
+    """Least coefficient of friction of the rails"""
     statistics: Statistics
     """Factors of the statistics"""
     sum_Y: ByAxleLoad

@@ -8,12 +8,17 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from railsim.definitions.base import Definition, FileDefinition, Finite, Flag, Name, Positive, Text
+from railsim.definitions.loads import LoadName
 
 SCENARIO_FORMAT = "railsim-scenario/1"
 
 
 class Speed(Definition):
-    """Speed of a part: fixed, a share of the admissible one, or from the cant deficiency."""
+    """Speed of a part: fixed, a share of the admissible one, or from the cant deficiency.
+
+    With both a share of the admissible speed and a cant deficiency, the radii of the track are
+    multiplied by one factor so that both hold.
+    """
 
     fixed: Positive | None = None
     """[m/s]"""
@@ -28,9 +33,9 @@ class Speed(Definition):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        given = [self.fixed, self.admissible, self.cant_deficiency]
-        if sum(value is not None for value in given) != 1:
-            raise ValueError("one of 'fixed', 'admissible' and 'cant_deficiency' is needed")
+        other = self.admissible is not None or self.cant_deficiency is not None
+        if (self.fixed is not None) == other:
+            raise ValueError("'fixed' is needed, or 'admissible', 'cant_deficiency' or both")
         if (self.cant_deficiency is None) != (self.radius is None):
             raise ValueError("'radius' belongs to 'cant_deficiency' and only to it")
         return self
@@ -45,6 +50,24 @@ class Part(Definition):
     """Speed"""
     until: Positive | None = None
     """Where the run ends [m]; by default at the end of the track's plan"""
+
+
+class TestCondition(Definition):
+    """A condition in which the vehicle is tested; its section values are not pooled with others."""
+
+    __test__ = False  # pytest: not a test
+
+    load: LoadName | None = None
+    """Load case; the condition is left out for vehicles without it"""
+    wheels: dict[Text, Text] = Field(default_factory=dict)
+    """Wheel profiles by those that they replace, built-in names or files; the condition is left out
+    for vehicles without any of these"""
+    assignments: tuple[Text, ...] = ()
+    """`vehicle.key.path=value`"""
+    remove: tuple[Text, ...] = ()
+    """Keys of the vehicle that are removed, such as a failed damper"""
+    fault: Flag = False
+    """It is a fault, assessed for running safety only"""
 
 
 class Scenario(FileDefinition):
@@ -66,5 +89,10 @@ class Scenario(FileDefinition):
     """Values of further keys: every part is run with each combination"""
     single: Flag = False
     """Store quantities with 4 bytes a number: 7 digits"""
+    conditions: dict[Name, TestCondition] = Field(default_factory=dict)
+    """Conditions in which the vehicle is tested; by default as its file says"""
+    to_standard: Flag = False
+    """Repeat every part with further seeds until its zone has the sections that the standard
+    requires, with random irregularities scaled to the track quality that it asks for"""
     parts: dict[Name, Part] = Field(min_length=1)
     """Parts by name"""

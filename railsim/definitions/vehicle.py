@@ -126,6 +126,11 @@ class Service(Definition):
     """Height of the floor above the rails, where accelerations are taken [m]"""
     points: dict[Name, Point] = Field(default_factory=dict)
     """Further points at which accelerations are taken, by name"""
+    condition: Text | None = None
+    """Condition in which it is tested, such as `worn, laden`: assessed together with the vehicles
+    of this name in other conditions, without pooling their values"""
+    fault: Flag = False
+    """The condition is a fault, assessed for running safety only"""
 
 
 class Vehicle(FileDefinition, Drawn):

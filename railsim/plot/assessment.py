@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.assessment import Assessment
-from railsim.assessment.verdict import ZoneReport
+from railsim.assessment.rules import WORDS, Assessed
 from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
+from railsim.assessment.zones import ZoneReport
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
 
 LONGEST_BAR = 250.0  # per cent; longer ones are cut and say how long they are
@@ -41,9 +42,8 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     most = 110.0
     for zone, ax in zip(zones, axes, strict=True):
         for k, assessment in enumerate(assessments):
-            report = next((z for z in assessment.zones if z.zone == zone), None)
-            worst = {r.rule.name: r for r in assessment.worst if report and r in report.rows}
-            shares = [100.0 * worst[name].share if name in worst else np.nan for name in rules]
+            worst = assessment.worst_in(zone)
+            shares = [100.0 * worst[name][1].share if name in worst else np.nan for name in rules]
             rows = np.arange(len(rules)) + (k - 0.5 * (len(assessments) - 1)) * width
             label = assessment.vehicle if ax is axes[0] else None
             ax.barh(rows, shares, 0.9 * width, color=DISTINCT[k % len(DISTINCT)], label=label)
@@ -62,11 +62,16 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     axes[0].invert_yaxis()
     for ax in axes:
         ax.set_xlim(0.0, min(most, LONGEST_BAR))
-    verdicts = "; ".join(f"{a.vehicle}: {a.verdict}" for a in assessments)
+    verdicts = "\n".join(_verdicts(a) for a in assessments)
     edition = next((a.limits.edition for a in assessments if a.limits), "")
     figure.suptitle(f"{edition}\n{verdicts}", x=0.012, ha="left", fontsize=10)
     figure.legend(loc="outside lower left", ncols=2)
     return figure
+
+
+def _verdicts(assessment: Assessment) -> str:
+    parts = [f"{WORDS[name]} {verdict.value}" for name, verdict in assessment.verdicts.items()]
+    return f"{assessment.vehicle}: {assessment.verdict} ({', '.join(parts)})"
 
 
 def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
@@ -93,9 +98,9 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
         grid = figure.subplots(len(assessments), len(zones), sharex="col", squeeze=False)
         for axes, assessment in zip(grid, assessments, strict=True):
             for ax, zone in zip(axes, zones, strict=True):
-                report = next((z for z in assessment.zones if z.zone == zone), None)
-                if report is not None:
-                    _sections(ax, report, looks)
+                for report in assessment.zones:
+                    if report.zone == zone:
+                        _sections(ax, report, looks)
                 ax.axhline(100.0, color=LIMIT, lw=1.0)
                 ax.set_ylim(bottom=0.0)
                 ax.set_title(f"zone {zone}", loc="right", fontsize=9)
@@ -124,6 +129,73 @@ def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any
         ]
         if points:
             ax.plot(*zip(*points, strict=True), **look)
+
+
+def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
+    """Draw section values over the cant deficiency with regression line and upper bound.
+
+    A row of axes for each vehicle, one for each zone of curves: the quantity of the two-dimensional
+    method that is nearest to its limit, of all populations.  None where there is none.
+    """
+    chosen = [{zone: row for zone in "234" if (row := _widest(a, zone))} for a in assessments]
+    zones = sorted({zone for own in chosen for zone in own})
+    if not zones:
+        return None
+    with styled():
+        figure = Picture(
+            figsize=(max(6.8, 1.2 + 2.8 * len(zones)), 1.4 + 2.6 * len(assessments)),
+            layout="constrained",
+        )
+        grid = figure.subplots(len(assessments), len(zones), squeeze=False)
+        for axes, assessment, own in zip(grid, assessments, chosen, strict=True):
+            names = list(dict.fromkeys(z.population.name for z in assessment.zones))
+            for ax, zone in zip(axes, zones, strict=True):
+                if zone not in own:
+                    ax.set_axis_off()
+                    continue
+                for report in assessment.zones:
+                    if report.zone == zone:
+                        colour = DISTINCT[names.index(report.population.name) % len(DISTINCT)]
+                        _regression(ax, report, own[zone], colour)
+                row = own[zone]
+                ax.axhline(row.rule.scale * row.limit, color=LIMIT, lw=1.0)
+                ax.set_title(f"zone {zone}", loc="right", fontsize=9)
+                unit = row.rule.unit.replace("-", "1")
+                ax.set_ylabel(f"{row.rule.words},\n{row.place} ({unit})", fontsize=8)
+            axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
+            handles = [
+                Line2D([], [], marker="o", ls="", color=DISTINCT[k % len(DISTINCT)], label=name)
+                for k, name in enumerate(names)
+            ]
+            if any(names):
+                axes[0].legend(handles=handles, loc="best", fontsize=7)
+        for ax in grid[-1]:
+            ax.set_xlabel("cant deficiency (mm)")
+    return figure
+
+
+def _widest(assessment: Assessment, zone: str) -> Assessed | None:
+    """Row of the two-dimensional method with the largest share of its limit in a zone."""
+    rows = [row for report in assessment.zones if report.zone == zone for row in report.rows
+            if row.estimate.line is not None]  # fmt: skip
+    return max(rows, key=lambda row: row.share, default=None)
+
+
+def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> None:
+    """Draw the values of one quantity at one place in one population."""
+    key, scale = (like.rule.name, like.place), like.rule.scale
+    points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[key]))
+              for v in report.values if key in v.values]  # fmt: skip
+    if points:
+        ax.plot(*zip(*points, strict=True), "o", color=colour, ms=3.5)
+    row = next((r for r in report.rows if (r.rule.name, r.place) == key), None)
+    line = row.estimate.line if row else None
+    if line is None or row is None:
+        return
+    x = np.linspace(min([p[0] for p in points]), 1e3 * line.target, 60)
+    ax.plot(x, scale * line.at(1e-3 * x), color=colour, lw=1.2)
+    ax.plot(x, scale * line.bound(1e-3 * x), color=colour, lw=1.0, ls="--")
+    ax.plot(1e3 * line.target, scale * row.estimate.value, "D", color=colour, ms=5)
 
 
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:

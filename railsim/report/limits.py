@@ -1,14 +1,21 @@
 """Tables of the values of runs with the limits of standards and the meaning of each limit."""
 
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from railsim.assessment import Assessment, assess
-from railsim.assessment.verdict import Assessed
+from railsim.assessment.rules import RULES, WORDS
+from railsim.assessment.rules import Assessed as Row
+from railsim.assessment.running import group_key
+from railsim.assessment.verdict import DERAILED, FAIL, PASS
+from railsim.assessment.zones import ZoneReport
+from railsim.definitions.flatten import flatten
 from railsim.errors import InputError
 from railsim.report.tables import Cell, Table
 from railsim.result import Result
+from railsim.result.sensors import sensors
 from railsim.text import printable
 
 # Meaning of each limit, by the key of the quantity in the limits file.
@@ -36,52 +43,210 @@ NADAL = (
     "without load."
 )
 NOTE = (
-    "Estimate according to the standard from the available sections (mean + k s), below it the "
-    "share of the limit and the wheelset, wheel or sensor nearest to it; for a single section its "
-    "own value. Reliability of the limits: [P] printed in a source that was read, [R] "
-    "recalled{unchecked}."
+    "Estimate from the sections within the standard's conditions, below it the share of the limit, "
+    "the wheelset, wheel or sensor nearest to it and the method: 1-dim. mean + k s, 2-dim. upper "
+    "bound of the regression over the cant deficiency at the admissible one. [P] printed in a "
+    "source that was read, [R] recalled, [A] assumed."
 )
-UNCHECKED = "; none has been compared with the printed standard"
-MOST = 64  # runs that are assessed; more would take long
+METHOD = {"one": "1-dim.", "two": "2-dim.", "largest": "largest value", "smallest": "smallest"}
+MOST = 256  # runs that are assessed; more would take long
 
 
-def limit_tables(results: Mapping[str, Result]) -> tuple[list[Table], list[str], list[str]]:
-    """Return tables of runs with their limits, remarks on them, and limits exceeded.
+@dataclass
+class Assessed:
+    """What a page says about limits.
 
-    EN 14363 as far as the runs cover its zones, with all full sections; Nadal's limit for each run.
+    Attributes
+    ----------
+    verdicts : list of (bool, str)
+        Whether it is a pass, and the verdict in a sentence.
+    tables, details : list of Table
+        Details are folded at first.
+    """
+
+    verdicts: list[tuple[bool, str]] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    details: list[Table] = field(default_factory=list)
+
+
+def assessed(results: Mapping[str, Result]) -> Assessed:
+    """Assess all runs as `railsim assess` does, also those that are sampled too coarsely.
+
+    EN 14363 as far as the runs cover its zones; Nadal's limit for each run.
     """
     runs = {name: result for name, result in results.items() if len(result["time"])}
+    found = Assessed()
     if len(runs) > MOST:
-        return [], [f"{len(runs)} runs are not compared with limits; at most {MOST} runs are."], []
+        words = f"{len(runs)} runs are not compared with limits; at most {MOST} runs are."
+        found.details.append(_remarks([words]))
+        return found
     running, remarks = _assessed(runs, "en14363")
     derailment, more = _assessed(runs, "safety")
-    tables, exceeded = _zones(running)
+    for one in running:
+        parts = ", ".join(f"{WORDS[n]} {v.value}" for n, v in one.verdicts.items())
+        edition = one.limits.edition if one.limits else ""
+        words = f"{one.vehicle}, {edition}: {one.verdict} ({parts})."
+        found.verdicts.append((one.verdict == PASS, printable(words)))
+        found.tables.append(_reasons(one))
+        found.details += [_conditions(one), _sections(one), *_rows(one)]
+    found.tables += _zones(running)
+    found.details += [_setup(one, runs) for one in running]
+    found.details += [_sources(one.limits) for one in running[:1] if one.limits]
     if derailment:
         table, above = _safety(derailment)
-        tables.append(table)
-        exceeded += above
-    return tables, _gathered([*remarks, *more], runs), exceeded
+        found.tables.append(table)
+        if above:
+            found.verdicts.append((False, printable(f"Limits exceeded: {'; '.join(above)}.")))
+    if words_of := _gathered([*remarks, *more], runs):
+        found.details.append(_remarks(words_of))
+    return found
+
+
+def _remarks(words: Sequence[str]) -> Table:
+    return Table(["remark"], [[word] for word in words], "Remarks on these values")
 
 
 def _assessed(runs: Mapping[str, Result], standard: str) -> tuple[list[Assessment], list[str]]:
     """Assess vehicle by vehicle, so that missing quantities of one do not affect the others."""
     groups: dict[str, dict[str, Result]] = {}
     for name, result in runs.items():
-        groups.setdefault(str(result.attributes["vehicle_toml"]), {})[name] = result
+        groups.setdefault(group_key(result), {})[name] = result
     found: list[Assessment] = []
     remarks: list[str] = []
     for group in groups.values():
         try:
-            own = assess(group, standard, coarse=True, all_sections=True)
+            found += assess(group, standard, coarse=True)
         except InputError as error:
             remarks += [f"{standard}: {fault}" for fault in error.faults]
-            continue
-        found += own
-        for one in own:
-            remarks += one.remarks
-            if one.verdict:
-                remarks.append(f"{one.vehicle}: {one.verdict}; {'; '.join(one.reasons)}")
-    return found, remarks
+    return found, [*remarks, *(remark for one in found for remark in one.remarks)]
+
+
+def _reasons(one: Assessment) -> Table:
+    """Return the verdicts of a vehicle with their reasons."""
+    deciding = getattr(one.limits, "deciding", ())
+    rows: list[list[Cell]] = []
+    for name, verdict in one.verdicts.items():
+        words = WORDS[name] + ("" if name in deciding else ", for information")
+        rows.append([words, verdict.value, "; ".join(map(printable, verdict.reasons))])
+    failed = [k for k, v in enumerate(one.verdicts.values()) if v.value in (FAIL, DERAILED)]
+    return Table(
+        ["verdict on", "", "reasons"], rows, f"Verdicts: {printable(one.vehicle)}",
+        words=frozenset({0, 1, 2}), failed=frozenset(failed),
+    )  # fmt: skip
+
+
+def _conditions(one: Assessment) -> Table:
+    rows = [
+        [c.place or "all runs", c.name, c.state, c.found, c.required, _origin(c.source, c.checked)]
+        for c in one.conditions
+    ]
+    return Table(
+        ["", "condition", "", "found", "required", "requirement from"],
+        [[printable(cell) for cell in row] for row in rows],
+        f"Conditions of the test: {printable(one.vehicle)}",
+        words=frozenset(range(6)),
+        failed=frozenset(k for k, c in enumerate(one.conditions) if c.state == "not met"),
+    )
+
+
+def _sections(one: Assessment) -> Table:
+    header = ["run", "zone", "from (m)", "to (m)", "R (m)", "I (mm)", "speed (m/s)",
+              "alignment (mm)", "level (mm)", "conicity", "quality", "not counted"]  # fmt: skip
+    rows = [
+        [
+            printable(row.run), row.zone, f"{row.begin:.0f}", f"{row.end:.0f}",
+            "straight" if math.isinf(row.radius) else f"{row.radius:.0f}",
+            f"{1e3 * row.cant_deficiency:.0f}", f"{row.speed:.2f}", f"{1e3 * row.alignment:.2f}",
+            f"{1e3 * row.level:.2f}", _number(row.conicity), row.quality,
+            "" if row.counts else row.reason or "no zone",
+        ]
+        for row in one.sections
+    ]  # fmt: skip
+    caption = f"Sections: {printable(one.vehicle)}"
+    return Table(header, rows, caption, words=frozenset({0, 1, 10, 11}))
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.2f}"
+
+
+def _rows(one: Assessment) -> list[Table]:
+    """Return every quantity of every zone and population, with and without a limit."""
+    header = ["", "unit", "N", "mean", "s", "method", "line", "s_e", "estimate", "uncorrected",
+              "limit", "limit from"]  # fmt: skip
+    tables = []
+    for zone in one.zones:
+        rows: list[list[Cell]] = []
+        for row in (*zone.rows, *zone.information):
+            e, line, text = row.estimate, row.estimate.line, row.rule.text
+            bounded = not math.isnan(row.limit)
+            rows.append([
+                (row.rule.words, row.place), row.rule.unit, str(e.N), text(e.mean),
+                text(e.deviation), METHOD[e.method], text(float(line.at(line.target))) if line
+                else "", text(line.error) if line else "", text(e.value),
+                text(row.uncorrected.value) if row.uncorrected else "",
+                text(row.limit) if bounded else "none",
+                _origin(row.source, row.checked) if bounded else "for information",
+            ])  # fmt: skip
+        tables.append(Table(
+            header, rows, f"All values: {printable(one.vehicle)}, {printable(zone.title)}",
+            words=frozenset({0, 1, 5, 11}),
+            note="line and s_e: regression over the cant deficiency at the admissible one, and its "
+            "standard error.",
+        ))  # fmt: skip
+    return tables
+
+
+def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
+    """Return what was tested: vehicle, measuring points, profiles."""
+    first = runs[one.runs[0]]
+    vehicle = first.vehicle()
+    service = vehicle.service
+    rows = [("vehicle", f"{vehicle.name}. {vehicle.source or ''}")]
+    if service:
+        rows.append(("admitted for", f"{3.6 * service.admissible_speed:.0f} km/h, cant deficiency "
+                     f"{1e3 * service.cant_deficiency:.0f} mm, {service.category}"))  # fmt: skip
+    rows += [
+        (f"measuring point {name}", f"on {s.body}, {s.offset + s.arm[0]:.2f} m ahead of the "
+         f"reference body's origin, {-s.arm[2]:.2f} m above that of its body")
+        for name, s in sensors(vehicle).items()
+    ]  # fmt: skip
+    rows.append(("wheel forces", "Y and Q of every wheel, in the contact"))
+    pairs = {", ".join((*dict.fromkeys(_wheels(runs[n])), *dict.fromkeys(runs[n].track().rail)))
+             for n in one.runs}  # fmt: skip
+    rows += [("profiles of wheels and rails", pair) for pair in sorted(pairs)]
+    rows.append(("runs", f"{len(one.runs)}, {sum(_seconds(runs[n]) for n in one.runs):.0f} s"))
+    if one.hunting_frequency is not None:
+        rows.append(("frequency of the instability", f"{one.hunting_frequency:.2f} Hz"))
+    return Table(
+        ["", ""], [[printable(a), printable(b)] for a, b in rows],
+        f"Vehicle, measuring points, profiles: {printable(one.vehicle)}", words=frozenset({0, 1}),
+    )  # fmt: skip
+
+
+def _sources(limits: Any) -> Table:
+    """Return where the number of each limit is from."""
+    rows = [
+        [rule.words, WORDS[rule.group], MEANING[rule.name], _origin(law.source, law.checked)]
+        for rule in RULES
+        if (law := getattr(limits, rule.name, None)) is not None
+    ]
+    caption = f"Limits of {limits.edition}"
+    return Table(["", "verdict on", "", "limit from"], rows, caption, words=frozenset(range(4)))
+
+
+def _wheels(result: Result) -> list[str]:
+    found = flatten(result.vehicle()).of_kind("wheelset")
+    return [name for body in found if body.wheelset for name in body.wheelset.profile]
+
+
+def _seconds(result: Result) -> float:
+    time = result["time"]
+    return float(time[-1] - time[0])
+
+
+def _origin(source: str, checked: bool) -> str:
+    return source if checked or source == "ours" else f"{source}; not compared with the print"
 
 
 def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
@@ -99,76 +264,63 @@ def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
     return found
 
 
-def _zones(assessments: Sequence[Assessment]) -> tuple[list[Table], list[str]]:
-    """Return a table for each zone, the vehicles side by side, and the limits exceeded."""
+def _zones(assessments: Sequence[Assessment]) -> list[Table]:
+    """Return a table for each zone, the vehicles side by side, worst population each."""
     tables: list[Table] = []
-    exceeded: list[str] = []
-    names = list(dict.fromkeys(zone.zone for one in assessments for zone in one.zones))
-    for name in sorted(names):
-        zones = {one.vehicle: z for one in assessments for z in one.zones if z.zone == name}
-        worst = {vehicle: _nearest(zone.rows) for vehicle, zone in zones.items()}
+    for name in sorted({zone.zone for one in assessments for zone in one.zones}):
+        worst = {one.vehicle: one.worst_in(name) for one in assessments}
         rules = list(dict.fromkeys(rule for rows in worst.values() for rule in rows))
         rows: list[list[Cell]] = []
         failed = []
         for rule in rules:
             own = [found.get(rule) for found in worst.values()]
-            first = next(row for row in own if row)
-            cells = [_cell(row) for row in own]
-            rows.append([(first.rule.words, MEANING[rule]), *cells, _limit(first)])
-            if any(row and _share(row) > 1.0 for row in own):
+            first = next(pair for pair in own if pair)[1]
+            limits = dict.fromkeys(_limit(pair[1]) for pair in own if pair)
+            rows.append([(first.rule.words, MEANING[rule]), *map(_cell, own), _joined(limits)])
+            if any(pair and pair[1].share > 1.0 for pair in own):
                 failed.append(len(rows) - 1)
-        exceeded += [
-            f"{vehicle}, zone {name}: {row.rule.words}, {row.place} ({row.estimate.N} values)"
-            for vehicle, found in worst.items()
-            for row in found.values()
-            if _share(row) > 1.0
-        ]
-        counts = " and ".join({str(len(zone.values)): None for zone in zones.values()})
-        needed = next(iter(zones.values())).needed
-        checked = all(row.checked for found in worst.values() for row in found.values())
+        counts = "; ".join(
+            f"{zone.population.name or one.vehicle} {len(zone.values)}"
+            for one in assessments for zone in one.zones if zone.zone == name
+        )  # fmt: skip
         edition = next((one.limits.edition for one in assessments if one.limits), "")
         tables.append(
             Table(
-                ["", *map(printable, zones), "limit"],
+                ["", *map(printable, worst), "limit"],
                 rows,
-                f"{edition}, zone {name}: {counts} of {needed} sections",
+                f"{edition}, zone {name}; sections: {printable(counts)}",
                 failed=frozenset(failed),
-                note=NOTE.format(unchecked="" if checked else UNCHECKED),
+                note=NOTE,
             )
         )
-    for table in tables[:-1]:
-        tables[tables.index(table)] = replace(table, note="")
-    return tables, exceeded
+    return [*(replace(table, note="") for table in tables[:-1]), *tables[-1:]]
 
 
-def _value(row: Assessed) -> float:
-    """Return the estimate; for a single section, which has none, its own value."""
-    return row.estimate.value if row.estimate.value == row.estimate.value else row.estimate.mean
+def _joined(limits: Iterable[tuple[str, str]]) -> Cell:
+    """Limits of several vehicles, with where they are from."""
+    values, sources = zip(*limits, strict=True)
+    return " / ".join(values), " / ".join(dict.fromkeys(sources))
 
 
-def _share(row: Assessed) -> float:
-    return _value(row) / row.limit
-
-
-def _nearest(rows: Sequence[Assessed]) -> dict[str, Assessed]:
-    """Return, by quantity, the wheelset, wheel or sensor that is nearest to its limit."""
-    found: dict[str, Assessed] = {}
-    for row in rows:
-        before = found.get(row.rule.name)
-        if before is None or _share(row) > _share(before):
-            found[row.rule.name] = row
-    return found
-
-
-def _cell(row: Assessed | None) -> Cell:
-    if row is None:
+def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
+    if pair is None:
         return ""
-    return f"{row.rule.scale * _value(row):.3g}", f"{100.0 * _share(row):.0f} %, {row.place}"
+    zone, row = pair
+    words = [f"{100.0 * row.share:.0f} %", row.place, METHOD[row.estimate.method]]
+    if row.uncorrected is not None:
+        words.append(f"uncorrected {row.rule.scale * row.uncorrected.value:.3g}")
+    if math.isnan(row.share):
+        words = [
+            f"{row.estimate.N} value, mean {row.rule.scale * row.estimate.mean:.3g}",
+            row.place,
+        ]
+    small = ", ".join(filter(None, [*words, zone.population.name]))
+    return f"{row.rule.scale * row.estimate.value:.3g}", printable(small)
 
 
-def _limit(row: Assessed) -> Cell:
-    marks = " ".join(dict.fromkeys(re.findall(r"\[[A-Z]\]", row.source)))
-    return f"{row.rule.scale * row.limit:.3g} {row.rule.unit.replace('-', '')}", marks
+def _limit(row: Row) -> tuple[str, str]:
+    unit = row.rule.unit.replace("-", "")
+    return f"{row.rule.scale * row.limit:.3g} {unit}", _origin(row.source, row.checked)
 
 
 def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:

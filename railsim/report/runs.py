@@ -17,7 +17,7 @@ from railsim.notation import QUANTITIES
 from railsim.page import rendered
 from railsim.report.curves import cells_of, curve_data, groups
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
-from railsim.report.limits import limit_tables
+from railsim.report.limits import assessed
 from railsim.report.published import beside_published
 from railsim.report.spread import LEAST, WORDS, columns, parameters, spread_rows
 from railsim.report.tables import Cell, Table
@@ -70,6 +70,7 @@ def page(
     records: Sequence[Record],
     results: Mapping[str, Result],
     remarks: Sequence[str] = (),
+    assessable: Mapping[str, Result] | None = None,
 ) -> str:
     """Return the page as HTML.
 
@@ -81,21 +82,24 @@ def page(
         One for each run, as `railsim.result.facts.run_facts` with ``name`` and ``labels``,
         including runs that failed or have not been done.
     results : mapping of str to Result
-        Results, by the names of their runs, whose curves and comparison with limits are shown.
+        Results, by the names of their runs, whose curves are shown.
     remarks : sequence of str
         Further notes for the reader.
+    assessable : mapping of str to Result, optional
+        All results, which are assessed together; by default `results`.
     """
     found = groups(results)
     cells = cells_of(found)
-    data: dict[str, Any] = {"curves": [curve_data(group, cells) for group in found]}
-    limits, limit_remarks, exceeded = limit_tables(results)
+    curves = [curve_data(group, cells) for group in found]
+    data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
+    limits = assessed(results if assessable is None else assessable)
     sections = [_peaks(records, results)]
     if found:
-        sections.append(_curves(found, records, results))
-    if limits or limit_remarks:
-        told = Table(["remark"], [[remark] for remark in limit_remarks], "Remarks on these values")
-        details = [told] if limit_remarks else []
-        sections.append(Section("limits", "Comparison with limits", tables=limits, details=details))
+        sections.append(_curves(len(data["curves"]), records, results))
+    if limits.tables or limits.details:
+        title_of = "Comparison with limits"
+        tables, details = limits.tables, limits.details
+        sections.append(Section("limits", title_of, tables=tables, details=details))
     if spread := _spread(records, data):
         sections.append(spread)
     if published := _published(results):
@@ -111,7 +115,7 @@ def page(
         data=data,
         schemes="light dark",
         lead=_lead(records, results),
-        verdict=_verdict(records, exceeded),
+        verdict=_verdict(records, limits.verdicts),
         sections=[section for section in sections if section],
         foot=f"Written by railsim {__version__}; plots by uPlot 1.6.32 (MIT). "
         "Values in customary units; files and the Python interface use SI units.",
@@ -142,19 +146,16 @@ def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
     return "; ".join(parts) + "."
 
 
-def _verdict(records: Sequence[Record], exceeded: Sequence[str]) -> list[dict[str, Any]]:
+def _verdict(
+    records: Sequence[Record], verdicts: Sequence[tuple[bool, str]]
+) -> list[dict[str, Any]]:
     counts = Counter(str(record["status"]) for record in records)
     whole = counts == {"complete": len(records)}
     words = ", ".join(f"{number} {status}" for status, number in counts.items())
     text = f"All {len(records)} runs are complete." if whole else f"Of {len(records)} runs {words}."
     if len(records) == 1:
         text = f"The run is {words[2:]}."
-    lines = [{"ok": whole, "text": text}]
-    if exceeded:
-        more = f" and {len(exceeded) - 3} more" if len(exceeded) > 3 else ""
-        text = f"Limits exceeded: {'; '.join(exceeded[:3])}{more}."
-        lines.append({"ok": False, "text": printable(text)})
-    return lines
+    return [{"ok": whole, "text": text}, *({"ok": ok, "text": told} for ok, told in verdicts)]
 
 
 def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
@@ -184,14 +185,14 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
     return Section("peaks", "Peaks", texts, tables=[table] if shown else [])
 
 
-def _curves(
-    found: Sequence[Any], records: Sequence[Record], results: Mapping[str, Result]
-) -> Section:
+def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> Section:
+    if not number:
+        text = "The results hold none of the quantities that are drawn here."
+        return Section("curves", "Along the track", [text])
     texts = []
     if len(results) < len(_done(records)):
         texts = [f"{len(results)} of {len(_done(records))} runs, those with the largest values."]
-    names = [str(number) for number in range(len(found))]
-    return Section("curves", "Along the track", texts, plots=names)
+    return Section("curves", "Along the track", texts, plots=[str(k) for k in range(number)])
 
 
 def _spread(records: Sequence[Record], data: dict[str, Any]) -> Section | None:

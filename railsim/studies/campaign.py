@@ -12,8 +12,8 @@ from pathlib import Path
 
 from railsim.assessment import Assessment, assess
 from railsim.cant import curve_speed
-from railsim.definitions.loading import load_scenario, load_vehicle
-from railsim.definitions.scenario import Scenario, Speed
+from railsim.definitions.loading import load_running_limits, load_scenario, load_vehicle
+from railsim.definitions.scenario import Scenario, Speed, TestCondition
 from railsim.definitions.vehicle import Service
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import check_folder
@@ -22,6 +22,7 @@ from railsim.result.hdf5 import Storage
 from railsim.studies.carry_out import carry_out, cores
 from railsim.studies.case import Case, short_name
 from railsim.studies.combine import load_case, name_faults
+from railsim.studies.in_conditions import in_condition, repeated, scaled_radii
 from railsim.studies.journal import Record
 from railsim.studies.keep import Keep
 from railsim.studies.points import ROUGH_DURATION, Point, check_number
@@ -151,9 +152,9 @@ def scenario_cases(
     """
     faults: list[Fault] = []
     cases: list[Case] = []
-    check_number(
-        [vehicles, list(scenario.parts), *scenario.grid.values()], cores(), lambda: ROUGH_DURATION
-    )
+    axes = [vehicles, _conditions(scenario), list(scenario.parts), *scenario.grid.values()]
+    check_number(axes, cores(), lambda: ROUGH_DURATION)
+    limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:
         own = [a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")]
@@ -166,22 +167,51 @@ def scenario_cases(
             allowed = "add [service] with admissible_speed and cant_deficiency"
             faults.append(Fault(str(vehicle), "service", "missing", allowed))
             continue
-        for (name, part), point in product(scenario.parts.items(), points):
+        several = list(product(_conditions(scenario), scenario.parts.items(), points))
+        for (number, state, condition), (name, part), point in several:
             texts = [*scenario.assignments, *(f"{key}={v}" for key, v in point.items())]
             speed = part_speed(part.speed, service)
-            label = "_".join([short_name(vehicle), name, *map(in_a_name, point.values())])
+            label = [short_name(vehicle), state, name, *map(in_a_name, point.values())]
             try:
+                if condition and not _has(vehicle, own, condition):
+                    continue
+                if condition:
+                    texts += condition.assignments
+                    texts += [f"vehicle.load={condition.load}"] if condition.load else []
                 case = load_case(
                     vehicle, part.track, speed, until=part.until,
                     assignments=[*texts, *assignments],
                 )  # fmt: skip
+                made = in_condition(case.vehicle, state, condition) if condition else case.vehicle
             except InputError as error:
                 faults += error.faults
                 continue
-            cases.append(replace(case, name=label, labels={**case.labels, "part": name, **point}))
+            if made is None:
+                continue
+            labels = {**case.labels, "part": name, **point}
+            if state:
+                labels["condition"] = state
+            case = replace(
+                case, name="_".join(filter(None, label)), vehicle=made, labels=labels,
+                track=scaled_radii(case.track, part.speed, service),
+            )  # fmt: skip
+            cases += repeated(case, limits, service, number) if limits else [case]
     if faults:
         raise InputError(dict.fromkeys(faults))
     return cases
+
+
+def _conditions(scenario: Scenario) -> list[tuple[int, str, TestCondition | None]]:
+    """Number, name and contents of each condition; one without name where there are none."""
+    if not scenario.conditions:
+        return [(0, "", None)]
+    return [(k, name, one) for k, (name, one) in enumerate(scenario.conditions.items())]
+
+
+def _has(vehicle: str | Path, assignments: Sequence[str], condition: TestCondition) -> bool:
+    """Whether a vehicle has the load case of a condition."""
+    known = load_vehicle(vehicle, assignments).loads
+    return condition.load in (None, "design", *known)
 
 
 def part_speed(speed: Speed, service: Service) -> float:

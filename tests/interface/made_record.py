@@ -53,6 +53,7 @@ def made(
     settings="{}",
     T_gamma=None,
     vehicle=None,
+    profiles=PROFILES,
 ):
     """A run whose wheel forces and body accelerations are given functions.
 
@@ -93,4 +94,4 @@ def made(
         "speed": speed, "vehicle_toml": vehicle or text("vehicles/coach_manchester.toml"),
         "track_toml": on.to_toml(), "settings_json": settings,
     }  # fmt: skip
-    return sink.close(attributes, {"Q0": given["Q0"]}, PROFILES)
+    return sink.close(attributes, {"Q0": given["Q0"]}, profiles)

@@ -16,7 +16,7 @@ from railsim.definitions.vehicle import Service
 from railsim.errors import InputError
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
-FAST = 1.1 * 44.44444
+FAST = 1.1 * 33.33333
 
 
 def both_sides(force):
@@ -42,7 +42,7 @@ def test_instability_of_a_sine_against_half_the_limit_of_the_sum_of_y(hunting):
     """E5: 21.21 against 23.18 kN for the benchmark's wheel load."""
     (found,) = assess(hunting)
     row = rows_of(found, "1", "instability")["wheelset 1"]
-    # 100 m are 10.2 periods: the rms of a window differs by up to 1/(4 pi 10.2)
+    # 100 m are 13.6 periods: the rms of a window differs by up to 1/(4 pi 13.6)
     assert row.estimate.value == pytest.approx(21.21e3, rel=8e-3)
     assert row.limit == pytest.approx(23.18e3, abs=10.0)
     frequencies = found.zones[0].values[0].frequencies
@@ -52,17 +52,18 @@ def test_instability_of_a_sine_against_half_the_limit_of_the_sum_of_y(hunting):
 def test_straight_track_gives_both_percentiles_of_signed_quantities(hunting):
     (found,) = assess(hunting)
     report = found.zones[0]
-    assert [len(report.values), report.needed, report.complete] == [6, 25, False]
+    assert [len(report.values), report.needed] == [6, 25]
     row = rows_of(found, "1", "sum_Y")["wheelset 2"]
     # 2 m means of a wave of 9.78 m
     wave = FAST / 5.0
     gain = math.sin(math.pi * 2.0 / wave) / (math.pi * 2.0 / wave)
-    assert row.estimate.N == 12
+    # two signs of six sections are six values each, not twelve
+    assert row.estimate.N == 6
     assert row.estimate.mean == pytest.approx(30e3 * gain, rel=3e-3)
     body = rows_of(found, "1", "body_y_rms")["floor_middle"]
     assert body.estimate.mean == pytest.approx(0.2 / math.sqrt(2.0), rel=0.01)
     assert found.verdict == "incomplete"
-    assert "zone 4: no sections" in found.reasons
+    assert "zone 4: number of sections not met: none; required 25 at least" in found.reasons
 
 
 def steady(turn):
@@ -81,7 +82,7 @@ def steady(turn):
 def test_left_and_right_curves_give_the_same_values(turn):
     (found,) = assess(steady(turn))
     assert rows_of(found, "4", "Y_qst")["wheelset 1 outer"].estimate.mean == pytest.approx(
-        40e3 - 50e3 * (25e3 / Q0 - 0.40), rel=1e-6
+        40e3, rel=1e-6
     )
     assert rows_of(found, "4", "sum_Y")["wheelset 1"].estimate.mean == pytest.approx(15e3, 1e-6)
     quotient = rows_of(found, "4", "Y_over_Q")["wheelset 1 outer"].estimate.mean
@@ -183,7 +184,7 @@ def test_what_cannot_be_assessed_is_refused(change, message):
 
 
 def test_run_without_a_whole_section_says_how_long_one_is():
-    (found,) = assess(made(track(STRAIGHT), FAST, until=400.0))
+    (found,) = assess(made(track(STRAIGHT), FAST, until=300.0))
     assert found.verdict == "incomplete"
     assert any("m of a straight, a section needs 250 m" in reason for reason in found.reasons)
 
@@ -257,7 +258,8 @@ def test_command_prints_writes_and_fails_only_when_asked(hunting, tmp_path, caps
     keys = {"name", "place", "mean", "deviation", "estimate", "limit", "share", "source", "checked"}
     assert keys <= set(data["zones"][0]["quantities"][0])
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert names == set(FILES)
+    # no values over the cant deficiency on straight track
+    assert names == set(FILES) - {"assessment_regression.png"}
     assert main(["assess", path, "--out", str(tmp_path / "out")]) == 2
     assert main(["assess", path, "--fail"]) == 0
     bad = made(track(STRAIGHT), FAST, Y=lambda t, s: both_sides(60e3 + 0.0 * s))

@@ -1,0 +1,282 @@
+"""Test conditions of the standard: each is met, not met or not checked, and belongs to the verdict.
+
+What is compared: sections (number, mean radius, both hands, independence, quality of the track) in
+each zone of each population; conicity, load states and friction over all runs of the vehicle.
+Fault modes need none of them.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from railsim.assessment.sections import reasons
+from railsim.assessment.zones import Population, ZoneReport
+from railsim.contact.geometry import contact_geometry
+from railsim.definitions.flatten import flatten
+from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
+from railsim.definitions.vehicle import Service
+from railsim.errors import InputError
+from railsim.profiles import Profile
+from railsim.result import Result
+
+MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"
+AMPLITUDE = 3e-3  # m, of the equivalent conicity
+SHARE = 90.0  # per cent of the sections, of the track's quality
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition of the test.
+
+    Attributes
+    ----------
+    name, place : str
+        What it is about; zone and population, empty for the whole test.
+    state : str
+        ``met``, ``not met`` or ``not checked``.
+    found, required : str
+        In words.
+    source : str
+        Source of the requirement.
+    checked : bool
+        Whether it has been compared with the printed standard.
+    """
+
+    name: str
+    place: str
+    state: str
+    found: str
+    required: str
+    source: str = ""
+    checked: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The condition in one line."""
+        where = f"{self.place}: " if self.place else ""
+        return f"{where}{self.name} {self.state}: {self.found}; required {self.required}"
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain strings."""
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True)
+class SectionRow:
+    """A section of a run, for the list of sections.
+
+    Attributes
+    ----------
+    run, population, zone : str
+    begin, end : float
+        Arc lengths [m].
+    radius : float
+        Signed, infinite on straight track [m].
+    cant_deficiency, speed : float
+        [m], [m/s]
+    alignment, level : float
+        Standard deviations in D1 [m].
+    quality : str
+        Class after UIC 518.
+    conicity : float
+        Equivalent conicity of the leading wheelset for 3 mm; nan where it is not known [1].
+    realisation : str
+        What the track's irregularities are, seed included.
+    counts : bool
+    reason : str
+        Why it is outside the conditions of its zone.
+    """
+
+    run: str
+    population: str
+    zone: str
+    begin: float
+    end: float
+    radius: float
+    cant_deficiency: float
+    speed: float
+    alignment: float
+    level: float
+    quality: str
+    conicity: float
+    realisation: str
+    counts: bool
+    reason: str
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI."""
+        return {k: v for k, v in self.__dict__.items() if k != "realisation"}
+
+
+def _stated(met: bool) -> str:
+    return MET if met else NOT_MET
+
+
+def _number(place: str, found: str, wanted: Zone, *, met: bool) -> Condition:
+    return Condition("number of sections", place, _stated(met), found,
+                     f"{wanted.sections} at least", wanted.source, wanted.checked)  # fmt: skip
+
+
+def missing_zones(
+    population: Population, reports: Sequence[ZoneReport], limits: RunningLimits
+) -> list[Condition]:
+    """Zones in which a population has no sections; fault modes need none."""
+    if population.fault:
+        return []
+    there = {report.zone for report in reports if report.population is population}
+    return [
+        _number(", ".join(filter(None, [f"zone {name}", population.name])), "none", zone, met=False)
+        for name, zone in sorted(limits.zones.items())
+        if name not in there
+    ]
+
+
+def zone_conditions(
+    report: ZoneReport, rows: Sequence[SectionRow], limits: RunningLimits, service: Service
+) -> list[Condition]:
+    """Conditions of a zone; `rows` are its sections that count."""
+    wanted, place, n = limits.zones[report.zone], report.title, len(report.values)
+    source, checked = wanted.source, wanted.checked
+    enough = n >= wanted.sections
+    words = str(n) if enough else "; ".join([str(n), *reasons(report.sections)])
+    found = [_number(place, words, wanted, met=enough)]
+    if not n:
+        return found
+    if (ends := wanted.mean_radius) is not None:
+        found.append(Condition(
+            "mean radius", place, _stated(ends[0] <= report.radius <= ends[1]),
+            f"{report.radius:.0f} m", f"{ends[0]:.0f} to {ends[1]:.0f} m", source, checked,
+        ))  # fmt: skip
+    if wanted.radius is not None:
+        right = sum(value.section.turn > 0 for value in report.values)
+        found.append(Condition(
+            "curves to both hands", place, _stated(0 < right < n),
+            f"{right} sections to the right, {n - right} to the left", "both", "ours",
+        ))  # fmt: skip
+    times = Counter((row.realisation, round(row.begin, 1)) for row in rows)
+    again = sum(times.values()) - len(times)
+    found.append(Condition(
+        "independent sections", place, _stated(not again),
+        f"{again} of {n} on irregularities that another section has as well", "none", "ours",
+    ))  # fmt: skip
+    found.append(_quality(place, rows, limits.track_quality, service))
+    return found
+
+
+def _quality(
+    place: str, rows: Sequence[SectionRow], target: TrackTarget | None, service: Service
+) -> Condition:
+    worse = sum(row.quality == "worse than QN2" for row in rows)
+    alignment, level = (
+        float(np.percentile([getattr(row, name) for row in rows], SHARE))
+        for name in ("alignment", "level")
+    )
+    found = (
+        f"{SHARE:.0f} % of the sections below {1e3 * alignment:.2f} mm alignment and "
+        f"{1e3 * level:.2f} mm level; {100.0 * worse / len(rows):.0f} % worse than QN2"
+    )
+    if target is None:
+        return Condition("track quality", place, NOT_CHECKED, found, "no target in the limits file")
+    speed = min(max(row.speed for row in rows), service.admissible_speed)
+    ends = target.ends(speed)
+    met = ends[0] <= alignment <= ends[1] and ends[2] <= level <= ends[3]
+    low_a, high_a, low_l, high_l = (1e3 * end for end in ends)
+    required = f"{low_a:.2f} to {high_a:.2f} mm and {low_l:.2f} to {high_l:.2f} mm"
+    return Condition(
+        "track quality", place, _stated(met), found, required, target.source, target.checked
+    )
+
+
+def vehicle_conditions(
+    reports: Sequence[ZoneReport],
+    rows: Sequence[SectionRow],
+    runs: Sequence[Result],
+    limits: RunningLimits,
+    service: Service,
+) -> list[Condition]:
+    """Conditions on all runs together; `rows` are the sections that count."""
+    found = []
+    values = [row.conicity for row in rows if row.zone == "1"]
+    if values:
+        found += _conicity(np.array(values), limits.conicity, service)
+    found.append(_loads(reports))
+    frictions = [mu for run in runs for mu in run.track().friction]
+    least = limits.friction
+    found.append(_compared(
+        "friction", f"{min(frictions):.3g} to {max(frictions):.3g}", least,
+        f"{least.value:g} at least" if least else "",
+        met=bool(least and min(frictions) >= least.value),
+    ))  # fmt: skip
+    return found
+
+
+def _compared(
+    name: str, found: str, rule: Sourced | None, required: str, *, met: bool
+) -> Condition:
+    if rule is None:
+        return Condition(name, "", NOT_CHECKED, found, "no value in the limits file")
+    return Condition(name, "", _stated(met), found, required, rule.source, rule.checked)
+
+
+def _conicity(
+    values: np.ndarray, classes: ConicityClasses | None, service: Service
+) -> list[Condition]:
+    names = ("low conicity in zone 1", "high conicity in zone 1")
+    known = values[np.isfinite(values)]
+    if classes is None or not len(known):
+        why = "no classes in the limits file" if classes is None else "a wheelset that fits"
+        return [Condition(name, "", NOT_CHECKED, "not known", why) for name in names]
+    speed = service.admissible_speed
+    high = next((least for v, least in classes.high if speed <= v), classes.high_above)
+    found = f"{known.min():.2f} to {known.max():.2f}"
+    return [
+        _compared(names[0], found, classes, f"{classes.low:.2f} at most in some sections",
+                  met=bool(known.min() <= classes.low)),
+        _compared(names[1], found, classes, f"{high:.2f} at least in some sections",
+                  met=bool(known.max() >= high)),
+    ]  # fmt: skip
+
+
+def _loads(reports: Sequence[ZoneReport]) -> Condition:
+    tested = [r.population.vehicle for r in reports if r.values and not r.population.fault]
+    loads = sorted({vehicle.load or "design" for vehicle in tested})
+    known = any(vehicle.loads for vehicle in tested)
+    state = _stated(len(loads) > 1) if known or len(loads) > 1 else NOT_CHECKED
+    words = ", ".join(loads) if known else "the vehicle's file has no load cases"
+    return Condition("load states", "", state, words or "none", "empty and laden", "[R]")
+
+
+def conicity_of(result: Result) -> float:
+    """Equivalent conicity of the leading wheelset of a run for 3 mm on rigid rails [1].
+
+    nan where the profiles are not kept or do not fit.
+    """
+    wheelset = flatten(result.vehicle()).of_kind("wheelset")[0].wheelset
+    track, known = result.track(), result.profiles
+    names = [*wheelset.profile, *track.rail] if wheelset else ["?"]
+    if wheelset is None or any(name not in known for name in names):
+        return float("nan")
+    wheels = known[wheelset.profile[0]], known[wheelset.profile[1]]
+    rails = known[track.rail[0]], known[track.rail[1]]
+    return _conicity_of(
+        wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
+    )
+
+
+@lru_cache(32)
+def _conicity_of(
+    wheels: tuple[Profile, Profile],
+    rails: tuple[Profile, Profile],
+    radius: float,
+    gauge: float,
+    inclination: float,
+    back_to_back: float,
+) -> float:
+    try:
+        geometry = contact_geometry(wheels, rails, radius, gauge, inclination, back_to_back)
+    except InputError:
+        return float("nan")
+    return float(geometry.equivalent_conicity([AMPLITUDE])[0])

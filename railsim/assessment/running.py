@@ -1,0 +1,204 @@
+"""Running tests after EN 14363 and UIC 518: all runs of a vehicle to zones and verdicts."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from railsim.assessment.conditions import (
+    Condition,
+    SectionRow,
+    conicity_of,
+    missing_zones,
+    vehicle_conditions,
+    zone_conditions,
+)
+from railsim.assessment.en14363 import (
+    SectionValues,
+    hunting_frequency,
+    hunting_spectrum,
+    section_values,
+)
+from railsim.assessment.record import Record
+from railsim.assessment.sections import TestSection, track_sections
+from railsim.assessment.track_quality import TrackQuality, quality_class
+from railsim.assessment.verdict import Verdict, all_verdicts
+from railsim.assessment.zones import Population, ZoneReport, zone_reports
+from railsim.definitions.limits import RunningLimits
+from railsim.definitions.vehicle import Service
+from railsim.errors import Fault, InputError
+from railsim.result import Result
+
+
+@dataclass(frozen=True)
+class Options:
+    """How runs are assessed; the arguments of `railsim.assessment.assess`."""
+
+    method: str = "normal"
+    causal: bool = False
+    coarse: bool = False
+    all_sections: bool = False
+
+
+@dataclass(frozen=True)
+class Running:
+    """What the runs of a vehicle give; attributes as of `Assessment`."""
+
+    verdicts: Mapping[str, Verdict]
+    zones: tuple[ZoneReport, ...]
+    conditions: tuple[Condition, ...]
+    sections: tuple[SectionRow, ...]
+    hunting_frequency: float | None
+    remarks: tuple[str, ...]
+
+
+@dataclass
+class _Run:
+    """A run that reached its end."""
+
+    name: str
+    record: Record
+    population: str
+    sections: list[TestSection]
+    counting: list[TestSection]
+    values: list[SectionValues] = field(default_factory=list)
+
+
+def group_key(result: Result) -> str:
+    """Key of the runs that belong to one assessment.
+
+    The same vehicle; or vehicles of the same name, each in a condition that its service table
+    states.
+    """
+    service = result.vehicle().service
+    if service is not None and service.condition is not None:
+        return f"name {result.vehicle().name}"
+    return hashlib.sha256(str(result.attributes["vehicle_toml"]).encode()).hexdigest()
+
+
+def _kind(result: Result) -> tuple[str, ...]:
+    """What may not be pooled with others, in words."""
+    vehicle, track = result.vehicle(), result.track()
+    service = vehicle.service
+    spectra = [str(getattr(part, "spectrum", part.type)) for part in track.irregularities]
+    friction = " / ".join(f"{mu:g}" for mu in dict.fromkeys(track.friction))
+    rails = " / ".join(dict.fromkeys(track.rail))
+    return (
+        (service.condition if service else None) or "",
+        vehicle.load or "",
+        ", ".join(dict.fromkeys(spectra)) or "smooth",
+        f"friction {friction}",
+        f"{rails}, inclination {track.inclination:g}, gauge {track.gauge:g} m",
+    )
+
+
+def _populations(runs: Mapping[str, Result]) -> dict[str, str]:
+    """Name of each run's population: what differs between the runs, and the condition."""
+    kinds = {name: _kind(result) for name, result in runs.items()}
+    several = [k for k in range(5) if len({kind[k] for kind in kinds.values()}) > 1]
+    shown = sorted({0, *several} - ({1} if 0 in several else set()))
+    return {name: ", ".join(filter(None, (kind[k] for k in shown))) for name, kind in kinds.items()}
+
+
+def assessed_runs(
+    runs: Mapping[str, Result], limits: RunningLimits, given: Service | None, options: Options
+) -> Running:
+    """Assess all runs of a vehicle.
+
+    Raises
+    ------
+    InputError : no service table; a run lacks a quantity, is sampled too coarsely or too short.
+    """
+    service = given or _service(runs)
+    done = _read(runs, limits, service, options)
+    if done and not any(run.sections for run in done):
+        raise InputError([Fault(
+            done[0].name, "distance", "too short for one section",
+            "a longer run, or other sections in the limits file (--limits)",
+        )])  # fmt: skip
+    f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
+    for run in done:
+        run.values = section_values(run.record, run.counting, f0=f0, causal=options.causal)
+    rows = [row for run in done for row in _section_rows(run, service)]
+    counted = [row for row in rows if row.counts]
+    zones: list[ZoneReport] = []
+    conditions: list[Condition] = []
+    for name in dict.fromkeys(run.population for run in done):
+        own = [run for run in done if run.population == name]
+        result = own[0].record.result
+        population = Population(name, result.vehicle(), result["Q0"])
+        reports = zone_reports(
+            population, [v for run in own for v in run.values],
+            [s for run in own for s in run.sections], service, limits, options.method,
+        )  # fmt: skip
+        zones += reports
+        conditions += missing_zones(population, reports, limits)
+        for report in reports if not population.fault else ():
+            there = [r for r in counted if r.zone == report.zone and r.population == name]
+            conditions += zone_conditions(report, there, limits, service)
+    results = [run.record.result for run in done]
+    if done:
+        conditions += vehicle_conditions(zones, counted, results, limits, service)
+    verdicts = all_verdicts(runs, zones, conditions)
+    return Running(
+        verdicts, tuple(zones), tuple(conditions), tuple(rows), f0, _remarks(done, zones, limits)
+    )
+
+
+def _service(runs: Mapping[str, Result]) -> Service:
+    name, first = next(iter(runs.items()))
+    service = first.vehicle().service
+    if service is None:
+        raise InputError([Fault(
+            name, "vehicle.service", "the vehicle has no service table",
+            "add [service] with admissible_speed and cant_deficiency to its file, or give "
+            "--admissible-speed and --cant-deficiency",
+        )])  # fmt: skip
+    return service
+
+
+def _read(
+    runs: Mapping[str, Result], limits: RunningLimits, service: Service, options: Options
+) -> list[_Run]:
+    """Runs that reached their end, with their sections."""
+    populations = _populations(runs)
+    found = []
+    for name, result in runs.items():
+        if result.status != "complete":
+            continue
+        record = Record(result, name, coarse=options.coarse)
+        if "Q0" not in result:
+            raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
+        own = track_sections(result.track(), limits, service, record.covered(), record.speed_at)
+        counting = [s for s in own if s.zone and (options.all_sections or not s.reason)]
+        found.append(_Run(name, record, populations[name], own, counting))
+    return found
+
+
+def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
+    """Return the sections of a run with what the standard asks about them."""
+    result, track = run.record.result, run.record.result.track()
+    quality = None
+    if run.sections and track.irregularities:
+        quality = TrackQuality(track, run.sections[0].begin, run.sections[-1].end)
+    conicity = conicity_of(result) if run.counting else float("nan")
+    realisation = repr(track.irregularities)
+    rows = []
+    for s in run.sections:
+        alignment, level = quality.deviations(s.begin, s.end) if quality else (0.0, 0.0)
+        name = quality_class(min(s.speed, service.admissible_speed), alignment, level)
+        rows.append(SectionRow(
+            run.name, run.population, s.zone, s.begin, s.end, s.radius, s.cant_deficiency, s.speed,
+            alignment, level, name, conicity, realisation, s in run.counting, s.reason,
+        ))  # fmt: skip
+    return rows
+
+
+def _remarks(
+    done: Sequence[_Run], zones: Sequence[ZoneReport], limits: RunningLimits
+) -> tuple[str, ...]:
+    found = [remark for run in done for remark in run.record.remarks()]
+    odd = {s.reason for run in done for s in run.sections if not s.zone}
+    found += [f"section outside all zones: {reason}" for reason in sorted(odd)]
+    if not all(row.checked for zone in zones for row in zone.rows):
+        found.append(f"limits of {limits.edition} not checked against the printed standard")
+    return tuple(dict.fromkeys(found))
