@@ -99,6 +99,9 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+LOADS = "loads"
+
+
 def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]:
     """Return the whole path of a short one: its parts in their order, others between them.
 
@@ -125,11 +128,16 @@ def full_path(data: Any, path: Sequence[str], defaults: Any = None) -> list[str]
     >>> axle = {"elements": {"primary": {"stiffness": [1.0, 2.0, 3.0]}}}
     >>> full_path({"assemblies": {"axle": axle}}, ["primary", "stiffness", "x"])
     ['assemblies', 'axle', 'elements', 'primary', 'stiffness', 'x']
+    >>> bodies = {"bodies": {"car": {"mass": 1.0}}}
+    >>> full_path({**bodies, "loads": {"laden": bodies}}, ["car", "mass"])
+    ['bodies', 'car', 'mass']
     """
     whole = list(path)
     if len(whole) < 2 or whole[0] in data or whole[0] in (defaults or {}):
         return whole
     found = [keys for keys in _paths(data) if _holds(keys, whole)]
+    # a load case repeats keys of bodies: a short path means the body
+    found = [keys for keys in found if keys[0] != LOADS] or found
     if len(found) > 1:
         shown = ", ".join(".".join(keys) for keys in found[:4])
         raise KeyError(f"'{'.'.join(whole)}' is {len(found)} keys: {shown}")

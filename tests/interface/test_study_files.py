@@ -236,7 +236,7 @@ def test_definitions_in_python_are_written_and_run(tmp_path, simulated):
 
 def test_permitted_speed_is_the_lower_one_of_vehicle_and_track():
     cases = combinations(["wagon_c62a", COACH], ["straight", "twist"], ["permitted"])
-    assert [case.speed for case in cases] == pytest.approx([22.22, 3.0, 44.44444, 3.0])
+    assert [case.speed for case in cases] == pytest.approx([22.22, 3.0, 33.33333, 3.0])
     assert cases[0].name == "wagon_c62a_straight_22.22"
 
 
