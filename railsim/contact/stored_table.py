@@ -24,7 +24,7 @@ def generator_hash() -> str:
     here = Path(__file__).parent
     modules = (kernel, contact_geometry, elastic_patch, non_elliptic, hertz_kernel)
     sources = [Path(str(module.__file__)) for module in modules]
-    for path in (here / "table.py", here / "curves.py", *sources):
+    for path in (here / "table.py", here / "curves.py", here / "zones.py", *sources):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -72,6 +72,7 @@ from railsim.contact.curves import (
     tape_circle_position,
     wheel_curve,
 )
+from railsim.contact.zones import table_range, zone_windows
 from railsim.errors import InputError
 from railsim.kernels import table_slice as kernel
 from railsim.kernels.contact_table import A1, B1, D_B1, FINE_ROLL, K2, N_FIELD, K, stretched_roll
@@ -169,41 +170,6 @@ class ContactTable:
     G: float
     nu: float
     description: dict[str, object] = field(default_factory=dict)
-
-
-def zone_windows(wheel: WheelCurve) -> Array:
-    """Partition of a wheel's candidates into tread, flange root and flange.
-
-    The borders lie where the profile's angle, followed from the nominal rolling circle towards the
-    flange, passes 10 to 15 degrees (tread to root), and 70 to 90 % of the flank's greatest angle
-    (root to flange); between these positions the windows change by the smoothest cubic.
-
-    Returns
-    -------
-    ndarray, shape (3, n)
-        Windows adding up to 1 [1].
-    """
-    angle = np.degrees(np.arctan(-wheel.t))
-    start = int(np.argmin(np.abs(wheel.y)))
-    toward_flange = slice(start, None, -1)
-    ahead, positions = angle[toward_flange], wheel.y[toward_flange]
-    steepest = float(ahead.max())
-
-    def passes(limit: float) -> float:
-        beyond = np.flatnonzero(ahead > limit)
-        return float(positions[beyond[0]]) if beyond.size else float(positions[-1])
-
-    def beyond(begin: float, end: float) -> Array:
-        """0 on the tread side of `begin`, 1 on the flange side of `end`."""
-        width = max(begin - end, 1e-4)
-        x = np.clip((begin - wheel.y) / width, 0.0, 1.0)
-        share: Array = x * x * (3.0 - 2.0 * x)
-        return share
-
-    root = beyond(passes(10.0), passes(15.0))
-    flange = beyond(passes(0.7 * steepest), passes(0.9 * steepest))
-    flange = np.minimum(flange, root)
-    return np.stack((1.0 - root, root - flange, flange))
 
 
 @functools.cache
@@ -327,7 +293,7 @@ def build_contact_table(
     values = np.empty((3, grid.n_w, n_roll, n_y, N_FIELD))
     arguments = (
         height,
-        _wheel_arrays(wheel_points),
+        _wheel_arrays(wheel_points, rail_nodes),
         kernel.Rail(
             rail_nodes.Y0, rail_nodes.dY, rail_nodes.z, rail_nodes.slope, rail_nodes.curvature
         ),
@@ -394,28 +360,10 @@ def chosen_grid(grid: TableGrid | None, normal: Normal | None) -> TableGrid:
 NOTHING = np.array([1.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])
 """Fields of a zone that never touches."""
 
-CROWN_SLOPE = 0.3
-"""Slope of a rail up to which its surface counts as its top, the tangent of 17 degrees [1]."""
 
-MORE_INWARDS = 0.010
-"""Room of a table beyond where the other wheel has climbed its rail, for widened track [m]."""
-
-
-def table_range(wheel: WheelCurve, rail: RailCurve) -> tuple[float, float]:
-    """Range of the lateral position that a table covers, in whole millimetres [m].
-
-    Outwards to where the tip of the flange stands over the top of the rail: beyond, the wheelset is
-    derailed.  Inwards as far as the other wheel's climbing lets this one go, and `MORE_INWARDS`.
-    """
-    tip = float(wheel.u[int(np.argmax(wheel.r))])
-    top = float(rail.Y[int(np.argmax(rail.slope > -CROWN_SLOPE))])
-    climbed = np.ceil(1e3 * (top - tip)) / 1e3
-    return -float(climbed) - MORE_INWARDS, float(climbed)
-
-
-def _wheel_arrays(wheel: WheelCurve) -> kernel.Wheel:
+def _wheel_arrays(wheel: WheelCurve, rail: RailCurve) -> kernel.Wheel:
     """A wheel as the generator takes it, with its zones."""
-    window = zone_windows(wheel)
+    window = zone_windows(wheel, rail)
     present = window > 1e-6
     # what touches with the zone's edge only has a share too small to feel, but a position
     window = np.where(present, np.maximum(window, 1e-6), 0.0)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dynamics import Settings, load_track
+from hollow_wheels import hollow_wheel
 from selection import points
 
 import railsim.model.equilibrium
@@ -13,8 +14,6 @@ from railsim.definitions.loading import load_vehicle_text
 from railsim.errors import ModelError
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import RESIDUAL, equilibrium
-from railsim.profiles import load_profile
-from railsim.profiles.profile import Profile
 
 DATA = Path(__file__).parents[1] / "data" / "vehicles"
 WAGON = (DATA / "two_axle_wagon.toml").read_text(encoding="utf-8")
@@ -77,21 +76,12 @@ def test_message_names_the_elements_that_alternate(monkeypatch):
         all_of_them()
 
 
-def hollow(depth, width=0.05):
-    """S1002 with a hollow of the tread, one wave of 1 - cos about the nominal rolling circle."""
-    new = load_profile("S1002", kind="wheel")
-    y = np.linspace(np.min(new.y), np.max(new.y), 2001)
-    u = np.clip(2.0 * y / width, -1.0, 1.0)
-    z = np.interp(y, new.y, new.z) - 0.5 * depth * (1.0 + np.cos(np.pi * u))
-    return Profile("hollow", "wheel", y, z, f"S1002, {1e3 * depth:g} mm hollow")
-
-
 @pytest.mark.slow
 @points("depth", [2e-3, 4e-3], always=(0,))
 @pytest.mark.usefixtures("small_contact_tables")
 def test_coach_on_hollow_wheels_stands_and_rolls_in_the_middle(depth):
     coach = railsim.load_vehicle("coach_manchester")
-    found = rolling(coach, 20.0, {"S1002": hollow(depth)})
+    found = rolling(coach, 20.0, {"S1002": hollow_wheel(depth)})
     assert found.residual < 1e3 * RESIDUAL
     np.testing.assert_allclose(found.Q0, found.Q0[0, 0], rtol=1e-6)
     for body in found.model.system.contact.body:

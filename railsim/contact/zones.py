@@ -1,0 +1,108 @@
+"""Zones of a wheel, each of which has a patch of its own in the contact table."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact.curves import RailCurve, WheelCurve
+
+Array = NDArray[np.float64]
+
+LONG_JUMP = 0.025
+"""Jump of the rigid contact over the wheel from which on its ends are patches of their own [m]."""
+
+JUMP_SEARCH = 1e-4
+"""Spacing of the lateral displacements at which jumps are sought [m]."""
+
+CROWN_SLOPE = 0.3
+"""Slope of a rail up to which its surface counts as its top, the tangent of 17 degrees [1]."""
+
+MORE_INWARDS = 0.010
+"""Room of a table beyond where the other wheel has climbed its rail, for widened track [m]."""
+
+
+def table_range(wheel: WheelCurve, rail: RailCurve) -> tuple[float, float]:
+    """Range of the lateral position that a table covers, in whole millimetres [m].
+
+    Outwards to where the tip of the flange stands over the top of the rail: beyond, the wheelset is
+    derailed.  Inwards as far as the other wheel's climbing lets this one go, and `MORE_INWARDS`.
+    """
+    tip = float(wheel.u[int(np.argmax(wheel.r))])
+    top = float(rail.Y[int(np.argmax(rail.slope > -CROWN_SLOPE))])
+    climbed = np.ceil(1e3 * (top - tip)) / 1e3
+    return -float(climbed) - MORE_INWARDS, float(climbed)
+
+
+def zone_windows(wheel: WheelCurve, rail: RailCurve) -> Array:
+    """Partition of a wheel's candidates into tread, flange root and flange.
+
+    The borders lie where the profile's angle, followed from the nominal rolling circle towards the
+    flange, passes 10 to 15 degrees (tread to root), and 70 to 90 % of the flank's greatest angle
+    (root to flange); between these positions the windows change by the smoothest cubic.
+
+    Ends of a long jump of the contact are patches of their own.  On a hollow wheel it jumps from
+    the rim on the field side to the side of the flange; where these borders would leave both ends
+    with parts of the tread, the border of tread and root lies in between (`hollow_between`).
+
+    Returns
+    -------
+    ndarray, shape (3, n)
+        Windows adding up to 1 [1].
+    """
+    angle = np.degrees(np.arctan(-wheel.t))
+    start = int(np.argmin(np.abs(wheel.y)))
+    toward_flange = slice(start, None, -1)
+    ahead, positions = angle[toward_flange], wheel.y[toward_flange]
+    steepest = float(ahead.max())
+
+    def passes(limit: float) -> float:
+        beyond = np.flatnonzero(ahead > limit)
+        return float(positions[beyond[0]]) if beyond.size else float(positions[-1])
+
+    def beyond(begin: float, end: float) -> Array:
+        """0 on the tread side of `begin`, 1 on the flange side of `end`."""
+        width = max(begin - end, 1e-4)
+        x = np.clip((begin - wheel.y) / width, 0.0, 1.0)
+        share: Array = x * x * (3.0 - 2.0 * x)
+        return share
+
+    def windows(begin: float, end: float) -> Array:
+        root = beyond(begin, end)
+        flange = np.minimum(beyond(passes(0.7 * steepest), passes(0.9 * steepest)), root)
+        return np.stack((1.0 - root, root - flange, flange))
+
+    by_angle = windows(passes(10.0), passes(15.0))
+    hollow = hollow_between(wheel, rail, by_angle)
+    return windows(*hollow) if hollow else by_angle
+
+
+def hollow_between(wheel: WheelCurve, rail: RailCurve, window: Array) -> tuple[float, float] | None:
+    """Where on the wheel two branches of the contact that share a zone lie apart.
+
+    Between the ends of the longest jump of the rigid contact, the middle third, which nothing
+    touches.  Jumps of up to 22 mm are those of unworn profiles: their ends nearly meet under load
+    and are one patch of the zone.
+
+    Parameters
+    ----------
+    wheel, rail : WheelCurve, RailCurve
+        Profiles.
+    window : ndarray, shape (3, n)
+        Windows that are to separate the branches.
+
+    Returns
+    -------
+    (float, float) or None
+        Positions on the wheel, that on the field side first [m]; None where there is no such jump.
+    """
+    reach = table_range(wheel, rail)[1]
+    lateral = np.arange(-reach, reach, JUMP_SEARCH)
+    height = np.interp(wheel.u + lateral[:, None], rail.Y, rail.z, left=1.0, right=1.0) - wheel.r
+    at = np.argmin(height, axis=1)
+    field, inner = at[:-1], at[1:]
+    shared = np.minimum(window[:, field], window[:, inner]).sum(axis=0) > 0.0
+    jump = np.where(shared, wheel.y[field] - wheel.y[inner], 0.0)
+    longest = int(np.argmax(jump))
+    if jump[longest] < LONG_JUMP:
+        return None
+    third = float(jump[longest]) / 3.0
+    return float(wheel.y[field[longest]]) - third, float(wheel.y[inner[longest]]) + third
