@@ -27,7 +27,8 @@ from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
 from railsim.model.work import no_extremes, work_arrays
-from railsim.result import Sink
+from railsim.result import MemorySink, Sink
+from railsim.result.hunting import SEEN, thinned
 from railsim.simulation.ensemble import Ensemble, contact_grid
 from railsim.simulation.outputs import OutputPlan
 from railsim.simulation.pace import Pace, duration
@@ -120,6 +121,8 @@ class Run:
         Error in writing its output.
     remarks : list of str
         Remarks for the reader of its result, see `railsim.simulation.remarks`.
+    swings : MemorySink
+        What shows whether it hunts, see `railsim.result.hunting`.
     """
 
     prepared: Preparation
@@ -139,12 +142,14 @@ class Run:
     together: int = 1
     error: Exception | None = None
     remarks: list[str] = field(default_factory=list)
+    swings: MemorySink = field(default_factory=lambda: MemorySink(only=SEEN))
 
     def __post_init__(self) -> None:
         wheelsets = len(self.prepared.model.index.wheelsets)
         self.extremes: Floats = no_extremes(wheelsets)
         self.evaluated: Floats = no_extremes(wheelsets)
         self.unloaded: Floats = np.zeros((wheelsets, 2))
+        self.swings.begin(self.plan.coordinates)
 
 
 def advance(
@@ -344,7 +349,9 @@ class _Convoy:
         for number, run in enumerate(self._runs):
             records = self._ensemble.records(number, rows)
             try:
-                run.sink.append(run.plan.chunk(records, rows, run.prepared.balance.Q0))
+                chunk = run.plan.chunk(records, rows, run.prepared.balance.Q0)
+                run.swings.append(thinned(chunk))
+                run.sink.append(chunk)
             except Exception as error:
                 run.error = error
 

@@ -243,6 +243,11 @@ class OutputPlan:
     ----------
     model, settings, track, vehicle : Model, Settings, Track, Vehicle
 
+    Attributes
+    ----------
+    irregularity : callable, optional
+        Displacements of the rails over the arc length, see `railsim.track.irregularity`.
+
     Raises
     ------
     InputError
@@ -256,7 +261,7 @@ class OutputPlan:
         self._readings_only = settings.outputs.sensors == "readings"
         self._alignment = alignment_of(track)
         self._track_file = track
-        self._irregularity = displacement(track)
+        self.irregularity = displacement(track)
         known = {
             name: (group, index)
             for group, names in (
@@ -369,8 +374,8 @@ class OutputPlan:
 
     def _track(self, distance: Floats) -> dict[str, Floats]:
         rails = np.zeros((4, *distance.shape))
-        if self._irregularity is not None:
-            rails = self._irregularity(distance.ravel())[0].reshape(4, *distance.shape)
+        if self.irregularity is not None:
+            rails = self.irregularity(distance.ravel())[0].reshape(4, *distance.shape)
         return {
             "track_curvature": self._alignment.curvature(distance),
             "track_cant": self._alignment.cant(distance),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
+from railsim.result.hunting import Hunting, hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.outputs import run_extremes
 
@@ -24,6 +25,8 @@ MOST_Q = 5.0  # times the static wheel load
 # Track shifting forces: this many times the limit 10 kN + P0/3 of EN 14363, P0 the axle load
 MOST_SUM_Y = 3.0
 VIBRATES = 0.05  # amplitude of a wheel load over the static one
+UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
+LONG = 1.0  # s: what is shorter is not taken for a test of stability
 
 
 def run_remarks(run: Run) -> tuple[str, ...]:
@@ -32,17 +35,20 @@ def run_remarks(run: Run) -> tuple[str, ...]:
     wheelsets = model.index.wheelsets
     Q0 = run.prepared.balance.Q0
     extremes = run_extremes(run.extremes, Q0)
+    swings = hunting(run.swings.close({}), run.plan.irregularity)
     found = [
         *run.remarks,
         *run.prepared.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
         *lifted_wheels(extremes, run.unloaded, wheelsets),
+        *stability(swings, extremes, float(run.state[-3] - run.prepared.state[-3])),
         *vibration(
             run.vibration,
             Q0,
             wheelsets,
             irregular=bool(model.system.track.has_irregularity),
             elastic=bool(model.system.support.elastic),
+            hunts=swings is not None,
         ),
         *creep_range(int(run.events[1]), int(run.events[0])),
         *unsettled_rails(run.unsettled),
@@ -111,6 +117,30 @@ def lifted_wheels(
     )
 
 
+def stability(
+    swings: Hunting | None, extremes: Mapping[str, Floats], duration: float
+) -> tuple[str, ...]:
+    """Remark on a vehicle that hunts, or that nothing has disturbed.
+
+    Parameters
+    ----------
+    swings : Hunting, optional
+        Its limit cycle.
+    extremes : mapping of str to ndarray
+        See `railsim.simulation.outputs.run_extremes`.
+    duration : float
+        Simulated time [s].
+    """
+    if swings is not None:
+        return (swings.sentence,)
+    if duration < LONG or not np.max(np.abs(extremes["wheelset_lateral"])) < UNDISTURBED:
+        return ()
+    return (
+        "Nothing disturbs the vehicle: no curve, no irregularity, no initial displacement. This "
+        "run proves nothing about its stability.",
+    )
+
+
 def _largest(ratio: Floats) -> tuple[int, ...]:
     """Index of the largest value; of a run that ended before its first instant all are NaN."""
     known = np.where(np.isnan(ratio), -np.inf, ratio)
@@ -160,8 +190,9 @@ def vibration(
     *,
     irregular: bool,
     elastic: bool,
+    hunts: bool = False,
 ) -> tuple[str, ...]:
-    """Remark on wheel loads that vibrate above 40 Hz.
+    """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
 
     Parameters
     ----------
@@ -171,8 +202,8 @@ def vibration(
         Static wheel loads [N].
     wheelsets : sequence of str
         Their names.
-    irregular, elastic : bool
-        Whether the rails are irregular, and elastic.
+    irregular, elastic, hunts : bool
+        Whether the rails are irregular, and elastic; whether the vehicle hunts.
     """
     if not len(measured):
         return ()
@@ -181,14 +212,16 @@ def vibration(
     if not share[w, side] > VIBRATES:
         return ()
     frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
-    if irregular:
+    if hunts:
+        cause = "the vehicle hunts"
+    elif irregular:
         cause = "excited by the irregularities of the rails"
     else:
         cause = "self-excited by sliding friction in flange contact, on smooth rails"
     if not elastic:
         cause += "; the rails are rigid, [support] of the track makes them elastic"
     return (
-        f"The wheel loads vibrate above {CUT_OFF:g} Hz: {100.0 * share[w, side]:.0f} % of Q0 at "
-        f"{frequency:.0f} Hz on the {('left', 'right')[side]} wheel of {wheelsets[w]}, vehicle at "
-        f"s = {position:.0f} m; {cause}.",
+        f"The wheel loads vibrate at {frequency:.0f} Hz: {100.0 * share[w, side]:.0f} % of Q0 "
+        f"(high pass {CUT_OFF:g} Hz) on the {('left', 'right')[side]} wheel of {wheelsets[w]}, "
+        f"vehicle at s = {position:.0f} m; {cause}.",
     )

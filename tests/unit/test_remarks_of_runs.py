@@ -1,7 +1,11 @@
 """Remarks on a run that ended, from what it counted."""
 
+import numpy as np
+import pytest
+
 from railsim.kernels.support import MOST_CORRECTIONS
-from railsim.simulation.remarks import creep_range, unsettled_rails
+from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
+from railsim.simulation.remarks import creep_range, unsettled_rails, vibration
 
 
 def test_nothing_counted_is_nothing_said():
@@ -19,3 +23,16 @@ def test_all_corrections_used_are_told_with_their_number_and_a_way_to_check():
 def test_patches_outside_the_creep_law_are_a_share_of_all():
     (remark,) = creep_range(5, 1000)
     assert remark.startswith("5 of 1000 contact patches in the time loop (5.0e-03)")
+
+
+@pytest.mark.parametrize(("hunts", "cause"), [(False, "sliding friction"), (True, "hunts")])
+def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(hunts, cause):
+    """35 Hz pass a high pass at 40 Hz in part; a hunting vehicle strikes its flanges."""
+    measured = np.zeros((2, 2, VIBRATION))
+    measured[1, 0, [AMPLITUDE, FREQUENCY]] = 7e3, 35.2
+    (remark,) = vibration(
+        measured, np.full((2, 2), 70e3), ("a", "b"), irregular=False, elastic=True, hunts=hunts
+    )
+    assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
+    assert "above" not in remark
+    assert cause in remark

@@ -1,4 +1,4 @@
-"""Limit cycle of hunting against an independent model, rigid rails.
+"""Limit cycle of hunting against an independent model, rigid rails; where hunting is said.
 
 The model is in global coordinates, with quaternions, spinning wheelsets and its own contact by a
 Winkler foundation; nothing in it comes from railsim.  Source: see tests/data/SOURCES.md.
@@ -6,7 +6,7 @@ Winkler foundation; nothing in it comes from railsim.  Source: see tests/data/SO
 
 import numpy as np
 import pytest
-from dynamics import Settings, load_track, load_vehicle
+from dynamics import Settings, load_any_track, load_track, load_vehicle
 
 from railsim.simulation import simulate
 
@@ -35,3 +35,49 @@ def test_hunting_of_the_benchmark_vehicle(y):
     amplitude, frequency = limit_cycle("benchmark_vehicle1", 80.0, y)
     assert amplitude == pytest.approx(AMPLITUDE, rel=0.02)
     assert frequency == pytest.approx(FREQUENCY, rel=0.02)
+
+
+def remarks(speed, until=1200.0, spectrum=None, start=3e-3, **irregularity):
+    """What is said of a run of the Manchester coach on straight track, on elastic rails."""
+    track = load_any_track("straight").replace(plan=[{"type": "STR", "length": until + 50.0}])
+    if spectrum:
+        irregularity = {"type": "random", "spectrum": spectrum, "seed": 11}
+    if irregularity:
+        track = track.replace(irregularities=[irregularity])
+    settings = Settings(initial={"front.outer.wheelset": {"y": start}})
+    coach = load_vehicle("coach_manchester")
+    return simulate(coach, track, speed=speed, until=until, settings=settings).remarks
+
+
+@pytest.mark.parametrize("spectrum", [None, "erri_b176_low"])
+@pytest.mark.parametrize("speed", [44.4, 48.9])
+def test_hunting_is_said(speed, spectrum):
+    """Above the critical speed of 38.5 to 40 m/s, on smooth rails and on those of ERRI B176."""
+    first = remarks(speed, spectrum=spectrum)[0]
+    assert first.startswith("The vehicle hunts at ")
+    assert "wheelsets 1 to 4, from s = " in first
+
+
+def test_the_response_to_bad_track_below_the_critical_speed_is_no_hunting():
+    found = remarks(35.0, until=2000.0, spectrum="erri_b176_high")
+    assert not any("hunts" in remark for remark in found)
+
+
+@pytest.mark.parametrize("channel", ["lateral", "cross_level"])
+def test_a_forced_motion_on_waves_of_one_length_is_no_hunting(channel):
+    """Waves of 9 m excite the kinematic motion at 3.9 Hz: 30 cycles are as regular as the rails."""
+    waves = {"amplitude": 0.002, "wavelengths": [9.0, 8.95], "begin": 50.0, "end": 1150.0}
+    found = remarks(35.0, type="sweep", channel=channel, **waves)
+    assert not any("hunts" in remark for remark in found)
+
+
+def test_a_curve_and_its_entry_are_no_hunting():
+    coach, track = load_vehicle("coach_manchester"), load_any_track("curve_r250")
+    assert simulate(coach, track, speed=20.0).remarks == ()
+
+
+def test_a_run_that_nothing_disturbs_proves_no_stability():
+    """44.4 m/s is above the critical speed; the unstable equilibrium stays where it is."""
+    (remark,) = remarks(44.4, until=300.0, start=0.0)
+    assert "proves nothing about its stability" in remark
+    assert not any("stability" in remark for remark in remarks(30.0, until=300.0))
