@@ -45,7 +45,7 @@ class TableArrays(NamedTuple):
     dy: float
     roll0: float
     droll: float
-    dw: float
+    w: Array
 
 
 @dataclass(frozen=True)
@@ -127,11 +127,11 @@ def loaded_contact(
         table.dy,
         table.roll0,
         table.droll,
-        table.dw,
+        table.w,
     )
     stretched, roll_slope = stretched_roll(roll)
     where, iy, ir, iw, ty, tr, tw = locate(arrays, 0, y, roll, stretched, yaw * yaw)
-    if where != INSIDE:
+    if where != INSIDE or tw > 1.0:
         raise ModelError(
             f"y = {1e3 * y:.2f} mm with roll {1e3 * roll:.2f} mrad and yaw {1e3 * yaw:.2f} mrad "
             "lies outside of the contact table"

@@ -95,6 +95,7 @@ def _checked_table(path: Path, text: str | bytes, stamp: tuple[int, ...]) -> Con
     try:
         facts = json.loads(text)
         crc = facts.pop("crc32")
+        facts["w"] = np.array(facts["w"])
         table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
         whole = zlib.crc32(table.values.data) == crc
     except (OSError, ValueError, TypeError, KeyError, EOFError):
@@ -111,6 +112,7 @@ def _store_table(table: ContactTable, path: Path) -> None:
         return  # on a network disk a file that others have mapped must not be replaced
     facts = {name: getattr(table, name) for name in ContactTable.__dataclass_fields__}
     facts["crc32"] = zlib.crc32(facts.pop("values").data)
+    facts["w"] = table.w.tolist()
 
     def write(handle: int) -> None:
         with os.fdopen(os.dup(handle), "wb") as file:

@@ -114,13 +114,13 @@ class SideBearer(SlidingFriction, PointElement):
 
     @property
     def vertical_stiffness(self) -> float:
-        """Stiffness of what carries [N/m]."""
-        return self.stiffness
+        """Stiffness of what carries in the nominal position [N/m]."""
+        return self.stiffness if self.clearance == 0.0 else 0.0
 
     @property
     def vertical_damping(self) -> float:
-        """Damping while it carries [N s/m]."""
-        return self.damping
+        """Damping while it carries there [N s/m]."""
+        return self.damping if self.clearance == 0.0 else 0.0
 
     @property
     def stop_table(self) -> Rows | None:
@@ -256,6 +256,20 @@ class Wedge(VerticalSpring, PointElement):
             )
         if self.stiffness[2] == 0.0:
             raise ValueError("the wedges need springs: 'stiffness' along z")
+        return self
+
+    @model_validator(mode="after")
+    def _wedge_presses(self) -> Self:
+        if self.preload != "auto" and self.preload[2] < 0.0:
+            raise ValueError(
+                "wedges press and never pull: 'preload' along z, on the side frame and positive "
+                f"downwards, must not be negative; found {self.preload[2]:g}"
+            )
+        if self.points is not None and self.points[0][2] < self.points[1][2]:
+            raise ValueError(
+                "the bolster, body 2, rests on the wedges, which stand on the side frame, body 1: "
+                "the point on body 1 must not lie above that on body 2 (z points down)"
+            )
         return self
 
     @property

@@ -12,9 +12,11 @@ w = yaw^2, twelve fields per patch (tread, flange root, flange):
     8 to 11  what 4 to 7 gain under endless load: v + dv N/(N + HALF_LOAD)
 
 The table's values are the coefficients of uniform cubic B-splines in y and roll (twice
-continuously differentiable) and are interpolated linearly in w.  The contact force is the gradient
-of U = 2/5 K e^(5/2) + 1/3 K2 e^3 *through this spline*, hence conservative by construction,
-whatever the table holds.  Only the first four fields, those of the force, have gradients.
+continuously differentiable) and are interpolated linearly in w, whose nodes lie close together
+where vehicles run, and continued linearly beyond the last of them.  The contact force is the
+gradient of U = 2/5 K e^(5/2) + 1/3 K2 e^3 *through this spline*, hence conservative by
+construction, whatever the table holds.  Only the first four fields, those of the force, have
+gradients.
 
 The first axis of the grid is s = y - shear * roll, the lateral displacement of the wheel's foot,
 see `railsim.contact.table`.
@@ -48,7 +50,8 @@ N_WEIGHT = 16
 INSIDE, BELOW_Y, ABOVE_Y, OUTSIDE_ROLL, OUTSIDE_W = range(5)
 
 # A patch whose gap exceeds the wheel's height by more than this is skipped; it is taken at a node
-# in y and between two in roll, which differs from the exact one by less (a cell at a slope of 3).
+# in y and between two in roll and w, which differs from the exact one by less (a cell at a slope of
+# 3).
 FAR = 4.0e-4
 FINE_ROLL = 4e-3  # up to about this roll the nodes lie as close as in the middle [rad]
 
@@ -59,6 +62,7 @@ MIDDLE_SHARE = LOADS[1] / (LOADS[1] + HALF_LOAD)
 MOST_ITERATIONS = 30  # of `coupled_approaches`; some four are needed
 # Relative change of the approaches below which they have converged: Newton squares it once more.
 SETTLED = 1e-8
+FURTHEST_W = 2.0  # over the last node of w: as far is the table continued
 
 
 @compiled
@@ -84,7 +88,8 @@ def locate(contact, table, y, roll, stretched, w):
     """Cell and local coordinate in the three directions; a code if outside (see above)."""
     ty = (y - contact.shear[table] * roll - contact.y0) / contact.dy
     tr = (stretched - contact.roll0) / contact.droll
-    tw = w / contact.dw
+    nodes = contact.w
+    last = nodes.shape[0] - 2
     shape = contact.values.shape
     # comparisons are written so that NaN falls out of range
     if not ty >= 1.0:
@@ -93,20 +98,24 @@ def locate(contact, table, y, roll, stretched, w):
         return ABOVE_Y, 0, 0, 0, 0.0, 0.0, 0.0
     if not (tr >= 1.0 and tr < shape[3] - 2.0):
         return OUTSIDE_ROLL, 0, 0, 0, 0.0, 0.0, 0.0
-    if not tw < shape[2] - 1.0:
+    if not w <= FURTHEST_W * nodes[last + 1]:
         return OUTSIDE_W, 0, 0, 0, 0.0, 0.0, 0.0
     iy = int(ty)
     ir = int(tr)
-    iw = int(tw)
-    return INSIDE, iy, ir, iw, ty - iy, tr - ir, tw - iw
+    iw = 0
+    while iw < last and w >= nodes[iw + 1]:
+        iw += 1
+    tw = (w - nodes[iw]) / (nodes[iw + 1] - nodes[iw])
+    return INSIDE, iy, ir, iw, ty - iy, tr - ir, tw
 
 
 @compiled
-def is_far(contact, table, patch, iy, ir, iw, tr, z):
+def is_far(contact, table, patch, iy, ir, iw, tr, tw, z):
     """Whether a patch is so far from touching that its look-up can be skipped."""
     values = contact.values
     node, following = values[table, patch, iw, ir, iy, 0], values[table, patch, iw, ir + 1, iy, 0]
-    return z - node - tr * (following - node) < -FAR
+    yawed = values[table, patch, iw + 1, ir, iy, 0]
+    return z - node - tr * (following - node) - tw * (yawed - node) < -FAR
 
 
 @compiled
@@ -176,7 +185,7 @@ def look_up(contact, table, patch, iy, ir, iw, tw, weights, out, first=0):
     out[first + G_ROLL] -= shear * out[first + G_Y]
     out[first + K_ROLL] -= shear * out[first + K_Y]
     out[first + K2_ROLL] -= shear * out[first + K2_Y]
-    per_step = 1.0 / contact.dw
+    per_step = 1.0 / (contact.w[iw + 1] - contact.w[iw])
     out[first + G_W] *= per_step
     out[first + K_W] *= per_step
     out[first + K2_W] *= per_step
@@ -250,15 +259,3 @@ def coupled_approaches(coupling, table, stiffness, approach):
             if abs(x0) + abs(x1) + abs(x2) < SETTLED * (e0 + e1 + e2):
                 break
     approach[0], approach[1], approach[2] = e0, e1, e2
-
-
-def bounds(contact) -> np.ndarray:
-    """Usable range of the tables, [[s], [stretched roll], [w]] lower and upper."""
-    shape = contact.values.shape
-    return np.array(
-        [
-            [contact.y0 + contact.dy, contact.y0 + (shape[4] - 2) * contact.dy],
-            [contact.roll0 + contact.droll, contact.roll0 + (shape[3] - 2) * contact.droll],
-            [0.0, (shape[2] - 1) * contact.dw],
-        ]
-    )

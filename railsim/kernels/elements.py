@@ -112,6 +112,27 @@ def push(pose, one, two, force, moment_1, moment_2, n):
     add_to_pairs(pose, one, two, PUSH, to_one, (zero, zero, -fx, -fy, -fz, n1, n2, n3), n)
 
 
+# Entries of `Work.laws` after those of the elements at hand: the time for which forces of tables
+# and pads without tension are foreseen [s], and the largest rate at which one will change [N/s].
+AHEAD, RATE_OF_STOPS = 9 * LANES, 9 * LANES + 1
+LAWS_SIZE = 10 * LANES
+
+
+@compiled(inline=True)
+def note_stop(laws, force, coming):
+    """Note how fast the force of a stop changes from `force` to `coming`."""
+    laws[RATE_OF_STOPS] = max(laws[RATE_OF_STOPS], abs(coming - force) / laws[AHEAD])
+
+
+@compiled(inline=True)
+def spring_table(curves, index, d, rate, laws):
+    """Force of a table at the deflection `d`; steps in which it changes fast are divided."""
+    force = curve_value(curves, index, d)
+    if laws[AHEAD] > 0.0:
+        note_stop(laws, force, curve_value(curves, index, d + laws[AHEAD] * rate))
+    return force
+
+
 @compiled(inline=True)
 def link_laws(links, curves, first, n, inner, drive, laws):
     """Forces of internal states and tables of `n` links; `laws`: elongations, rates, forces."""
@@ -124,7 +145,7 @@ def link_laws(links, curves, first, n, inner, drive, laws):
             force += inner[m]
             drive[m, 0] = rate
         if links.curve[e, 0] >= 0:
-            force += curve_value(curves, links.curve[e, 0], laws[k])
+            force += spring_table(curves, links.curve[e, 0], laws[k], rate, laws)
         if links.curve[e, 1] >= 0:
             force += curve_value(curves, links.curve[e, 1], rate)
         laws[2 * LANES + k] = force
@@ -191,12 +212,15 @@ def grip(mounts, internal, friction, e, normal, inner):
 
 
 @compiled(inline=True)
-def axis_law(mounts, internal, curves, friction, e, k, motion, normal, inner, drive):
-    """Force along axis `k` of mount `e` of its table and internal state; `normal` loads a pad."""
-    d, rate = motion
+def axis_law(mounts, internal, curves, friction, e, k, motion, inner, drive, laws):
+    """Force along axis `k` of mount `e` of its table and internal state.
+
+    ``motion``: deflection, its rate, and the load on a pad.
+    """
+    d, rate, normal = motion
     force = 0.0
     if mounts.curve[e, k] >= 0:
-        force += curve_value(curves, mounts.curve[e, k], d)
+        force += spring_table(curves, mounts.curve[e, k], d, rate, laws)
     m = mounts.internal[e, k]
     if m >= 0:
         if internal.kind[m] == PAD:
@@ -214,6 +238,8 @@ def axis_law(mounts, internal, curves, friction, e, k, motion, normal, inner, dr
             force += inner[m]
     if k == 2 and mounts.flags[e, FRICTION] == ONE_SIDED:
         force += lifted_part(mounts, e, d, rate, normal)
+        if laws[AHEAD] > 0.0:
+            note_stop(laws, normal, pad_load(mounts, curves, e, d + laws[AHEAD] * rate))
     return force
 
 
@@ -256,7 +282,7 @@ def mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
         normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
         laws[(6 + k) * LANES + lane] = axis_law(
-            mounts, internal, curves, friction, e, k, (d, rate), normal, inner, drive
+            mounts, internal, curves, friction, e, k, (d, rate, normal), inner, drive, laws
         )
 
 

@@ -11,7 +11,9 @@ PAD            force of a friction pad that sticks elastically and slides at a l
                F' = k_t v, |F| <= F_max (Masing 1926): no creep at rest, loss = work of sliding.
                States of a pad that slides in any direction follow each other; their forces over
                their limits, q, stay within |q| - e q_z = 1: a circle, of a wedge (e > 0) a conic
-               with its focus at no force, see `elements`
+               with its focus at no force, see `elements`.  What slides, slides along the gradient
+               of |q| over the forces: with equal limits along the force, else by the principle of
+               greatest dissipation (Michalowski, Mroz 1978, Archives of Mechanics 30)
 AIR            deflection w of the reservoir, c w' = k_1 (z - w) - k_2 w (Nishimura 1984); exact
                over a step at constant z
 """
@@ -24,6 +26,9 @@ import numpy as np
 from railsim.kernels import compiled
 
 MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
+MOST_RETURNS = 8  # iterations of `hold_within`
+RETURNED = 1e-12  # what is left beyond the limit, over it
+LEAST_LIMIT = 1e-6  # N; below it there is no friction
 
 
 class Internal(NamedTuple):
@@ -173,25 +178,51 @@ def slides_together(internal, i):
     return internal.kind[i] == PAD and internal.parameter[i, 1] > 1.0
 
 
+@compiled(inline=True)
+def yielding(internal, i, drive):
+    """k/L^2 of a friction pad's state `i`: how fast sliding takes its force back."""
+    return internal.parameter[i, 0] / (drive[i, 1] * drive[i, 1])
+
+
 @compiled(python=False)
 def hold_within(internal, last, first, drive, state):
     """Bring the forces of a pad that slides in any direction back to their limit.
 
     They stand in `state` from `first` on; the limits in `drive`; `last` is the pad's last state.
+
+    Closest-point return (Simo, Hughes, Computational Inelasticity, 1998, 3): the pad slides along
+    the gradient of |q| until the sticking stiffnesses k have brought the forces to their limits L,
+
+        q_i = q_i,trial / (1 + lambda k_i/L_i^2),   |q| - e q_z = 1,
+
+    in steady sliding with equal limits the force has the direction of the sliding, whatever the
+    stiffnesses.  Newton's method on 1/(|q| - e q_z), which for equal k_i/L_i^2 is linear in lambda.
     """
-    square, z = 0.0, 0.0
-    begin = last + 1 - int(internal.parameter[last, 1])
-    for i in range(begin, last + 1):
-        z = 0.0
-        if drive[i, 1] > 0.0:
-            z = state[first + i] / drive[i, 1]
-        else:
-            state[first + i] = 0.0
-        square += z * z
-    size = sqrt(square) - internal.parameter[last, 2] * z
-    if size > 1.0:
+    begin, skew = last + 1 - int(internal.parameter[last, 1]), internal.parameter[last, 2]
+    size, slip = 0.0, 0.0
+    for _ in range(MOST_RETURNS):
+        square, change, z, z_change = 0.0, 0.0, 0.0, 0.0
         for i in range(begin, last + 1):
-            state[first + i] /= size
+            z, z_change = 0.0, 0.0
+            if drive[i, 1] > LEAST_LIMIT:
+                back = yielding(internal, i, drive)
+                z = state[first + i] / (drive[i, 1] * (1.0 + slip * back))
+                z_change = -z * back / (1.0 + slip * back)
+            else:
+                state[first + i] = 0.0
+            square += z * z
+            change += z * z_change
+        size = sqrt(square) - skew * z
+        if size <= 1.0 + RETURNED:
+            break
+        slope = change / sqrt(square) - skew * z_change
+        if slope >= 0.0:  # a wedge that slides along its column alone does not come back
+            break
+        slip += size * (1.0 - size) / slope
+    if slip > 0.0 or size > 1.0:
+        for i in range(begin, last + 1):
+            if drive[i, 1] > LEAST_LIMIT:
+                state[first + i] /= (1.0 + slip * yielding(internal, i, drive)) * size
 
 
 @compiled

@@ -32,6 +32,8 @@ from railsim.kernels.driving import (
     turn_fixed,
 )
 from railsim.kernels.elements import (
+    AHEAD,
+    RATE_OF_STOPS,
     friction_at_speed,
     link_forces,
     load_forces,
@@ -408,6 +410,7 @@ def mechanics(system, work, state, derivative, rails):
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
     mounts, laws, pose = system.mounts, work.laws, work.pose
+    laws[AHEAD], laws[RATE_OF_STOPS] = work.watch[0], 0.0
     link_forces(system.links, system.curves, inner, work.drive, laws, pose)
     if mounts.falling.shape[0] > 0:
         friction_at_speed(mounts, system.internal, laws, pose, work.friction)

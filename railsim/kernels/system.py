@@ -110,7 +110,8 @@ class Contact(NamedTuple):
     values : float64[t, 3, n_w, n_roll, n_y, 8]  tables, see `contact_table`
     shear : float64[t]           lever of roll in the tables' lateral coordinate [m]
     coupling : float64[t, 2]     compliance between neighbouring patches [m/N]
-    y0, dy, roll0, droll, dw : float   grid of the tables [m, rad, rad2]
+    y0, dy, roll0, droll : float   grid of the tables [m, rad]
+    w : float64[n_w]             its nodes of yaw squared [rad2]
     damping : float              normal to the patch [N s/m]
     kalker : float64[k, 4]       c11 c22 c23 c33 over (a - b)/(a + b)
     law : CreepLaw               creep law with its material, its grid and its data
@@ -127,7 +128,7 @@ class Contact(NamedTuple):
     dy: float
     roll0: float
     droll: float
-    dw: float
+    w: np.ndarray
     damping: float
     kalker: np.ndarray
     law: CreepLaw
@@ -360,7 +361,7 @@ class Work(NamedTuple):
     acceleration : float64[n, 6]  absolute, in body axes
     drive : float64[m, 2]       what drives each internal state, and its limit
     friction : float64[e, 3, 2]  limits of the pads of mounts, see `elements.friction_at_speed`
-    laws : float64[9 * LANES]   of the elements at hand, see `elements`
+    laws : float64[LAWS_SIZE]   of the elements at hand, see `elements`
     decay : float64[m]          see `internal.constant_decays`
     contact_jacobian : float64[n, CONTACT_JACOBIAN]  see `wheel_rail`
     plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE];
@@ -377,9 +378,11 @@ class Work(NamedTuple):
     compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
                                 [m/(N s)]
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
-    events : int64[w, 4]        of each wheelset: loaded patches so far, and how many of them were
-                                outside the range of the creep law; the same kept over corrections
-    swing : float64[w]          largest rate of the contact forces of each wheelset [N/s]
+    events : int64[w, 5]        of each wheelset: loaded patches so far, and how many of them were
+                                outside the range of the creep law; the same kept over corrections;
+                                look-ups beyond the yaw of the contact table
+    swing : float64[w]          largest rate of the contact forces of each wheelset, and of stops
+                                between bodies [N/s]
     watch : float64[2]          time for which contact forces are foreseen [s]; share of the static
                                 wheel load by which they may change in a step
     coming : float64[2, COMING] of the wheelset at hand, see `rails.foresee`

@@ -55,6 +55,7 @@ from railsim.kernels.contact_table import (
     stretched_roll,
     under_load,
 )
+from railsim.kernels.elements import RATE_OF_STOPS
 from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
@@ -141,7 +142,7 @@ def normal_contact(system, work, speed, state):
         above[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
         above[7] = yaw_rate
         above[8], above[9] = stretched_roll(above[2])
-        work.swing[w] = 0.0
+        work.swing[w] = work.laws[RATE_OF_STOPS]
         if ahead > 0.0 and system.track.has_irregularity:
             own = smoothed + 6 * b
             s = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
@@ -220,13 +221,15 @@ def wheel_contact(system, work, w, side, speed, n):
     )
     if where != INSIDE:
         return outside(where), n
+    if tw > 1.0:
+        work.events[w, 4] += 1
     cell_weights(contact, ty, tr, above[9], work.weights)
     lift = 1.0
     for patch in range(N_PATCH):
         work.stiffness[patch] = 0.0
         work.stiffness[N_PATCH + patch] = 0.0
         approach[patch] = -1.0
-        if is_far(contact, table, patch, iy, ir, iw, tr, meet.z):
+        if is_far(contact, table, patch, iy, ir, iw, tr, tw, meet.z):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)

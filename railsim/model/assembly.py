@@ -447,7 +447,7 @@ def _contact(
         dy=first.dy,
         roll0=first.roll0,
         droll=first.droll,
-        dw=first.dw,
+        w=first.w,
         damping=settings.contact_damping,
         kalker=creep_tables(settings.poisson),
         law=_creep_law(settings, track),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Remark
+from railsim.definitions.element_base import FreeLength
 from railsim.definitions.flatten import FlatElement, FlatVehicle, flatten
 from railsim.definitions.friction_elements import Friction, SideBearer, Wedge
 from railsim.definitions.spring_elements import Airspring, Bushing, ShearSpring, SpringDamper
@@ -54,7 +55,7 @@ def vehicle_remarks(vehicle: Vehicle, balanced: Model | None = None) -> list[Rem
     """
     flat = flatten(vehicle) if balanced is None else balanced.flat
     found = [*_below_the_rails(flat), *_wheel_load(flat), *_vertical_modes(flat)]
-    return [*found, *_supports(vehicle, balanced)]
+    return [*found, *_pulling(flat), *_supports(vehicle, balanced)]
 
 
 def gathered(what: str, names: Sequence[str]) -> Remark:
@@ -158,6 +159,27 @@ class _Support:
     load: float
 
 
+def _pulling(flat: FlatVehicle) -> list[Remark]:
+    """Remarks on springs that are longer between their seats than without load."""
+    names: dict[str, list[str]] = {}
+    for element in flat.elements:
+        law = element.definition
+        if not isinstance(law, FreeLength) or not law.has_free_length or _upright(element) < 0.5:
+            continue
+        way = np.array(element.point2) - np.array(element.point1)
+        length = float(np.linalg.norm(way) if isinstance(law, SpringDamper) else abs(way[2]))
+        stiffness = element.definition.vertical_stiffness
+        force = law.compression(stiffness, length)
+        if force < 0.0:
+            free = length + force / stiffness
+            text = (
+                f"pulls with {-force / 1e3:.3g} kN: {1e3 * free:.4g} mm long without load, and "
+                f"{1e3 * length:.4g} mm between its seats"
+            )
+            names.setdefault(text, []).append(element.name)
+    return [gathered(text, parts) for text, parts in names.items()]
+
+
 def _supports(vehicle: Vehicle, balanced: Model | None) -> list[Remark]:
     """Remarks on how the springs share the weight at rest."""
     try:
@@ -167,7 +189,7 @@ def _supports(vehicle: Vehicle, balanced: Model | None) -> list[Remark]:
         return [Remark("elements", str(error))]
     parts = {element.name: element for element in model.flat.elements}
     supports = [_Support(parts[name], force) for name, force in shares.items() if name in parts]
-    return [*_pulled(model.flat, supports), *_other_loads(supports)]
+    return [*_pulled(model.flat, supports), *_idle(supports), *_other_loads(supports)]
 
 
 def _as_they_are(balanced: Model) -> bool:
@@ -181,7 +203,7 @@ def _pulled(flat: FlatVehicle, supports: Iterable[_Support]) -> list[Remark]:
     kinds = {body.name: body.kind for body in flat.bodies}
     pulled = [
         support for support in supports
-        if _only_presses(support.element, kinds) and support.load < -1.0
+        if _carries_from_below(support.element, kinds) and support.load < -1.0
     ]  # fmt: skip
     if not pulled:
         return []
@@ -192,7 +214,16 @@ def _pulled(flat: FlatVehicle, supports: Iterable[_Support]) -> list[Remark]:
     return [gathered(text, [support.element.name for support in pulled])]
 
 
-def _only_presses(element: FlatElement, kinds: Mapping[str, str]) -> bool:
+def _idle(supports: Iterable[_Support]) -> list[Remark]:
+    """Pads that only press, and would have to pull for the vehicle to stand as it is drawn."""
+    idle = [
+        support.element.name for support in supports
+        if isinstance(support.element.definition, SideBearer) and support.load <= 0.0
+    ]  # fmt: skip
+    return [gathered("carries nothing at rest, it would have to pull", idle)] if idle else []
+
+
+def _carries_from_below(element: FlatElement, kinds: Mapping[str, str]) -> bool:
     """Whether an element is a support that carries from below; others may hang."""
     law = element.definition
     if isinstance(law, ShearSpring | Airspring | SideBearer | Wedge):

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.flatten import FlatElement
+from railsim.definitions.friction_elements import Wedge
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
+from railsim.kernels.element_columns import FRICTION, ONE_SIDED
 from railsim.kernels.system import AXLEBOX, RIGID, Links, Mounts, System
 from railsim.model.assembly import Model
 from railsim.notation import COMPONENTS
@@ -28,7 +30,8 @@ def with_preloads(model: Model) -> Model:
 
     Unknowns are the vertical force of each mount and the force of each link so marked; conditions
     the vertical force, roll and pitch moment of each rigid body and the pitch moment of each
-    axlebox, with the preloads given by the user and gravity as loads.
+    axlebox, with the preloads given by the user and gravity as loads.  What only presses, and would
+    have to pull, carries nothing.
 
     A load case takes the preloads of the design load: its bodies find their heights, rolls and
     pitches themselves.  So does a vehicle with springs of known free length: their preloads are
@@ -87,11 +90,35 @@ def _solved(model: Model) -> Model:
         filled, rest = _with_solved_preloads(model, _auto_preloads(model), wanted)
         unbalanced = [] if free_lengths else _unbalanced(model, wanted, rest)
         if not unbalanced:
-            return filled
+            return _with_pressing_wedges(filled)
     raise ModelError(
         "no static equilibrium: the springs with preload cannot carry the vehicle in its "
         "nominal position; unbalanced: " + "; ".join(unbalanced)
     )
+
+
+def _with_pressing_wedges(model: Model) -> Model:
+    """Return the model; a wedge that would have to pull stands the wrong way round.
+
+    Raises
+    ------
+    ModelError
+        Names the wedges.
+    """
+    force = dict(zip(model.index.mounts, model.system.mounts.preload[:, 2], strict=True))
+    wrong = [
+        element.name
+        for element in model.flat.elements
+        if isinstance(element.definition, Wedge)
+        and force[element.name] < (1.0 if element.definition.preload == "auto" else 0.0)
+    ]
+    if wrong:
+        raise ModelError(
+            "wedges press and never pull, these would have to pull in the nominal position: "
+            + ", ".join(wrong)
+            + "; body 1 of a wedge is the side frame, body 2 the bolster that rests on it"
+        )
+    return model
 
 
 def static_shares(model: Model, *, solved: bool = False) -> dict[str, float]:
@@ -174,7 +201,44 @@ def _carried_by_levelled_springs(model: Model) -> set[int]:
 def _with_solved_preloads(
     model: Model, support: dict[tuple[str, int], float], conditions: list[tuple[int, int]]
 ) -> tuple[Model, Floats]:
-    """Solve the preloads of `support` for `conditions`; the model with them, and what is left."""
+    """Solve the preloads of `support` for `conditions`; the model with them, and what is left.
+
+    What only presses does not pull: it carries nothing, and the others are solved without it.
+    """
+    support = dict(support)
+    while True:
+        filled, rest = _solved_for(model, support, conditions)
+        forces = filled.system.mounts.preload[:, 2]
+        pulling = [
+            (group, i)
+            for group, i in support
+            if group == "mounts" and only_presses(filled.system.mounts, i) and forces[i] < 0.0
+        ]
+        if not pulling:
+            return filled, rest
+        for each in pulling:
+            forces[each[1]] = 0.0
+            del support[each]
+        model = filled
+
+
+def only_presses(mounts: Mounts, i: int) -> bool:
+    """Whether a mount is a pad or wedge, whose spring and damper never pull."""
+    return bool(mounts.flags[i, FRICTION] == ONE_SIDED)
+
+
+def nominal_forces(mounts: Mounts) -> Floats:
+    """Preloads of mounts as they act: of a pad with clearance none, shape (mount, 3) [N]."""
+    forces = np.array(mounts.preload)
+    presses = mounts.flags[:, FRICTION] == ONE_SIDED
+    forces[presses, 2] = np.maximum(forces[presses, 2], 0.0)
+    return forces
+
+
+def _solved_for(
+    model: Model, support: dict[tuple[str, int], float], conditions: list[tuple[int, int]]
+) -> tuple[Model, Floats]:
+    """As `_with_solved_preloads`, whatever the signs."""
     system = model.system
     unknowns = list(support)
     loads = np.array([_load(system, body, component) for body, component in conditions])
@@ -278,9 +342,9 @@ def _preload_forces(
         force = links.spring[e, 2] * direction / np.linalg.norm(direction)
         _add(totals, i, links.point[e, 0], force)
         _add(totals, j, links.point[e, 1], -force)
-    for e, (i, j) in enumerate(mounts.body):
-        _add(totals, i, mounts.point[e, 0], mounts.preload[e])
-        _add(totals, j, mounts.point[e, 1], -mounts.preload[e])
+    for e, ((i, j), force) in enumerate(zip(mounts.body, nominal_forces(mounts), strict=True)):
+        _add(totals, i, mounts.point[e, 0], force)
+        _add(totals, j, mounts.point[e, 1], -force)
     return np.array([totals[body, component] for body, component in conditions])
 
 

@@ -13,6 +13,7 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
+from railsim.model.preloads import nominal_forces
 from railsim.profiles import Profile
 from railsim.text import html_table
 
@@ -104,7 +105,7 @@ def static_loads(
     model = balance.model
     tensions = np.array(model.system.links.spring[:, 2:])
     preload = dict(zip(model.index.links, tensions, strict=True))
-    mounts = np.array(model.system.mounts.preload)
+    mounts = nominal_forces(model.system.mounts)
     preload |= dict(zip(model.index.mounts, mounts, strict=True))
     kept = {name: value for name, value in preload.items() if value.any()}
     return StaticLoads(tuple(model.index.wheelsets), balance.Q0.copy(), kept)

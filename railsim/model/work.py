@@ -7,9 +7,9 @@ from railsim.contact.creep import creep_scratch
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
+from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
 from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
-from railsim.kernels.registers import LANES
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
 from railsim.kernels.system import (
     AXLEBOX,
@@ -53,7 +53,7 @@ def work_arrays(system: System) -> Work:
         acceleration=aligned_zeros((n, RATES_SIZE)),
         drive=aligned_zeros((len(system.internal.kind), 2)),
         friction=np.ascontiguousarray(system.mounts.friction[:, :, :2]),
-        laws=aligned_zeros(9 * LANES),
+        laws=aligned_zeros(LAWS_SIZE),
         decay=aligned_zeros(len(system.internal.kind)),
         contact_jacobian=aligned_zeros((n, CONTACT_JACOBIAN)),
         plane=smooth_planes(n_wheelsets),
@@ -71,7 +71,7 @@ def work_arrays(system: System) -> Work:
         support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
         compliance=aligned_zeros(2),
         vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
-        events=aligned_zeros((n_wheelsets, 4), np.int64),
+        events=aligned_zeros((n_wheelsets, 5), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         swing=aligned_zeros(n_wheelsets),
         watch=aligned_zeros(2),

@@ -100,8 +100,9 @@ class Run:
         Whether `state` is to be recorded.
     status, where : int
         How it ended, see `railsim.kernels.status`.
-    events : int64[2]
-        Loaded contact patches so far, and those out of the creep law's range.
+    events : int64[3]
+        Loaded contact patches so far, and those out of the creep law's range; look-ups beyond the
+        yaw of the contact table.
     extremes, evaluated : float64[6, w, EXTREMES]
         Largest and smallest values so far, see `railsim.kernels.extremes`; of all, and since the
         evaluation began.
@@ -133,7 +134,7 @@ class Run:
     due: bool = True
     status: int = RUNNING
     where: int = 0
-    events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, dtype=np.int64))
+    events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
     divided: int = 0
     unsettled: int = 0
     vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
@@ -374,7 +375,7 @@ class _Convoy:
         for run, part in zip(self._runs, self._ensemble.parts, strict=True):
             run.state = self._state[part.state]
             run.fresh, run.due = self._fresh, self._due
-            run.events += self._work.events[part.wheelsets, :2].sum(axis=0)
+            run.events += self._work.events[part.wheelsets][:, [0, 1, 4]].sum(axis=0)
             _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
             if self._evaluates:
                 _take_extremes(run.evaluated, self._work.extremes[:, part.wheelsets])

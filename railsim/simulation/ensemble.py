@@ -48,7 +48,7 @@ Ints = NDArray[np.int64]
 Group = TypeVar("Group", bound=tuple[Any, ...])
 
 # the grid of the contact tables, which a system has but one of
-GRID = ("y0", "dy", "roll0", "droll", "dw")
+GRID = ("y0", "dy", "roll0", "droll")
 # statuses that concern a wheelset
 OF_WHEELSET = (DERAILED, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
 
@@ -56,7 +56,7 @@ OF_WHEELSET = (DERAILED, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKE
 def contact_grid(model: Model) -> tuple[float | int, ...]:
     """Grid of a model's contact tables; models that differ in it cannot be one system."""
     contact = model.system.contact
-    return (*(getattr(contact, name) for name in GRID), *contact.values.shape[1:])
+    return (*(getattr(contact, name) for name in GRID), *contact.w, *contact.values.shape[1:])
 
 
 @dataclass(frozen=True)

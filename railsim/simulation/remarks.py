@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
@@ -27,6 +28,7 @@ MOST_SUM_Y = 3.0
 VIBRATES = 0.05  # amplitude of a wheel load over the static one
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
 LONG = 1.0  # s: what is shorter is not taken for a test of stability
+YAW_MAX = TableGrid().yaw_max
 
 
 def run_remarks(run: Run) -> tuple[str, ...]:
@@ -51,6 +53,7 @@ def run_remarks(run: Run) -> tuple[str, ...]:
             hunts=swings is not None,
         ),
         *creep_range(int(run.events[1]), int(run.events[0])),
+        *yaw_range(int(run.events[2])),
         *unsettled_rails(run.unsettled),
     ]
     return tuple(dict.fromkeys(found))
@@ -180,6 +183,17 @@ def creep_range(outside: int, patches: int) -> tuple[str, ...]:
     return (
         f"{outside} of {patches} contact patches in the time loop ({outside / patches:.1e}) were "
         "narrower or wider than the creep law's range of a/b; they got the force of its end.",
+    )
+
+
+def yaw_range(look_ups: int) -> tuple[str, ...]:
+    """Remark on wheels that were yawed against their rails beyond the contact table."""
+    if look_ups == 0:
+        return ()
+    return (
+        f"In {look_ups} evaluations a wheel was yawed against its rail by more than "
+        f"{1e3 * YAW_MAX:g} mrad, where the contact table ends: it was continued linearly in the "
+        "square of the yaw.",
     )
 
 

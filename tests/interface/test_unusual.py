@@ -66,6 +66,11 @@ def vehicle(body=(), spring=(), **others):
             "spring.left, spring.right",
             "its length was measured under 12 kN",
         ),
+        (
+            vehicle(spring={"free_length": 0.29}),
+            "spring.left, spring.right",
+            "pulls with 4 kN: 290 mm long without load, and 300 mm between its seats",
+        ),
     ],
 )
 def test_slips_of_sign_and_unit_are_remarked(unusual, names, words):

@@ -17,11 +17,13 @@ def evaluate(table, y, roll, w=0.0):
     x = roll / 4e-3
     slope = (1 + x**2) ** -0.25 - 0.5 * x**2 * (1 + x**2) ** -1.25
     b = (roll * (1 + x**2) ** -0.25 - table.roll0) / table.droll
-    c = w / table.dw
-    i, j, k = int(a), int(b), min(int(c), table.values.shape[1] - 2)
+    i, j = int(a), int(b)
+    k = min(int(np.searchsorted(table.w, w, side="right")), len(table.w) - 1) - 1
+    step = table.w[k + 1] - table.w[k]
+    c = (w - table.w[k]) / step
     in_s, by_s = spline_basis(a - i)
     in_roll, by_roll = spline_basis(b - j)
-    in_w, by_w = np.array([1 - (c - k), c - k]), np.array([-1.0, 1.0]) / table.dw
+    in_w, by_w = np.array([1 - c, c]), np.array([-1.0, 1.0]) / step
     nodes = table.values[:, k : k + 2, j - 1 : j + 3, i - 1 : i + 3]
 
     def total(along_w, along_roll, along_s):

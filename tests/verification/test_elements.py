@@ -174,6 +174,31 @@ def test_limits_for_each_axis_can_be_kept():
     assert np.hypot(*(together / [3e3, 4e3])) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("angle", np.radians([10.0, 40.0, 75.0, 130.0, 200.0]))
+@pytest.mark.parametrize("sticking", [(8e6, 2e6), (2e6, 8e6)])
+def test_sliding_force_has_the_direction_of_sliding_whatever_the_stick_stiffness(sticking, angle):
+    """Coulomb's law: the force of a steadily sliding pad is against its slip, to 1 degree at most.
+
+    Forces taken back along themselves kept the direction of the sticking force, 37 degrees off.
+    """
+    law = {
+        "kind": "friction",
+        "friction_force": [4e3, 4e3, 0.0],
+        "stick_stiffness": [*sticking, 0.0],
+    }
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0, 0.0, 0.0, 0.0])
+    force = pulled(Rig(**law), direction, way=0.04)[-1, :2]
+    assert force == pytest.approx(4e3 * direction[:2], abs=4e3 * np.radians(0.1))
+
+
+def test_pad_with_unequal_limits_takes_the_greatest_power():
+    """Sliding v: of all forces within the ellipse of the limits L that of L_i^2 v_i takes most."""
+    limits, direction = np.array([3e3, 4e3]), np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
+    law = {"kind": "friction", "friction_force": [*limits, 0.0], "stick_stiffness": [8e6, 2e6, 0.0]}
+    force = pulled(Rig(**law), direction, way=0.04)[-1, :2]
+    assert force @ direction[:2] == pytest.approx(np.hypot(*(limits * direction[:2])), rel=1e-6)
+
+
 def test_sliding_around_a_circle_turns_the_force_with_it():
     """Once around at constant |v| the force follows the way; its work is mu N times the way.
 
@@ -257,6 +282,16 @@ def test_tilting_stiffness_and_edge_of_a_centre_plate():
     assert 0.0 < far[3] / far[2] < R
 
 
+def test_sticking_stiffness_of_a_centre_plate():
+    """Across k; about its axis k (R^2 + r^2)/2, the polar radius of gyration of a ring."""
+    R, r, k = 0.178, 0.05, 3e7
+    plate = {**pressed(4e5, stick_stiffness=k), "kind": "centre_plate"}
+    for axis, way, stiffness in ((X, 1e-4, k), (Y, 1e-4, k), (5, 1e-3, 0.5 * k * (R**2 + r**2))):
+        rig = Rig(**plate, radius=R, inner_radius=r)
+        force = pulled(rig, np.eye(6)[axis], way=way)[-1, axis]
+        assert force == pytest.approx(stiffness * way, rel=3e-3)  # of the last step
+
+
 def test_turning_plate_loses_its_side_capacity():
     """Each point's friction is against its own way: little is left across a plate that turns."""
     plate = {**pressed(4e5, stick_stiffness=1e9), "kind": "centre_plate", "radius": 0.178}
@@ -305,6 +340,17 @@ def test_wedges_lose_the_work_of_both_ways():
     y = np.array([down(A), up(top), up(-A), down(bottom)])
     area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
     assert loop_area(d, f - F - k * d) == pytest.approx(area, rel=1e-3)
+
+
+@pytest.mark.parametrize("angle", np.radians([-60.0, -20.0, 30.0, 60.0]))
+def test_wedges_slide_in_any_direction_along_their_friction(angle):
+    """T has the direction of the slip on the column and the amount mu N, N = (F + T_z)/tan(a)."""
+    F, mu = WEDGE["preload"][2], WEDGE["friction_coefficient"]
+    law = {**WEDGE, "stiffness": [0.0, 0.0, 1.0], "stick_stiffness": [2e7, 1e7]}
+    direction = np.array([0.0, np.cos(angle), np.sin(angle), 0.0, 0.0, 0.0])
+    _, t_y, t_z = pulled(Rig(**law), direction, way=0.04)[-1, :3] - [0.0, 0.0, F]
+    assert np.hypot(t_y, t_z) == pytest.approx(mu * (F + t_z) / np.tan(WEDGE["angle"]), rel=1e-3)
+    assert np.arctan2(t_z, t_y) == pytest.approx(angle, abs=np.radians(1.0))
 
 
 def test_wedges_slide_sideways_at_their_level_limit():

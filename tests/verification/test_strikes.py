@@ -1,4 +1,4 @@
-"""Wheels that lift and strike: divided steps against the reference scheme, peaks from all steps.
+"""Wheels that lift and strike, bodies on stops: divided steps against the reference; peaks.
 
 A dip of 1 m and 2 mm at 40 m/s, in which the wheels leave the rail for milliseconds.  The reference
 is RK4 at 0.125 ms; at 0.0625 ms its peaks change by less than 1e-4.
@@ -9,8 +9,10 @@ import pytest
 import xarray
 from dynamics import Settings, load_track, load_vehicle
 from selection import points
+from test_loads import wagon
 
 import railsim
+from railsim.definitions.vehicle import Vehicle
 from railsim.simulation import simulate, simulate_together
 from railsim.simulation.remarks import MOST_Q
 
@@ -140,3 +142,53 @@ def test_forces_beyond_experience_are_remarked_on():
     largest = np.max(result.groups["peaks"]["Q"][0] / result.Q0)
     assert largest > MOST_Q
     assert f"The largest Q is {largest:.3g} times the static wheel load" in result.remarks[0]
+
+
+# stops between bodies -----------------------------------------------------------------------------
+
+
+def box_on_a_stop(step):
+    """A box of 1 t hits a lateral stop of 50 MN/m at 0.6 m/s, and rebounds."""
+    mass, stiffness = 1e3, 5e7
+    data = wagon().model_dump(exclude_none=True)
+    place = [0.0, 0.0, -1.2]
+    data["bodies"]["box"] = {"mass": mass, "inertia": [1e3, 1e3, 1e3], "position": place}
+    data["elements"] = {
+        "hold": {
+            "kind": "bushing",
+            "bodies": ["body", "box"],
+            "point": place,
+            "stiffness": [1e7, 1e3, 1e7],
+            "rotational_stiffness": [1e7, 1e7, 1e7],
+        },
+        "stop": {
+            "kind": "bump_stop",
+            "bodies": ["body", "box"],
+            "point": place,
+            "axis": "y",
+            "table": [[0.0, 0.0], [0.003, 0.0], [1.0, 0.997 * stiffness]],
+        },
+        "push": {
+            "kind": "applied_force",
+            "bodies": ["box"],
+            "force_table": [[0.0] * 4, [0.01, 0.0, 60.0 * mass, 0.0], [0.02, 0.0, 0.0, 0.0]],
+        },
+    }
+    result = simulate(
+        Vehicle.model_validate(data),
+        load_track("straight"),
+        speed=10.0,
+        duration=0.08,
+        settings=Settings(step=step, output_rate=1000.0, outputs={"elements": ["stop"]}),
+    )
+    box = list(result.coordinates["body"]).index("box")
+    return result, result.body_velocity[:, box, 1]
+
+
+def test_a_bounce_on_a_stop_gives_back_what_it_took():
+    """A stop has no damping; at a step of 1 ms, not divided, the box left it 5.9 % too fast."""
+    result, rate = box_on_a_stop(1e-3)
+    _, fine = box_on_a_stop(0.05e-3)
+    assert 0 < result.attributes["steps_divided"] < 80
+    assert rate.min() == pytest.approx(fine.min(), rel=0.005)
+    assert rate.max() == pytest.approx(fine.max(), rel=0.005)

@@ -1,0 +1,92 @@
+"""Track case 4 of the Manchester benchmark: both rails step aside by 5 mm within 0.1 m.
+
+S. Iwnicki (1999), The Manchester Benchmarks for Rail Vehicle Simulation, Vehicle System Dynamics
+Supplement 31.  A rail's tangent turns by 50 mrad, and by up to 75 mrad where a spline through the
+samples swings; the wheelsets themselves yaw by some milliradians.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from dynamics import load_any_track, load_vehicle
+from selection import points
+
+from railsim import simulate
+from railsim.contact import build_contact_table
+from railsim.contact.table import TableGrid
+from railsim.model import assembly
+
+VEHICLES = ("coach_manchester", "coach_flexicoil", "benchmark_vehicle1")
+SPEEDS = (10.0, 20.0, 40.0, 60.0, 80.0)
+CASES = [
+    (vehicle, spacing, support, speed)
+    for vehicle in VEHICLES
+    for spacing in (0.05, 0.5)
+    for support in ("rigid", "co-running")
+    for speed in SPEEDS
+]
+ALWAYS = [
+    CASES.index(case)
+    for case in (
+        ("coach_manchester", 0.05, "co-running", 40.0),
+        ("coach_flexicoil", 0.5, "rigid", 80.0),
+        ("benchmark_vehicle1", 0.5, "co-running", 10.0),
+    )
+]
+
+
+def ramp(spacing, support="co-running", begin=40.0, step=5e-3, length=0.1):
+    """Straight track with the ramp, sampled at `spacing` [m] and at the ramp's ends."""
+    s = np.unique(np.round([*np.arange(0.0, 90.0, spacing), begin, begin + length], 6))
+    y = np.interp(s, [begin, begin + length], [0.0, step])
+    rows = [(float(a), float(b), 0.0, float(b), 0.0) for a, b in zip(s, y, strict=True)]
+    return load_any_track("straight").replace(
+        irregularities=[{"type": "measured", "rows": rows}], support={"preset": support}
+    )
+
+
+@points(("vehicle", "spacing", "support", "speed"), CASES, always=ALWAYS)
+def test_vehicle_runs_over_the_ramp(vehicle, spacing, support, speed):
+    """To the end; it was stopped, for a yaw of its rails beyond the range of the contact table."""
+    result = simulate(
+        load_vehicle(vehicle), ramp(spacing, support), speed=speed, until=60.0 + 0.2 * speed
+    )
+    assert result.status == "complete"
+    # in the middle it follows the new alignment within the clearance of the flanges, and what the
+    # rails yield
+    assert np.abs(result.wheelset_yaw).max() < 0.02
+    assert np.abs(result.wheelset_lateral).max() < 0.016
+    assert any("mrad, where the contact table ends" in remark for remark in result.remarks)
+
+
+def test_smooth_and_sharp_ramps_below_60_mrad_have_no_remark():
+    """A cosine of 5 mm over 0.14 m turns the rail by 56 mrad: within the table."""
+    kink = {"type": "kink", "s": 30.0, "length": 0.28, "offset": 5e-3}
+    result = simulate(
+        load_vehicle("coach_manchester"),
+        load_any_track("straight").replace(irregularities=[kink]),
+        speed=20.0,
+        until=45.0,
+    )
+    assert result.status == "complete"
+    assert not any("contact table" in remark for remark in result.remarks)
+
+
+@pytest.mark.further
+def test_continued_table_agrees_with_a_table_of_75_mrad(monkeypatch):
+    """Peaks of the run that leaves the table by most, with a table that it does not leave."""
+
+    def peaks():
+        result = simulate(load_vehicle("coach_manchester"), ramp(0.5), speed=40.0, until=60.0)
+        found = result.groups["peaks"]
+        return np.array([np.abs(found[name]).max() for name in ("Q", "Y", "sum_Y")])
+
+    usual = peaks()
+    wide = dataclasses.replace(TableGrid(), yaw_max=0.085, n_w=37)
+
+    def wide_table(wheel, rail, **geometry):
+        return build_contact_table(wheel, rail, grid=wide, **geometry)
+
+    monkeypatch.setattr(assembly, "cached_contact_table", wide_table)
+    assert peaks() == pytest.approx(usual, rel=0.05)
