@@ -4,7 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from railsim.assessment.comfort_report import PointComfort, comfort_report, short_of_blocks
+from railsim.assessment.comfort_report import (
+    PointComfort,
+    caused_by_hunting,
+    comfort_report,
+    short_of_blocks,
+)
 from railsim.assessment.conditions import Condition, SectionRow
 from railsim.assessment.record import Record
 from railsim.assessment.rules import Assessed
@@ -240,8 +245,9 @@ def _other(
         return Assessment(vehicle, standard, names, safety=safety, remarks=tuple(remarks))
     law = load_comfort_limits(limits or "comfort")
     comfort = {name: comfort_report(record) for name, record in records.items()}
-    remarks += [f"{name}: {short}" for name, points in comfort.items()
-                if (short := short_of_blocks(points))]  # fmt: skip
+    for name, points in comfort.items():
+        said = short_of_blocks(points), caused_by_hunting(records[name], points)
+        remarks += [f"{name}: {sentence}" for sentence in said if sentence]
     if not law.mean_comfort.checked:
         remarks.append(f"classes of {law.edition} not checked against the printed standard")
     return Assessment(

@@ -20,8 +20,9 @@ from railsim.assessment.weighting import WK
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.limits import Classes, ComfortLimits
 from railsim.errors import Fault, InputError
-from railsim.result.filters import Floats
+from railsim.result.filters import Floats, band_passed
 
+NEAR = (0.85, 1.15)  # band around the frequency of hunting, over this frequency
 MARGIN = 16.0  # s on either side of a part, for the lower band limit of 0.4 Hz of the weightings
 
 
@@ -43,6 +44,9 @@ class PointComfort:
     transitions : tuple of TransitionComfort
     events : dict
         Largest P_DE by posture [%].
+    hunting : float
+        Share that the vehicle's hunting has in the mean square of the weighted lateral
+        acceleration; 0 where it does not hunt.
     """
 
     sensor: str
@@ -52,6 +56,7 @@ class PointComfort:
     sperling: dict[str, float]
     transitions: tuple[TransitionComfort, ...]
     events: dict[str, float]
+    hunting: float = 0.0
 
     def record(self, limits: ComfortLimits) -> dict[str, object]:
         """Return the values as plain numbers and strings, SI, percentages in per cent."""
@@ -73,6 +78,7 @@ class PointComfort:
                 for posture in ("standing", "seated")
             },
             "P_DE": self.events,
+            "hunting_share": self.hunting,
             "source": limits.mean_comfort.source,
             "checked": limits.mean_comfort.checked,
         }
@@ -104,7 +110,8 @@ def comfort_report(record: Record) -> list[PointComfort]:
             "run it with settings.outputs.sensors=true",
         )])  # fmt: skip
     columns = [list(record.sensors).index(name) for name in names]
-    gathered = [_Gathered() for _ in names]
+    frequency = float(record.result.attributes.get("hunting_frequency", 0.0))
+    gathered = [_Gathered(frequency) for _ in names]
     for rows, counted in record.pieces(MARGIN):
         a = record.readings(rows)[0]
         for column, into in zip(columns, gathered, strict=True):
@@ -122,15 +129,24 @@ def comfort_report(record: Record) -> list[PointComfort]:
             {k: index_of_rms(float(np.sqrt(v / into.count))) for k, v in into.sperling.items()},
             tuple(transitions[number]),
             into.events,
+            float(into.hunting / into.iso[1]) if frequency else 0.0,
         )
         for number, (name, into) in enumerate(zip(names, gathered, strict=True))
     ]
 
 
 class _Gathered:
-    """Sums and blocks of one measuring point over the parts of a run."""
+    """Sums and blocks of one measuring point over the parts of a run.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    frequency : float
+        At which the vehicle hunts; 0: it does not [Hz].
+    """
+
+    def __init__(self, frequency: float) -> None:
+        self.frequency = frequency
+        self.hunting = 0.0
         self.blocks: list[Floats] = []
         self.back: list[Floats] = []
         self.iso = np.zeros(3)
@@ -149,6 +165,10 @@ class _Gathered:
         iso = np.column_stack([floor[:, 0], floor[:, 1], WK.weighted(a[:, 2], rate)])
         self.iso += np.sum(iso[counted] ** 2, axis=0)
         self.count += size
+        if self.frequency:
+            low, high = (share * self.frequency for share in NEAR)
+            near = band_passed(floor[:, 1], rate, low, high)[counted]
+            self.hunting += float(np.sum(near**2))
         for axis, direction in ((1, "lateral"), (2, "vertical")):
             way: Direction = "lateral" if direction == "lateral" else "vertical"
             self.sperling[way] += size * sperling_mean_square(a[counted, axis], rate, way)
@@ -176,6 +196,18 @@ def _transitions(record: Record, columns: list[int]) -> list[list[TransitionComf
             if one is not None:
                 found[number].append(one)
     return found
+
+
+def caused_by_hunting(record: Record, points: list[PointComfort]) -> str:
+    """Sentence that names hunting as a cause of discomfort; empty where the vehicle does not."""
+    most = max(points, key=lambda point: point.hunting)
+    if not most.hunting:
+        return ""
+    return (
+        f"hunting at {record.result.attributes['hunting_frequency']:.1f} Hz makes up "
+        f"{100.0 * most.hunting:.0f} % of the mean square of the weighted lateral acceleration at "
+        f"{most.sensor}"
+    )
 
 
 def short_of_blocks(points: list[PointComfort]) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from railsim.errors import Fault, InputError
 from railsim.result import Result
 from railsim.result.filters import Floats
+from railsim.result.hunting import HUNTS
 from railsim.result.sensors import Sensor, readings, sensors
 from railsim.track.alignment import Alignment
 
@@ -202,7 +203,10 @@ class Record:
 
     def remarks(self) -> list[str]:
         """Notes on the record for the reader of the assessment."""
-        found = list(self.result.remarks)
+        found = [
+            f"{self.name}: {remark}" if remark.startswith(HUNTS) else remark
+            for remark in self.result.remarks
+        ]
         if self.coarse:
             found.append(
                 f"{self.name}: {self.rate:.4g} samples per second are too few for instantaneous "

@@ -260,7 +260,7 @@ def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
     for text, names in by_text.items():
         own = list(dict.fromkeys(names))
         who = own[0] if len(own) == 1 else f"{len(own)} runs"
-        found.append(f"{who + ': ' if own else ''}{text}.")
+        found.append(f"{who + ': ' if own else ''}{text.removesuffix('.')}.")
     return found
 
 

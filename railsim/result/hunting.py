@@ -40,6 +40,8 @@ RATE = 100.0  # samples per second that are enough
 PER_CYCLE = 6  # samples per cycle at least
 TOO = 0.5  # a wheelset hunts, too, that swings this share of the farthest one
 
+HUNTS = "The vehicle hunts"  # how the sentence begins
+
 SEEN = ("time", "distance", "wheelset_distance", "wheelset_lateral", "sum_Y")
 """Quantities that are looked at."""
 
@@ -87,7 +89,7 @@ class Hunting:
             who = f"wheelsets {first} to {last}"
         until = "" if self.lasts else f" to {self.end:.0f} m"
         return (
-            f"The vehicle hunts at {self.frequency:.1f} Hz, {1e3 * self.amplitude:.1f} mm, {who}, "
+            f"{HUNTS} at {self.frequency:.1f} Hz, {1e3 * self.amplitude:.1f} mm, {who}, "
             f"from s = {self.begin:.0f} m{until}."
         )
 

@@ -32,7 +32,7 @@ DIMENSIONS = ("wheelset", "side", "body")
 NUMBERS = (
     "speed", "start", "duration", "evaluation_start", "asked_duration", "asked_until", "step",
     "wall_time", "cpu_time", "real_time_factor", "runs_together", "patches_evaluated",
-    "patches_out_of_range",
+    "patches_out_of_range", "hunting_frequency", "hunting_amplitude",
 )  # fmt: skip
 STATES = ("complete", "derailed", "stopped")
 

@@ -12,6 +12,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.status import NOT_FINITE, STATUS
 from railsim.model.assembly import Model
 from railsim.result import Result
+from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.conditions import Inputs
 from railsim.simulation.outputs import run_extremes
@@ -30,10 +31,11 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
     # a run that ended before its evaluation began is evaluated as a whole
     evaluates = run.state[-3] > prepared.evaluation
     of_peaks = run.evaluated if evaluates else run.extremes
+    swings = hunting(run.swings.close({}), run.plan.irregularity)
     attributes: dict[str, str | float | int] = {
         "status": STATUS[run.status][0],
         "status_reason": _sentence(prepared.model, run.status, run.where),
-        "remarks": "\n".join(run_remarks(run)),
+        "remarks": "\n".join(run_remarks(run, swings)),
         "vehicle_toml": vehicle.to_toml(),
         "track_toml": inputs.track.to_toml(),
         "settings_json": json.dumps(settings.model_dump(mode="json")),
@@ -46,6 +48,11 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
             for name, value in (("duration", inputs.duration), ("until", inputs.until))
             if value is not None
         },
+        **(
+            {"hunting_frequency": swings.frequency, "hunting_amplitude": swings.amplitude}
+            if swings
+            else {}
+        ),
         "step": prepared.pace.smallest,
         "scheme": settings.scheme,
         "wall_time": run.wall_time + time.perf_counter() - began,

@@ -14,7 +14,7 @@ from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
-from railsim.result.hunting import Hunting, hunting
+from railsim.result.hunting import Hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.outputs import run_extremes
 
@@ -31,13 +31,12 @@ LONG = 1.0  # s: what is shorter is not taken for a test of stability
 YAW_MAX = TableGrid().yaw_max
 
 
-def run_remarks(run: Run) -> tuple[str, ...]:
-    """Return the remarks on a run that has ended, each once."""
+def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
+    """Return the remarks on a run that has ended, each once; `swings` is its limit cycle."""
     model = run.prepared.model
     wheelsets = model.index.wheelsets
     Q0 = run.prepared.balance.Q0
     extremes = run_extremes(run.extremes, Q0)
-    swings = hunting(run.swings.close({}), run.plan.irregularity)
     found = [
         *run.remarks,
         *run.prepared.remarks,

@@ -14,6 +14,7 @@ from railsim.cli import main
 from railsim.cli.assess import FILES
 from railsim.definitions.vehicle import Service
 from railsim.errors import InputError
+from railsim.result import Result
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
 FAST = 1.1 * 33.33333
@@ -314,3 +315,24 @@ def test_wear_of_a_run_that_ended_soon(duration, counted, status, tmp_path, caps
     assert "NaN" not in said.out
     words = "run: time: 3 s; more than the first 3 s, which do not count\n"
     assert said.err == (words if status == 2 else "")
+
+
+def test_hunting_is_named_as_the_cause_of_discomfort():
+    """A tone of 5 Hz beside one of 1.25 Hz: Wd is 0.409 and 1.008 there (ISO 2631-1, table 3)."""
+
+    def lateral(t):
+        return 0.5 * np.sin(2 * np.pi * 5.0 * t) + 0.2 * np.sin(2 * np.pi * 1.25 * t)
+
+    run = made(track(STRAIGHT), FAST, lateral=lateral)
+    (calm,) = assess(run, "comfort")
+    assert not any("hunting" in remark for remark in calm.remarks)
+    sentence = "The vehicle hunts at 5.0 Hz, 7.0 mm, wheelsets 1 to 4, from s = 0 m."
+    facts = {**run.attributes, "hunting_frequency": 5.0, "remarks": sentence}
+    arrays = {name: run[name] for name in run}
+    hunting = Result(arrays, run.quantities, run.coordinates, facts, run.profiles)
+    (found,) = assess({"fast": hunting}, "comfort")
+    assert f"fast: {sentence}" in found.remarks
+    five, one = 0.5 * 0.409, 0.2 * 1.008
+    share = next(p.hunting for p in found.comfort["fast"] if p.sensor == "floor_middle")
+    assert share == pytest.approx(five**2 / (five**2 + one**2), abs=0.03)
+    assert any("hunting at 5.0 Hz makes up" in remark for remark in found.remarks)
