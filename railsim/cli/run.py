@@ -401,6 +401,7 @@ def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:
             rows.append([name, quantity.words, "", *_with_scatter(quantity, values, spread)])
     numbers = [str(index + 1) for index in range(len(result.wheelsets))]
     begin, end = curve.full_curve
-    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: median and scatter"
+    around = "median, ± still settling" if curve.settling else "median and scatter"
+    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: {around}"
     header = ["", "wheelset", "side", *numbers]
     return [title, *table(header, rows, numbers=3)]

@@ -39,6 +39,9 @@ DEVIATION = (15.87, 84.13)
 SETTLING = 1.0 / 3.0
 """Share of a full curve in which the vehicle settles."""
 
+SETTLES, CROSSINGS = 0.4, 6
+"""What is still settling in a full curve, see `_settling`."""
+
 BY_SIGN = ("dQ_over_Q0",)
 """Quantities whose largest and smallest value are two different questions (overload, unloading)."""
 
@@ -250,6 +253,9 @@ class MidCurve:
     full_curve : (float, float)
         Where the reference body is while all wheelsets are in the full curve, without the
         first third of it [m]; where it is shorter than that, its middle.
+    settling : bool
+        Whether the scatter is mostly that of values on their way to a steady state, on smooth
+        rails.
     """
 
     radius: float
@@ -261,6 +267,7 @@ class MidCurve:
     scatter: Mapping[str, Array]
     median_peaks: tuple[Peak, ...]
     full_curve: tuple[float, float]
+    settling: bool
 
     def record(self) -> dict[str, Any]:
         """Return the values as plain numbers and strings, SI."""
@@ -272,6 +279,7 @@ class MidCurve:
             "largest": {peak.quantity.name: peak.value for peak in self.peaks},
             "largest_medians": {peak.quantity.name: peak.value for peak in self.median_peaks},
             "full_curve": list(self.full_curve),
+            "settling": self.settling,
             "medians": {name: values.tolist() for name, values in self.medians.items()},
             "scatter": {name: values.tolist() for name, values in self.scatter.items()},
         }
@@ -298,10 +306,13 @@ def mid_curves(
     found: list[MidCurve] = []
     if not len(distance):
         return ()
-    for section in curvature_sections(track or result.track()):
+    on = track or result.track()
+    for section in curvature_sections(on):
         middle = 0.5 * (section.begin + section.end)
         if section.type == "CIR" and distance[0] <= middle <= distance[-1] > distance[0]:
-            found.append(_mid_curve(result, wanted, section))
+            curve = _mid_curve(result, wanted, section)
+            smooth = not on.irregularities
+            found.append(curve if smooth else replace(curve, settling=False))
     return tuple(found)
 
 
@@ -336,6 +347,7 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
     )
     medians: dict[str, Array] = {}
     scatter: dict[str, Array] = {}
+    settling: list[Array] = []
     for name, array in values.items():
         over = result.part(name, rows)
         if len(over) < 2:
@@ -347,10 +359,32 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
             percentile = np.nanpercentile if np.isnan(over).any() else np.percentile
             bounds = percentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
         medians[name], scatter[name] = bounds[1], 0.5 * (bounds[2] - bounds[0])
+        settling.append(_settling(over))
+    changes = np.concatenate(settling) if settling else np.zeros(0)
     steady = tuple(_largest(result, name, array, time, middle) for name, array in medians.items())
     return MidCurve(
-        radius, middle, time, values, tuple(largest), medians, scatter, steady, (begin, end)
+        radius, middle, time, values, tuple(largest), medians, scatter, steady, (begin, end),
+        bool(len(changes) and np.mean(changes) > 0.5),
     )  # fmt: skip
+
+
+def _settling(values: Array) -> Array:
+    """Which columns are in their way to steady values; not those that do not change or have gaps.
+
+    On smooth rails a vehicle in a full curve has a steady state: what changes so slowly that it
+    crosses its median fewer than `CROSSINGS` times is on its way there, and so is what decays,
+    by mean square distances from the last values in the two halves (a stationary vibration: 1,
+    an even drift: 0.14).
+    """
+    columns = values.reshape(len(values), -1)
+    columns = columns[:, np.ptp(columns, axis=0) > 0.0]
+    half, last = len(columns) // 2, columns[-max(1, len(columns) // 10) :].mean(axis=0)
+    before, after = (
+        np.mean((part - last) ** 2, axis=0) for part in (columns[:half], columns[half:])
+    )
+    above = columns > np.median(columns, axis=0)
+    crossings = np.count_nonzero(above[1:] != above[:-1], axis=0)
+    return np.asarray((after < SETTLES * before) | (crossings < CROSSINGS))
 
 
 def _largest(result: Result, name: str, array: Array, time: float, distance: float) -> Peak:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from example_result import arrays, attributes, example_result
 
+from railsim import load_track
 from railsim.notation import QUANTITIES
 from railsim.result import Result, mid_curves, peak, peaks
 
@@ -86,6 +87,36 @@ def test_full_curve_values_are_medians_with_their_scatter():
     low, high = np.percentile(flat["Q"][rows], [15.87, 84.13], axis=0)
     np.testing.assert_allclose(curve.scatter["Q"], 0.5 * (high - low))
     assert curve.record()["medians"]["Q"] == curve.medians["Q"].tolist()
+
+
+def in_the_curve(course, **track):
+    """Result whose wheel loads follow `course` of the time from the beginning of the full curve."""
+    time = np.arange(round(25.0 * 200.0)) / 200.0
+    Q = 60e3 + 1e3 * course(np.maximum(time - 18.0, 0.0))
+    facts = attributes()
+    if track:
+        facts["track_toml"] = load_track("curve_r250").replace(**track).to_toml()
+    arrays = {"time": time, "distance": 20.0 * time, "Q": np.stack([Q, Q], axis=-1)[:, None]}
+    quantities = {name: QUANTITIES[name] for name in arrays}
+    names = {"wheelset": ["lead"], "side": ["left", "right"]}
+    return mid_curves(Result(arrays, quantities, names, facts))[0]
+
+
+@pytest.mark.parametrize(
+    ("course", "settling"),
+    [
+        (lambda t: np.exp(-t) * np.cos(2.0 * np.pi * 0.6 * t), True),  # sway of the car body
+        (lambda t: np.exp(-2.0 * t) * np.cos(2.0 * np.pi * 5.0 * t), True),
+        (lambda t: 0.1 * t, True),
+        (lambda t: np.cos(2.0 * np.pi * 5.0 * t), False),  # hunting
+        (lambda t: 0.0 * t, False),
+    ],
+)
+def test_scatter_of_values_that_decay_is_called_settling(course, settling):
+    curve = in_the_curve(course)
+    assert curve.settling is curve.record()["settling"] is settling
+    rough = [{"type": "random", "spectrum": "erri_b176_low"}]
+    assert not in_the_curve(course, irregularities=rough).settling
 
 
 def test_peak_leaves_out_what_is_not_a_number():
