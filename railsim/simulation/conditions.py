@@ -45,7 +45,7 @@ class Inputs:
         check_numbers(speed=speed, start=start, duration=duration, until=until)
         speed = initial_speed(settings, speed, start)
         check_range(track, speed, start, duration, until)
-        # of another type of number the time loop would be compiled anew
+        # of another type of number the time loop would be compiled again
         return cls(track, settings, float(speed), float(start), duration, until)
 
 
