@@ -280,6 +280,8 @@ def _content(
     content = {f"{name}.png": png for name, png in drawn.items()}
     content["animation.gif"] = report.animation(collected.result)
     content["positions.csv"] = report.positions(collected.result)
+    if collected.result.timed is not None:
+        content["motion.csv"] = report.motion_table(collected.result)
     content[REPORT] = report.page(collected, drawn).encode()
     return content
 

@@ -41,6 +41,7 @@ from railsim.definitions.mechanism_parts import (
     Start,
     Stop,
     Torque,
+    TorsionSpring,
     by_key,
 )
 
@@ -72,12 +73,21 @@ Element = Annotated[
     | Annotated[Force, Tag("a force")]
     | Annotated[Torque, Tag("a torque")]
     | Annotated[Spring, Tag("a spring")]
+    | Annotated[TorsionSpring, Tag("a torsion_spring")]
     | Annotated[JointFriction, Tag("a joint_friction")]
     | Annotated[Damper, Tag("a damper")]
     | Annotated[Stop, Tag("a stop")]
     | Annotated[GasSpring, Tag("a gas_spring")],
     by_key(
-        "point_mass", "force", "torque", "spring", "joint_friction", "damper", "stop", "gas_spring"
+        "point_mass",
+        "force",
+        "torque",
+        "spring",
+        "torsion_spring",
+        "joint_friction",
+        "damper",
+        "stop",
+        "gas_spring",
     ),
 ]
 
@@ -96,6 +106,8 @@ class Output(Definition):
 
     point: PointName
     """The point; its height is its y less that at the start"""
+    axis: Literal["x", "y"] = "y"
+    """Direction in which it is to move: ratio, zone and contact force are taken along it"""
 
 
 class Zone(Definition):
@@ -128,25 +140,29 @@ class Contact(Definition):
 
 
 class Motion(Definition):
-    """Motion law of an actuator's length, for inverse dynamics."""
+    """Motion law of an actuator's length or a body's angle, for inverse dynamics."""
 
-    actuator: Name
+    actuator: Name | None = None
     """Actuator whose length follows the law"""
+    angle: Name | None = None
+    """Body whose angle follows it, instead, such as a crank"""
     unknown: Name | None = None
-    """Actuator whose force drives the motion; by default the same"""
+    """Actuator whose force drives the motion; by default the same, of an angle that of `[solve]`"""
     law: Literal["constant_speed", "polynomial_345", "table"] = "constant_speed"
     """Constant speed, the 3-4-5 polynomial from rest to rest, or a table"""
     speed: Quantity | None = None
-    """Speed of the length [m/s], for a constant speed"""
+    """Speed of the length [m/s] or angle [rad/s], for a constant speed"""
     duration: Quantity | None = None
     """Time for the whole range [s]"""
     table: tuple[tuple[Quantity, Quantity], ...] | None = None
-    """Rows [time s, change of length since the start m], a cubic spline, for a table"""
+    """Rows [time s, change of length m or angle rad since the start], a cubic spline"""
     points: Annotated[int, Field(strict=True, ge=3, le=100_000)] = 401
     """Number of points in time"""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        if (self.actuator is None) == (self.angle is None):
+            raise ValueError("either 'actuator' (its length) or 'angle' (of a body)")
         if self.law == "table":
             if self.table is None or len(self.table) < 4:
                 raise ValueError("law = 'table' needs a 'table' of four rows at least")

@@ -138,7 +138,10 @@ def _references(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
         if mechanism.solve.actuator is not None:
             yield "solve.actuator", mechanism.solve.actuator, "actuator"
     if mechanism.motion is not None:
-        yield "motion.actuator", mechanism.motion.actuator, "actuator"
+        if mechanism.motion.actuator is not None:
+            yield "motion.actuator", mechanism.motion.actuator, "actuator"
+        if mechanism.motion.angle is not None:
+            yield "motion.angle", mechanism.motion.angle, "body"
         if mechanism.motion.unknown is not None:
             yield "motion.unknown", mechanism.motion.unknown, "actuator"
     for i, selection in enumerate(mechanism.selection):
@@ -159,6 +162,8 @@ def _part_references(key: str, part: Any) -> Iterator[tuple[str, str, str]]:
     for field in ("push", "force", "point_mass", "cam", "path"):
         if (point := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", point, "point"
+    for i, body in enumerate(getattr(part, "torsion_spring", ())):
+        yield f"{key}.torsion_spring.{i}", body, "body"
     for field in ("turn", "torque", "body", "joint_friction"):
         if (body := getattr(part, field, None)) is not None:
             yield f"{key}.{field}", body, "body"
@@ -187,11 +192,14 @@ def _actuator_faults(mechanism: Mechanism) -> list[Fault]:
         if mechanism.solve.actuator and not isinstance(mechanism.actuators[actuator], along):
             found = f"'{actuator}' has no length"
             faults.append(Fault("", "solve.actuator", found, "an actuator between two points"))
-    if mechanism.motion is not None and not isinstance(
-        mechanism.actuators[mechanism.motion.actuator], along
-    ):
-        found = f"'{mechanism.motion.actuator}' has no length"
-        faults.append(Fault("", "motion.actuator", found, "an actuator between two points"))
+    if (motion := mechanism.motion) is not None:
+        moved = motion.actuator
+        if moved is not None and not isinstance(mechanism.actuators[moved], along):
+            found = f"'{moved}' has no length"
+            faults.append(Fault("", "motion.actuator", found, "an actuator between two points"))
+        if moved is None and motion.unknown is None and mechanism.solve is None:
+            found = "nothing drives the motion of an angle"
+            faults.append(Fault("", "motion.unknown", found, "an actuator, here or in [solve]"))
     needs = [
         ("zone", mechanism.zone, "output", mechanism.output),
         ("contact", mechanism.contact, "zone", mechanism.zone),
@@ -274,6 +282,8 @@ def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fa
                 faults += _gas_faults(f"{table}.{name}", part, values)
             if isinstance(part, Cam):
                 faults += _arc_faults(f"joints.{name}", part, values)
+            if getattr(part, "table", None) is not None:
+                faults += _spring_table_faults(f"{table}.{name}", part, values)
             if isinstance(part, AirSpring):
                 faults += _table_faults(f"{table}.{name}", part, values)
     for key, timed in (("motion", mechanism.motion), ("release", mechanism.release)):
@@ -338,6 +348,13 @@ def _arc_faults(key: str, cam: Cam, values: Mapping[str, Any]) -> list[Fault]:
                 found = f"{number(quantity, values):g}"
                 faults.append(Fault("", f"{key}.arcs.{i}.{field}", found, "greater than 0"))
     return faults
+
+
+def _spring_table_faults(key: str, spring: Any, values: Mapping[str, Any]) -> list[Fault]:
+    steps = np.diff([number(row[0], values) for row in spring.table])
+    if np.all(steps > 0.0):
+        return []
+    return [Fault("", f"{key}.table", "first column not rising", "rising from row to row")]
 
 
 def _table_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> list[Fault]:

@@ -308,15 +308,51 @@ class Torque(Definition):
     """Its size, anticlockwise [N m]"""
 
 
+Rows = Annotated[tuple[tuple[Quantity, Quantity], ...], Field(min_length=2)]
+
+
+def _one_law(spring: Any, free: str) -> None:
+    """Refuse a spring with stiffness and table, or with neither."""
+    linear = spring.stiffness is not None and getattr(spring, free) is not None
+    either = spring.stiffness is not None or getattr(spring, free) is not None
+    if linear == (spring.table is not None) or (either and not linear):
+        raise ValueError(f"either 'stiffness' and '{free}', or 'table'")
+
+
 class Spring(Definition):
-    """A linear spring between two points."""
+    """A spring between two points, linear or by a table."""
 
     spring: Pair
     """Its ends"""
-    stiffness: Quantity
+    stiffness: Quantity | None = None
     """Stiffness [N/m]"""
-    free_length: Quantity
+    free_length: Quantity | None = None
     """Length without force [m]"""
+    table: Rows | None = None
+    """Rows [length m, push N], lengths rising, straight in between, instead"""
+
+    @model_validator(mode="after")
+    def _law(self) -> Self:
+        _one_law(self, "free_length")
+        return self
+
+
+class TorsionSpring(Definition):
+    """A torsion spring between two bodies, linear or by a table."""
+
+    torsion_spring: tuple[Name, Name]
+    """The bodies; `ground` too"""
+    stiffness: Quantity | None = None
+    """Stiffness [N m/rad]"""
+    free_angle: Quantity | None = None
+    """Angle of the first body less that of the second without torque [rad]"""
+    table: Rows | None = None
+    """Rows [angle rad, torque on the first body N m], angles rising, straight in between"""
+
+    @model_validator(mode="after")
+    def _law(self) -> Self:
+        _one_law(self, "free_angle")
+        return self
 
 
 class JointFriction(Definition):

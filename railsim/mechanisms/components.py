@@ -115,6 +115,20 @@ def next_size(sizes: list[float], wanted: float) -> float | None:
     return min((size for size in sizes if size >= wanted * (1.0 - 1e-12)), default=None)
 
 
+def table_value(rows: NDArray[np.float64], x: Any) -> Any:
+    """Value of a table of rows (x, y), straight in between; NaN outside.
+
+    Examples
+    --------
+    >>> float(table_value(np.array([[0.1, 50.0], [0.2, 20.0]]), 0.15))
+    35.0
+    """
+    k = np.clip(np.searchsorted(rows[:, 0], np.real(x), side="right") - 1, 0, len(rows) - 2)
+    share = (x - rows[k, 0]) / (rows[k + 1, 0] - rows[k, 0])
+    inside = (np.real(share) >= -1e-9) & (np.real(share) <= 1.0 + 1e-9)
+    return np.where(inside, rows[k, 1] * (1.0 - share) + rows[k + 1, 1] * share, np.nan)
+
+
 class AirSpringTable:
     """Force of an air spring over height and pressure: linear in the height, then in the pressure.
 

@@ -6,13 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.mechanism_parts import GasSpring, Link, Prismatic, Revolute, Slot, Spring
+from railsim.definitions.mechanism_parts import (
+    GasSpring,
+    Link,
+    PointMass,
+    Prismatic,
+    Revolute,
+    Slot,
+    Spring,
+)
 from railsim.definitions.mechanism_values import ends
 from railsim.mechanisms.cams import cam_rows
 from railsim.mechanisms.kinematics import Motion
 
 Floats = NDArray[np.float64]
 ARC_POINTS = 24
+COILS = 8
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,53 @@ def lines(motion: Motion) -> list[Line]:
     for name, element in definition.elements.items():
         if (pair := ends(element)) is not None:
             kind = "spring" if isinstance(element, Spring | GasSpring) else "damper"
-            found.append(_between(motion, kind, name, pair))
+            line = _between(motion, kind, name, pair)
+            if isinstance(element, Spring):
+                line = _coiled(line)
+            elif isinstance(element, GasSpring):
+                line = _telescope(line, element, motion)
+            found.append(line)
+    return found
+
+
+def _coiled(line: Line) -> Line:
+    """A spring as a zigzag between its ends, as wide as a twelfth of its length at first."""
+    first, last = line.xy[:, 0], line.xy[:, 1]
+    along = last - first
+    length = np.hypot(along[:, 0], along[:, 1])[:, None]
+    across = np.stack((-along[:, 1], along[:, 0]), axis=-1) / np.where(length > 0.0, length, 1.0)
+    across = across * length[0] / 24.0
+    turns = np.linspace(0.15, 0.85, 2 * COILS + 1)[1::2]
+    shares = np.concatenate(([0.0, 0.15], turns, [0.85, 1.0]))
+    sides = [0.0, 0.0, *(1.0 if k % 2 == 0 else -1.0 for k in range(COILS)), 0.0, 0.0]
+    xy = [first + share * along + side * across for share, side in zip(shares, sides, strict=True)]
+    return Line(line.kind, line.name, np.stack(xy, axis=1))
+
+
+def _telescope(line: Line, spring: GasSpring, motion: Motion) -> Line:
+    """A gas spring as a tube, as long as the spring fully compressed, with its rod."""
+    n = motion.model.number
+    first, last = line.xy[:, 0], line.xy[:, 1]
+    if spring.rod_end == spring.gas_spring[0]:
+        first, last = last, first
+    along = last - first
+    length = np.hypot(along[:, 0], along[:, 1])[:, None]
+    along = along / np.where(length > 0.0, length, 1.0)
+    half = 0.03 * n(spring.extended) * np.stack((-along[:, 1], along[:, 0]), axis=-1)
+    end = first + 0.9 * (n(spring.extended) - n(spring.stroke)) * along
+    xy = [first, first + half, end + half, end, last, end, end - half, first - half, first]
+    return Line(line.kind, line.name, np.stack(xy, axis=1))
+
+
+def centres(motion: Motion) -> dict[str, Floats]:
+    """Centres of gravity of the bodies and points with a mass, shape (position, 2) [m]."""
+    model, found = motion.model, {}
+    for name, body in model.definition.bodies.items():
+        if model.number(body.mass):
+            found[name] = motion.at(model.bodies[name], *model.position(body.centre))[0]
+    for name, element in model.definition.elements.items():
+        if isinstance(element, PointMass):
+            found[name] = motion.point(element.point_mass)[0]
     return found
 
 

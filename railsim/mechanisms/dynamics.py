@@ -105,6 +105,15 @@ def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float
     return constant, stroke / speed
 
 
+def driving(definition: written.Mechanism) -> str:
+    """Name of the actuator whose force makes the motion of the file's motion law."""
+    law, solve_for = definition.motion, definition.solve
+    assert law is not None
+    name = law.unknown or law.actuator or (solve_for.unknown if solve_for is not None else None)
+    assert name is not None
+    return name
+
+
 def driven_motion(whole: Motion) -> TimedMotion:
     """Inverse dynamics along the file's motion law.
 
@@ -120,27 +129,39 @@ def driven_motion(whole: Motion) -> TimedMotion:
     model = whole.model
     law = model.definition.motion
     assert law is not None
-    pair = ends(model.definition.actuators[law.actuator])
-    assert pair is not None
-    lengths = whole.length(pair)[0]
+
+    def moved(motion: Motion) -> tuple[Any, Any, Any]:
+        """Length or angle that follows the law, with its derivatives by the driver."""
+        if law.angle is not None:
+            k = model.bodies[law.angle]
+            return motion.q[:, k, 2], motion.q1[:, k, 2], motion.q2[:, k, 2]
+        pair = ends(model.definition.actuators[law.actuator or ""])
+        assert pair is not None
+        return motion.length(pair)
+
+    lengths = moved(whole)[0]
     function, duration = law_of(model, law, float(lengths[-1] - lengths[0]))
     time = np.linspace(0.0, duration, law.points)
     travel, speed, acceleration = function(time)
     wanted = np.clip(
         lengths[0] + travel, *np.sort(lengths[[0, -1]])
     ) if law.law != "table" else lengths[0] + travel  # fmt: skip
-    s = driver_at(whole, lambda motion: motion.length(pair)[:2], wanted)
+    s = driver_at(whole, lambda motion: moved(motion)[:2], wanted)
     if not np.all(np.isfinite(s)):
         t = time[np.flatnonzero(~np.isfinite(s))[0]]
-        found = f"at {t:.4g} s the length would be {wanted[~np.isfinite(s)][0] * 1e3:.3f} mm"
-        low, high = np.sort(lengths[[0, -1]]) * 1e3
-        allowed = f"{low:.3f} to {high:.3f} mm"
+        what, unit, scale = ("angle", "deg", float(np.degrees(1.0))) if law.angle else (
+            "length", "mm", 1e3,
+        )  # fmt: skip
+        value = wanted[~np.isfinite(s)][0] * scale
+        found = f"at {t:.4g} s the {what} would be {value:.3f} {unit}"
+        low, high = np.sort(lengths[[0, -1]]) * scale
+        allowed = f"{low:.3f} to {high:.3f} {unit}"
         raise InputError([Fault(model.definition.name, "motion", found, allowed)])
     motion = solve(model, s)
-    _, slope, bend = motion.length(pair)
+    _, slope, bend = moved(motion)
     s1 = speed / slope
     s2 = (acceleration - bend * s1**2) / slope
-    unknown = law.unknown or law.actuator
+    unknown = driving(model.definition)
     force = actuator_force(motion, unknown, Rates(s1, s2, model.sense))
     return TimedMotion(time, motion, s1, s2, force)
 

@@ -29,11 +29,17 @@ from railsim.definitions.mechanism_parts import (
     Spring,
     Stop,
     Torque,
+    TorsionSpring,
 )
 from railsim.definitions.mechanism_values import ends
 from railsim.errors import Fault, InputError
 from railsim.kernels import linkage_motion as motion_kernel
-from railsim.mechanisms.components import AirSpringTable, cylinder_area, gas_spring_force
+from railsim.mechanisms.components import (
+    AirSpringTable,
+    cylinder_area,
+    gas_spring_force,
+    table_value,
+)
 from railsim.mechanisms.kinematics import Motion, driver_words
 from railsim.mechanisms.model import Model
 
@@ -116,7 +122,7 @@ def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
     n = model.number
     match element:
         case Spring():
-            return n(element.stiffness) * (n(element.free_length) - length)
+            return _spring_law(motion, name, element, length, element.free_length, rates)
         case Damper():
             return -n(element.damping) * speed
         case Stop():
@@ -124,6 +130,48 @@ def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
         case GasSpring():
             return _gas_push(motion, name, element, (length, slope, speed), rates)
     raise AssertionError(name)
+
+
+def _spring_law(
+    motion: Motion,
+    name: str,
+    spring: Spring | TorsionSpring,
+    x: Any,
+    free: float | str | None,
+    rates: Rates,
+) -> Any:
+    """Push or torque of a spring at a length or angle, linear or by its table.
+
+    Raises
+    ------
+    InputError : outside the table.
+    """
+    model = motion.model
+    n = model.number
+    if spring.table is None:
+        assert spring.stiffness is not None
+        assert free is not None
+        return n(spring.stiffness) * (n(free) - x)
+    rows = np.array([[float(np.ravel(np.real(n(q)))[0]) for q in row] for row in spring.table])
+    found = table_value(rows, x)
+    outside = np.flatnonzero(np.isnan(np.real(found)).reshape(-1, motion.s.shape[-1])[0])
+    if len(outside) and not rates.trial:
+        k = outside[0]
+        at = driver_words(model, float(np.ravel(np.real(motion.s))[k]))
+        value, scale, unit = np.ravel(np.real(x))[k], 1e3, "mm"
+        if isinstance(spring, TorsionSpring):
+            scale, unit = float(np.degrees(1.0)), "deg"
+        low, high = rows[[0, -1], 0] * scale
+        words = f"driver at {at}: {value * scale:.2f} {unit} is outside the table"
+        allowed = f"{low:g} to {high:g} {unit}: a longer table"
+        raise InputError([Fault(model.definition.name, f"elements.{name}", words, allowed)])
+    return found
+
+
+def _twist(motion: Motion, spring: TorsionSpring) -> tuple[Any, Any]:
+    """Angle of a torsion spring's first body less that of its second, and its rate."""
+    first, second = (motion.model.bodies[name] for name in spring.torsion_spring)
+    return tuple(a[..., first, 2] - a[..., second, 2] for a in (motion.q, motion.q1))
 
 
 def _stop_push(motion: Motion, stop: Stop, length: Any, speed: Any) -> Any:
@@ -186,6 +234,10 @@ def generalised_force(motion: Motion, rates: Rates = AT_REST) -> Any:
         elif isinstance(element, Torque):
             turning = motion.q1[..., model.bodies[element.torque], 2]
             total = total + model.number(element.size) * turning
+        elif isinstance(element, TorsionSpring):
+            angle, turning = _twist(motion, element)
+            torque = _spring_law(motion, name, element, angle, element.free_angle, rates)
+            total = total + torque * turning
         elif isinstance(element, JointFriction):
             turning = motion.q1[..., model.bodies[element.joint_friction], 2]
             total = total + friction_torque(motion, element, rates) * turning
@@ -315,12 +367,12 @@ def _area(motion: Motion, cylinder: Cylinder, acts: str) -> Any:
 
 
 def contact_force(motion: Motion, name: str, force: Any, rates: Rates = AT_REST) -> Any:
-    """Static force of the output upwards at a given actuator force, `(F w + Q)/y'` [N]."""
+    """Static force of the output along its axis at a given actuator force, `(F w + Q)/y'` [N]."""
     model = motion.model
     assert model.definition.output is not None
     _, r1, _ = motion.point(model.definition.output.point)
     work = unit_work(motion, model.definition.actuators[name])
-    return (force * work + generalised_force(motion, rates)) / r1[..., 1]
+    return (force * work + generalised_force(motion, rates)) / r1[..., model.axis]
 
 
 def applied(motion: Motion, forces: dict[str, Any], rates: Rates = AT_REST) -> Any:
@@ -356,6 +408,11 @@ def applied(motion: Motion, forces: dict[str, Any], rates: Rates = AT_REST) -> A
             add(element.force, size * c, size * s)
         elif isinstance(element, Torque):
             total[:, model.bodies[element.torque], 2] += model.number(element.size)
+        elif isinstance(element, TorsionSpring):
+            angle, _ = _twist(motion, element)
+            torque = _spring_law(motion, name, element, angle, element.free_angle, rates)
+            for body, sign in zip(element.torsion_spring, (1.0, -1.0), strict=True):
+                total[:, model.bodies[body], 2] += sign * torque
         elif isinstance(element, JointFriction):
             k = model.bodies[element.joint_friction]
             total[:, k, 2] += friction_torque(motion, element, rates)

@@ -24,7 +24,7 @@ from railsim.definitions.mechanism import Mechanism, Optimise
 from railsim.definitions.mechanism_parts import AirSpring, Cylinder, GasSpring
 from railsim.definitions.mechanism_values import ends, number, parameter_values
 from railsim.errors import Fault, InputError
-from railsim.mechanisms.forces import STROKE_EDGE, Rates, generalised_force, rubs, unit_work
+from railsim.mechanisms.forces import Rates, generalised_force, rubs, unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents
 from railsim.mechanisms.model import Model, build, with_lanes
@@ -216,7 +216,8 @@ class Judge:
         force = self._force(motion)
         ratio = 0.0 * force
         if self.pair is not None and self.output is not None:
-            ratio = motion.point(self.output)[1][..., 1] / motion.length(self.pair)[1]
+            along = motion.point(self.output)[1][..., model.axis]
+            ratio = along / motion.length(self.pair)[1]
         ratio, force_zone = self._at_height(motion, model, zone, ratio, force)
         whole = [force[..., grid]]
         if rubs(model):
@@ -242,8 +243,9 @@ class Judge:
         if self.output is None:
             return ratio[..., zone], force[..., zone]
         r, _, _ = motion.point(self.output)
-        first = motion.point(self.output)[0][..., :1, 1]
-        drift = np.imag(r[..., zone, 1] - first)
+        k = model.axis
+        first = motion.point(self.output)[0][..., :1, k]
+        drift = np.imag(r[..., zone, k] - first)
         if not np.any(drift):
             return ratio[..., zone], force[..., zone]
         real = solve(model, np.real(motion.s[0, zone]))
@@ -251,8 +253,8 @@ class Judge:
         slope: Any = 0.0
         if self.pair is not None:
             _, w, w1 = real.length(self.pair)
-            slope = (y2[:, 1] * w - y1[:, 1] * w1) / w**2
-        shift = drift / y1[:, 1]
+            slope = (y2[:, k] * w - y1[:, k] * w1) / w**2
+        shift = drift / y1[:, k]
         h = 1e-6 * (motion.model.end - motion.model.start)
         known = [self._force(solve(real.model, real.s + d)) for d in (-h, h)]
         bend = (known[1] - known[0]) / (2.0 * h)
@@ -357,5 +359,5 @@ class Judge:
         for name, part in self.definition.elements.items():
             if isinstance(part, GasSpring):
                 compressed = n(part.extended) - motion.length(part.gas_spring)[0]
-                yield f"{name}_stroke", 1.0, compressed + STROKE_EDGE * n(part.stroke)
-                yield f"{name}_stroke", 1.0, n(part.stroke) * (1.0 + STROKE_EDGE) - compressed
+                yield f"{name}_stroke", 1.0, compressed
+                yield f"{name}_stroke", 1.0, n(part.stroke) - compressed

@@ -82,6 +82,12 @@ class Model:
         return replace(self, values=values, linkage=self.linkage._replace(**arrays))
 
     @property
+    def axis(self) -> int:
+        """Coordinate along which the output is to move: 0 for x, 1 for y."""
+        output = self.definition.output
+        return 0 if output is not None and output.axis == "x" else 1
+
+    @property
     def sense(self) -> int:
         """Sense of the driver's motion from start to end."""
         return 1 if self.end > self.start else -1

@@ -83,7 +83,7 @@ def outputs(motion: Motion) -> dict[str, Any]:
         closed = solve(model, [model.start]).point(definition.output.point)[0][0]
         found["height"], found["x"] = r[:, 1] - closed[1], r[:, 0] - closed[0]
         if actuator is not None:
-            found["ratio"], found["ratio_x"] = r1[:, 1] / found["rate"], r1[:, 0] / found["rate"]
+            found["ratio"], found["ratio_x"] = (r1[:, k] / found["rate"] for k in (model.axis, 0))
     if definition.solve is not None:
         found |= _forces(motion, definition.solve.unknown)
     for name, element in definition.elements.items():
@@ -116,8 +116,9 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     if definition.output is not None:
         _, r1, _ = motion.point(definition.output.point)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found["effective_weight"] = -generalised_force(motion) / r1[:, 1]
-            found["effective_mass"] = inertia(motion)[0] / r1[:, 1] ** 2
+            along = r1[:, model.axis]
+            found["effective_weight"] = -generalised_force(motion) / along
+            found["effective_mass"] = inertia(motion)[0] / along**2
     return found
 
 
@@ -181,12 +182,13 @@ def zone_drivers(dense: Motion) -> tuple[list[str], Floats]:
 
 
 def height_of(motion: Motion) -> tuple[Any, Any]:
-    """Height of the output over the start with its derivative by the driver [m]."""
+    """Way of the output along its axis since the start, with its derivative by the driver [m]."""
     assert motion.model.definition.output is not None
     point = motion.model.definition.output.point
     r, r1, _ = motion.point(point)
-    start = solve(motion.model, [motion.model.start]).point(point)[0][0, 1]
-    return r[..., 1] - start, r1[..., 1]
+    k = motion.model.axis
+    start = solve(motion.model, [motion.model.start]).point(point)[0][0, k]
+    return r[..., k] - start, r1[..., k]
 
 
 def height_drivers(dense: Motion, heights: Any) -> Floats:

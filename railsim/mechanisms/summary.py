@@ -3,6 +3,7 @@
 The keys are part of the interface and documented in docs/user/mechanisms.md.
 """
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact
+from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tolerance import scatter
@@ -71,6 +73,8 @@ def analysis_data(result: Analysis) -> Data:
         data["zone"] = {
             name: {at: values[name] for at, values in result.zone.items()} for name in names
         }
+    for key, courses in (("links", links(result.motion)), ("actuators", actuators(result.motion))):
+        data[key] = course_data(courses, "angle" if key == "links" else "length")
     if result.timed is not None:
         data["motion"] = motion_data(result)
     if result.contact is not None:
@@ -168,11 +172,25 @@ def motion_data(result: Analysis) -> Data:
         "max_force": float(np.max(timed.force)),
         "min_force": float(np.min(timed.force)),
     }
+    for key, courses in (("links", links(timed.motion)), ("actuators", actuators(timed.motion))):
+        moving = {n: c.in_time(timed.speed, timed.acceleration) for n, c in courses.items()}
+        value = "angle" if key == "links" else "length"
+        data[key] = course_data(moving, value, "speed", "acceleration")
     if result.definition.output is not None:
         v, a = timed.point(result.definition.output.point)
         data["velocity_x"], data["velocity_y"] = _list(v[:, 0]), _list(v[:, 1])
         data["acceleration_x"], data["acceleration_y"] = _list(a[:, 0]), _list(a[:, 1])
     return data
+
+
+def course_data(
+    courses: Mapping[str, Course], value: str, first: str = "first", second: str = "second"
+) -> Data:
+    """Angles or lengths with two derivatives as plain numbers, by the names given."""
+    return {
+        name: {value: _list(c.value), first: _list(c.first), second: _list(c.second)}
+        for name, c in courses.items()
+    }
 
 
 def comparison_data(comparison: Comparison) -> list[Data]:

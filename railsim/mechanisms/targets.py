@@ -127,8 +127,9 @@ def _number(definition: Mechanism, key: str, values: Any) -> float:
 def heights_and_ratios(motion: Motion, pair: Any, point: str) -> tuple[Any, Any]:
     """Height of the output over the start of the range, and its ratio to the actuator's length."""
     r, r1, _ = motion.point(point)
-    first = solve(motion.model, [motion.model.start]).point(point)[0][0, 1]
-    return r[..., 1] - first, r1[..., 1] / motion.length(pair)[1]
+    k = motion.model.axis
+    first = solve(motion.model, [motion.model.start]).point(point)[0][0, k]
+    return r[..., k] - first, r1[..., k] / motion.length(pair)[1]
 
 
 def drivers_at_heights(model: Model, heights: Floats, guess: Floats) -> Floats:
@@ -136,8 +137,9 @@ def drivers_at_heights(model: Model, heights: Floats, guess: Floats) -> Floats:
     output = model.definition.output
     assert output is not None
     motion = solve(model, guess)
-    first = solve(model, [model.start]).point(output.point)[0][0, 1]
-    error = motion.point(output.point)[0][:, 1] - first - heights
+    k = model.axis
+    first = solve(model, [model.start]).point(output.point)[0][0, k]
+    error = motion.point(output.point)[0][:, k] - first - heights
     if np.max(np.abs(error)) < 1e-11:  # what is optimised does not move the output
         return guess
     dense = solve(model, np.linspace(model.start, model.end, DENSE))

@@ -70,7 +70,7 @@ def sensitivities(
         add("length_start", "m", length[:, 0])
         add("stroke", "m", length[:, -1] - length[:, 0])
         if definition.output is not None:
-            ratio = motion.point(definition.output.point)[1][..., 1] / rate
+            ratio = motion.point(definition.output.point)[1][..., model.axis] / rate
             for i, label in enumerate(labels):
                 add(f"ratio_{label}", "1", ratio[:, i])
     if definition.solve is not None:

@@ -1,31 +1,32 @@
-"""Pictures of a mechanism: drawing, kinematics, ratios, forces, pressures, motion, search.
+"""Pictures of a mechanism: drawing, kinematics, ratios, forces, pressures, motion.
 
 Every function takes results of `railsim.mechanisms` and returns a figure in the field's habits: mm,
 degrees, N, MPa.  Lines can be distinguished without colour too.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from railsim.definitions.mechanism_parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.cams import cam_rows, on_one_arc, roller_body
-from railsim.mechanisms.drawing import Line, joint_points, lines, points, working_box
+from railsim.mechanisms.drawing import Line, centres, joint_points, lines, points, working_box
+from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
+from railsim.mechanisms.links import actuators, links
 from railsim.mechanisms.quantities import quantity
 from railsim.plot.point_names import name_points
 from railsim.plot.style import DISTINCT, LIMIT, Picture
 
 if TYPE_CHECKING:
-    from railsim.mechanisms.optimum import Optimum
+    pass
 
 Floats = NDArray[np.float64]
 DASHES: tuple[Any, ...] = (
@@ -34,27 +35,32 @@ DASHES: tuple[Any, ...] = (
 )  # fmt: skip
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
-WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8, "actuator": 3.2, "spring": 2.4,
+WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8, "actuator": 3.2, "spring": 1.0,
           "damper": 1.6}  # fmt: skip
+CENTRE: dict[str, Any] = {"marker": "$\\oplus$", "color": "k", "ms": 8, "ls": "", "zorder": 5}
+"""Centre of gravity."""
 STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
 
 
-def _line(i: int) -> dict[str, Any]:
+def line(i: int) -> dict[str, Any]:
+    """Colour and dashes of the line of a number."""
     return {"color": DISTINCT[i % len(DISTINCT)], "ls": DASHES[i % len(DASHES)]}
 
 
-def _label(name: str, result: Analysis, words: str = "") -> str:
+def label_of(name: str, result: Analysis, words: str = "") -> str:
+    """Label of an axis for a named result."""
     unit = quantity(name, result.definition).shown
     text = words or name.replace("_", " ")
     return f"{text} / {unit.replace('deg', '°')}" if unit else text
 
 
-def _values(name: str, result: Analysis) -> Floats:
+def values_of(name: str, result: Analysis) -> Floats:
+    """Values of a named result in the unit shown."""
     found: Floats = np.asarray(result.output[name]) * quantity(name, result.definition).scale
     return found
 
 
-def _zone(axes: Axes, result: Analysis, over: str) -> None:
+def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
     """Shade the zone and mark the work height over a quantity."""
     if not result.zone or over not in result.zone["low"]:
         return
@@ -101,6 +107,10 @@ def drawing_figure(result: Analysis) -> Figure:
         one.set_aspect("equal")
         one.set_xlabel("x / mm")
         one.set_ylabel("y / mm")
+    for xy in centres(motion).values():
+        axes[0].plot(*(xy[0] * 1e3), **CENTRE)
+        if named is not axes[0]:
+            named.plot(*(xy[0] * 1e3), **CENTRE)
     axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), title="driver at")
     if small:
         mark_points(named, motion, box)
@@ -142,35 +152,57 @@ def mark_points(axes: Axes, motion: Motion, box: Any) -> None:
 
 
 def kinematics_figure(result: Analysis) -> Figure:
-    """Angles of the bodies over the driver, their rates and accelerations."""
+    """Angles of bodies and rods over the driver, their rates and accelerations."""
     motion = result.motion
     figure = Picture(figsize=(7.6, 5.6), layout="constrained")
     rows = figure.subplots(3, 1, sharex=True)
-    travel = _values("travel", result)
+    travel = values_of("travel", result)
     s1: Any = 1.0
     s2: Any = 0.0
     timed = result.timed
     if timed is not None:
         motion, s1, s2 = timed.motion, timed.speed, timed.acceleration
         travel = motion.s * quantity("travel", result.definition).scale
-    for i, name in enumerate(result.definition.bodies):
-        k = result.model.bodies[name]
-        theta, w, w1 = (a[:, k, 2] for a in (motion.q, motion.q1, motion.q2))
-        turned = np.degrees(np.unwrap(theta) - theta[0])
-        for axes, values in zip(
-            rows, (turned, np.degrees(w * s1), np.degrees(w1 * s1**2 + w * s2)), strict=True
-        ):
-            axes.plot(travel, values, label=name, **_line(i))
+    for i, (name, course) in enumerate(links(motion).items()):
+        moving = course.in_time(s1, s2)
+        turned = moving.value - moving.value[0]
+        for axes, values in zip(rows, (turned, moving.first, moving.second), strict=True):
+            axes.plot(travel, np.degrees(values), label=name, **line(i))
     words = ("rate / (°/s)", "acceleration / (°/s²)")
     if timed is None:
         words = ("d angle/d driver / (°/unit)", "second derivative")
     rows[0].set_ylabel("angle since start / °")
     rows[1].set_ylabel(words[0])
     rows[2].set_ylabel(words[1])
-    rows[2].set_xlabel(_label("travel", result, "driver"))
+    rows[2].set_xlabel(label_of("travel", result, "driver"))
     rows[0].legend(ncols=3)
     for axes in rows:
-        _zone(axes, result, "travel")
+        mark_zone(axes, result, "travel")
+    return figure
+
+
+def actuators_figure(result: Analysis) -> Figure:
+    """Lengths of the actuators, their speeds and accelerations; in time where there is a law."""
+    motion, timed = result.motion, result.timed
+    s1: Any = 1.0
+    s2: Any = 0.0
+    over, words = values_of("travel", result), label_of("travel", result, "driver")
+    labels = ["length / mm", "d length/d driver / (mm/unit)", "second derivative"]
+    if timed is not None:
+        motion, s1, s2, over, words = (
+            timed.motion, timed.speed, timed.acceleration, timed.time, "time / s",
+        )  # fmt: skip
+        labels = ["length / mm", "speed / (mm/s)", "acceleration / (mm/s²)"]
+    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
+    rows = figure.subplots(3, 1, sharex=True)
+    for i, (name, course) in enumerate(actuators(motion).items()):
+        moving = course.in_time(s1, s2)
+        for axes, values in zip(rows, (moving.value, moving.first, moving.second), strict=True):
+            axes.plot(over, np.round(values * 1e3, 9), label=name, **line(i))  # no noise
+    for axes, label in zip(rows, labels, strict=True):
+        axes.set_ylabel(label)
+    rows[2].set_xlabel(words)
+    rows[0].legend(ncols=3)
     return figure
 
 
@@ -178,12 +210,13 @@ def path_figure(result: Analysis) -> Figure:
     """Path of the output, with the zone."""
     figure = Picture(figsize=(4.6, 5.2), layout="constrained")
     axes = figure.subplots()
-    x, y = _values("x", result), _values("height", result)
+    x, y = values_of("x", result), values_of("height", result)
     axes.plot(x, y, color=MAIN)
     for name, values in result.zone.items():
         axes.plot(values["x"] * 1e3, values["height"] * 1e3, "o", color="k", ms=4)
         point = (values["x"] * 1e3, values["height"] * 1e3)
         axes.annotate(name, point, xytext=(6, -3), textcoords="offset points", fontsize=8)
+    axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x since start / mm")
     axes.set_ylabel("height over start / mm")
     return figure
@@ -193,22 +226,22 @@ def angles_figure(result: Analysis) -> Figure:
     """Transmission angles, folded, with their limit, and pressure angles of cams."""
     figure = Picture(figsize=(7.0, 3.6), layout="constrained")
     axes = figure.subplots()
-    travel = _values("travel", result)
+    travel = values_of("travel", result)
     names = list(result.definition.angles)
     for i, name in enumerate(names):
         values = np.degrees(folded(result.output[name]))
-        axes.plot(travel, values, label=name, **_line(i))
+        axes.plot(travel, values, label=name, **line(i))
     for i, name in enumerate(n for n in result.output if n.endswith("_pressure_angle")):
         label = name.replace("_", " ")
-        axes.plot(travel, _values(name, result), label=label, lw=1.8, **_line(len(names) + i))
+        axes.plot(travel, values_of(name, result), label=label, lw=1.8, **line(len(names) + i))
     limits = result.definition.optimise
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
         axes.axhline(limit, color=LIMIT, lw=0.9)
         axes.annotate("limit", (1.0, limit), xycoords=("axes fraction", "data"), fontsize=8,
                       color=LIMIT, ha="right", va="bottom")  # fmt: skip
-    _zone(axes, result, "travel")
-    axes.set_xlabel(_label("travel", result, "driver"))
+    mark_zone(axes, result, "travel")
+    axes.set_xlabel(label_of("travel", result, "driver"))
     axes.set_ylabel("angle / °")
     axes.legend(ncols=3)
     return figure
@@ -226,7 +259,7 @@ def cam_figure(result: Analysis) -> Figure:
     beyond = 0.12 * abs(result.travel)
     figure = Picture(figsize=(7.0, 3.6), layout="constrained")
     axes = figure.subplots()
-    travel = _values("travel", result)
+    travel = values_of("travel", result)
     rate = motion.q1[:, body, 2]
     roller = cam.cam.partition(".")[0]
     unit = "" if result.definition.driver.angle is not None else " / (m/rad)"
@@ -234,7 +267,7 @@ def cam_figure(result: Analysis) -> Figure:
     for i, arc in enumerate(np.unique(motion.arcs[:, row])):
         on = motion.arcs[:, row] == arc
         label = f"arc {arc - first + 1}, turns {cam.arcs[arc - first].turns}"
-        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.2, **_line(i))
+        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.2, **line(i))
         if (alone := on_one_arc(motion, row, int(arc), beyond)) is not None:
             more = np.abs(1.0 / alone.q1[:, body, 2])
             axes.plot(alone.s * scale, more, color="0.45", lw=0.8, ls=DASHES[i], zorder=1)
@@ -244,8 +277,8 @@ def cam_figure(result: Analysis) -> Figure:
         axes.annotate(f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm",
                       (at, 1.0), xycoords=("data", "axes fraction"), fontsize=8,
                       xytext=(3, -10), textcoords="offset points")  # fmt: skip
-    _zone(axes, result, "travel")
-    axes.set_xlabel(_label("travel", result, "driver"))
+    mark_zone(axes, result, "travel")
+    axes.set_xlabel(label_of("travel", result, "driver"))
     axes.set_ylabel(words)
     axes.legend()
     return figure
@@ -260,18 +293,18 @@ def force_figure(result: Analysis) -> Figure:
     for i, name in enumerate(shown):
         for j, x in enumerate(over):
             axes = grid[i, j]
-            axes.plot(_values(x, result), _values(name, result), color=MAIN, label="along y")
+            axes.plot(values_of(x, result), values_of(name, result), color=MAIN, label="along y")
             if name == "ratio":
-                axes.plot(_values(x, result), _values("ratio_x", result), color=SECOND,
+                axes.plot(values_of(x, result), values_of("ratio_x", result), color=SECOND,
                           ls=DASHES[1], label="along x")  # fmt: skip
             elif "force_back" in result.output:
-                axes.plot(_values(x, result), _values("force_back", result), color=SECOND,
+                axes.plot(values_of(x, result), values_of("force_back", result), color=SECOND,
                           ls=DASHES[1], label="on the way back")  # fmt: skip
-            _zone(axes, result, x)
+            mark_zone(axes, result, x)
             if i == len(shown) - 1:
-                axes.set_xlabel(_label(x, result))
+                axes.set_xlabel(label_of(x, result))
         words = {"ratio": "ratio dy/dL, dx/dL", "force": "force of the unknown"}[name]
-        grid[i, 0].set_ylabel(_label(name, result, words))
+        grid[i, 0].set_ylabel(label_of(name, result, words))
         if name == "ratio" or "force_back" in result.output:
             grid[i, 0].legend()
     return figure
@@ -281,17 +314,19 @@ def pressure_figure(result: Analysis) -> Figure:
     """Pressure that the mechanism needs, over the height."""
     figure = Picture(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
-    axes.plot(_values("height", result), _values("pressure", result), color=MAIN, label="needed")
+    axes.plot(
+        values_of("height", result), values_of("pressure", result), color=MAIN, label="needed"
+    )
     if "pressure_back" in result.output:
-        axes.plot(_values("height", result), _values("pressure_back", result), color=MAIN,
+        axes.plot(values_of("height", result), values_of("pressure_back", result), color=MAIN,
                   ls=DASHES[2], label="needed on the way back")  # fmt: skip
         axes.legend()
     if result.contact is not None:
         axes.axhline(result.contact.pressure / 1e6, color=SECOND, ls=DASHES[1], label="held")
         axes.legend()
-    _zone(axes, result, "height")
+    mark_zone(axes, result, "height")
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel(_label("height", result))
+    axes.set_xlabel(label_of("height", result))
     axes.set_ylabel("pressure / MPa")
     return figure
 
@@ -303,12 +338,12 @@ def contact_figure(result: Analysis) -> Figure:
     figure = Picture(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
     label = f"at {contact.pressure / 1e6:.4f} MPa"
-    axes.plot(_values("height", result), contact.curve, color=MAIN, label=label)
+    axes.plot(values_of("height", result), contact.curve, color=MAIN, label=label)
     axes.axhline(0.0, color="0.4", lw=0.8)
     for y, stable in contact.equilibria:
         axes.plot(y * 1e3, 0.0, "o", mfc="k" if stable else "w", color="k", ms=6, clip_on=False)
-    _zone(axes, result, "height")
-    axes.set_xlabel(_label("height", result))
+    mark_zone(axes, result, "height")
+    axes.set_xlabel(label_of("height", result))
     axes.set_ylabel("static contact force / N")
     axes.legend()
     return figure
@@ -328,10 +363,10 @@ def carpet_figure(result: Analysis) -> Figure:
         point = (heights[0], table.forces[0, i] / 1e3)
         axes.annotate(f"{pressure / 1e6:g} MPa", point, xytext=(-4, 0), fontsize=8,
                       textcoords="offset points", ha="right", va="center")  # fmt: skip
-    length = _values("length", result)
+    length = values_of("length", result)
     axes.plot(length, result.output["force"] / 1e3, color=MAIN, lw=2.2, label="load")
     if result.zone:
-        _zone(axes, result, "length")
+        mark_zone(axes, result, "length")
     axes.set_xlim(left=heights[0] - 0.14 * (heights[-1] - heights[0]))
     axes.set_xlabel("height of the air spring / mm")
     axes.set_ylabel("force / kN")
@@ -344,30 +379,15 @@ def gas_spring_figure(result: Analysis) -> Figure:
     names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
     figure = Picture(figsize=(7.2, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    travel = _values("travel", result)
+    travel = values_of("travel", result)
     for i, name in enumerate(names):
-        left.plot(travel, _values(f"{name}_length", result), label=name, **_line(i))
-        right.plot(travel, _values(f"{name}_force", result), label=name, **_line(i))
+        left.plot(travel, values_of(f"{name}_length", result), label=name, **line(i))
+        right.plot(travel, values_of(f"{name}_force", result), label=name, **line(i))
     left.set_ylabel("length / mm")
     right.set_ylabel("push / N")
     for axes in (left, right):
-        axes.set_xlabel(_label("travel", result, "driver"))
+        axes.set_xlabel(label_of("travel", result, "driver"))
     left.legend()
-    return figure
-
-
-def cases_figure(results: Mapping[str, Analysis]) -> Figure:
-    """Unknown force over the driver, for all cases of a mechanism."""
-    figure = Picture(figsize=(6.6, 3.6), layout="constrained")
-    axes = figure.subplots()
-    for i, (name, result) in enumerate(results.items()):
-        axes.plot(_values("travel", result), _values("force", result), label=name, **_line(i))
-    first = next(iter(results.values()))
-    axes.axhline(0.0, color="0.4", lw=0.8)
-    axes.set_xlabel(_label("travel", first, "driver"))
-    unknown = first.definition.solve.unknown if first.definition.solve is not None else ""
-    axes.set_ylabel(_label("force", first, f"force of '{unknown}'"))
-    axes.legend()
     return figure
 
 
@@ -379,92 +399,21 @@ def time_figure(result: Analysis) -> Figure:
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
     travel = quantity("travel", result.definition)
     a.plot(timed.time, timed.motion.s * travel.scale, color=MAIN)
-    a.set_ylabel(_label("travel", result, "driver"))
-    law = result.definition.motion
-    assert law is not None
+    a.set_ylabel(label_of("travel", result, "driver"))
+    name = driving(result.definition)
+    unit = "N m" if hasattr(result.definition.actuators[name], "turn") else "N"
     b.plot(timed.time, timed.force, color=MAIN)
-    b.set_ylabel(f"force of '{law.unknown or law.actuator}' / N")
+    b.set_ylabel(f"{'torque' if unit == 'N m' else 'force'} of '{name}' / {unit}")
     if result.definition.output is not None:
         v, acceleration = timed.point(result.definition.output.point)
         for axes, values in ((c, v), (d, acceleration)):
-            axes.plot(timed.time, values[:, 0] * 1e3, label="x", **_line(0))
-            axes.plot(timed.time, values[:, 1] * 1e3, label="y", **_line(1))
+            axes.plot(timed.time, values[:, 0] * 1e3, label="x", **line(0))
+            axes.plot(timed.time, values[:, 1] * 1e3, label="y", **line(1))
             absolute = np.hypot(values[:, 0], values[:, 1]) * 1e3
-            axes.plot(timed.time, absolute, label="absolute", **_line(2))
+            axes.plot(timed.time, absolute, label="absolute", **line(2))
     c.set_ylabel("speed of the output / (mm/s)")
     d.set_ylabel("acceleration / (mm/s²)")
     c.legend()
     for axes in (c, d):
         axes.set_xlabel("time / s")
-    return figure
-
-
-def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) -> Figure:
-    """Ratio and force of several mechanisms over the height.
-
-    With `zoom`, in the zone only, and below it what they are above the first one.
-    """
-    first = next(iter(results.values()))
-    figure = Picture(figsize=(7.6, 6.4 if zoom else 3.8), layout="constrained")
-    panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
-    for column, name in enumerate(("ratio", "force")):
-        base = _over_height(first, name, zoom)
-        for i, (label, result) in enumerate(results.items()):
-            if (curve := _over_height(result, name, zoom)) is None:
-                continue
-            panels[0, column].plot(*curve, label=label, **_line(i))
-            if zoom and base is not None:
-                above = curve[1] - np.interp(curve[0], *base)
-                panels[1, column].plot(curve[0], above, **_line(i))
-        if not zoom:
-            _zone(panels[0, column], first, "height")
-        panels[-1, column].set_xlabel("height over start / mm")
-    panels[0, 0].set_ylabel("ratio dy/dL")
-    panels[0, 1].set_ylabel("force / N")
-    if zoom:
-        panels[1, 0].set_ylabel("ratio over the first's")
-        panels[1, 1].set_ylabel("force over the first's / N")
-    panels[0, 0].legend(fontsize=7.5)
-    return figure
-
-
-def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Floats] | None:
-    """A result over the height, with `zoom` in the zone only; None where there is none."""
-    if name not in result.output or "height" not in result.output:
-        return None
-    x, y = _values("height", result), _values(name, result)
-    if zoom and result.zone:
-        low, high = (result.zone[k]["height"] * 1e3 for k in ("low", "high"))
-        inside = (x >= low) & (x <= high)
-        x, y = x[inside], y[inside]
-    return x, y
-
-
-def search_figure(optimum: "Optimum") -> Figure:
-    """Objective at the end of every start, feasible or not, and the best."""
-    figure = Picture(figsize=(6.4, 3.6), layout="constrained")
-    axes = figure.subplots()
-    starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
-    for kept, marker, fill, label in (
-        (True, "o", "k", "all constraints kept"),
-        (False, "x", "k", "a constraint broken"),
-    ):
-        chosen = [s for s in starts if s.feasible is kept]
-        if chosen:
-            axes.plot([s.number for s in chosen], [s.objective for s in chosen], marker, mfc=fill,
-                      color="0.3", ms=5, label=label)  # fmt: skip
-    lost = [s.number for s in optimum.starts if not np.isfinite(s.objective)]
-    if lost:
-        axes.plot(lost, [max(s.objective for s in starts)] * len(lost), "s", mfc="w", color="0.5",
-                  ms=5, label="not assembled")  # fmt: skip
-    if optimum.objective > 0.0:
-        axes.axhline(optimum.objective, color=MAIN, label=f"best {optimum.objective:.4g}")
-    if optimum.objective_before > 0.0:
-        before = f"file {optimum.objective_before:.4g}"
-        axes.axhline(optimum.objective_before, color=SECOND, ls=DASHES[1], label=before)
-    axes.set_yscale("log")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("start")
-    axes.set_ylabel("objective")
-    axes.legend()
     return figure

@@ -19,13 +19,16 @@ from railsim.mechanisms import drawing, tables
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
+from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.quantities import quantity
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import Texts
 from railsim.mechanisms.tolerance import Scatter, scatter
 from railsim.page import rendered
+from railsim.plot import mechanism_comparison as side_by_side
 from railsim.plot import mechanisms as pictures
 from railsim.plot.style import styled
 from railsim.version import __version__
@@ -106,9 +109,11 @@ class Section:
 
 
 CAPTIONS = {
-    "drawing": "Four positions, and the working parts with the names of their points.",
+    "drawing": "Four positions, and the working parts with the names of their points; crossed "
+    "circles: centres of gravity at the start, zigzags: springs, tubes: gas springs.",
     "path": "Path of the output.",
-    "kinematics": "Angles of the bodies, their rates and accelerations.",
+    "kinematics": "Angles of bodies and rods, their rates and accelerations.",
+    "actuators": "Lengths of the actuators, their speeds and accelerations.",
     "angles": "Transmission angles folded to 90 degrees, pressure angles of cams; zone shaded.",
     "cam": "Rate on the arcs of the cam with the transitions; thin: each arc beyond its part.",
     "ratio_force": "Ratio and force over length and height; zone shaded, work height dashed.",
@@ -119,6 +124,7 @@ CAPTIONS = {
     "cases": "Unknown force in all cases.",
     "time": "The motion in time.",
     "comparison": "The mechanisms side by side over the height.",
+    "comparison_held": "Pressures needed, and contact forces at the held pressures.",
     "comparison_zone": "The same within the zone; below, the differences from the first.",
     "search": "Objective at the end of the search from each starting point.",
 }
@@ -128,6 +134,7 @@ def figures(collected: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
     result = collected.result
     definition, output = result.definition, result.output
+    others: dict[str, Figure] = {}
     with styled():
         drawn = {
             "drawing": pictures.drawing_figure(result),
@@ -135,6 +142,8 @@ def figures(collected: Collected) -> dict[str, Figure]:
         }
         if "height" in output:
             drawn["path"] = pictures.path_figure(result)
+        if actuators(result.motion):
+            drawn["actuators"] = pictures.actuators_figure(result)
         if definition.angles:
             drawn["angles"] = pictures.angles_figure(result)
         if any(hasattr(joint, "cam") for joint in definition.joints.values()):
@@ -151,16 +160,23 @@ def figures(collected: Collected) -> dict[str, Figure]:
         if any(name.endswith("_length") for name in output):
             drawn["gas_springs"] = pictures.gas_spring_figure(result)
         if len(collected.cases) > 1 and "force" in output:
-            drawn["cases"] = pictures.cases_figure(collected.cases)
+            drawn["cases"] = side_by_side.cases_figure(collected.cases)
         if result.timed is not None:
             drawn["time"] = pictures.time_figure(result)
         if (compared := _compared(collected)) and "ratio" in output:
-            drawn["comparison"] = pictures.comparison_figure(compared)
+            drawn["comparison"] = side_by_side.comparison_figure(compared)
+            if any("pressure" in one.output for one in compared.values()):
+                drawn["comparison_held"] = side_by_side.held_figure(compared)
             if result.zone:
-                drawn["comparison_zone"] = pictures.comparison_figure(compared, zoom=True)
+                drawn["comparison_zone"] = side_by_side.comparison_figure(compared, zoom=True)
         if collected.optimum is not None:
-            drawn["search"] = pictures.search_figure(collected.optimum)
-    return {name: drawn[name] for name in CAPTIONS if name in drawn}
+            drawn["search"] = side_by_side.search_figure(collected.optimum)
+        else:
+            others = {
+                f"drawing_{i}": pictures.drawing_figure(other)
+                for i, other in enumerate(collected.results[1:], start=2)
+            }
+    return {name: drawn[name] for name in CAPTIONS if name in drawn} | others
 
 
 def _compared(collected: Collected) -> dict[str, Analysis]:
@@ -187,13 +203,59 @@ def as_png(figure: Figure) -> bytes:
 
 def positions(result: Analysis) -> bytes:
     """All results at all positions as CSV; the header names quantity and unit."""
+    names = list(result.output)
+    columns = {f"{n} [{quantity(n, result.definition).unit}]": result.output[n] for n in names}
+    unit = quantity("travel", result.definition).unit
+    columns |= _courses(links(result.motion), "angle", "rad", (f"rad/{unit}", f"rad/{unit}2"))
+    columns |= _courses(actuators(result.motion), "length", "m", (f"m/{unit}", f"m/{unit}2"))
+    return _csv(columns)
+
+
+def motion_table(result: Analysis) -> bytes:
+    """The motion in time as CSV: driver, force, every link and actuator, the output."""
+    timed = result.timed
+    assert timed is not None
+    unit = quantity("travel", result.definition).unit
+    columns = {"time [s]": timed.time, f"travel [{unit}]": timed.motion.s, "force [N]": timed.force}
+    if hasattr(result.definition.actuators[driving(result.definition)], "turn"):
+        columns["force [N m]"] = columns.pop("force [N]")
+    for courses, value, of in (
+        (links(timed.motion), "angle", "rad"), (actuators(timed.motion), "length", "m"),
+    ):  # fmt: skip
+        moving = {n: c.in_time(timed.speed, timed.acceleration) for n, c in courses.items()}
+        columns |= _courses(moving, value, of, (f"{of}/s", f"{of}/s2"), "speed", "acceleration")
+    if result.definition.output is not None:
+        v, a = timed.point(result.definition.output.point)
+        for k, axis in enumerate("xy"):
+            columns[f"output speed {axis} [m/s]"] = v[:, k]
+            columns[f"output acceleration {axis} [m/s2]"] = a[:, k]
+    return _csv(columns)
+
+
+def _csv(columns: Mapping[str, Any]) -> bytes:
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = list(result.output)
-    writer.writerow([f"{name} [{quantity(name, result.definition).unit}]" for name in names])
-    for row in zip(*(result.output[name] for name in names), strict=True):
+    writer.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
         writer.writerow([repr(float(value)) for value in row])
     return text.getvalue().encode()
+
+
+def _courses(
+    courses: Mapping[str, Course],
+    value: str,
+    unit: str,
+    units: tuple[str, str],
+    first: str = "first",
+    second: str = "second",
+) -> dict[str, Any]:
+    """Columns of angles or lengths with two derivatives, by their headers."""
+    found = {}
+    for name, course in courses.items():
+        found[f"{name} {value} [{unit}]"] = course.value
+        found[f"{name} {value} {first} [{units[0]}]"] = course.first
+        found[f"{name} {value} {second} [{units[1]}]"] = course.second
+    return found
 
 
 def animation(result: Analysis) -> bytes:
@@ -315,7 +377,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     if collected.comparison is not None:
         sections.append(_comparison(collected.comparison, drawn))
     elif "comparison" in drawn:
-        shown = _shown(drawn, "comparison", "comparison_zone")
+        shown = _shown(drawn, "comparison", "comparison_held", "comparison_zone")
         sections.append(Section("Before and after the search", [], [], shown))
     sections += [_kinematics(drawn), _forces(result, drawn)]
     if choices := selection(result):
@@ -363,7 +425,8 @@ def _shown(drawn: Mapping[str, bytes], *names: str) -> list[Picture]:
             png = drawn[name]
             width = int.from_bytes(png[16:20], "big")  # the header of a PNG file
             code = b64encode(png).decode()
-            found.append(Picture(code, round(width * 96 / DPI), CAPTIONS[name]))
+            caption = CAPTIONS[name.rstrip("_0123456789")]
+            found.append(Picture(code, round(width * 96 / DPI), caption))
     return found
 
 
@@ -391,7 +454,7 @@ def _results(result: Analysis, drawn: Mapping[str, bytes]) -> Section:
 
 
 def _kinematics(drawn: Mapping[str, bytes]) -> Section:
-    return Section("Kinematics", [], [], _shown(drawn, "kinematics", "angles", "cam"))
+    return Section("Kinematics", [], [], _shown(drawn, "kinematics", "actuators", "angles", "cam"))
 
 
 def _forces(result: Analysis, drawn: Mapping[str, bytes]) -> Section:
@@ -411,7 +474,9 @@ def _search(optimum: "Optimum", drawn: Mapping[str, bytes]) -> Section:
 
 def _comparison(comparison: Comparison, drawn: Mapping[str, bytes]) -> Section:
     shown = [_table(tables.comparison_table(comparison))]
-    return Section("Comparison", [], shown, _shown(drawn, "comparison", "comparison_zone"))
+    names = ("comparison", "comparison_held", "comparison_zone")
+    drawings = [name for name in drawn if name.startswith("drawing_")]
+    return Section("Comparison", [], shown, _shown(drawn, *names, *drawings))
 
 
 def _tolerances(found: Sequence[Scatter]) -> Section:

@@ -1,0 +1,133 @@
+"""Pictures of several mechanisms side by side: cases, files, the starts of a search."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from railsim.mechanisms.analysis import Analysis
+from railsim.plot.mechanisms import (
+    DASHES,
+    MAIN,
+    SECOND,
+    Floats,
+    label_of,
+    line,
+    mark_zone,
+    values_of,
+)
+from railsim.plot.style import Picture
+
+if TYPE_CHECKING:
+    from railsim.mechanisms.optimum import Optimum
+
+
+def cases_figure(results: Mapping[str, Analysis]) -> Figure:
+    """Unknown force over the driver, for all cases of a mechanism."""
+    figure = Picture(figsize=(6.6, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for i, (name, result) in enumerate(results.items()):
+        axes.plot(values_of("travel", result), values_of("force", result), label=name, **line(i))
+    first = next(iter(results.values()))
+    axes.axhline(0.0, color="0.4", lw=0.8)
+    axes.set_xlabel(label_of("travel", first, "driver"))
+    unknown = first.definition.solve.unknown if first.definition.solve is not None else ""
+    axes.set_ylabel(label_of("force", first, f"force of '{unknown}'"))
+    axes.legend()
+    return figure
+
+
+def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) -> Figure:
+    """Ratio and force of several mechanisms over the height.
+
+    With `zoom`, in the zone only, and below it what they are above the first one.
+    """
+    first = next(iter(results.values()))
+    figure = Picture(figsize=(7.6, 6.4 if zoom else 3.8), layout="constrained")
+    panels = figure.subplots(2 if zoom else 1, 2, sharex=True, squeeze=False)
+    for column, name in enumerate(("ratio", "force")):
+        base = _over_height(first, name, zoom)
+        for i, (label, result) in enumerate(results.items()):
+            if (curve := _over_height(result, name, zoom)) is None:
+                continue
+            panels[0, column].plot(*curve, label=label, **line(i))
+            if zoom and base is not None:
+                above = curve[1] - np.interp(curve[0], *base)
+                panels[1, column].plot(curve[0], above, **line(i))
+        if not zoom:
+            mark_zone(panels[0, column], first, "height")
+        panels[-1, column].set_xlabel("height over start / mm")
+    panels[0, 0].set_ylabel("ratio dy/dL")
+    panels[0, 1].set_ylabel("force / N")
+    if zoom:
+        panels[1, 0].set_ylabel("ratio over the first's")
+        panels[1, 1].set_ylabel("force over the first's / N")
+    panels[0, 0].legend(fontsize=7.5)
+    return figure
+
+
+def held_figure(results: Mapping[str, Analysis]) -> Figure:
+    """Pressures that several mechanisms need, and their contact forces at the held pressures."""
+    figure = Picture(figsize=(7.6, 3.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for i, (label, result) in enumerate(results.items()):
+        if "pressure" not in result.output or "height" not in result.output:
+            continue
+        height = values_of("height", result)
+        left.plot(height, values_of("pressure", result), label=label, **line(i))
+        if result.contact is not None:
+            held = f"{label}, {result.contact.pressure / 1e6:.4f} MPa"
+            right.plot(height, result.contact.curve, label=held, **line(i))
+    right.axhline(0.0, color="0.4", lw=0.8)
+    first = next(iter(results.values()))
+    for axes, text in ((left, "pressure needed / MPa"), (right, "static contact force / N")):
+        mark_zone(axes, first, "height")
+        axes.set_xlabel("height over start / mm")
+        axes.set_ylabel(text)
+        axes.legend(fontsize=7.5)
+    left.set_ylim(bottom=0.0)
+    return figure
+
+
+def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Floats] | None:
+    """A result over the height, with `zoom` in the zone only; None where there is none."""
+    if name not in result.output or "height" not in result.output:
+        return None
+    x, y = values_of("height", result), values_of(name, result)
+    if zoom and result.zone:
+        low, high = (result.zone[k]["height"] * 1e3 for k in ("low", "high"))
+        inside = (x >= low) & (x <= high)
+        x, y = x[inside], y[inside]
+    return x, y
+
+
+def search_figure(optimum: "Optimum") -> Figure:
+    """Objective at the end of every start, feasible or not, and the best."""
+    figure = Picture(figsize=(6.4, 3.6), layout="constrained")
+    axes = figure.subplots()
+    starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
+    for kept, marker, fill, label in (
+        (True, "o", "k", "all constraints kept"),
+        (False, "x", "k", "a constraint broken"),
+    ):
+        chosen = [s for s in starts if s.feasible is kept]
+        if chosen:
+            axes.plot([s.number for s in chosen], [s.objective for s in chosen], marker, mfc=fill,
+                      color="0.3", ms=5, label=label)  # fmt: skip
+    lost = [s.number for s in optimum.starts if not np.isfinite(s.objective)]
+    if lost:
+        axes.plot(lost, [max(s.objective for s in starts)] * len(lost), "s", mfc="w", color="0.5",
+                  ms=5, label="not assembled")  # fmt: skip
+    if optimum.objective > 0.0:
+        axes.axhline(optimum.objective, color=MAIN, label=f"best {optimum.objective:.4g}")
+    if optimum.objective_before > 0.0:
+        before = f"file {optimum.objective_before:.4g}"
+        axes.axhline(optimum.objective_before, color=SECOND, ls=DASHES[1], label=before)
+    axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("start")
+    axes.set_ylabel("objective")
+    axes.legend()
+    return figure
