@@ -83,6 +83,9 @@ def argument_fault(
     return Fault(parameter, key, found, allowed, option or "--" + parameter.replace("_", "-"))
 
 
+MOST_FAULTS = 100
+"""Faults that are kept of an input; the rest is counted."""
+
 EQUAL = 5
 """More faults than these that differ in their keys alone are one line with a count."""
 
@@ -152,10 +155,13 @@ class RailsimError(Exception):
 
 
 class InputError(RailsimError):
-    """The input is wrong; `faults` lists everything that was found."""
+    """The input is wrong; `faults` lists what was found, the first hundred and a count."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        self.faults = tuple(faults)
+        found = list(faults)
+        if (more := len(found) - MOST_FAULTS) > 1:
+            found[MOST_FAULTS:] = [Fault(found[-1].file, "", f"{more} more faults", "")]
+        self.faults = tuple(found)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
@@ -163,10 +169,16 @@ class ModelError(RailsimError):
     """A model was asked for something outside its range of validity."""
 
 
+LONGEST_NAME = 200
+MOST_NAMES = 100  # in a message
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Return ``did you mean 'x'?`` or the list of valid names, for the end of a message."""
     names = sorted(valid)
-    close = get_close_matches(name, names, n=1, cutoff=0.6)
+    # no name is that long, and the comparison takes time
+    close = get_close_matches(name, names, n=1, cutoff=0.6) if len(name) < LONGEST_NAME else ()
     if close:
         return f"did you mean '{close[0]}'?"
-    return "allowed: " + ", ".join(names)
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return "allowed: " + ", ".join(names[:MOST_NAMES]) + more

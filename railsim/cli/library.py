@@ -113,12 +113,13 @@ def trust(text: str) -> str:
 
 def text_with_bases(path: Path, kind: str) -> str:
     """Return the text of a file with those of all files that it extends."""
-    from railsim.definitions.sources import find_file, read_toml
+    from railsim.definitions.sources import find_file, parse_toml
+    from railsim.files import DEFINITION_BYTES, read_text
 
     texts: dict[Path, str] = {}
     while path.resolve() not in texts:  # a circle is reported where the file is loaded
-        texts[path.resolve()] = path.read_text("utf-8")
-        base = read_toml(path).get("extends")
+        text = texts[path.resolve()] = read_text(path, DEFINITION_BYTES)
+        base = parse_toml(text, str(path)).get("extends")
         if not isinstance(base, str):
             break
         path = find_file(base, kind, path)

@@ -8,8 +8,9 @@ from typing import Any
 from pydantic import BaseModel, Tag, ValidationError
 
 from railsim.definitions.base import meanings
+from railsim.definitions.paths import LONGEST_KEY
 from railsim.definitions.sources import Source
-from railsim.errors import Fault, nearest
+from railsim.errors import MOST_FAULTS, Fault, nearest
 from railsim.text import shortened
 
 
@@ -27,23 +28,28 @@ def validation_faults(
     model : type
         The definition that was expected.
     """
-    faults = []
-    for detail in error.errors(include_url=False):
+    faults: list[Fault] = []
+    for number, detail in enumerate(error.errors(include_url=False)):
         if detail["type"] == "too_short" and detail["ctx"]["actual_length"] < len(detail["input"]):
             continue  # members with faults of their own do not count
+        if number >= MOST_FAULTS:  # they are counted only
+            faults.append(Fault(source.file, ".".join(map(str, detail["loc"])), "", ""))
+            continue
         path = _written_path(detail, source.data)
         found, allowed = _wording(_as_written(detail, path, source.data), model)
-        faults.append(Fault(source.file_of(path), ".".join(path), found, allowed))
+        key = shortened(".".join(path), LONGEST_KEY)
+        faults.append(Fault(source.file_of(path), key, found, allowed))
     # a number that stands for both sides is objected to twice, the second time at its row
+    shown = faults[:MOST_FAULTS]
     return [
         fault
-        for fault in faults
+        for fault in shown
         if not any(
             other.key.startswith(f"{fault.key}.")
             and (other.found, other.allowed) == (fault.found, fault.allowed)
-            for other in faults
+            for other in shown
         )
-    ]
+    ] + faults[MOST_FAULTS:]
 
 
 def _as_written(detail: Any, path: Sequence[str], data: Any) -> Any:

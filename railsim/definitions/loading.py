@@ -296,11 +296,12 @@ def load_any(path: str | Path, overrides: Iterable[str] = ()) -> tuple[FileDefin
         Everything that is wrong in it; an unknown format.
     """
     file = sources.find_any(path)
-    head = sources.read_toml(file).get("format")
+    data = sources.read_toml(file)
+    head = data.get("format")
     known = FORMATS.get(head) if isinstance(head, str) else None
     if known is None:
         raise InputError([_format_fault(str(path), head, FORMATS)])
-    source = sources.read_source(file, known.kind)
+    source = sources.read_source(file, known.kind, data)
     return _loaded(known.model, source, overrides), known
 
 

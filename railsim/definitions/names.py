@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from railsim.errors import Fault, nearest
+from railsim.errors import MOST_FAULTS, Fault, nearest
 from railsim.units import duration_in_words
 
 Scope = tuple[str, ...]
@@ -180,11 +180,14 @@ def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
     for group in groups(parts):
         for name, axlebox in group.table("axleboxes").items():
             key = ".".join((*group.path, "axleboxes", name, "wheelset"))
-            faults += _unknown(axlebox.get("wheelset"), group, None, wheelsets, key, "wheelset")
+            hint = len(faults) < MOST_FAULTS  # takes time, and further ones are only counted
+            named = axlebox.get("wheelset")
+            faults += _unknown(named, group, None, wheelsets, key, "wheelset", hint=hint)
         for name, element in group.table("elements").items():
             key = ".".join((*group.path, "elements", name))
             for sided, side in sided_names(name, element):
-                faults += _element_faults(element, group, side, known, key)
+                hint = len(faults) < MOST_FAULTS
+                faults += _element_faults(element, group, side, known, key, hint=hint)
                 if group.full(sided) in used:
                     found = f"the name '{group.full(sided)}' is used twice"
                     faults.append(Fault("", key, found, "give each element a name of its own"))
@@ -194,7 +197,7 @@ def name_faults(parts: Mapping[str, Any]) -> list[Fault]:
 
 def _reference_faults(parts: Mapping[str, Any], known: Mapping[str, str]) -> list[Fault]:
     """Faults of names outside assemblies: the reference body, sensors."""
-    candidates = [full for full, kind in known.items() if kind != "axlebox"]
+    candidates = {full for full, kind in known.items() if kind != "axlebox"}
     named = {"reference": parts.get("reference")}
     service = parts.get("service")
     if isinstance(service, Mapping):
@@ -202,22 +205,29 @@ def _reference_faults(parts: Mapping[str, Any], known: Mapping[str, str]) -> lis
             named[f"service.points.{point}.body"] = table.get("body")
     for sensor, table in _members(parts, "sensors").items():
         named[f"sensors.{sensor}.body"] = table.get("body")
+    wrong = [(key, name) for key, name in named.items() if isinstance(name, str)]
+    wrong = [(key, name) for key, name in wrong if name not in candidates]
     return [
-        Fault("", key, f"no body '{name}'", nearest(name, candidates))
-        for key, name in named.items()
-        if isinstance(name, str) and name not in candidates
+        Fault("", key, f"no body '{name}'", nearest(name, candidates) if n < MOST_FAULTS else "")
+        for n, (key, name) in enumerate(wrong)
     ]
 
 
 def _element_faults(
-    element: Mapping[str, Any], group: Group, side: str | None, known: Mapping[str, str], key: str
+    element: Mapping[str, Any],
+    group: Group,
+    side: str | None,
+    known: Mapping[str, str],
+    key: str,
+    *,
+    hint: bool,
 ) -> list[Fault]:
     bodies = element.get("bodies")
     if not isinstance(bodies, list | tuple):
         return []
     faults: list[Fault] = []
     for index, name in enumerate(bodies):
-        faults += _unknown(name, group, side, known, f"{key}.bodies.{index}", "body")
+        faults += _unknown(name, group, side, known, f"{key}.bodies.{index}", "body", hint=hint)
     ends = [resolve(name, group.scope, side, known) for name in bodies if isinstance(name, str)]
     if len(ends) == 2 and ends[0] is not None and ends[0] == ends[1]:
         found = f"both ends are on '{bodies[0]}'"
@@ -226,8 +236,16 @@ def _element_faults(
 
 
 def _unknown(
-    name: Any, group: Group, side: str | None, known: Mapping[str, str], key: str, kind: str
+    name: Any,
+    group: Group,
+    side: str | None,
+    known: Mapping[str, str],
+    key: str,
+    kind: str,
+    *,
+    hint: bool,
 ) -> list[Fault]:
     if not isinstance(name, str) or resolve(name, group.scope, side, known) is not None:
         return []
-    return [Fault("", key, f"no {kind} '{name}'", nearest(name, visible(group.scope, known)))]
+    allowed = nearest(name, visible(group.scope, known)) if hint else ""
+    return [Fault("", key, f"no {kind} '{name}'", allowed)]

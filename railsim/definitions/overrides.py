@@ -130,7 +130,7 @@ def _assign(
     present = parent[last] if not isinstance(parent, dict) or last in parent else None
     parent[last] = read(present)
     names = tuple(str(descend(source.data, path[:end])[1]) for end in range(1, len(path) + 1))
-    replace_origin(source.origin, names, parent[last], origin)
+    replace_origin(source.origin, names, present, parent[last], origin)
 
 
 def _value(written: str, text_expected: bool) -> Any:

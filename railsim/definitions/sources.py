@@ -33,6 +33,10 @@ FOLDERS = {
 FILE_KEYS = {"profile", "rail", "file"}
 
 DEEPEST = 50  # levels of tables and lists
+MOST_KEYS = 100_000  # in a file; the largest vehicles and tracks have less
+# A key of too many parts, quoted ones too: the parser's time grows with the square of the number.
+_PART = r"""(?:[\w-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}){{{DEEPEST}}}""")
 LONGEST_CHAIN = 20  # files that extend each other
 
 KeyPath = tuple[str, ...]
@@ -191,7 +195,11 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
     ------
     InputError : a syntax error, with its line; tables nested too deeply, too long a number.
     """
+    if max(text.count("=") + text.count("\n["), text.count("{")) > MOST_KEYS:
+        raise InputError([Fault(file, "", "too many keys", f"{MOST_KEYS} at most")])
     try:
+        if _DEEP_KEY.search(text):
+            raise RecursionError
         data = tomllib.loads(text)
         if _depth(data) <= DEEPEST:
             return data
@@ -232,14 +240,14 @@ def _depth(data: Any) -> int:
     return depth
 
 
-def read_source(path: Path, kind: str) -> Source:
-    """Read a file and everything that it extends.
+def read_source(path: Path, kind: str, data: dict[str, Any] | None = None) -> Source:
+    """Read a file, unless its content is given, and everything that it extends.
 
     Raises
     ------
     InputError : a file is missing or broken, or the chain of `extends` runs in a circle.
     """
-    return _extended(read_toml(path), path, kind, (path.resolve(),))
+    return _extended(data or read_toml(path), path, kind, (path.resolve(),))
 
 
 def text_source(text: str, file: str, kind: str) -> Source:
@@ -269,15 +277,11 @@ def _extended(data: dict[str, Any], path: Path, kind: str, chain: tuple[Path, ..
 
 
 def _paths(node: Any, at: KeyPath) -> Iterator[KeyPath]:
-    """Yield the key paths of everything in a nested table."""
-    members: Iterable[tuple[Any, Any]] = ()
+    """Yield the key paths of everything in a nested table; a list comes as a whole."""
     if isinstance(node, dict):
-        members = node.items()
-    elif isinstance(node, list):
-        members = enumerate(node)
-    for key, value in members:
-        yield (*at, str(key))
-        yield from _paths(value, (*at, str(key)))
+        for key, value in node.items():
+            yield (*at, str(key))
+            yield from _paths(value, (*at, str(key)))
 
 
 def _without_extends(
@@ -318,13 +322,15 @@ def _merge(
             _merge(old, value, path, origin, file)
         else:
             table[key] = value
-            replace_origin(origin, path, value, file)
+            replace_origin(origin, path, old, value, file)
 
 
-def replace_origin(origin: dict[KeyPath, str], path: KeyPath, value: Any, file: str) -> None:
+def replace_origin(
+    origin: dict[KeyPath, str], path: KeyPath, old: Any, value: Any, file: str
+) -> None:
     """Note that the value at a path, with everything in it, came from a file."""
-    for known in [known for known in origin if known[: len(path)] == path]:
-        del origin[known]
+    for known in _paths(old, path):
+        origin.pop(known, None)
     origin[path] = file
     origin.update(dict.fromkeys(_paths(value, path), file))
 

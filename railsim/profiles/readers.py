@@ -178,10 +178,10 @@ def _cells(text: str) -> list[str]:
 def _header(file: str, line: int, names: list[str]) -> tuple[tuple[int, int], float | None]:
     """Columns of y and z and metres per unit, from a header line."""
     units = {"y": 1.0, "y_m": 1.0, "y_mm": 1e-3, "y [m]": 1.0, "y [mm]": 1e-3}
-    for i, name in enumerate(names):
-        partner = "z" + name[1:]
-        if name in units and partner in names:
-            return (i, names.index(partner)), units[name]
+    pairs = [(name, f"z{name[1:]}") for name in units]
+    found = [(names.index(y), names.index(z)) for y, z in pairs if y in names and z in names]
+    if found:
+        return min(found), units[names[min(found)[0]]]
     raise InputError(
         [
             Fault(

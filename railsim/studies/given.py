@@ -31,12 +31,18 @@ def as_files(given: Sequence[Any], folder: Path) -> list[str | Path]:
             name = f"{base}-{number}"
         taken[name] = text
         path = (folder / INPUTS / f"{name}.toml").absolute()
-        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        if not _holds(path, text.encode()):
             make_folder(path.parent)
             with whole_file(path) as partial:
                 partial.write_text(text, encoding="utf-8")
         found.append(str(path))
     return found
+
+
+def _holds(path: Path, data: bytes) -> bool:
+    if not path.is_file() or path.stat().st_size != len(data):
+        return False
+    return path.read_bytes() == data
 
 
 def _slug(name: str) -> str:

@@ -23,6 +23,7 @@ from railsim.errors import Fault, InputError
 
 JOURNAL = "study.journal"
 FORMAT = "railsim-study-journal/1"
+LONGEST_LINE = 100_000_000  # bytes; the inputs of 200 000 runs take some 5 MB for each key
 
 RECORD = {"name", "file", "labels", "status"}  # keys of every record
 
@@ -103,7 +104,8 @@ class Journal:
     def _read(self) -> None:
         last = b"\n"
         with open(self.path, "rb", buffering=1 << 20) as file:
-            for line in file:
+            # a longer line comes in parts, each of which is damaged
+            for line in iter(lambda: file.readline(LONGEST_LINE), b""):
                 self._take(line, self._end)
                 self._end += len(line)
                 last = line
@@ -123,10 +125,9 @@ class Journal:
                 self.inputs = json.loads(line[end + 1 :]) if facts["format"] == FORMAT else None
                 return
             entry = Entry(**facts, offset=offset + end + 1, length=len(line) - end - 2)
-        except (ValueError, TypeError, KeyError):
+            self.entries[entry.name] = entry
+        except (ValueError, TypeError, KeyError, RecursionError):
             self.damaged += 1
-            return
-        self.entries[entry.name] = entry
 
     def clear(self) -> None:
         """Delete all entries."""

@@ -25,7 +25,7 @@ from railsim.studies.keep import ALL, parse_keep
 from railsim.studies.outcome import Outcome
 from railsim.studies.own import Function, fingerprint, named
 from railsim.studies.rows import PERMITTED, speed_of
-from railsim.studies.summary import Inputs, checked, read_index
+from railsim.studies.summary import Inputs, checked, read_index, refuse_too_many
 from railsim.units import ALLOWED
 from railsim.version import __version__
 
@@ -220,6 +220,7 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
             raise InputError([fault])
         inputs = read_index(index).inputs
     else:
+        refuse_too_many(data, str(folder / JOURNAL))
         inputs = checked(Inputs, data, str(folder / JOURNAL))
     base = (folder / inputs.folder).resolve()
     return inputs, base if os.path.isdir(base) else Path.cwd()

@@ -24,10 +24,13 @@ from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Record, Records
 from railsim.studies.own import own_quantities
+from railsim.studies.points import MOST_RUNS
 from railsim.text import spreadsheet_cell
 
 M = TypeVar("M", bound=BaseModel)
 INDEX_BYTES = 500_000_000
+MOST_VALUES = 30_000_000  # of an index: 150 for each run of the largest study
+MOST_INPUTS = 10 * MOST_RUNS
 MOST_FAULTS = 20
 UNITS = {"speed": "m/s", "step": "s", "wall_time": "s", "cpu_time": "s"}
 _COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*|median\d*)(?:_(time|distance|20hz))?")
@@ -149,6 +152,9 @@ def read_index(path: Path) -> Index:
     InputError : the file cannot be read, or is not the index of a study.
     """
     text = read_text(path, INDEX_BYTES)
+    # each takes some hundred bytes of memory when it is read
+    if max(text.count(","), 5 * text.count("{"), 5 * text.count("[")) > MOST_VALUES:
+        raise InputError([Fault(str(path), "", "too many values", f"{MOST_VALUES} at most")])
     try:
         index: Any = json.loads(text)
     except json.JSONDecodeError as error:
@@ -160,7 +166,27 @@ def read_index(path: Path) -> Index:
     if found != FORMAT:
         shown = repr(found)[:60]
         raise InputError([Fault(str(path), "format", shown, f"allowed: {FORMAT}")])
+    if isinstance(index.get("runs"), list) and len(index["runs"]) > MOST_RUNS:
+        raise InputError([Fault(str(path), "runs", "too many", f"{MOST_RUNS} at most")])
+    refuse_too_many(index.get("inputs"), str(path))
     return checked(Index, index, str(path))
+
+
+def refuse_too_many(inputs: Any, file: str) -> None:
+    """Refuse stored inputs with more values than a study can have: each may become a fault.
+
+    Raises
+    ------
+    InputError : there are more.
+    """
+    nodes, number = [inputs], 0
+    while nodes and number <= MOST_INPUTS:
+        node = nodes.pop()
+        if isinstance(node, dict | list):
+            number += len(node)
+            nodes += node.values() if isinstance(node, dict) else node
+    if number > MOST_INPUTS:
+        raise InputError([Fault(file, "inputs", "too many values", f"{MOST_INPUTS} at most")])
 
 
 def checked(model: type[M], data: Any, file: str) -> M:

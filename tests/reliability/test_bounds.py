@@ -2,6 +2,8 @@
 
 import os
 import re
+import time
+import zlib
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,7 @@ from cases import bounded
 
 from railsim.cli import main
 from railsim.files import PartialFile
+from railsim.studies.journal import Journal
 
 ROOT = Path(__file__).parents[2]
 DESIGN = ROOT / "examples/primary_and_yaw_damper.toml"
@@ -148,3 +151,74 @@ def test_names_of_profile_files_are_whole_in_faults_and_long_values_are_cut(refu
     run = ["run", "coach_manchester", "straight", "--speed", "20", "--set"]
     refused([*run, f"track.rail={file}"], str(file))
     refused([*run, f"track.gauge=[{'1.5, ' * 99}1.5]"], "1.5, 1.5, 1...; ")
+
+
+TRACK = 'format = "railsim-track/1"\nname = "x"\nplan = [{type = "STR", length = 1.0}]\n'
+INDEX = (
+    '{"format": "railsim-study-result/1", "status": "complete",'
+    ' "inputs": {"vehicles": [%s], "tracks": [], "speeds": []}, "runs": [%s]}'
+)
+BOMBS = {
+    "misspelt.toml": (
+        VEHICLE + "[bodies.carbody]\n" + "".join(f"masss_{k} = 1.0\n" for k in range(8000)),
+        ["bodies.carbody.masss_0: unknown key; did you mean 'mass'?", "7900 more faults"],
+    ),
+    "bodies.toml": (
+        VEHICLE + "".join(f"[bodies.b{k}]\nmas = 1.0\n" for k in range(4000)),
+        ["bodies.b0.mass: missing", "15900 more faults"],
+    ),
+    "names.toml": (
+        VEHICLE + "".join(f'[sensors.s{k}]\nbody = "carbodyy{k}"\n' for k in range(4000)),
+        ["sensors.s0.position: missing", "more faults"],
+    ),
+    "tables.toml": (
+        VEHICLE + "".join(f"[t{k}.a.b.c.d]\nx = 1\n" for k in range(101_000)),
+        ["too many keys; 100000 at most"],
+    ),
+    "key.toml": (TRACK + ".".join(["a"] * 100_000) + " = 1\n", ["50 levels at most"]),
+    "header.toml": (TRACK + f"[{'.'.join(['a'] * 100_000)}]\n", ["50 levels at most"]),
+    "quoted.toml": (
+        TRACK + "x = {" + " . ".join(['"a.b"', "'c d'"] * 50_000) + " = 1}\n",
+        ["50 levels at most"],
+    ),
+    "columns.csv": ("y_mm," * 300_000, ["line 1: unknown columns"]),
+    "values.json": (INDEX % ("", "{}," * 6_100_000 + "{}"), ["too many values"]),
+    "runs.json": (INDEX % ("", "{}," * 210_000 + "{}"), ["runs: too many; 200000 at most"]),
+    "inputs.json": (INDEX % ("1," * 2_100_000 + "1", ""), ["inputs: too many values"]),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_time_and_memory_grow_with_the_size_of_a_file_only(name, tmp_path, capsys):
+    """A hundred faults are kept, the rest is counted; numbers of keys and values are limited."""
+    text, words = BOMBS[name]
+    (tmp_path / name).write_text(text)
+    before = time.process_time()
+    assert main(["validate", str(tmp_path / name)]) == 2
+    assert time.process_time() - before < 4.0
+    error = capsys.readouterr().err
+    assert len(error) < 10_000
+    for word in words:
+        assert word in error
+
+
+def test_keys_with_fifty_parts_in_texts_and_comments_are_no_keys(tmp_path, capsys):
+    dots = "see www." + "a." * 40
+    path = tmp_path / "track.toml"
+    path.write_text(f'# {"a." * 49}\n{TRACK}source = "{dots}"\n')
+    assert main(["validate", str(path)]) == 0
+    capsys.readouterr()
+
+
+def test_journal_with_endless_lines_is_read_in_parts(tmp_path, monkeypatch):
+    monkeypatch.setattr("railsim.studies.journal.LONGEST_LINE", 3000)
+    with Journal(tmp_path) as journal:
+        journal.begin({"vehicles": ["x" * 500]})
+    with open(journal.path, "ab") as file:
+        file.write(b"x" * 5000 + b"\n")
+    deep = b'{"name": ' + b"[" * 2000 + b"\t{}"
+    with open(journal.path, "ab") as file:
+        file.write(b"%08x\t%s\n" % (zlib.crc32(deep), deep))
+    with Journal(tmp_path) as journal:
+        assert journal.inputs == {"vehicles": ["x" * 500]}
+        assert journal.damaged == 3
