@@ -4,7 +4,8 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -139,6 +140,34 @@ def load_option(function: F) -> F:
 def with_load(assignments: Sequence[str], load: str | None, prefix: str = "") -> tuple[str, ...]:
     """Return the assignments with that of a load case."""
     return (*assignments, f"{prefix}load={load}") if load is not None else tuple(assignments)
+
+
+@contextmanager
+def faults_in(file: str, kind: str, name: str) -> Iterator[None]:
+    """Let faults that computing finds name the file of their key, as those of loading do.
+
+    Parameters
+    ----------
+    file : str
+        As given on the command line: a path, or the name of a shipped file.
+    kind : str
+        What it holds: spring, mechanism.
+    name : str
+        The definition's own name, which faults found by computing bear.
+    """
+    from railsim.definitions.sources import find_file, read_source
+    from railsim.errors import InputError
+
+    try:
+        yield
+    except InputError as error:
+        source = read_source(find_file(file, kind), kind)
+        raise InputError(
+            source.fault(fault.key, fault.found, fault.allowed)
+            if fault.file in ("", name)
+            else fault
+            for fault in error.faults
+        ) from None
 
 
 def print_json(data: Any) -> None:

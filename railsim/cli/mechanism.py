@@ -1,8 +1,7 @@
 """``railsim mechanism``: kinematics, forces and optimisation of planar linkages."""
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from railsim.cli.common import (
     echo,
+    faults_in,
     json_option,
     overwrite_option,
     print_json,
@@ -88,17 +88,17 @@ def command(
         check_folder(Path(out))
     optimum = None
     if searched:
-        with _faults_in(files[0], mechanisms[0]):
+        with faults_in(files[0], "mechanism", mechanisms[0].name):
             optimum = _optimised(mechanisms[0], case, starts, seed)
         results = [optimum.after]
     else:
         results = []
         for file, mechanism in zip(files, mechanisms, strict=True):
-            with _faults_in(file, mechanism):
+            with faults_in(file, "mechanism", mechanism.name):
                 results.append(_analysed(mechanism, case))
     found = []
     for file, mechanism, result in zip(files, mechanisms, results, strict=True):
-        with _faults_in(file, mechanism):
+        with faults_in(file, "mechanism", mechanism.name):
             found.append(_values_at(result, at))
     cases = {} if searched else _cases(files[0], mechanisms[0], results[0])
     written: list[Path] = []
@@ -146,7 +146,7 @@ def _cases(file: str, mechanism: "Mechanism", base: "Analysis") -> dict[str, "An
     """All cases of the first file, the base first; none where it is computed in a case."""
     if not mechanism.cases or base.case is not None:
         return {}
-    with _faults_in(file, mechanism):
+    with faults_in(file, "mechanism", mechanism.name):
         return {"base": base, **{name: _analysed(mechanism, name) for name in mechanism.cases}}
 
 
@@ -162,24 +162,6 @@ def _optimised(
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     chosen = mechanism.in_case(case)
     return optimise(chosen, starts=starts, seed=seed, workers=cores or 1)
-
-
-@contextmanager
-def _faults_in(file: str, mechanism: "Mechanism") -> Iterator[None]:
-    """Let faults that computing finds name the file of the key, as those of loading do."""
-    from railsim.definitions.sources import find_file, read_source
-    from railsim.errors import InputError
-
-    try:
-        yield
-    except InputError as error:
-        source = read_source(find_file(file, "mechanism"), "mechanism")
-        raise InputError(
-            source.fault(fault.key, fault.found, fault.allowed)
-            if fault.file in ("", mechanism.name)
-            else fault
-            for fault in error.faults
-        ) from None
 
 
 def _values_at(result: "Analysis", at: Sequence[str]) -> list[dict[str, Any]]:

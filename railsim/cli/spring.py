@@ -2,9 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -12,6 +10,7 @@ import click
 
 from railsim.cli.common import (
     echo,
+    faults_in,
     json_option,
     overwrite_option,
     print_json,
@@ -85,7 +84,7 @@ def design(
 
     _check_out(out, overwrite)
     suspension = _loaded(file, assignments)
-    with _faults_in(file, suspension):
+    with faults_in(file, "spring", suspension.name):
         result = designed(suspension)
         found = None
         if search:
@@ -139,7 +138,7 @@ def verify(
 
     _check_out(out, overwrite)
     suspension = _loaded(file, assignments)
-    with _faults_in(file, suspension):
+    with faults_in(file, "spring", suspension.name):
         result = verified(suspension)
         heights = ride_heights(suspension) if suspension.tolerances is not None else ()
         written = _write_pages(suspension, out, overwrite) if out else []
@@ -184,7 +183,7 @@ def fatigue(
 
     _check_out(out, overwrite)
     suspension = _loaded(file, assignments)
-    with _faults_in(file, suspension):
+    with faults_in(file, "spring", suspension.name):
         result = fatigue_of(suspension)
         loads = dynamic_loads(suspension)
         written = _write_pages(suspension, out, overwrite) if out else []
@@ -227,7 +226,7 @@ def vehicle(
     suspension = _loaded(file, assignments)
     if out:
         check_file(Path(out), overwrite=overwrite, endings=TABLES)
-    with _faults_in(file, suspension):
+    with faults_in(file, "spring", suspension.name):
         if load is not None and load not in suspension.loads:
             _refuse("--load", f"no load '{load}' in [loads]", load, suspension.loads)
         part = vehicle_part(suspension, load)
@@ -259,20 +258,6 @@ def _loaded(file: str, assignments: Sequence[str]) -> "TrailingArmSuspension":
     from railsim.definitions.loading import load_spring
 
     return load_spring(file, assignments)
-
-
-@contextmanager
-def _faults_in(file: str, suspension: "TrailingArmSuspension") -> Iterator[None]:
-    """Let faults that computing finds name the file instead of the suspension."""
-    from railsim.errors import InputError
-
-    try:
-        yield
-    except InputError as error:
-        raise InputError(
-            replace(fault, file=file) if fault.file == suspension.name else fault
-            for fault in error.faults
-        ) from None
 
 
 def _refuse(option: str, found: str, name: str, valid: Iterable[str]) -> NoReturn:

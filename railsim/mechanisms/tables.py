@@ -76,7 +76,7 @@ def published_table(result: Analysis) -> Texts:
         difference = both["ours"] / both["published"] - 1.0
         cells = [shown(both[key], unit, 8) for key in ("published", "ours")]
         rows.append([name, *cells, f"{difference:+.1e}"])
-    return ["result", "published", "ours", "relative difference"], rows
+    return ["result", "published", "computed", "relative difference"], rows
 
 
 def check_table(checks: Sequence[Check]) -> Texts:
@@ -100,13 +100,15 @@ def check_table(checks: Sequence[Check]) -> Texts:
 def selection_table(choices: Sequence[Choice]) -> Texts:
     """One row for each row of a catalogue, with the force that the mechanism then needs."""
     rows = []
-    for c in choices:
+    for alike in _alike(choices):
+        c = alike[0]
+        name = c.name if len(alike) == 1 else f"{c.name} ... {alike[-1].name} ({len(alike)} rows)"
         v = {key: f"{value:.1f}" for key, value in c.values.items() if key.startswith(("F", "f"))}
         sizes = [f"{c.values[key] * 1e3:g}" for key in ("body", "rod") if key in c.values]
         rows.append(
             [
                 c.catalogue,
-                c.name,
+                name,
                 "yes" if c.fits else "no",
                 "; ".join(c.reasons),
                 "/".join(sizes) or "-",
@@ -118,6 +120,18 @@ def selection_table(choices: Sequence[Choice]) -> Texts:
         )
     header = ["catalogue", "row", "fits", "stroke, or why not", "body/rod / mm", "p", "F1 / N"]
     return [*header, "unknown force / N", "over temperature and F1 / N"], rows
+
+
+def _alike(choices: Sequence[Choice]) -> list[list[Choice]]:
+    """Rows in turn, those of a catalogue that do not fit for the same reason together."""
+    groups: list[list[Choice]] = []
+    for choice in choices:
+        same = groups and not choice.fits and groups[-1][0].reasons == choice.reasons
+        if same and groups[-1][0].catalogue == choice.catalogue:
+            groups[-1].append(choice)
+        else:
+            groups.append([choice])
+    return groups
 
 
 def reaction_table(result: Analysis) -> Texts:

@@ -339,6 +339,11 @@ def contact_figure(result: Analysis) -> Figure:
     axes = figure.subplots()
     label = f"at {contact.pressure / 1e6:.4f} MPa"
     axes.plot(values_of("height", result), contact.curve, color=MAIN, label=label)
+    if contact.rising != contact.falling:
+        for curve, words, dashes in zip(
+            contact.bounds, ("rising", "falling"), DASHES[1:3], strict=True
+        ):
+            axes.plot(values_of("height", result), curve, color=SECOND, ls=dashes, label=words)
     axes.axhline(0.0, color="0.4", lw=0.8)
     for y, stable in contact.equilibria:
         axes.plot(y * 1e3, 0.0, "o", mfc="k" if stable else "w", color="k", ms=6, clip_on=False)

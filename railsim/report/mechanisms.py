@@ -382,7 +382,7 @@ def page(collected: Collected, drawn: Mapping[str, bytes]) -> str:
     sections += [_kinematics(drawn), _forces(result, drawn)]
     if choices := selection(result):
         rows = tables.selection_table(choices)
-        failed = frozenset(i for i, c in enumerate(choices) if not c.fits)
+        failed = frozenset(i for i, row in enumerate(rows[1]) if row[2] == "no")
         words = frozenset({0, 1, 2, 3})
         sections.append(Section("Selection", [], [_table(rows, words=words, failed=failed)]))
     if definition.tolerances:

@@ -453,3 +453,50 @@ def test_info_shows_parameters_with_their_provenance(capsys):
     assert cli.main(["info", "atr95_lift_5"]) == 0
     out = capsys.readouterr().out
     assert re.search(r"a1 +0.1641893 +m +printed", out)
+
+
+def test_faults_name_the_file_of_their_key_in_one_way(capsys, write):
+    """Found when loading and when computing, of a shipped name and of a file that extends one."""
+    shipped = Path(load_file_of("atr95_lift_5"))
+    # a negative arm is found when loading, a rocker that is too long when computing
+    for change, key in (("a1=-1", "derived.rocker_angle"), ("a3=0.40", "joints.rocker")):
+        (line,) = refused(capsys, "atr95_lift_5", "--set", f"parameters.{change}")
+        assert line.startswith(f"{shipped}: {key}: ")
+    mine = write(
+        'format = "railsim-mechanism/1"\nextends = "atr95_lift_5"\n[parameters]\na3 = 0.40\n'
+    )
+    (line,) = refused(capsys, mine)
+    assert line.startswith(f"{shipped}: joints.rocker: ")  # the file that holds the key
+
+
+def load_file_of(name):
+    from railsim.definitions.sources import find_file
+
+    return find_file(name, "mechanism")
+
+
+def test_a_motion_is_written_with_every_link_and_actuator(tmp_path, capsys):
+    folder = tmp_path / "out"
+    names = ["tilting_one_spring", "tilting_two_springs"]
+    assert cli.main(["mechanism", *names, "--out", str(folder), *FEW]) == 0
+    capsys.readouterr()
+    written = {path.name for path in folder.iterdir()}
+    assert {"motion.csv", "actuators.png", "drawing.png", "drawing_2.png"} <= written
+    head, *rows = (folder / "motion.csv").read_text().splitlines()
+    columns = head.split(",")
+    assert len(rows) == 401
+    assert {"plate angle speed [rad/s]", "piston length acceleration [m/s2]"} <= set(columns)
+    # the 3-4-5 polynomial: fastest in the middle, 15/8 h/T
+    speed = [float(row.split(",")[columns.index("piston length speed [m/s]")]) for row in rows]
+    assert max(speed) == pytest.approx(15 / 8 * 0.434 / 2.0, rel=1e-4)
+    data = answer(capsys, names[0], *FEW)
+    assert set(data["links"]) == {"plate"}
+    assert set(data["motion"]["actuators"]["piston"]) == {"length", "speed", "acceleration"}
+
+
+def test_equal_reasons_of_a_catalogue_are_one_row_on_the_terminal_only(capsys):
+    assert cli.main(["mechanism", "tilting_one_spring", *FEW]) == 0
+    out = capsys.readouterr().out
+    assert "front: 3ML p 30 % ... front: 4SL p 100 % (30 rows)" in out
+    rows = answer(capsys, "tilting_one_spring", *FEW)["selection"]
+    assert sum(row["catalogue"] == "rigid_lock" for row in rows) == 30
