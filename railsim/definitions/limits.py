@@ -295,15 +295,19 @@ class ComfortLimits(FileDefinition):
     """Continuous comfort along y and z [m/s2]"""
 
 
-class BodyTwist(Sourced):
-    """Twist over the spacing of bogies: constant + numerator / spacing, at most `greatest`."""
+class Twist(Sourced):
+    """Twist of the track over a length: constant + numerator / length, at most `greatest`."""
 
     constant: NonNegative
     """[1]"""
-    numerator: NonNegative
+    numerator: Finite
     """[m]"""
     greatest: Positive
     """[1]"""
+
+    def over(self, length: float) -> float:
+        """Return the twist over a length [1]."""
+        return max(0.0, min(self.constant + self.numerator / length, self.greatest))
 
 
 class Guiding(Sourced):
@@ -324,12 +328,13 @@ class StationaryLimits(FileDefinition):
     """Edition of the standards"""
     unloading: Constant
     """(Q0 - Q)/Q0 of the least loaded wheel on twisted track"""
-    bogie_twist: Constant
+    bogie_twist: Twist
     """Twist of the track over the wheelbase of a bogie"""
-    body_twist: BodyTwist
+    body_twist: Twist
     """Twist of the track over the spacing of bogies, or of the axles of a vehicle without"""
     guiding: Guiding
-    """Y/Q of the leading outer wheel"""
+    """Y/Q of the leading outer wheel: force in the level curve over the least load on the twists,
+    and both in the twisted curve"""
     lean_unloading: Constant
     """(Q0 - Q)/Q0 of the least loaded wheel on a cant equal to the admissible cant deficiency"""
     lean_angle: Constant

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from railsim.constants import CANT_BASE
 from railsim.definitions.track import Track
 from railsim.kernels.aligned import aligned
-from railsim.kernels.contact_columns import W_Q
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
 from railsim.linear.circle import POSITION, circle
@@ -39,11 +39,14 @@ class Standing:
         Its state.
     Q, Q0 : float64[wheelset, side]
         Wheel loads, and those on straight level track [N].
+    Y : float64[wheelset, side] or None
+        Lateral wheel forces of rolling wheelsets [N].
     """
 
     state: Floats
     Q: Floats
     Q0: Floats
+    Y: Floats | None = None
 
     @property
     def unloading(self) -> float:
@@ -86,9 +89,14 @@ def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -
 
 
 def on_twist(
-    balance: Equilibrium, track: Track, heights: Sequence[float] | Floats, *, held: bool = False
+    balance: Equilibrium,
+    track: Track,
+    heights: Sequence[float] | Floats,
+    *,
+    curvature: float = 0.0,
+    held: bool = False,
 ) -> Standing:
-    """Return the vehicle standing on twisted track (EN 14363, 6.1).
+    """Return the vehicle standing on twisted track (EN 14363, 6.1), or rolling in a twisted curve.
 
     Parameters
     ----------
@@ -96,11 +104,18 @@ def on_twist(
         As in `on_cant`.
     heights : float64[wheelset]
         Left rail over the right one under each wheelset, on 1.5 m [m].
+    curvature : float
+        1/radius, positive to the right, of a curve that wheelsets roll through [1/m].
     """
     model, start = balance.model, _placed(balance)
     raised = np.asarray(heights, dtype=float)
-    level = model.system._replace(track=track_tables(circle(track)))
+
+    def flat(share: float) -> System:
+        curve = circle(track, curvature=share * curvature)
+        return model.system._replace(track=track_tables(curve))
+
     if held:
+        level = flat(0.0)
         solver = SteadyRolling(model, level_track(level), held=True)
         for body, height in zip(level.contact.body, raised, strict=True):
             start[6 * body + 3] += height / CANT_BASE
@@ -109,10 +124,11 @@ def on_twist(
         solver.evaluate(state)
     else:
         found, solver = led(
-            model, lambda share: (_twisted(level, share * raised), WALKING_PACE), start
+            model, lambda share: (_twisted(flat(share), share * raised), WALKING_PACE), start
         )
         state = found.state
-    return Standing(state, _loads(solver, held), balance.Q0)
+    Y = None if held else np.asarray(solver.work.wheel[:, :, W_Y].copy())
+    return Standing(state, _loads(solver, held), balance.Q0, Y)
 
 
 def _placed(balance: Equilibrium) -> Floats:

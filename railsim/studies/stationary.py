@@ -5,7 +5,9 @@ without a steady state is reported, and the verdict is then not a pass.
 
 Guiding (EN 14363, 6.1, the method with two separate tests): the guiding force Y_a of the leading
 outer wheel at walking pace in a level curve of R 150 m (`railsim.stability.curving`), over the
-smallest wheel load of that wheelset on the twists, Y_a/Q_a <= 1.2.
+smallest wheel load of that wheelset on the twists, Y_a/Q_a <= 1.2; and Y/Q of this wheel rolling
+through the curve of R 150 m with both twists, to either side.  Dry friction of the suspension is in
+one state only: the hysteresis between loading and unloading is not followed.
 """
 
 from collections.abc import Callable, Sequence
@@ -154,6 +156,12 @@ def stationary(
         values.append(_unloading(name, stands, limits.unloading))
         loads += [np.nan if stand is None else float(stand.Q[0].min()) for stand in stands]
     values.append(_guiding(vehicle, track, limits, float(np.min(loads)), settings, reasons))
+    curve, bend = f"R {limits.guiding.radius:g} m, {name}", 1.0 / limits.guiding.radius
+
+    def rolling(heights: Floats) -> Standing | None:
+        return found(curve, lambda: on_twist(balance, track, heights, curvature=bend))
+
+    values.append(_climbing(curve, [rolling(heights), rolling(-heights)], limits))
     name = f"cant {1e3 * height:g} mm"
     standing = found(name, lambda: on_cant(balance, track, height, held=held))
     values.append(_unloading(name, [standing], limits.lean_unloading))
@@ -189,17 +197,17 @@ def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floa
     middles = np.array([x[ends == name].mean() for name in names])
     of_wheelset = np.array([middles[names.index(end)] for end in ends])
     spacing = float(abs(middles[0] - middles[1]))
-    rule = limits.body_twist
-    over_body = min(rule.constant + rule.numerator / spacing, rule.greatest)
+    over_body = limits.body_twist.over(spacing)
     body = over_body * (of_wheelset - middles.mean())
     name = f"twist {1e3 * over_body:.2f} permille over {spacing:g} m"
     within = x - of_wheelset
     if not np.any(within):
         return {name: body}
     base = float(np.ptp(within))
-    bogie = limits.bogie_twist.value * within
+    over_bogie = limits.bogie_twist.over(base)
+    bogie = over_bogie * within
     return {
-        f"twist {1e3 * limits.bogie_twist.value:g} permille over {base:g} m": bogie,
+        f"twist {1e3 * over_bogie:.2f} permille over {base:g} m": bogie,
         name: body,
         "both twists": bogie + body,
     }
@@ -241,6 +249,21 @@ def _guiding(
     return StationaryValue(
         case, "guiding Y/Q", quotient, limit.value, "wheelset 1 outer", limit.source, limit.checked
     )
+
+
+def _climbing(
+    case: str, rolling: Sequence[Standing | None], limits: StationaryLimits
+) -> StationaryValue:
+    """Largest Y/Q of the leading outer wheel, the left one, over some states."""
+    quotients = [
+        float("nan") if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
+        for state in rolling
+    ]
+    limit = limits.guiding
+    return StationaryValue(
+        case, "guiding Y/Q, combined", float(np.max(quotients)), limit.value, "wheelset 1 outer",
+        limit.source, limit.checked,
+    )  # fmt: skip
 
 
 def _unloading(case: str, stands: Sequence[Standing | None], limit: Constant) -> StationaryValue:

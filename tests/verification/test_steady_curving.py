@@ -165,6 +165,22 @@ def test_unloading_on_twist(coach, heights, expected):
     assert standing.Q.sum() == pytest.approx(coach.Q0.sum(), rel=1e-4)
 
 
+def test_forces_in_a_twisted_curve_balance_and_add_up():
+    """R 150 m with twists of bogie and body: sums by Newton-Euler, loads superposed."""
+    vehicle = load_vehicle("benchmark_vehicle1")
+    _, solver, balance = curving(vehicle, 150.0, 0.0, WALKING_PACE)
+    track, twist = load_track("curve_r250"), 5e-3 * np.array([1.28, -1.28, 1.28, -1.28])
+    twisted = on_twist(balance, track, twist, curvature=1.0 / 150.0)
+    alone = on_twist(balance, track, twist)
+    mass = twisted.Q0.sum() / GRAVITY
+    assert twisted.Q.sum() == pytest.approx(twisted.Q0.sum(), rel=1e-3)
+    centrifugal = -mass * WALKING_PACE**2 / 150.0
+    # against wheel forces of 30 kN; the wheelsets' frames are canted by 4 mrad
+    assert twisted.Y.sum() == pytest.approx(centrifugal, abs=1e-4 * twisted.Q0.sum())
+    added = solver.work.wheel[:, :, W_Q] + alone.Q - alone.Q0
+    np.testing.assert_allclose(twisted.Q, added, atol=0.03 * twisted.Q0.max())
+
+
 @pytest.fixture(scope="module")
 def rolling_on_twist():
     """Bogie and body twist of rolling wheelsets over the primary's lateral stiffness [N/m]."""
