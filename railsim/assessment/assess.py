@@ -11,6 +11,7 @@ from railsim.assessment.comfort_report import (
     short_of_blocks,
 )
 from railsim.assessment.conditions import Condition, SectionRow
+from railsim.assessment.influences import Influence
 from railsim.assessment.record import Record
 from railsim.assessment.rules import Assessed
 from railsim.assessment.running import Options, Running, assessed_runs, group_key
@@ -52,6 +53,8 @@ class Assessment:
         Sections of all runs.
     hunting_frequency : float or None
         Frequency at which the instability is judged [Hz].
+    influences : tuple of Influence
+        Regressions over several influences, for information.
     comfort : dict
         Comfort at the measuring points, by run.
     wear : dict
@@ -72,6 +75,7 @@ class Assessment:
     conditions: tuple[Condition, ...] = ()
     sections: tuple[SectionRow, ...] = ()
     hunting_frequency: float | None = None
+    influences: tuple[Influence, ...] = ()
     comfort: Mapping[str, Sequence[PointComfort]] = field(default_factory=dict)
     wear: Mapping[str, Sequence[WheelWear]] = field(default_factory=dict)
     safety: Mapping[str, SafetyReport] = field(default_factory=dict)
@@ -129,6 +133,7 @@ class Assessment:
             "conditions": [condition.record() for condition in self.conditions],
             "zones": [zone.record() for zone in self.zones],
             "hunting_frequency": self.hunting_frequency,
+            "regression": [one.record() for one in self.influences],
             "sections": [row.record() for row in self.sections],
             "comfort": comfort,
             "wear": {run: [w.record() for w in wheels] for run, wheels in self.wear.items()},
@@ -222,6 +227,7 @@ def _running(runs: Mapping[str, Result], limits: RunningLimits, done: Running) -
         done.conditions,
         done.sections,
         done.hunting_frequency,
+        done.influences,
         remarks=done.remarks,
         limits=limits,
     )

@@ -14,7 +14,7 @@ import numpy as np
 
 from railsim.assessment.sections import reasons
 from railsim.assessment.zones import Population, ZoneReport
-from railsim.contact.geometry import contact_geometry
+from railsim.contact.geometry import ContactGeometry, contact_geometry
 from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
 from railsim.definitions.vehicle import Service
@@ -249,34 +249,38 @@ def _loads(reports: Sequence[ZoneReport]) -> Condition:
     return Condition("load states", "", state, words or "none", "empty and laden", "[R]")
 
 
-def conicity_of(result: Result) -> float:
-    """Equivalent conicity of the leading wheelset of a run for 3 mm on rigid rails [1].
+def leading_geometry(result: Result) -> ContactGeometry | None:
+    """Contact functions of the leading wheelset of a run on rigid rails.
 
-    nan where the profiles are not kept or do not fit.
+    None where the profiles are not kept or do not fit.
     """
     wheelset = flatten(result.vehicle()).of_kind("wheelset")[0].wheelset
     track, known = result.track(), result.profiles
     names = [*wheelset.profile, *track.rail] if wheelset else ["?"]
     if wheelset is None or any(name not in known for name in names):
-        return float("nan")
+        return None
     wheels = known[wheelset.profile[0]], known[wheelset.profile[1]]
     rails = known[track.rail[0]], known[track.rail[1]]
-    return _conicity_of(
+    return _geometry(
         wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
     )
 
 
 @lru_cache(32)
-def _conicity_of(
+def _geometry(
     wheels: tuple[Profile, Profile],
     rails: tuple[Profile, Profile],
     radius: float,
     gauge: float,
     inclination: float,
     back_to_back: float,
-) -> float:
+) -> ContactGeometry | None:
     try:
-        geometry = contact_geometry(wheels, rails, radius, gauge, inclination, back_to_back)
+        return contact_geometry(wheels, rails, radius, gauge, inclination, back_to_back)
     except InputError:
-        return float("nan")
-    return float(geometry.equivalent_conicity([AMPLITUDE])[0])
+        return None
+
+
+def conicity_of(geometry: ContactGeometry | None) -> float:
+    """Equivalent conicity for 3 mm; nan where it is not known [1]."""
+    return float("nan") if geometry is None else float(geometry.equivalent_conicity([AMPLITUDE])[0])

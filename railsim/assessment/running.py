@@ -4,10 +4,13 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from railsim.assessment.conditions import (
     Condition,
     SectionRow,
     conicity_of,
+    leading_geometry,
     missing_zones,
     vehicle_conditions,
     zone_conditions,
@@ -18,11 +21,13 @@ from railsim.assessment.en14363 import (
     hunting_spectrum,
     section_values,
 )
+from railsim.assessment.influences import Influence, influences, steering_index
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality, quality_class
 from railsim.assessment.verdict import Verdict, all_verdicts
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
+from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.vehicle import Service
 from railsim.errors import Fault, InputError
@@ -48,6 +53,7 @@ class Running:
     conditions: tuple[Condition, ...]
     sections: tuple[SectionRow, ...]
     hunting_frequency: float | None
+    influences: tuple[Influence, ...]
     remarks: tuple[str, ...]
 
 
@@ -118,6 +124,7 @@ def assessed_runs(
     f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
     for run in done:
         run.values = section_values(run.record, run.counting, f0=f0, causal=options.causal)
+        _add_steering(run)
     rows = [row for run in done for row in _section_rows(run, service)]
     counted = [row for row in rows if row.counts]
     zones: list[ZoneReport] = []
@@ -140,8 +147,24 @@ def assessed_runs(
         conditions += vehicle_conditions(zones, counted, results, limits, service)
     verdicts = all_verdicts(runs, zones, conditions)
     return Running(
-        verdicts, tuple(zones), tuple(conditions), tuple(rows), f0, _remarks(done, zones, limits)
-    )
+        verdicts, tuple(zones), tuple(conditions), tuple(rows), f0,
+        tuple(influences(zones, service)), _remarks(done, zones, limits),
+    )  # fmt: skip
+
+
+def _add_steering(run: _Run) -> None:
+    """Add the steering index of the leading wheelset to the sections in curves."""
+    result = run.record.result
+    geometry = leading_geometry(result) if any(v.section.turn for v in run.values) else None
+    wheelset = flatten(result.vehicle()).of_kind("wheelset")[0].wheelset
+    if geometry is None or wheelset is None:
+        return
+    rolling = float(np.mean(wheelset.radius))
+    for value in run.values:
+        if value.section.turn:
+            index = steering_index(geometry, abs(value.section.radius), rolling)
+            if index == index:
+                value.values["steering", "wheelset 1"] = [index]
 
 
 def _service(runs: Mapping[str, Result]) -> Service:
@@ -180,7 +203,7 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
     quality = None
     if run.sections and track.irregularities:
         quality = TrackQuality(track, run.sections[0].begin, run.sections[-1].end)
-    conicity = conicity_of(result) if run.counting else float("nan")
+    conicity = conicity_of(leading_geometry(result) if run.counting else None)
     realisation = repr(track.irregularities)
     rows = []
     for s in run.sections:

@@ -136,6 +136,63 @@ def two_dimensional(x: Floats, y: Floats, x0: float, probability: float) -> Esti
     return replace(plain, value=float(line.bound(x0)), method="two", line=line)
 
 
+@dataclass(frozen=True)
+class Regression:
+    """Linear regression over several influences.
+
+    Attributes
+    ----------
+    N : int
+        Number of values.
+    coefficients : tuple of float
+        Constant, then one for each influence.
+    error : float
+        Standard error of the regression.
+    determination : float
+        Share of the variance that the influences explain, R^2 [1].
+    value : float
+        Value at the target conditions.
+    """
+
+    N: int
+    coefficients: tuple[float, ...]
+    error: float
+    determination: float
+    value: float
+
+
+def multiple_regression(x: Floats, y: Floats, target: Floats) -> Regression | None:
+    """Least squares of y = a + b1 x1 + b2 x2 + ...; None where x does not determine it.
+
+    Parameters
+    ----------
+    x : float64[section, influence]
+    y : float64[section]
+    target : float64[influence]
+        Conditions at which the value is sought.
+
+    Examples
+    --------
+    >>> x = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 1.0]])
+    >>> found = multiple_regression(x, 1.0 + 2.0 * x[:, 0] - x[:, 1], np.array([3.0, 2.0]))
+    >>> round(found.value, 9), round(found.determination, 9)
+    (5.0, 1.0)
+    """
+    n, k = x.shape
+    scale = np.maximum(np.abs(x).max(axis=0, initial=0.0), 1e-300)
+    design = np.column_stack([np.ones(n), x / scale])
+    if n <= k + 1 or np.linalg.matrix_rank(design, tol=1e-6 * np.sqrt(n)) <= k:
+        return None
+    solved = np.linalg.lstsq(design, y, rcond=None)[0]
+    rest = float(np.sum((y - design @ solved) ** 2))
+    all_of_it = float(np.sum((y - np.mean(y)) ** 2))
+    return Regression(
+        n, (float(solved[0]), *(float(c) for c in solved[1:] / scale)),
+        math.sqrt(rest / (n - k - 1)), 1.0 - rest / all_of_it if all_of_it else 1.0,
+        float(solved[0] + np.sum(solved[1:] * target / scale)),
+    )  # fmt: skip
+
+
 def extreme(x: Floats, method: str) -> Estimate:
     """Largest or smallest value, with mean and deviation beside it; no estimate.
 

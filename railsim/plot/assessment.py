@@ -45,7 +45,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
             worst = assessment.worst_in(zone)
             shares = [100.0 * worst[name][1].share if name in worst else np.nan for name in rules]
             rows = np.arange(len(rules)) + (k - 0.5 * (len(assessments) - 1)) * width
-            label = assessment.vehicle if ax is axes[0] else None
+            label = _verdicts(assessment) if ax is axes[0] else None
             ax.barh(rows, shares, 0.9 * width, color=DISTINCT[k % len(DISTINCT)], label=label)
             most = max(most, 1.1 * float(np.nanmax([0.0, *shares])))
             for row, share in zip(rows, shares, strict=True):
@@ -62,16 +62,15 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     axes[0].invert_yaxis()
     for ax in axes:
         ax.set_xlim(0.0, min(most, LONGEST_BAR))
-    verdicts = "\n".join(_verdicts(a) for a in assessments)
     edition = next((a.limits.edition for a in assessments if a.limits), "")
-    figure.suptitle(f"{edition}\n{verdicts}", x=0.012, ha="left", fontsize=10)
-    figure.legend(loc="outside lower left", ncols=2)
+    figure.suptitle(edition, x=0.012, ha="left", fontsize=10)
+    figure.legend(loc="outside lower left")
     return figure
 
 
 def _verdicts(assessment: Assessment) -> str:
     parts = [f"{WORDS[name]} {verdict.value}" for name, verdict in assessment.verdicts.items()]
-    return f"{assessment.vehicle}: {assessment.verdict} ({', '.join(parts)})"
+    return f"{assessment.vehicle}: {assessment.verdict}\n{', '.join(parts)}"
 
 
 def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from railsim.assessment import Assessment, assess
+from railsim.assessment.influences import RADIUS
 from railsim.assessment.rules import RULES, WORDS
 from railsim.assessment.rules import Assessed as Row
 from railsim.assessment.running import group_key
@@ -89,6 +90,7 @@ def assessed(results: Mapping[str, Result]) -> Assessed:
         found.verdicts.append((one.verdict == PASS, printable(words)))
         found.tables.append(_reasons(one))
         found.details += [_conditions(one), _sections(one), *_rows(one)]
+        found.details += [_influences(one)] if one.influences else []
     found.tables += _zones(running)
     found.details += [_setup(one, runs) for one in running]
     found.details += [_sources(one.limits) for one in running[:1] if one.limits]
@@ -195,6 +197,26 @@ def _rows(one: Assessment) -> list[Table]:
             "standard error.",
         ))  # fmt: skip
     return tables
+
+
+def _influences(one: Assessment) -> Table:
+    """Return the regressions over cant deficiency and curvature."""
+    rows: list[list[Cell]] = []
+    for found in one.influences:
+        rule, solved = found.rule, found.regression
+        constant, deficiency, curvature = (rule.scale * c for c in solved.coefficients)
+        rows.append([
+            (rule.words, printable(", ".join(filter(None, [found.place, found.population])))),
+            rule.unit, str(solved.N), f"{constant:.3g}", f"{1e-3 * deficiency:.3g}",
+            f"{1e-3 * curvature:.3g}", rule.text(solved.error), f"{solved.determination:.2f}",
+            rule.text(solved.value),
+        ])  # fmt: skip
+    return Table(
+        ["", "unit", "N", "constant", "per mm of I", "per 1/km", "s_e", "R2", "value"], rows,
+        f"Multiple regression, for information: {printable(one.vehicle)}", words=frozenset({0, 1}),
+        note="All curves of zones 2 to 4 of a population over cant deficiency I and curvature; "
+        f"value: at the admissible cant deficiency and R {RADIUS:.0f} m.",
+    )  # fmt: skip
 
 
 def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:

@@ -231,3 +231,26 @@ def test_result_without_static_wheel_loads_is_an_input_error():
     )  # fmt: skip
     with pytest.raises(InputError, match="Q0: is not in the result"):
         assess(bare)
+
+
+# for information ----------------------------------------------------------------------------------
+
+
+def test_regression_over_cant_deficiency_and_curvature_of_all_curves():
+    """Three radii at one cant: the deficiency follows from the curvature, and nothing is solved;
+    with other cants it is."""
+
+    def run(radius, cant):
+        return made(
+            track(*curve(radius, 500.0), cant=cant), 23.0, Y=sides(20e3 + 6e6 / radius, 0.0)
+        )
+
+    (found,) = assess({"a": run(290.0, 0.12), "b": run(320.0, 0.12), "c": run(340.0, 0.12)})
+    assert found.influences == ()
+    (found,) = assess({"a": run(290.0, 0.12), "b": run(300.0, 0.11), "c": run(290.0, 0.125)})
+    row = next(
+        one for one in found.influences if one.rule.name == "Y_qst" and "1 outer" in one.place
+    )
+    assert row.regression.value == pytest.approx(40e3, rel=1e-4)
+    assert row.regression.coefficients[2] == pytest.approx(6e6, rel=1e-3)
+    assert found.record()["regression"][0]["radius"] == 300.0

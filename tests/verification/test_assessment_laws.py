@@ -22,9 +22,10 @@ from railsim.assessment.comfort import (
     transition_comfort,
 )
 from railsim.assessment.en14363 import dominant_frequency
+from railsim.assessment.influences import steering_index
 from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
-from railsim.assessment.statistics import one_dimensional, two_dimensional
+from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
 from railsim.assessment.wear import (
     WholeLifeRailModel,
     pearce_sherratt_1991,
@@ -33,6 +34,7 @@ from railsim.assessment.wear import (
 )
 from railsim.assessment.wear_report import _patches
 from railsim.assessment.weighting import WEIGHTINGS
+from railsim.contact.geometry import contact_geometry
 from railsim.profiles import load_profile
 from railsim.result.filters import (
     StreamingPercentiles,
@@ -177,6 +179,28 @@ def test_too_few_values_give_no_estimate():
     assert math.isnan(one_dimensional(SECTIONS[:1], 3.0).value)
     assert math.isnan(two_dimensional(DEFICIENCY[:2], FORCES[:2], 150.0, 0.95).value)
     assert math.isnan(two_dimensional(np.full(5, 100.0), FORCES[:5], 150.0, 0.95).value)
+
+
+def test_multiple_regression_finds_the_plane_and_its_scatter():
+    rng = np.random.default_rng(5)
+    x = np.column_stack([rng.uniform(0.11, 0.16, 400), 1.0 / rng.uniform(280.0, 600.0, 400)])
+    y = 20e3 + 80e3 * x[:, 0] + 9e6 * x[:, 1] + 500.0 * rng.normal(size=400)
+    found = multiple_regression(x, y, np.array([0.15, 1.0 / 300.0]))
+    assert found.value == pytest.approx(20e3 + 12e3 + 30e3, abs=4.0 * 500.0 / math.sqrt(100))
+    assert found.error == pytest.approx(500.0, rel=0.1)
+    assert multiple_regression(np.ones((9, 2)), y[:9], np.ones(2)) is None
+
+
+def test_steering_index_of_cones_is_proportional_to_the_curvature():
+    """Cones 1:20: delta_r = 0.1 y; e r0/R = 0.69 m2/R: 3.45 mm at R 2000 m (Redtenbacher)."""
+    wheel, rail = load_profile("cone_1in20"), load_profile("60E1")
+    lateral = np.arange(0.0, 9.0e-3, 1e-5)
+    geometry = contact_geometry(wheel, rail, lateral=lateral)
+    gentle, tight = (steering_index(geometry, R, 0.46) for R in (4000.0, 2000.0))
+    assert tight / gentle == pytest.approx(2.0)
+    flange = lateral[np.abs(geometry.contact_angle).max(axis=1) > 0.5][0]
+    # rails curved to 300 mm steepen the contact of a cone that moves and rolls: 5 %
+    assert tight * flange == pytest.approx(3.45e-3, rel=0.06)
 
 
 # weightings and comfort ---------------------------------------------------------------------------
