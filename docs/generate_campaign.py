@@ -1,5 +1,9 @@
 """Fill the table of all vehicles on all tracks in `docs/validation/vehicles_and_tracks.md`.
 
+And that of the test campaign in `docs/validation/assessment.md`, from the folder of a campaign:
+
+    railsim study --scenario en14363 --vehicles ... --out DIR
+
 ``python docs/generate_campaign.py DIR`` reads the folder of
 
     railsim study --vehicles ... --tracks ... --speeds permitted --keep summary --out DIR
@@ -7,6 +11,8 @@
 with all vehicles and tracks of `railsim list`; it takes a quarter of an hour of one core.
 """
 
+import json
+import shutil
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -17,6 +23,8 @@ from railsim.definitions.sources import library_files
 from railsim.studies.summary import read_index
 
 PAGE = Path(__file__).parent / "validation" / "vehicles_and_tracks.md"
+ASSESSMENT = PAGE.with_name("assessment.md")
+IMAGES = PAGE.parents[1] / "img" / "assessment"
 COMPLETE = "complete"
 
 
@@ -77,6 +85,40 @@ def campaign(found: list[dict]) -> str:
     return text
 
 
+def coaches(folder: Path, found: list[dict]) -> str:
+    """One row for each vehicle of a test campaign: verdicts, and what is nearest to its limit."""
+    rows = []
+    for one in json.loads((folder / "assessment.json").read_text("utf-8")):
+        own = [run for run in found if run["name"] in one["runs"]]
+        seconds = sum(run["cpu_time"] * run["real_time_factor"] for run in own)
+        quantities = [
+            (q["share"], f"{q['name']}, zone {zone['zone']} {zone['population']}")
+            for zone in one["zones"]
+            for q in zone["quantities"]
+            if q["criterion"] in one["deciding"]
+        ]
+        share, name = max(quantities)
+        states = [condition["state"] for condition in one["conditions"]]
+        rows.append((
+            one["vehicle"], f"{len(own)}, {seconds:.0f} s",
+            f"{states.count('met')} of {len(states)}",
+            *(one["verdicts"][name]["verdict"] for name in ("safety", "loading", "ride")),
+            f"{100.0 * share:.0f} %, {name}", f"{one['hunting_frequency']:.2f} Hz",
+        ))  # fmt: skip
+    head = ("vehicle", "runs, simulated time", "conditions met", "running safety", "track loading",
+            "ride", "nearest to a limit that decides", "f0")  # fmt: skip
+    IMAGES.mkdir(exist_ok=True)
+    for name in ("assessment", "assessment_regression"):
+        shutil.copy(
+            folder / f"{name}.png", IMAGES / f"{name.replace('assessment', 'campaign')}.png"
+        )
+    return table(head, rows, "---")
+
+
 if __name__ == "__main__":
-    runs = [run.model_dump() for run in read_index(Path(sys.argv[1]) / "study.json").runs]
-    fill_page(PAGE, {"campaign": lambda: campaign(runs)}, ["campaign"])
+    folder = Path(sys.argv[1])
+    runs = [run.model_dump() for run in read_index(folder / "study.json").runs]
+    if (folder / "assessment.json").is_file():
+        fill_page(ASSESSMENT, {"coaches": lambda: coaches(folder, runs)}, ["coaches"])
+    else:
+        fill_page(PAGE, {"campaign": lambda: campaign(runs)}, ["campaign"])

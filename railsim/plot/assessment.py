@@ -174,9 +174,11 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
 
 
 def _widest(assessment: Assessment, zone: str) -> Assessed | None:
-    """Row of the two-dimensional method with the largest share of its limit in a zone."""
+    """Row with an upper bound, of the verdicts that decide, with the largest share in a zone."""
+    deciding = getattr(assessment.limits, "deciding", ())
     rows = [row for report in assessment.zones if report.zone == zone for row in report.rows
-            if row.estimate.line is not None]  # fmt: skip
+            if row.estimate.line is not None and row.estimate.line.quantile > 0.0
+            and row.rule.group in deciding]  # fmt: skip
     return max(rows, key=lambda row: row.share, default=None)
 
 
@@ -191,7 +193,8 @@ def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> No
     line = row.estimate.line if row else None
     if line is None or row is None:
         return
-    x = np.linspace(min([p[0] for p in points]), 1e3 * line.target, 60)
+    places = [1e3 * line.target, *(deficiency for deficiency, _ in points)]
+    x = np.linspace(min(places), max(places), 60)
     ax.plot(x, scale * line.at(1e-3 * x), color=colour, lw=1.2)
     ax.plot(x, scale * line.bound(1e-3 * x), color=colour, lw=1.0, ls="--")
     ax.plot(1e3 * line.target, scale * row.estimate.value, "D", color=colour, ms=5)

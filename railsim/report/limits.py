@@ -47,7 +47,8 @@ NOTE = (
     "Estimate from the sections within the standard's conditions, below it the share of the limit, "
     "the wheelset, wheel or sensor nearest to it and the method: 1-dim. mean + k s, 2-dim. upper "
     "bound of the regression over the cant deficiency at the admissible one. [P] printed in a "
-    "source that was read, [R] recalled, [A] assumed."
+    "source that was read, [R] recalled, [A] assumed; unchecked: not compared with the printed "
+    "standard."
 )
 METHOD = {"one": "1-dim.", "two": "2-dim.", "largest": "largest value", "smallest": "smallest"}
 MOST = 256  # runs that are assessed; more would take long
@@ -268,7 +269,7 @@ def _seconds(result: Result) -> float:
 
 
 def _origin(source: str, checked: bool) -> str:
-    return source if checked or source == "ours" else f"{source}; not compared with the print"
+    return source if checked or source == "ours" else f"{source}, unchecked"
 
 
 def _gathered(remarks: Sequence[str], runs: Mapping[str, Result]) -> list[str]:
@@ -301,16 +302,16 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
             rows.append([(first.rule.words, MEANING[rule]), *map(_cell, own), _joined(limits)])
             if any(pair and pair[1].share > 1.0 for pair in own):
                 failed.append(len(rows) - 1)
-        counts = "; ".join(
-            f"{zone.population.name or one.vehicle} {len(zone.values)}"
-            for one in assessments for zone in one.zones if zone.zone == name
-        )  # fmt: skip
+        own_zones = [z for one in assessments for z in one.zones if z.zone == name]
+        counts = sorted({len(zone.values) for zone in own_zones})
+        number = " to ".join(dict.fromkeys(str(n) for n in (counts[0], counts[-1])))
+        needed = own_zones[0].needed
         edition = next((one.limits.edition for one in assessments if one.limits), "")
         tables.append(
             Table(
                 ["", *map(printable, worst), "limit"],
                 rows,
-                f"{edition}, zone {name}; sections: {printable(counts)}",
+                f"{edition}, zone {name}: {number} of {needed} sections in each population",
                 failed=frozenset(failed),
                 note=NOTE,
             )

@@ -8,11 +8,13 @@ import shutil
 import subprocess
 from base64 import b64encode
 from hashlib import sha256
+from html import escape
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 from example_result import example_result, feed
+from made_record import curve, made, track
 from test_study import arguments
 from test_study import simulated as simulated
 
@@ -302,3 +304,35 @@ def test_peaks_of_the_page_are_those_of_the_result(html, folder):
 
     for peak in peaks(open_result(folder / "b.h5")):
         assert peak.quantity.text(peak.value) in html
+
+
+def test_page_and_assessment_of_a_folder_agree(tmp_path, capsys):
+    """More runs than curves are shown of, and quantities for curves were left out."""
+
+    def Y(t, s):
+        return np.stack([np.full(s.shape, -20e3), np.full(s.shape, 5e3)], axis=-1)
+
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    on = track(*curve(300.0, 300.0), cant=0.12)
+    for number in range(3):
+        run = made(on, 22.8 + 0.1 * number, Y=Y, without=("Y_over_Q",))
+        run.to_hdf5(folder / f"run{number}.h5")
+    page = tmp_path / "page.html"
+    assert main(["report", str(folder), "--out", str(page), "--curves", "1", "--quiet"]) == 0
+    assert main(["assess", str(folder), "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)
+    html = page.read_text()
+    verdicts = {name: one["verdict"] for name, one in found["verdicts"].items()}
+    assert (
+        f"{found['verdict']} (running safety {verdicts['safety']}, track loading "
+        f"{verdicts['loading']}, ride {verdicts['ride']})" in html
+    )
+    row = next(q for z in found["zones"] for q in z["quantities"] if q["name"] == "Y_qst")
+    assert row["N"] == 3 * 4
+    assert f"{100.0 * row['share']:.0f} %, {row['place']}" in html
+    assert all(escape(condition["found"]) in html for condition in found["conditions"])
+    assert html.count("run2") > 0
+    # a section without curves says so instead of showing controls
+    assert "The results hold none of the quantities that are drawn here." in html
+    assert '"curves":[]' in html
