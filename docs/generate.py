@@ -1,8 +1,9 @@
 """Fill those tables of the manual that railsim itself knows.
 
 ``python docs/generate.py`` writes them between ``<!-- generated: NAME -->`` and ``<!-- end -->``:
-the quantities of a result, and the published curving study against railsim.  The tests check that
-they are up to date.
+the quantities of a result, and the published curving study against railsim; and the first picture
+of README and manual.  The tests check that they are up to date, of the picture what it shows, which
+is in its file as a text.
 """
 
 import re
@@ -14,9 +15,12 @@ import numpy as np
 
 from railsim import Result, Settings, load_track, load_vehicle, simulate
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
+from railsim.plot.histories import histories
 
 DOCS = Path(__file__).parent
 PAGES = (DOCS.parent / "README.md", DOCS / "notation.md", DOCS / "validation" / "curving.md")
+PICTURE = DOCS / "img" / "curve_r250.png"
+PICTURED, SHOWN = ("dQ_over_Q0", "Y_over_Q"), (250.0, 550.0)  # quantities; m
 TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
@@ -77,6 +81,27 @@ def _beside(elastic: Result) -> list[tuple[str, ...]]:
     return [(words, "", "", "", _digits(aside.scale * value)) for words, value in values]
 
 
+def first_run() -> Result:
+    """The run of README's first picture, as its example of one run."""
+    return simulate(load_vehicle("coach_manchester"), load_track("curve_r250"), speed=20.0)
+
+
+def shown(result: Result) -> str:
+    """What the picture shows, in numbers: they tell whether it is up to date."""
+    change, quotient = (result[name][result["distance"] > SHOWN[0]] for name in PICTURED)
+    return (
+        f"dQ/Q0 {100.0 * change.min():.1f} to {100.0 * change.max():.1f} %, "
+        f"Y/Q {quotient.min():.2f} to {quotient.max():.2f}"
+    )
+
+
+def draw_first_picture() -> None:
+    """Wheel load change and derailment quotient in the curve."""
+    result = first_run()
+    figure = histories(result, PICTURED, between=SHOWN)
+    figure.savefig(PICTURE, metadata={"Description": shown(result)})
+
+
 def _digits(value: float) -> str:
     return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.3f}"
 
@@ -106,6 +131,7 @@ def fill_page(
 
 
 if __name__ == "__main__":
+    draw_first_picture()
     known = tables()
     for page in PAGES:
         page.write_text(filled(page.read_text("utf-8"), known), encoding="utf-8")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 import pytest
+from PIL import Image
 
 from railsim.cli import railsim as command_line
 
@@ -48,6 +49,16 @@ def test_tables_of_the_curving_study_are_up_to_date(generate, coach):
         for written, now in zip(NUMBER.findall(table), NUMBER.findall(made), strict=True):
             unit = 10.0 ** -len(now.partition(".")[2])
             assert float(written) == pytest.approx(float(now), abs=1.01 * unit), MENDED_BY
+
+
+def test_first_picture_is_up_to_date(generate):
+    """Its file says what it shows; a limit at standstill speed is none at 20 m/s."""
+    with Image.open(generate.PICTURE) as picture:
+        written = picture.info["Description"]
+    made = generate.shown(generate.first_run())
+    assert NUMBER.sub("", written) == NUMBER.sub("", made), MENDED_BY
+    for old, new in zip(NUMBER.findall(written), NUMBER.findall(made), strict=True):
+        assert float(old) == pytest.approx(float(new), abs=0.101), MENDED_BY
 
 
 def command_lines():

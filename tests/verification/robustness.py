@@ -7,11 +7,13 @@ Y/Q: `excess` is the largest difference over what is allowed.
 
 import itertools
 import math
+import re
 
 import numpy as np
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
+from railsim.errors import InputError
 from railsim.simulation import simulate
 
 COACHES = ("coach_manchester", "coach_flexicoil")
@@ -22,6 +24,7 @@ CANT = 0.10
 CASES = tuple(itertools.product(COACHES, RADII, FRICTIONS, DEFICIENCIES))
 REFERENCE = {"scheme": "rk4", "step": 0.125e-3}
 DAMPING = (1e5, 4e5)  # half and twice the default
+RIGID_CASES = ((500.0, 0.30), (250.0, 0.45), (100.0, 0.36), (150.0, 0.40))  # radius, friction
 ALLOWED = 0.02, 0.005, 0.01  # of a peak, of Q0; of Y/Q
 
 
@@ -88,3 +91,22 @@ def ways(case, support=None, reference=False):
     if reference:
         settings.append(REFERENCE)
     return [excess(result, run(case, support, **way)) for way in settings], result
+
+
+def rigid_row(case):
+    """Row of the table of rigid rails in `docs/validation/robustness.md`, as text."""
+    radius, friction = case
+    where = ("coach_manchester", radius, friction, 0.10), {"preset": "rigid"}
+    fast = run(*where)
+    cells = [f"{100.0 * (peaks(fast)[0] - 1.0):.2f}"]
+    said = " ".join(fast.remarks)
+    try:
+        reference = run(*where, **REFERENCE)
+    except InputError as error:  # where the growth by friction cannot be followed
+        cells.append(str(error).rpartition("; ")[2])
+    else:
+        cells.append(f"{100.0 * (peaks(reference)[0] - 1.0):.2f}")
+        said += " ".join(reference.remarks)
+    vibration = re.findall(r"vibrate at (\d+ Hz: \d+ % of Q0)", said)
+    step = f"{1e3 * fast.attributes['step']:.2f}"
+    return (f"{radius:g}, {friction:.2f}", step, *cells, "; ".join(vibration))

@@ -3,8 +3,11 @@
 All 280 are run by ``python docs/generate_robustness.py grid``.
 """
 
+import re
+from pathlib import Path
+
 import pytest
-from robustness import CASES, peaks, run, ways
+from robustness import CASES, RIGID_CASES, peaks, rigid_row, run, ways
 from selection import points
 
 # every thirteenth case: both coaches, all radii, frictions and cant deficiencies
@@ -52,3 +55,16 @@ def test_peaks_of_an_independent_computation(radius, friction, dQ, quotient, dam
     found = peaks(result)
     assert result.dQ_over_Q0.max() == pytest.approx(dQ, abs=0.01)
     assert found[3] == pytest.approx(quotient, abs=0.005)
+
+
+@points("case", RIGID_CASES[:3], always=(0,), ids=lambda case: "-".join(map(str, case)))
+def test_the_table_of_rigid_rails_is_up_to_date(case):
+    """Where nothing vibrates; one unit of the last digit for another machine."""
+    page = Path(__file__).parents[2] / "docs" / "validation" / "robustness.md"
+    text = page.read_text("utf-8")
+    table = re.search(r"<!-- generated: rigid -->\n(.*?)<!-- end -->", text, re.DOTALL)
+    rows = [line.strip("| ").split(" | ") for line in table[1].strip().splitlines()]
+    made = rigid_row(case)
+    (written,) = (row for row in rows if row[0] == made[0])
+    for old, new in zip(written[1:4], made[1:4], strict=True):
+        assert float(old) == pytest.approx(float(new), abs=0.0101), "generate_robustness.py rigid"
