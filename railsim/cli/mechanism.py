@@ -197,7 +197,9 @@ def _data(
     if len(data) > 1:
         return {"mechanisms": data, "comparison": comparison_data(compare(results))}
     data[0]["cases"] = {
-        name: analysis_data(result) for name, result in cases.items() if name != "base"
+        name: analysis_data(result, courses=False)
+        for name, result in cases.items()
+        if name != "base"
     }
     return data[0]
 

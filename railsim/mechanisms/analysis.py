@@ -232,6 +232,8 @@ def _force_zeros(dense: Motion) -> tuple[float, ...]:
     if dense.model.definition.solve is None:
         return ()
     rates = Rates(friction=dense.model.sense)
+    if not np.any(generalised_force(dense, rates)):
+        return ()
     return tuple(zeros(dense, lambda m: -generalised_force(m, rates)))
 
 

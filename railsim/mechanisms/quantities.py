@@ -50,8 +50,8 @@ def quantity(name: str, definition: Mechanism) -> Quantity:
     if name == "rate" and not angular:
         return Quantity("1", "", 1.0, 4, QUANTITIES[name].meaning)
     if name in ("force", "force_back") and definition.solve is not None:
-        unknown = definition.actuators[definition.solve.unknown]
-        return TORQUE if hasattr(unknown, "turn") else QUANTITIES[name]
+        turns = force_unit(definition.solve.unknown, definition) == "N m"
+        return TORQUE if turns else QUANTITIES[name]
     if name in QUANTITIES:
         return QUANTITIES[name]
     if name in definition.angles or name.endswith("_pressure_angle"):
@@ -59,6 +59,11 @@ def quantity(name: str, definition: Mechanism) -> Quantity:
     if name.endswith("_pressure"):
         return GAS
     return LENGTH if name.endswith("_length") else FORCE
+
+
+def force_unit(actuator: str, definition: Mechanism) -> str:
+    """Unit of the force, or torque, of an actuator."""
+    return "N m" if hasattr(definition.actuators[actuator], "turn") else "N"
 
 
 def shown(value: float, unit: str, digits: int = 6) -> str:

@@ -7,6 +7,7 @@ from railsim.definitions.mechanism_values import parameter_values
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
 from railsim.mechanisms.kinematics import solve
+from railsim.mechanisms.quantities import force_unit
 
 GAS_PRESSURES = (20e5, 250e5)
 """Usual pressures of gas springs over the outside [Pa] (makers' catalogues; Merci, 2017)."""
@@ -35,7 +36,7 @@ def _forces(result: Analysis) -> list[str]:
     least = runs_ahead(result)
     if not isinstance(unknown, HandForce | HandTorque) or least >= 0.0:
         return []
-    unit = "N" if isinstance(unknown, HandForce) else "N m"
+    unit = force_unit(solve_for.unknown, result.definition)
     return [f"'{solve_for.unknown}' holds back with up to {-least:.2f} {unit}: the load runs ahead"]
 
 

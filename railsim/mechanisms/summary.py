@@ -13,6 +13,7 @@ from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact
+from railsim.mechanisms.dynamics import FreeMotion
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
@@ -38,8 +39,8 @@ def provenance_data(definition: Mechanism) -> dict[str, str]:
     return {name: definition.provenance_of(name) for name in definition.parameters}
 
 
-def analysis_data(result: Analysis) -> Data:
-    """One analysis as plain numbers."""
+def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
+    """One analysis as plain numbers, with `courses` also those of every link and actuator."""
     definition = result.definition
     data: Data = {
         "name": definition.name,
@@ -73,21 +74,15 @@ def analysis_data(result: Analysis) -> Data:
         data["zone"] = {
             name: {at: values[name] for at, values in result.zone.items()} for name in names
         }
-    for key, courses in (("links", links(result.motion)), ("actuators", actuators(result.motion))):
-        data[key] = course_data(courses, "angle" if key == "links" else "length")
+    parts = (("links", links(result.motion)), ("actuators", actuators(result.motion)))
+    for key, found in parts if courses else ():
+        data[key] = course_data(found, "angle" if key == "links" else "length")
     if result.timed is not None:
-        data["motion"] = motion_data(result)
+        data["motion"] = motion_data(result, courses=courses)
     if result.contact is not None:
         data["contact"] = contact_data(result.contact)
     if result.release is not None:
-        released = result.release
-        data["release"] = {
-            "time": _list(released.time),
-            "travel": _list(released.s),
-            "speed": _list(released.speed),
-            "reached": released.reached,
-            "duration": float(released.time[-1]),
-        }
+        data["release"] = release_data(result.release)
     data["reactions"] = {
         name: {"max": r.max, "at": r.at, "components": [_list(row) for row in r.components.T]}
         for name, r in result.reactions.items()
@@ -139,6 +134,17 @@ def contact_data(contact: Contact) -> Data:
     }
 
 
+def release_data(released: FreeMotion) -> Data:
+    """The free motion as plain numbers."""
+    return {
+        "time": _list(released.time),
+        "travel": _list(released.s),
+        "speed": _list(released.speed),
+        "reached": released.reached,
+        "duration": float(released.time[-1]),
+    }
+
+
 def published_data(result: Analysis) -> dict[str, Data]:
     """Results that the source prints beside ours; none with parameters that are not the file's."""
     definition = result.definition
@@ -159,7 +165,7 @@ def published_data(result: Analysis) -> dict[str, Data]:
     }
 
 
-def motion_data(result: Analysis) -> Data:
+def motion_data(result: Analysis, *, courses: bool = True) -> Data:
     """The motion in time as plain numbers."""
     timed = result.timed
     assert timed is not None
@@ -172,8 +178,9 @@ def motion_data(result: Analysis) -> Data:
         "max_force": float(np.max(timed.force)),
         "min_force": float(np.min(timed.force)),
     }
-    for key, courses in (("links", links(timed.motion)), ("actuators", actuators(timed.motion))):
-        moving = {n: c.in_time(timed.speed, timed.acceleration) for n, c in courses.items()}
+    parts = (("links", links(timed.motion)), ("actuators", actuators(timed.motion)))
+    for key, found in parts if courses else ():
+        moving = {n: c.in_time(timed.speed, timed.acceleration) for n, c in found.items()}
         value = "angle" if key == "links" else "length"
         data[key] = course_data(moving, value, "speed", "acceleration")
     if result.definition.output is not None:

@@ -9,8 +9,9 @@ from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import Check
 from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact, moved
+from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import folded
-from railsim.mechanisms.quantities import SHOWN, quantity, shown
+from railsim.mechanisms.quantities import SHOWN, force_unit, quantity, shown
 from railsim.mechanisms.selection import Choice
 from railsim.mechanisms.summary import parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
@@ -178,9 +179,11 @@ def sentences(result: Analysis) -> list[str]:
     if (contact := result.contact) is not None:
         found += _contact_sentences(contact)
     if (timed := result.timed) is not None:
+        drives = driving(result.definition)
+        unit = force_unit(drives, result.definition)
         found.append(
-            f"motion in {timed.time[-1]:.3f} s: force {timed.force[0]:.2f} N at first, "
-            f"{np.min(timed.force):.2f} to {np.max(timed.force):.2f} N"
+            f"motion in {timed.time[-1]:.3f} s: force of '{drives}' {timed.force[0]:.2f} {unit} at "
+            f"first, {np.min(timed.force):.2f} to {np.max(timed.force):.2f} {unit}"
         )
     if (released := result.release) is not None:
         end = "reaches" if released.reached else "is then at"
@@ -199,10 +202,8 @@ def _force_sentence(result: Analysis, driver: Callable[[float], str]) -> str:
     for name, words in (("force", ""), ("force_back", "on the way back ")):
         if name in result.output:
             ends = result.extremes(name)
-            found.append(
-                f"{words}{ends.least:.2f} {unit} at {driver(ends.least_at)} to {ends.most:.2f} "
-                f"{unit} at {driver(ends.most_at)}"
-            )
+            low, high = (f"{force + 0.0:.2f} {unit} at" for force in (ends.least, ends.most))
+            found.append(f"{words}{low} {driver(ends.least_at)} to {high} {driver(ends.most_at)}")
     largest = f"largest amount {result.peak_force:.2f} {unit}"
     return f"force of '{result.definition.solve.unknown}' {'; '.join(found)}; {largest}"
 

@@ -17,6 +17,7 @@ from railsim.plot.mechanisms import (
     line,
     mark_zone,
     values_of,
+    way,
 )
 from railsim.plot.style import Picture
 
@@ -57,8 +58,8 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
                 above = curve[1] - np.interp(curve[0], *base)
                 panels[1, column].plot(curve[0], above, **line(i))
         if not zoom:
-            mark_zone(panels[0, column], first, "height")
-        panels[-1, column].set_xlabel("height over start / mm")
+            mark_zone(panels[0, column], first, way(first))
+        panels[-1, column].set_xlabel(label_of(way(first), first))
     panels[0, 0].set_ylabel("ratio dy/dL")
     panels[0, 1].set_ylabel("force / N")
     if zoom:
@@ -75,7 +76,7 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
     for i, (label, result) in enumerate(results.items()):
         if "pressure" not in result.output or "height" not in result.output:
             continue
-        height = values_of("height", result)
+        height = values_of(way(result), result)
         left.plot(height, values_of("pressure", result), label=label, **line(i))
         if result.contact is not None:
             held = f"{label}, {result.contact.pressure / 1e6:.4f} MPa"
@@ -83,8 +84,8 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
     right.axhline(0.0, color="0.4", lw=0.8)
     first = next(iter(results.values()))
     for axes, text in ((left, "pressure needed / MPa"), (right, "static contact force / N")):
-        mark_zone(axes, first, "height")
-        axes.set_xlabel("height over start / mm")
+        mark_zone(axes, first, way(first))
+        axes.set_xlabel(label_of(way(first), first))
         axes.set_ylabel(text)
         axes.legend(fontsize=7.5)
     left.set_ylim(bottom=0.0)
@@ -95,9 +96,9 @@ def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Float
     """A result over the height, with `zoom` in the zone only; None where there is none."""
     if name not in result.output or "height" not in result.output:
         return None
-    x, y = values_of("height", result), values_of(name, result)
+    x, y = values_of(way(result), result), values_of(name, result)
     if zoom and result.zone:
-        low, high = (result.zone[k]["height"] * 1e3 for k in ("low", "high"))
+        low, high = (result.zone[k][way(result)] * 1e3 for k in ("low", "high"))
         inside = (x >= low) & (x <= high)
         x, y = x[inside], y[inside]
     return x, y

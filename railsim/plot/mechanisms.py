@@ -21,7 +21,7 @@ from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.links import actuators, links
-from railsim.mechanisms.quantities import quantity
+from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.plot.point_names import name_points
 from railsim.plot.style import DISTINCT, LIMIT, Picture
 
@@ -68,6 +68,11 @@ def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
     low, work, high = (result.zone[k][over] * scale for k in ("low", "work", "high"))
     axes.axvspan(min(low, high), max(low, high), color="0.93", lw=0, zorder=0)
     axes.axvline(work, color="0.5", lw=0.8, ls=(0, (4, 2)), zorder=1)
+
+
+def way(result: Analysis) -> str:
+    """Name of the result that says how far the output has moved along its axis."""
+    return "x" if result.model.axis == 0 else "height"
 
 
 def drawing_figure(result: Analysis) -> Figure:
@@ -286,7 +291,7 @@ def cam_figure(result: Analysis) -> Figure:
 
 def force_figure(result: Analysis) -> Figure:
     """Ratios and force of the actuator over its length and over the height."""
-    over = [name for name in ("length", "height") if name in result.output]
+    over = [name for name in ("length", way(result)) if name in result.output]
     shown = [name for name in ("ratio", "force") if name in result.output]
     figure = Picture(figsize=(7.8, 5.4), layout="constrained")
     grid = figure.subplots(len(shown), len(over), sharex="col", sharey="row", squeeze=False)
@@ -315,18 +320,18 @@ def pressure_figure(result: Analysis) -> Figure:
     figure = Picture(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
     axes.plot(
-        values_of("height", result), values_of("pressure", result), color=MAIN, label="needed"
+        values_of(way(result), result), values_of("pressure", result), color=MAIN, label="needed"
     )
     if "pressure_back" in result.output:
-        axes.plot(values_of("height", result), values_of("pressure_back", result), color=MAIN,
+        axes.plot(values_of(way(result), result), values_of("pressure_back", result), color=MAIN,
                   ls=DASHES[2], label="needed on the way back")  # fmt: skip
         axes.legend()
     if result.contact is not None:
         axes.axhline(result.contact.pressure / 1e6, color=SECOND, ls=DASHES[1], label="held")
         axes.legend()
-    mark_zone(axes, result, "height")
+    mark_zone(axes, result, way(result))
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel(label_of("height", result))
+    axes.set_xlabel(label_of(way(result), result))
     axes.set_ylabel("pressure / MPa")
     return figure
 
@@ -338,17 +343,17 @@ def contact_figure(result: Analysis) -> Figure:
     figure = Picture(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.subplots()
     label = f"at {contact.pressure / 1e6:.4f} MPa"
-    axes.plot(values_of("height", result), contact.curve, color=MAIN, label=label)
+    axes.plot(values_of(way(result), result), contact.curve, color=MAIN, label=label)
     if contact.rising != contact.falling:
         for curve, words, dashes in zip(
             contact.bounds, ("rising", "falling"), DASHES[1:3], strict=True
         ):
-            axes.plot(values_of("height", result), curve, color=SECOND, ls=dashes, label=words)
+            axes.plot(values_of(way(result), result), curve, color=SECOND, ls=dashes, label=words)
     axes.axhline(0.0, color="0.4", lw=0.8)
     for y, stable in contact.equilibria:
         axes.plot(y * 1e3, 0.0, "o", mfc="k" if stable else "w", color="k", ms=6, clip_on=False)
-    mark_zone(axes, result, "height")
-    axes.set_xlabel(label_of("height", result))
+    mark_zone(axes, result, way(result))
+    axes.set_xlabel(label_of(way(result), result))
     axes.set_ylabel("static contact force / N")
     axes.legend()
     return figure
@@ -406,7 +411,7 @@ def time_figure(result: Analysis) -> Figure:
     a.plot(timed.time, timed.motion.s * travel.scale, color=MAIN)
     a.set_ylabel(label_of("travel", result, "driver"))
     name = driving(result.definition)
-    unit = "N m" if hasattr(result.definition.actuators[name], "turn") else "N"
+    unit = force_unit(name, result.definition)
     b.plot(timed.time, timed.force, color=MAIN)
     b.set_ylabel(f"{'torque' if unit == 'N m' else 'force'} of '{name}' / {unit}")
     if result.definition.output is not None:

@@ -22,7 +22,7 @@ from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import solve
 from railsim.mechanisms.links import Course, actuators, links
-from railsim.mechanisms.quantities import quantity
+from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import Texts
@@ -216,9 +216,8 @@ def motion_table(result: Analysis) -> bytes:
     timed = result.timed
     assert timed is not None
     unit = quantity("travel", result.definition).unit
-    columns = {"time [s]": timed.time, f"travel [{unit}]": timed.motion.s, "force [N]": timed.force}
-    if hasattr(result.definition.actuators[driving(result.definition)], "turn"):
-        columns["force [N m]"] = columns.pop("force [N]")
+    force = f"force [{force_unit(driving(result.definition), result.definition)}]"
+    columns = {"time [s]": timed.time, f"travel [{unit}]": timed.motion.s, force: timed.force}
     for courses, value, of in (
         (links(timed.motion), "angle", "rad"), (actuators(timed.motion), "length", "m"),
     ):  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 
 from railsim import cli
 from railsim.definitions.loading import load_mechanism
-from railsim.definitions.sources import shipped_names
+from railsim.definitions.sources import find_file, shipped_names
 
 FEW = ["--set", "sampling.points=51"]
 FOUR_BAR = """
@@ -457,7 +457,7 @@ def test_info_shows_parameters_with_their_provenance(capsys):
 
 def test_faults_name_the_file_of_their_key_in_one_way(capsys, write):
     """Found when loading and when computing, of a shipped name and of a file that extends one."""
-    shipped = Path(load_file_of("atr95_lift_5"))
+    shipped = find_file("atr95_lift_5", "mechanism")
     # a negative arm is found when loading, a rocker that is too long when computing
     for change, key in (("a1=-1", "derived.rocker_angle"), ("a3=0.40", "joints.rocker")):
         (line,) = refused(capsys, "atr95_lift_5", "--set", f"parameters.{change}")
@@ -467,12 +467,6 @@ def test_faults_name_the_file_of_their_key_in_one_way(capsys, write):
     )
     (line,) = refused(capsys, mine)
     assert line.startswith(f"{shipped}: joints.rocker: ")  # the file that holds the key
-
-
-def load_file_of(name):
-    from railsim.definitions.sources import find_file
-
-    return find_file(name, "mechanism")
 
 
 def test_a_motion_is_written_with_every_link_and_actuator(tmp_path, capsys):

@@ -246,3 +246,7 @@ def test_friction_does_not_hide_in_the_sense_of_a_rate():
     motion = solve(model, np.linspace(model.start, model.end, 11))
     forward, back = (generalised_force(motion, Rates(friction=k)) for k in (1, -1))
     assert np.all(forward < back)
+
+
+def test_a_force_that_is_zero_everywhere_has_no_zeros(load):
+    assert analyse(load(CRANK)).force_zeros == ()  # was one at every position
