@@ -46,7 +46,22 @@ def mechanism_remarks(mechanism: Mechanism) -> list[Remark]:
     stated = {name for names in mechanism.provenance.values() for name in names}
     if silent := [name for name in mechanism.parameters if name not in stated]:
         remarks.append(Remark("provenance", f"not stated for {', '.join(silent)}"))
-    return remarks
+    return [*remarks, *bounds_remarks(mechanism)]
+
+
+def bounds_remarks(mechanism: Mechanism) -> list[Remark]:
+    """Remarks on bounds of a search that exclude the file's own values."""
+    if mechanism.optimise is None:
+        return []
+    values = parameter_values(mechanism)
+    found = []
+    for name, (lower, upper) in mechanism.optimise.bounds.items():
+        low, high = (number(quantity, values) for quantity in (lower, upper))
+        if not low <= values[name] <= high:
+            text = f"{low:.6g} to {high:.6g} exclude the file's own {values[name]:.6g}"
+            end = "the first start begins at the nearer bound"
+            found.append(Remark(f"optimise.bounds.{name}", f"{text}; {end}"))
+    return found
 
 
 def _parameter_faults(mechanism: Mechanism) -> list[Fault]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from railsim.definitions.mechanism_faults import bounds_remarks
 from railsim.definitions.mechanism_parts import GasSpring, HandForce, HandTorque, Link
-from railsim.definitions.mechanism_values import parameter_values
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
 from railsim.mechanisms.kinematics import solve
@@ -23,7 +23,7 @@ def remarks(result: Analysis) -> list[str]:
         *_rods(result),
         *_gas_springs(result),
         *_lid(result),
-        *_bounds(result),
+        *(f"{r.key}: {r.text}" for r in bounds_remarks(result.definition)),
     ]
 
 
@@ -109,19 +109,3 @@ def _lid(result: Analysis) -> list[str]:
         for check in checks(result)
         if check.sense == "about"
     ]
-
-
-def _bounds(result: Analysis) -> list[str]:
-    """Bounds of the search that exclude the file's own values."""
-    definition, n = result.definition, result.model.number
-    if definition.optimise is None:
-        return []
-    values = parameter_values(definition)
-    found = []
-    for name, (low, high) in definition.optimise.bounds.items():
-        if not n(low) <= values[name] <= n(high):
-            found.append(
-                f"optimise.bounds.{name}: {n(low):.6g} to {n(high):.6g} exclude the file's own "
-                f"{values[name]:.6g}; the first start begins at the nearer bound"
-            )
-    return found
