@@ -7,15 +7,18 @@ import h5py
 import numpy as np
 import pytest
 from example_result import feed
+from made_record import made
 
 import railsim
 import railsim.studies.run
+from railsim.assessment import assess
 from railsim.assessment.sections import track_sections
 from railsim.assessment.track_quality import TrackQuality
 from railsim.cli import main
 from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_running_limits, load_scenario
 from railsim.errors import InputError
+from railsim.profiles import load_profile
 from railsim.studies.campaign import campaign, part_speed, scenario_cases
 
 
@@ -54,6 +57,29 @@ def test_campaign_meets_the_conditions_of_the_standard(vehicle):
     assert wheels == {"S1002", "S1002_hollow"}
     assert loads == {None, "laden"}
     assert len(set(seeds)) == len(seeds)
+
+
+@pytest.mark.slow
+def test_quiet_records_of_the_whole_campaign_pass_and_one_missing_run_does_not():
+    """Made-up records on the tracks and vehicles of the campaign: every condition is met."""
+    settings = '{"outputs": {"low_pass": {"frequency": 80.0}}, "output_rate": 200.0}'
+    profiles = {name: load_profile(name) for name in ("S1002", "S1002_hollow", "60E1")}
+    runs = {
+        case.name: made(
+            case.track, case.speed, rate=200.0, settings=settings, profiles=profiles,
+            vehicle=case.vehicle.to_toml(),
+        )
+        for case in scenario_cases(load_scenario("en14363"), ["coach_manchester"])
+    }  # fmt: skip
+    (found,) = assess(runs)
+    assert found.reasons == ()
+    assert found.verdict == "pass"
+    assert {verdict.value for verdict in found.verdicts.values()} == {"pass"}
+    assert {condition.state for condition in found.conditions} == {"met"}
+    (less,) = assess(dict(list(runs.items())[1:]))
+    assert less.verdict == "incomplete"
+    assert len(less.reasons) == 1
+    assert "zone 1, new, empty: number of sections not met: 14" in less.reasons[0]
 
 
 FAULTS = """format = "railsim-scenario/1"
