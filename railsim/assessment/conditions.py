@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from railsim.assessment.sections import reasons
+from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.zones import Population, ZoneReport
 from railsim.contact.geometry import ContactGeometry, contact_geometry
 from railsim.definitions.flatten import flatten
@@ -70,13 +70,8 @@ class SectionRow:
 
     Attributes
     ----------
-    run, population, zone : str
-    begin, end : float
-        Arc lengths [m].
-    radius : float
-        Signed, infinite on straight track [m].
-    cant_deficiency, speed : float
-        [m], [m/s]
+    run, population : str
+    section : TestSection
     alignment, level : float
         Standard deviations in D1 [m].
     quality : str
@@ -86,29 +81,22 @@ class SectionRow:
     realisation : str
         What the track's irregularities are, seed included.
     counts : bool
-    reason : str
-        Why it is outside the conditions of its zone.
     """
 
     run: str
     population: str
-    zone: str
-    begin: float
-    end: float
-    radius: float
-    cant_deficiency: float
-    speed: float
+    section: TestSection
     alignment: float
     level: float
     quality: str
     conicity: float
     realisation: str
     counts: bool
-    reason: str
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
-        return {k: v for k, v in self.__dict__.items() if k != "realisation"}
+        own = {k: v for k, v in self.__dict__.items() if k not in ("section", "realisation")}
+        return {**own, **self.section.__dict__}
 
 
 def _stated(met: bool) -> str:
@@ -156,7 +144,7 @@ def zone_conditions(
             "curves to both hands", place, _stated(0 < right < n),
             f"{right} sections to the right, {n - right} to the left", "both", "ours",
         ))  # fmt: skip
-    times = Counter((row.realisation, round(row.begin, 1)) for row in rows)
+    times = Counter((row.realisation, round(row.section.begin, 1)) for row in rows)
     again = sum(times.values()) - len(times)
     found.append(Condition(
         "independent sections", place, _stated(not again),
@@ -180,7 +168,7 @@ def _quality(
     )
     if target is None:
         return Condition("track quality", place, NOT_CHECKED, found, "no target in the limits file")
-    speed = min(max(row.speed for row in rows), service.admissible_speed)
+    speed = min(max(row.section.speed for row in rows), service.admissible_speed)
     ends = target.ends(speed)
     met = ends[0] <= alignment <= ends[1] and ends[2] <= level <= ends[3]
     low_a, high_a, low_l, high_l = (1e3 * end for end in ends)
@@ -199,7 +187,7 @@ def vehicle_conditions(
 ) -> list[Condition]:
     """Conditions on all runs together; `rows` are the sections that count."""
     found = []
-    values = [row.conicity for row in rows if row.zone == "1"]
+    values = [row.conicity for row in rows if row.section.zone == "1"]
     if values:
         found += _conicity(np.array(values), limits.conicity, service)
     found.append(_loads(reports))

@@ -92,7 +92,7 @@ def section_values(
     Parameters
     ----------
     record : Record
-        Run with Q, Y and wheelset distances, and accelerations or body motions.
+        Run with all that is `NEEDED`, and accelerations or body motions.
     sections : sequence of TestSection
         In the order of the track.
     f0 : float, optional
@@ -100,7 +100,6 @@ def section_values(
     causal : bool
         Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
     """
-    record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
     found = []
     for group in _stretches(sections):
         part = _Part(record, group[0].begin, group[-1].end, causal=causal)

@@ -16,6 +16,7 @@ from railsim.assessment.conditions import (
     zone_conditions,
 )
 from railsim.assessment.en14363 import (
+    NEEDED,
     SectionValues,
     hunting_frequency,
     hunting_spectrum,
@@ -100,8 +101,10 @@ def _kind(result: Result) -> tuple[str, ...]:
 def _populations(runs: Mapping[str, Result]) -> dict[str, str]:
     """Name of each run's population: what differs between the runs, and the condition."""
     kinds = {name: _kind(result) for name, result in runs.items()}
-    several = [k for k in range(5) if len({kind[k] for kind in kinds.values()}) > 1]
-    shown = sorted({0, *several} - ({1} if 0 in several else set()))
+    several = {k for k in range(5) if len({kind[k] for kind in kinds.values()}) > 1}
+    if len({kind[0] for kind in kinds.values()}) == len({kind[:2] for kind in kinds.values()}):
+        several -= {1}  # the condition says which load it is
+    shown = sorted({0, *several})
     return {name: ", ".join(filter(None, (kind[k] for k in shown))) for name, kind in kinds.items()}
 
 
@@ -140,7 +143,7 @@ def assessed_runs(
         zones += reports
         conditions += missing_zones(population, reports, limits)
         for report in reports if not population.fault else ():
-            there = [r for r in counted if r.zone == report.zone and r.population == name]
+            there = [r for r in counted if r.section.zone == report.zone and r.population == name]
             conditions += zone_conditions(report, there, limits, service)
     results = [run.record.result for run in done]
     if done:
@@ -189,6 +192,7 @@ def _read(
         if result.status != "complete":
             continue
         record = Record(result, name, coarse=options.coarse)
+        record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
         if "Q0" not in result:
             raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
         own = track_sections(result.track(), limits, service, record.covered(), record.speed_at)
@@ -210,8 +214,8 @@ def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
         alignment, level = quality.deviations(s.begin, s.end) if quality else (0.0, 0.0)
         name = quality_class(min(s.speed, service.admissible_speed), alignment, level)
         rows.append(SectionRow(
-            run.name, run.population, s.zone, s.begin, s.end, s.radius, s.cant_deficiency, s.speed,
-            alignment, level, name, conicity, realisation, s in run.counting, s.reason,
+            run.name, run.population, s, alignment, level, name, conicity, realisation,
+            s in run.counting,
         ))  # fmt: skip
     return rows
 

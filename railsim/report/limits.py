@@ -157,13 +157,14 @@ def _sections(one: Assessment) -> Table:
               "alignment (mm)", "level (mm)", "conicity", "quality", "not counted"]  # fmt: skip
     rows = [
         [
-            printable(row.run), row.zone, f"{row.begin:.0f}", f"{row.end:.0f}",
-            "straight" if math.isinf(row.radius) else f"{row.radius:.0f}",
-            f"{1e3 * row.cant_deficiency:.0f}", f"{row.speed:.2f}", f"{1e3 * row.alignment:.2f}",
+            printable(row.run), s.zone, f"{s.begin:.0f}", f"{s.end:.0f}",
+            "straight" if math.isinf(s.radius) else f"{s.radius:.0f}",
+            f"{1e3 * s.cant_deficiency:.0f}", f"{s.speed:.2f}", f"{1e3 * row.alignment:.2f}",
             f"{1e3 * row.level:.2f}", _number(row.conicity), row.quality,
-            "" if row.counts else row.reason or "no zone",
+            "" if row.counts else s.reason or "no zone",
         ]
         for row in one.sections
+        for s in [row.section]
     ]  # fmt: skip
     caption = f"Sections: {printable(one.vehicle)}"
     return Table(header, rows, caption, words=frozenset({0, 1, 10, 11}))

@@ -176,6 +176,7 @@ def test_track_quality_stands_beside_the_sections():
 
 @pytest.mark.parametrize(("change", "message"), [
     ({"without": ("Q",)}, r"Q: is not in the result; run it with settings.outputs.quantities"),
+    ({"without": ("Y",)}, r"Y: is not in the result; run it with settings.outputs.quantities"),
     ({"rate": 200.0}, r"200 samples per second; at least 1000"),
     ({"until": 100.0}, r"too short for one section"),
 ])  # fmt: skip

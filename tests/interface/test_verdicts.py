@@ -160,6 +160,20 @@ def test_conditions_of_one_vehicle_are_assessed_together_and_apart():
     assert [z.population.name for z in found.zones if z.zone == "4"] == ["new", "worn"]
 
 
+def test_loads_in_one_condition_are_not_pooled():
+    import railsim
+
+    coach = railsim.load_vehicle("coach_manchester")
+    texts = {}
+    for state, load in (("new", "design"), ("worn", "design"), ("worn", "laden")):
+        service = coach.service.model_copy(update={"condition": state})
+        changed = coach.model_copy(update={"service": service, "load": load})
+        texts[f"{state} {load}"] = changed.to_toml()
+    (found,) = assess({name: made(ON_ZONE_4, 23.0, vehicle=text) for name, text in texts.items()})
+    names = [z.population.name for z in found.zones if z.zone == "4"]
+    assert names == ["new", "worn", "worn, laden"]
+
+
 def test_fault_mode_is_assessed_for_running_safety_only():
     run = made(ON_ZONE_4, 23.0, vehicle=vehicle(condition="failed damper", fault=True))
     (found,) = assess(run)
