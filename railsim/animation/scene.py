@@ -17,6 +17,7 @@ from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.result import Result
 from railsim.result.data import Array
 from railsim.track.alignment import Alignment
+from railsim.track.irregularity import displacement
 
 FRAMES = 600
 TRACK_STEP = 1.0  # m
@@ -62,7 +63,8 @@ class Scene:
     time, distance : float64[frame]
         [s], [m]
     pose : float64[frame, body, 6]
-        Against the nominal position, as `body_position` [m], [rad].
+        Against the nominal position, as `body_position`; those of wheelsets in y, z and roll
+        against their rails, which are drawn without irregularities [m], [rad].
     track : dict
         ``s``, ``x``, ``y``, ``heading``, ``cant`` along the track [m], [rad].
     Q, Y : float64[frame, wheelset, 2] or None
@@ -134,13 +136,28 @@ def result_scene(
         bodies=drawn,
         time=result["time"][rows],
         distance=distance[rows],
-        pose=result["body_position"][rows][:, columns],
+        pose=_poses(result, rows)[:, columns],
         track=_track(Alignment(result.track()), distance[rows]),
         Q=result["Q"][rows],
         Y=result["Y"][rows],
         sections=_sections(result, flat),
         patches=patches,
     )
+
+
+def _poses(result: Result, rows: Array) -> Array:
+    """Poses of all bodies; of wheelsets where they are on their rails."""
+    pose = np.array(result["body_position"][rows])
+    wheelsets = [result.bodies.index(name) for name in result.wheelsets]
+    if "wheelset_lateral" in result and "wheelset_roll" in result:
+        pose[:, wheelsets, 1] = result["wheelset_lateral"][rows]
+        pose[:, wheelsets, 3] = result["wheelset_roll"][rows]
+    irregularity = displacement(result.track())
+    if irregularity is not None and "wheelset_distance" in result:
+        at = result["wheelset_distance"][rows]
+        _, z_left, _, z_right = irregularity(at.ravel())[0]
+        pose[:, wheelsets, 2] -= 0.5 * (z_left + z_right).reshape(at.shape)
+    return pose
 
 
 def mode_scene(

@@ -55,6 +55,26 @@ def test_wheels_stand_on_their_rails(result):
         assert abs(np.max(wheel - rail)) < 2e-4
 
 
+def test_wheelsets_are_drawn_where_they_are_on_irregular_rails():
+    """The track as a whole lies 4 mm aside and 20 mm higher: no wheel is drawn within its rail."""
+    rows = (
+        "{type='kink', s=40.0, length=60.0, offset=0.004, shape='cosine'}, "
+        "{type='dip', s=75.0, length=100.0, depth=-0.02}"
+    )
+    track = railsim.load_track("straight", [f"irregularities=[{rows}]"])
+    coach = railsim.load_vehicle("coach_manchester")
+    result = railsim.simulate(coach, track, speed=20.0, start=65.0, duration=0.3)
+    scene = result_scene(result, frames=20)
+    wheelsets = [k for k, body in enumerate(scene.bodies) if body.kind == "wheelset"]
+    poses = scene.pose[:, wheelsets]
+    moved = result.body_position[:, [result.bodies.index(name) for name in result.wheelsets]]
+    assert np.max(np.abs(moved[..., 1])) > 2e-3
+    assert np.max(np.abs(poses[..., 1])) < 1e-3
+    # but for the settlement of elastic rails under the wheel loads
+    assert np.min(moved[..., 2]) < -0.015
+    assert np.max(np.abs(poses[..., 2])) < 2e-3
+
+
 def test_page_needs_nothing_from_elsewhere(result, tmp_path):
     page = write_page(result_scene(result, frames=40), tmp_path / "run.html").read_text()
     assert not re.search(r"(src|href)=|https?://|@import|url\(", page)
