@@ -10,11 +10,17 @@ NOT_FINITE = 6
 END_OF_TRACK = 7
 STANDSTILL = 8
 STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; it goes on alone
+BESIDE_RAIL = 10
 
 # code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
 STATUS = {
     RUNNING: ("complete", "the run reached its end"),
     DERAILED: ("derailed", "{where} climbed over the rail: a flange's tip stands over its top"),
+    BESIDE_RAIL: (
+        "stopped",
+        "{where} is beside its rail without having climbed it: the step is too long or the model "
+        "is unstable",
+    ),
     INWARD_RANGE: ("stopped", "{where} moved a wheel inwards beyond the range of the table"),
     WHEEL_LIFT: ("stopped", "{where} lifted a wheel beyond the range of the model"),
     ROLL_RANGE: ("stopped", "{where} rolled beyond the range of the contact table"),

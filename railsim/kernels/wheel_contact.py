@@ -81,6 +81,7 @@ from railsim.kernels.rails import (
     foresee,
 )
 from railsim.kernels.status import (
+    BESIDE_RAIL,
     DERAILED,
     INWARD_RANGE,
     ROLL_RANGE,
@@ -94,6 +95,7 @@ from railsim.kernels.track_frame import OMEGA
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
 FADE = 30e-6  # penetration over which the contact damping is faded in (m)
+DEEPEST = 1e-3  # penetration under some 2 MN, more than any wheel that climbs carries (m)
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
 
@@ -220,7 +222,7 @@ def wheel_contact(system, work, w, side, speed, n):
         contact, table, meet.y, meet.roll, meet.sign * above[8], meet.yaw * meet.yaw
     )
     if where != INSIDE:
-        return outside(where), n
+        return outside(contact, table, where, meet, meet.sign * above[8]), n
     if tw > 1.0:
         work.events[w, 4] += 1
     cell_weights(contact, ty, tr, above[9], work.weights)
@@ -356,15 +358,35 @@ def all_far(contact, table, iy, ir, iw, tr, z):
 
 
 @compiled
-def outside(where):
+def outside(contact, table, where, meet, stretched):
     """Status code for a look-up outside the contact table."""
     if where == ABOVE_Y:
-        return DERAILED
+        return DERAILED if has_climbed(contact, table, meet, stretched) else BESIDE_RAIL
     if where == BELOW_Y:
         return INWARD_RANGE
     if where == OUTSIDE_ROLL:
         return ROLL_RANGE
     return YAW_RANGE
+
+
+@compiled
+def has_climbed(contact, table, meet, stretched):
+    """Whether a wheel stands as high as the end of the table, its flange's tip over the rail's top.
+
+    A wheel that is beyond without having been lifted there, or presses itself into the rail deeper
+    than any load does, was not carried there by its rail: the step or the model is unstable.
+    """
+    shape = contact.values.shape
+    tr = (stretched - contact.roll0) / contact.droll
+    ir = min(max(int(tr), 0), shape[3] - 2)
+    last = shape[4] - 3  # the last node of the range
+    for patch in range(N_PATCH):
+        # the top is level: yaw does not change how high the tip stands on it
+        here = contact.values[table, patch, 0, ir, last, 0]
+        following = contact.values[table, patch, 0, ir + 1, last, 0]
+        if meet.z > here + (tr - ir) * (following - here) + DEEPEST:
+            return False
+    return True
 
 
 @compiled(merge=True)

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.vehicle import Vehicle
-from railsim.kernels.status import NOT_FINITE, STATUS
+from railsim.kernels.status import DERAILED, NOT_FINITE, STATUS
 from railsim.model.assembly import Model
 from railsim.result import Result
 from railsim.result.hunting import hunting
 from railsim.simulation.advance import Run
 from railsim.simulation.conditions import Inputs
 from railsim.simulation.outputs import run_extremes
-from railsim.simulation.remarks import run_remarks
+from railsim.simulation.remarks import beyond_experience, run_remarks
 from railsim.simulation.right_samples import low_pass_remark
 
 Floats = NDArray[np.float64]
@@ -33,8 +33,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
     of_peaks = run.evaluated if evaluates else run.extremes
     swings = hunting(run.swings.close({}), run.plan.irregularity)
     attributes: dict[str, str | float | int] = {
-        "status": STATUS[run.status][0],
-        "status_reason": _sentence(prepared.model, run.status, run.where),
+        **verdict(run),
         "remarks": "\n".join(run_remarks(run, swings)),
         "vehicle_toml": vehicle.to_toml(),
         "track_toml": inputs.track.to_toml(),
@@ -82,6 +81,25 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         if remark != low_pass_remark(settings) and remark not in prepared.remarks:
             _LOG.warning(remark)
     return result
+
+
+def verdict(run: Run) -> dict[str, str]:
+    """How a run ended, and why: attributes `status` and `status_reason`.
+
+    A wheelset is derailed if it stands over its rail, which the loop has looked at, and if the
+    forces on the way there can have been those of a railway.
+    """
+    model, Q0 = run.prepared.model, run.prepared.balance.Q0
+    if run.status == DERAILED:
+        where = model.index.wheelsets[run.where]
+        if beyond_experience(run_extremes(run.extremes, Q0), Q0, model.index.wheelsets):
+            why = "left its rail under forces beyond all experience"
+            cause = "the step is too long or the model is unstable"
+            return {"status": "stopped", "status_reason": f"{where} {why}: {cause}"}
+    return {
+        "status": STATUS[run.status][0],
+        "status_reason": _sentence(model, run.status, run.where),
+    }
 
 
 def _sentence(model: Model, status: int, where: int) -> str:

@@ -21,6 +21,7 @@ from railsim.kernels.aligned import aligned
 from railsim.kernels.element_columns import BOTH_ENDS, ROTATES
 from railsim.kernels.element_outputs import LINK
 from railsim.kernels.status import (
+    BESIDE_RAIL,
     DERAILED,
     INWARD_RANGE,
     NOT_FINITE,
@@ -50,7 +51,9 @@ Group = TypeVar("Group", bound=tuple[Any, ...])
 # the grid of the contact tables, which a system has but one of
 GRID = ("y0", "dy", "roll0", "droll")
 # statuses that concern a wheelset
-OF_WHEELSET = (DERAILED, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
+OF_WHEELSET = (
+    DERAILED, BESIDE_RAIL, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES,
+)  # fmt: skip
 
 
 def contact_grid(model: Model) -> tuple[float | int, ...]:

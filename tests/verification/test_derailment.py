@@ -1,0 +1,56 @@
+"""A run is `derailed` where position, lift and forces say so; what blows up is `stopped`."""
+
+import numpy as np
+import pytest
+
+from railsim.contact.elastic import TableArrays
+from railsim.contact.table import TableGrid, build_contact_table
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.settings import Settings
+from railsim.kernels.wheel_contact import Meeting, has_climbed
+from railsim.profiles import load_profile
+from railsim.simulation import simulate
+
+FLANGE = 0.028  # m, height of the flange of S1002
+COACH = load_vehicle("coach_manchester")
+
+
+def test_wheel_that_climbs_is_derailed_and_stands_on_its_flange():
+    # far too tight and dry for a coach
+    track = load_track("curve_r250", ["plan.2.radius=90", "friction=0.9"])
+    result = simulate(COACH, track, speed=15.0)
+    assert result.status == "derailed"
+    assert "front.outer.wheelset climbed" in result.attributes["status_reason"]
+    assert result.wheelset_lateral[-1, 0] < -0.020
+    # the wheelset turns about the inner wheel, 1.5 m away
+    assert result.wheelset_roll[-1, 0] > 0.9 * FLANGE / 1.5
+    assert np.max(result.Q) < 3.0 * np.max(result.Q0)
+
+
+def test_wheelset_that_is_thrown_off_the_rails_is_not_derailed():
+    settings = Settings(initial={"front.outer.wheelset": {"vy": -6.0}})
+    track = load_track("straight", ["support.preset=rigid"])
+    result = simulate(COACH, track, speed=20.0, until=5.0, settings=settings)
+    assert result.status == "stopped"
+    assert "under forces beyond all experience" in result.attributes["status_reason"]
+
+
+@pytest.mark.parametrize("roll", [-0.002, 0.0, 0.002])
+def test_wheel_beyond_the_rail_that_was_not_lifted_is_not_derailed(roll):
+    table = build_contact_table(
+        load_profile("S1002"), load_profile("60E1"), grid=TableGrid(roll_max=3e-3, n_w=2)
+    )
+    arrays = TableArrays(
+        table.values[None], np.array([table.shear]), table.y0, table.dy, table.roll0, table.droll,
+        table.w,
+    )  # fmt: skip
+
+    def climbed(z):
+        meet = Meeting(1.0, 0.1, z, roll, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return has_climbed(arrays, 0, meet, roll)
+
+    on_top = -FLANGE - 0.75 * roll
+    assert climbed(on_top)
+    assert climbed(on_top - 0.01)  # in the air
+    assert not climbed(on_top + 0.005)
+    assert not climbed(0.0)
