@@ -1,6 +1,7 @@
 """Wheels worn hollow: two branches of the contact, 40 mm apart on the wheel, share the load."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from railsim.contact.table import TableGrid, build_contact_table
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.profiles import load_profile
+from railsim.profiles.profile import Profile
 from railsim.simulation import simulate
 
+CROSSING = Path(__file__).parents[1] / "data" / "crossing"
 LOAD = 60e3
 NARROW = TableGrid(s_min=-4e-3, s_max=6e-3, roll_max=3e-3, n_w=2)
 FIELD_SIDE = 0.75  # m, beyond it lies the rim of the hollow
@@ -43,6 +46,54 @@ def test_load_moves_across_a_hollow_as_by_boundary_elements(depth, inclination, 
         shares.append(rim / LOAD)
     assert shares == sorted(shares, reverse=True)
     assert 0.05 < shares[1] < 0.95  # both carry
+
+
+def crossing_rail(s):
+    """Wing rail and nose of a crossing where a wheel at `s` touches them, and their gauge.
+
+    Both slope along the track: the wheel touches the wing 3.2 mm behind, the nose 4.6 mm before
+    its axle's plane (CONTACT), x^2/(2 r) higher than there.  The flangeway between them is filled
+    up to 10 mm below the top and given slopes that a rail may have.
+    """
+    places = 0.22871, 0.24836
+    sections = [1e-3 * np.loadtxt(CROSSING / f"section_{n}.txt") for n in (70, 71)]
+    y = np.arange(-0.040, 0.0651, 1e-4)
+
+    def height(x):
+        share = (s + x - places[0]) / (places[1] - places[0])
+        low, high = (np.interp(y, *section.T) for section in sections)
+        return low + share * (high - low) + x**2 / (2 * 0.46)
+
+    z = np.where(y < 0.0, height(4.6e-3), height(-3.2e-3))
+    z[y > -0.024] = np.minimum(z[y > -0.024], 0.010)
+    z = np.min(z + 4.0 * np.abs(y[:, None] - y), axis=1)
+    z -= z.min()
+    last = int(np.flatnonzero(z >= 0.014)[-1])
+    face = np.interp(-0.014, -z[last : last + 2], y[last : last + 2])
+    return Profile("crossing", "rail", y, z), 2.0 * (0.75 + face)
+
+
+def test_load_moves_from_wing_rail_to_nose_as_by_contact():
+    rail, gauge = crossing_rail(0.239)
+    lateral, wing, nose = np.loadtxt(CROSSING / "loads.csv", delimiter=",", skiprows=1).T
+    grid = TableGrid(s_min=-1e-3, s_max=3e-3, roll_max=3e-3, n_w=2)
+    table = build_contact_table(
+        load_profile("S1002"), rail, gauge=gauge, inclination=0.0, grid=grid
+    )
+
+    def wing_share(y):
+        patches = loaded_contact(table, y, 0.0, 10e3).patches
+        loads = [sum(p.N for p in patches if (p.y > FIELD_SIDE) == on_wing) for on_wing in (1, 0)]
+        return loads[0] / sum(loads)
+
+    share = wing / (wing + nose)
+    places = np.arange(0.70, 1.30, 0.01)  # mm
+    found = np.array([wing_share(1e-3 * y) for y in places])
+    limits = np.array([0.9, 0.7, 0.5, 0.3, 0.1])
+    exact, ours = np.interp(-limits, -share, lateral), np.interp(-limits, -found, places)
+    # the corner of the wing is not the same between two sections 20 mm apart
+    assert ours[2] == pytest.approx(exact[2], abs=0.08)
+    np.testing.assert_allclose(ours - ours[2], exact - exact[2], atol=0.002)
 
 
 def run(depth, inclination, support, radius, speed, **settings):
