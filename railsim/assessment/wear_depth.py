@@ -6,6 +6,8 @@ ellipse, at the position of the patch on the profile.  The wheel stays round: th
 over the circumference.
 """
 
+import math
+
 import numpy as np
 
 from railsim.assessment.wear import pearce_sherratt_1991
@@ -18,10 +20,12 @@ from railsim.result.filters import Floats
 
 SPACING = 0.25e-3  # m
 RANGE = (-0.070, 0.070)  # m from the nominal rolling circle
-SMOOTHING = 2e-3  # m, width of the smoothing of the worn profile
+SCATTER = 3e-3  # m along the contour, standard deviation of where the same contact lies
 ROUNDING = 0.1  # largest share of the worn area that the points of the profile may miss
 WORN = " worn"
 DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the profile meanwhile
+UPDATE = 0.1e-3  # m, after which the contact is computed again on the worn profile
+MOST_PARTS = 100  # of a step
 NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", "patch_T_x",
           "patch_T_y", "body_position")  # fmt: skip
 
@@ -100,6 +104,59 @@ def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
     return np.asarray(np.diff(inside) / SPACING)
 
 
+def scattered(profile: Profile, depth: Floats) -> Floats:
+    """Depth of wear as contacts scatter along the contour that a run has in one place.
+
+    Gauge, rails and loads differ from place to place; without, a circle and its one rail would cut
+    a groove narrower than any rail.  On the flank the same way along the contour is shorter in y.
+
+    Parameters
+    ----------
+    profile : Profile
+        A wheel.
+    depth : float64[position]
+        Depth in the direction z over `grid` [m].
+
+    Returns
+    -------
+    float64[position]
+        Depth with the same worn area [m].
+    """
+    lengths = _lengths(profile)
+    s = np.cumsum(lengths)
+    kernel = np.exp(-0.5 * ((s[:, None] - s) / SCATTER) ** 2) * lengths[:, None]
+    return np.asarray(kernel / kernel.sum(axis=0) @ depth)
+
+
+def _lengths(profile: Profile) -> Floats:
+    """Length of the contour in each cell of `grid` [m]."""
+    z = np.interp(grid(), profile.y, profile.z)
+    return np.asarray(np.hypot(SPACING, np.gradient(z)))
+
+
+def deepest(profile: Profile, depth: Floats) -> float:
+    """Greatest depth of `scattered` wear, measured along the normal [as `depth`]."""
+    return float(np.max(scattered(profile, depth) * SPACING / _lengths(profile)))
+
+
+def parts_of_step(profile: Profile, depth: Floats, distance: float) -> int:
+    """Into how many parts a distance is divided so that each wears the profile by `UPDATE` at most.
+
+    Arguments as for `worn_profile`.
+
+    Raises
+    ------
+    InputError : more than `MOST_PARTS`.
+    """
+    worn = deepest(profile, depth) * distance
+    parts = max(math.ceil(worn / UPDATE), 1)
+    if not parts <= MOST_PARTS:
+        allowed = f"at most {1e3 * MOST_PARTS * UPDATE:g} mm in a step"
+        found = f"{1e-3 * distance:g} km wear it {1e3 * worn:.3g} mm deep"
+        raise InputError([Fault(profile.name, "step", found, allowed)])
+    return parts
+
+
 def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     """Profile after a distance at a constant rate of wear.
 
@@ -115,20 +172,19 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     Returns
     -------
     Profile
-        The depth is smoothed over 2 mm; the worn area is that of `depth` times `distance`.
+        The depth is that of `scattered`; the worn area is that of `depth` times `distance`.
 
     Raises
     ------
     InputError : the wear is deeper than 1 mm; the points of the profile are too far apart.
     """
     worn = depth * distance
-    deepest = float(np.max(worn))
-    if deepest > DEEPEST:
-        allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / deepest:.3g} km"
-        found = f"{1e-3 * distance:g} km wear {1e3 * deepest:.3g} mm deep"
+    most = deepest(profile, worn)
+    if most > DEEPEST:
+        allowed = f"at most {1e3 * DEEPEST:g} mm: {1e-3 * distance * DEEPEST / most:.4g} km"
+        found = f"{1e-3 * distance:g} km wear {1e3 * most:.3g} mm deep"
         raise InputError([Fault("wear", "step", found, allowed)])
-    kernel = np.exp(-0.5 * ((np.arange(-24, 25) * SPACING) / (0.5 * SMOOTHING)) ** 2)
-    smooth = np.convolve(worn, kernel / kernel.sum(), mode="same")
+    smooth = scattered(profile, worn)
     y = np.asarray(profile.y)
     lost = np.interp(y, grid(), smooth, left=0.0, right=0.0)
     area, kept = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, y))

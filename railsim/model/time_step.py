@@ -143,10 +143,11 @@ class Stability:
             if self.holds(interval / n, MARGIN):
                 return interval / n
             n = max(n + 1, int(n * 1.1))
-        raise ModelError(
-            f"no stable step longer than {SHORTEST_STEP:g} s: an element is too stiff for the "
-            "masses it connects"
-        )
+        cause = "an element is too stiff for the masses it connects"
+        if self._within(False, *self._straight, interval / n):
+            names = " on ".join(profile.name for profile in self._model.profiles.values())
+            cause = f"the contact of {names} is too sharp in flange contact"
+        raise ModelError(f"no stable step longer than {SHORTEST_STEP:g} s: {cause}")
 
     def holds(self, h: float, margin: float = 1.0) -> bool:
         """Whether a step `margin` times as long as `h` is stable, in flange contact too."""

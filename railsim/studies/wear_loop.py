@@ -10,12 +10,13 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.assessment.wear_depth import worn_depth, worn_profile
+from railsim.assessment.wear_depth import parts_of_step, worn_depth, worn_profile
 from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
 from railsim.definitions.settings import Settings
@@ -52,7 +53,8 @@ class WearStep:
     profile, worn : Profile
         Wheel profile in this step, and after it.
     depth : float64[position]
-        Depth of wear per distance, mean of all wheels, over `wear_depth.grid` [m/m].
+        Depth of wear per distance, mean of all wheels and over the step, on `wear_depth.grid`
+        [m/m].
     """
 
     distance: float
@@ -83,8 +85,8 @@ def wear_loop(
     routes : sequence of Route or (Track, float, float)
         Tracks with their speeds [m/s] and shares of the distance.
     step : float
-        Distance between two updates of the profile [m], such that the depth of wear in one step
-        is at most a few tenths of a millimetre; more than 1 mm is refused.
+        Distance between two profiles that are told [m].  Within a step the profile is updated as
+        often as it has worn by 0.1 mm.
     steps : int
         Number of updates.
     settings : Settings, optional
@@ -103,7 +105,7 @@ def wear_loop(
     ------
     InputError : different wheel profiles; no route, or a route without a share; no step; too much
         wear in a step.
-    ModelError : a run ended early.
+    ModelError : a run ended early; names profile, distance and track.
     """
     name = _profile_name(vehicle)
     ways = [Route(*route) for route in routes]
@@ -112,26 +114,37 @@ def wear_loop(
     outputs = given.outputs.model_copy(update={"contact_patches": True})
     given = given.model_copy(update={"outputs": outputs})
     tell, remark = progress or (lambda _: None), on_remark or _LOG.warning
-    profile, found = load_profile(name), []
+    profile, found, whole = load_profile(name), [], steps * step
     for number in range(steps):
-        path = None if folder is None else folder / _file_name(vehicle, ways, given, step, profile)
-        depth = _kept(path, remark)
-        if depth is None:
-
-            def part(share: float, before: int = number) -> None:
-                tell((before + share) / steps)
-
-            depth = _depth(vehicle, ways, given, {name: profile}, part)
-            if path is not None:
-                keep(path, {"distance": number * step, "depth": depth.tolist()})
-        worn = worn_profile(profile, depth, step)
-        done = WearStep(number * step, step, profile, worn, depth)
+        worn, at, lost = profile, number * step, np.zeros(1)
+        left = step
+        while left > 0.0:
+            path = None if folder is None else folder / _file_name(vehicle, ways, given, step, worn)
+            depth = _kept(path, remark)
+            if depth is None:
+                try:
+                    part = partial(_tell_part, tell, at / whole, left / whole)
+                    depth = _depth(vehicle, ways, given, {name: worn}, part)
+                except ModelError as error:
+                    words = f"wheel {worn.name} after {1e-3 * at:.4g} km {error}"
+                    raise ModelError(words) from None
+                if path is not None:
+                    keep(path, {"distance": at, "depth": depth.tolist()})
+            length = left / parts_of_step(worn, depth, left)
+            worn = worn_profile(worn, depth, length)
+            lost = lost + depth * length
+            at, left = at + length, left - length
+        done = WearStep(number * step, step, profile, worn, lost / step)
         found.append(done)
         tell((number + 1) / steps)
         if on_step is not None:
             on_step(done)
         profile = worn
     return found
+
+
+def _tell_part(tell: Callable[[float], None], before: float, portion: float, done: float) -> None:
+    tell(before + portion * done)
 
 
 def wear_rows(
@@ -244,18 +257,18 @@ def _depth(
             progress((before + done) / len(routes))
 
         rails = {rail: load_profile(rail) for rail in track.rail}
-        result = simulate(
-            vehicle, track, speed=speed, settings=settings, profiles=rails | worn, progress=part
-        )
-        depths.append(share / total * _mean_depth(result))
+        try:
+            result = simulate(
+                vehicle, track, speed=speed, settings=settings, profiles=rails | worn, progress=part
+            )
+            depths.append(share / total * _mean_depth(result))
+        except ModelError as error:
+            raise ModelError(f"on {track.name}: {error}") from None
     return np.asarray(np.sum(depths, axis=0))
 
 
 def _mean_depth(result: Result) -> Floats:
     if result.status != "complete":
-        raise ModelError(
-            f"a run of the wear loop ended early: {result.status}, "
-            f"{result.attributes['status_reason']}"
-        )
+        raise ModelError(f"{result.status}, {result.attributes['status_reason']}")
     depths = [worn_depth(result, w, side) for w in range(len(result.wheelsets)) for side in (0, 1)]
     return np.asarray(np.mean(depths, axis=0))

@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 
 import railsim
 from railsim.assessment.wear import pearce_sherratt_1991
-from railsim.assessment.wear_depth import SPACING, grid, spread, worn_depth, worn_profile
+from railsim.assessment.wear_depth import (
+    SPACING,
+    deepest,
+    grid,
+    parts_of_step,
+    spread,
+    worn_depth,
+    worn_profile,
+)
+from railsim.contact.curves import wheel_curve
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.profiles import load_profile
@@ -37,15 +46,42 @@ def test_worn_profile_loses_the_area_of_the_wear():
     assert lost.min() > -1e-12
 
 
+@pytest.mark.parametrize("place", [-0.032, -0.02, 0.0])
+def test_contact_in_one_place_wears_no_groove_sharper_than_a_gauge_corner(place):
+    new = load_profile("S1002")
+    depth = spread(np.array([place]), np.array([1e-3]), np.array([1e-6]))
+    depth *= 0.3e-3 / deepest(new, depth)
+    worn = worn_profile(new, depth, 1.0)
+
+    def concave(profile):
+        curve = wheel_curve(profile, 0.46, 0.75)
+        near = np.abs(curve.y - place) < 6e-3
+        return np.max(-curve.curvature[1][near])  # averaged over 2 mm
+
+    # where the new wheel is as hollow as the corner, R 13 mm, the groove adds to it
+    assert concave(worn) - concave(new) < 0.5 / 13e-3
+
+
+def test_step_is_divided_where_the_profile_would_wear_by_more_than_a_tenth_of_a_millimetre():
+    profile = load_profile("S1002")
+    depth = spread(np.array([0.0]), np.array([5e-3]), np.array([1e-11]))
+    worn = deepest(profile, depth) * 1e5
+    assert 0.0 < worn < 0.1e-3
+    assert parts_of_step(profile, depth, 1e5) == 1
+    assert parts_of_step(profile, depth, 1e5 * 3.5e-4 / worn) == 4
+    with pytest.raises(InputError, match=r"S1002.* 11 mm deep; .*at most 10 mm in a step"):
+        parts_of_step(profile, depth, 1e5 * 11e-3 / worn)
+
+
 def test_wear_too_deep_for_one_step_is_refused_with_the_step_that_is_not():
     depth = spread(np.array([0.0]), np.array([5e-3]), np.array([1e-11]))
-    with pytest.raises(InputError, match=r"2000 km wear 2\.5\d* mm deep; .*at most 1 mm: 78\d km"):
+    with pytest.raises(InputError, match=r"2000 km wear 1\.98 mm deep; .*at most 1 mm: 1010 km"):
         worn_profile(load_profile("S1002"), depth, 2e6)
 
 
 def test_profile_of_few_points_is_refused():
     profile = load_profile("S1002")
-    coarse = dataclasses.replace(profile, y=profile.y[::300], z=profile.z[::300])
+    coarse = dataclasses.replace(profile, y=profile.y[::400], z=profile.z[::400])
     depth = spread(np.array([0.0]), np.array([2e-3]), np.array([1e-12]))
     with pytest.raises(InputError, match="points at most 1 mm apart"):
         worn_profile(coarse, depth, 1e6)
