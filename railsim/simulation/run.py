@@ -95,11 +95,12 @@ def simulate(
     settings = settings or Settings()
     before = None if resume is None else state_before(vehicle, track, settings, resume)
     if before is not None:
-        if speed is not None or start:
-            found, allowed = "given together with `resume`", "the state's own is used"
-            name = "start" if speed is None else "speed"
-            raise InputError([argument_fault(name, "", found, allowed)])
-        speed, start = float(before[-1]), float(before[-2])
+        own = {"speed": float(before[-1]), "start": float(before[-2])}
+        for name, given in (("speed", speed), ("start", start or None)):
+            if given is not None and given != own[name]:
+                found, allowed = "given together with `resume`", "the state's own is used"
+                raise InputError([argument_fault(name, "", found, allowed)])
+        speed, start = own["speed"], own["start"]
     inputs = Inputs.checked(track, settings, speed, start, duration, until)
     told = Told(progress, 1, inputs)
     told.next_run()
