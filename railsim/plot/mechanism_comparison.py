@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from railsim.mechanisms.analysis import Analysis
-from railsim.plot.mechanisms import (
+from railsim.plot.mechanism_axes import (
     DASHES,
     MAIN,
     SECOND,
     Floats,
     label_of,
-    line,
+    line_style,
     mark_zone,
     values_of,
     way,
@@ -30,7 +30,9 @@ def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     figure = Picture(figsize=(6.6, 3.6), layout="constrained")
     axes = figure.subplots()
     for i, (name, result) in enumerate(results.items()):
-        axes.plot(values_of("travel", result), values_of("force", result), label=name, **line(i))
+        axes.plot(
+            values_of("travel", result), values_of("force", result), label=name, **line_style(i)
+        )
     first = next(iter(results.values()))
     axes.axhline(0.0, color="0.4", lw=0.8)
     axes.set_xlabel(label_of("travel", first, "driver"))
@@ -53,10 +55,10 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
         for i, (label, result) in enumerate(results.items()):
             if (curve := _over_height(result, name, zoom)) is None:
                 continue
-            panels[0, column].plot(*curve, label=label, **line(i))
+            panels[0, column].plot(*curve, label=label, **line_style(i))
             if zoom and base is not None:
                 above = curve[1] - np.interp(curve[0], *base)
-                panels[1, column].plot(curve[0], above, **line(i))
+                panels[1, column].plot(curve[0], above, **line_style(i))
         if not zoom:
             mark_zone(panels[0, column], first, way(first))
         panels[-1, column].set_xlabel(label_of(way(first), first))
@@ -77,10 +79,10 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
         if "pressure" not in result.output or "height" not in result.output:
             continue
         height = values_of(way(result), result)
-        left.plot(height, values_of("pressure", result), label=label, **line(i))
+        left.plot(height, values_of("pressure", result), label=label, **line_style(i))
         if result.contact is not None:
             held = f"{label}, {result.contact.pressure / 1e6:.4f} MPa"
-            right.plot(height, result.contact.curve, label=held, **line(i))
+            right.plot(height, result.contact.curve, label=held, **line_style(i))
     right.axhline(0.0, color="0.4", lw=0.8)
     first = next(iter(results.values()))
     for axes, text in ((left, "pressure needed / MPa"), (right, "static contact force / N")):

@@ -5,13 +5,12 @@ degrees, N, MPa.  Lines can be distinguished without colour too.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from railsim.definitions.mechanism_parts import AirSpring, Cam
 from railsim.mechanisms.analysis import Analysis
@@ -22,57 +21,34 @@ from railsim.mechanisms.forces import table_of
 from railsim.mechanisms.kinematics import Motion, folded, solve
 from railsim.mechanisms.links import actuators, links
 from railsim.mechanisms.quantities import force_unit, quantity
+from railsim.plot.mechanism_axes import (
+    DASHES,
+    MAIN,
+    SECOND,
+    label_of,
+    line_style,
+    mark_zone,
+    values_of,
+    way,
+)
+from railsim.plot.mechanism_comparison import (
+    cases_figure,
+    comparison_figure,
+    held_figure,
+    search_figure,
+)
 from railsim.plot.point_names import name_points
-from railsim.plot.style import DISTINCT, LIMIT, Picture
+from railsim.plot.style import LIMIT, Picture
 
-if TYPE_CHECKING:
-    pass
+# drawn beside this module, offered here
+__all__ = ["cases_figure", "comparison_figure", "held_figure", "search_figure"]
 
-Floats = NDArray[np.float64]
-DASHES: tuple[Any, ...] = (
-    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)),
-    (0, (11, 3)), (0, (1, 3)), (0, (9, 2, 3, 2)),
-)  # fmt: skip
-MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
 WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8, "actuator": 3.2, "spring": 1.0,
           "damper": 1.6}  # fmt: skip
 CENTRE: dict[str, Any] = {"marker": "$\\oplus$", "color": "k", "ms": 8, "ls": "", "zorder": 5}
 """Centre of gravity."""
 STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
-
-
-def line(i: int) -> dict[str, Any]:
-    """Colour and dashes of the line of a number."""
-    return {"color": DISTINCT[i % len(DISTINCT)], "ls": DASHES[i % len(DASHES)]}
-
-
-def label_of(name: str, result: Analysis, words: str = "") -> str:
-    """Label of an axis for a named result."""
-    unit = quantity(name, result.definition).shown
-    text = words or name.replace("_", " ")
-    return f"{text} / {unit.replace('deg', '°')}" if unit else text
-
-
-def values_of(name: str, result: Analysis) -> Floats:
-    """Values of a named result in the unit shown."""
-    found: Floats = np.asarray(result.output[name]) * quantity(name, result.definition).scale
-    return found
-
-
-def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
-    """Shade the zone and mark the work height over a quantity."""
-    if not result.zone or over not in result.zone["low"]:
-        return
-    scale = quantity(over, result.definition).scale
-    low, work, high = (result.zone[k][over] * scale for k in ("low", "work", "high"))
-    axes.axvspan(min(low, high), max(low, high), color="0.93", lw=0, zorder=0)
-    axes.axvline(work, color="0.5", lw=0.8, ls=(0, (4, 2)), zorder=1)
-
-
-def way(result: Analysis) -> str:
-    """Name of the result that says how far the output has moved along its axis."""
-    return "x" if result.model.axis == 0 else "height"
 
 
 def drawing_figure(result: Analysis) -> Figure:
@@ -172,7 +148,7 @@ def kinematics_figure(result: Analysis) -> Figure:
         moving = course.in_time(s1, s2)
         turned = moving.value - moving.value[0]
         for axes, values in zip(rows, (turned, moving.first, moving.second), strict=True):
-            axes.plot(travel, np.degrees(values), label=name, **line(i))
+            axes.plot(travel, np.degrees(values), label=name, **line_style(i))
     words = ("rate / (°/s)", "acceleration / (°/s²)")
     if timed is None:
         words = ("d angle/d driver / (°/unit)", "second derivative")
@@ -203,7 +179,7 @@ def actuators_figure(result: Analysis) -> Figure:
     for i, (name, course) in enumerate(actuators(motion).items()):
         moving = course.in_time(s1, s2)
         for axes, values in zip(rows, (moving.value, moving.first, moving.second), strict=True):
-            axes.plot(over, np.round(values * 1e3, 9), label=name, **line(i))  # no noise
+            axes.plot(over, np.round(values * 1e3, 9), label=name, **line_style(i))  # no noise
     for axes, label in zip(rows, labels, strict=True):
         axes.set_ylabel(label)
     rows[2].set_xlabel(words)
@@ -235,10 +211,12 @@ def angles_figure(result: Analysis) -> Figure:
     names = list(result.definition.angles)
     for i, name in enumerate(names):
         values = np.degrees(folded(result.output[name]))
-        axes.plot(travel, values, label=name, **line(i))
+        axes.plot(travel, values, label=name, **line_style(i))
     for i, name in enumerate(n for n in result.output if n.endswith("_pressure_angle")):
         label = name.replace("_", " ")
-        axes.plot(travel, values_of(name, result), label=label, lw=1.8, **line(len(names) + i))
+        axes.plot(
+            travel, values_of(name, result), label=label, lw=1.8, **line_style(len(names) + i)
+        )
     limits = result.definition.optimise
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
@@ -272,7 +250,7 @@ def cam_figure(result: Analysis) -> Figure:
     for i, arc in enumerate(np.unique(motion.arcs[:, row])):
         on = motion.arcs[:, row] == arc
         label = f"arc {arc - first + 1}, turns {cam.arcs[arc - first].turns}"
-        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.2, **line(i))
+        axes.plot(travel[on], np.abs(1.0 / rate[on]), label=label, lw=2.2, **line_style(i))
         if (alone := on_one_arc(motion, row, int(arc), beyond)) is not None:
             more = np.abs(1.0 / alone.q1[:, body, 2])
             axes.plot(alone.s * scale, more, color="0.45", lw=0.8, ls=DASHES[i], zorder=1)
@@ -391,8 +369,8 @@ def gas_spring_figure(result: Analysis) -> Figure:
     left, right = figure.subplots(1, 2)
     travel = values_of("travel", result)
     for i, name in enumerate(names):
-        left.plot(travel, values_of(f"{name}_length", result), label=name, **line(i))
-        right.plot(travel, values_of(f"{name}_force", result), label=name, **line(i))
+        left.plot(travel, values_of(f"{name}_length", result), label=name, **line_style(i))
+        right.plot(travel, values_of(f"{name}_force", result), label=name, **line_style(i))
     left.set_ylabel("length / mm")
     right.set_ylabel("push / N")
     for axes in (left, right):
@@ -417,10 +395,10 @@ def time_figure(result: Analysis) -> Figure:
     if result.definition.output is not None:
         v, acceleration = timed.point(result.definition.output.point)
         for axes, values in ((c, v), (d, acceleration)):
-            axes.plot(timed.time, values[:, 0] * 1e3, label="x", **line(0))
-            axes.plot(timed.time, values[:, 1] * 1e3, label="y", **line(1))
+            axes.plot(timed.time, values[:, 0] * 1e3, label="x", **line_style(0))
+            axes.plot(timed.time, values[:, 1] * 1e3, label="y", **line_style(1))
             absolute = np.hypot(values[:, 0], values[:, 1]) * 1e3
-            axes.plot(timed.time, absolute, label="absolute", **line(2))
+            axes.plot(timed.time, absolute, label="absolute", **line_style(2))
     c.set_ylabel("speed of the output / (mm/s)")
     d.set_ylabel("acceleration / (mm/s²)")
     c.legend()

@@ -28,7 +28,6 @@ from railsim.mechanisms.selection import selection
 from railsim.mechanisms.tables import Texts
 from railsim.mechanisms.tolerance import Scatter, scatter
 from railsim.page import rendered
-from railsim.plot import mechanism_comparison as side_by_side
 from railsim.plot import mechanisms as pictures
 from railsim.plot.style import styled
 from railsim.version import __version__
@@ -160,17 +159,17 @@ def figures(collected: Collected) -> dict[str, Figure]:
         if any(name.endswith("_length") for name in output):
             drawn["gas_springs"] = pictures.gas_spring_figure(result)
         if len(collected.cases) > 1 and "force" in output:
-            drawn["cases"] = side_by_side.cases_figure(collected.cases)
+            drawn["cases"] = pictures.cases_figure(collected.cases)
         if result.timed is not None:
             drawn["time"] = pictures.time_figure(result)
         if (compared := _compared(collected)) and "ratio" in output:
-            drawn["comparison"] = side_by_side.comparison_figure(compared)
+            drawn["comparison"] = pictures.comparison_figure(compared)
             if any("pressure" in one.output for one in compared.values()):
-                drawn["comparison_held"] = side_by_side.held_figure(compared)
+                drawn["comparison_held"] = pictures.held_figure(compared)
             if result.zone:
-                drawn["comparison_zone"] = side_by_side.comparison_figure(compared, zoom=True)
+                drawn["comparison_zone"] = pictures.comparison_figure(compared, zoom=True)
         if collected.optimum is not None:
-            drawn["search"] = side_by_side.search_figure(collected.optimum)
+            drawn["search"] = pictures.search_figure(collected.optimum)
         else:
             others = {
                 f"drawing_{i}": pictures.drawing_figure(other)

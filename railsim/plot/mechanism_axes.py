@@ -1,0 +1,51 @@
+"""Axes of the pictures of mechanisms: lines, labels, values in shown units, the shaded zone."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.quantities import quantity
+from railsim.plot.style import DISTINCT
+
+Floats = NDArray[np.float64]
+DASHES: tuple[Any, ...] = (
+    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)),
+    (0, (11, 3)), (0, (1, 3)), (0, (9, 2, 3, 2)),
+)  # fmt: skip
+MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
+
+
+def line_style(i: int) -> dict[str, Any]:
+    """Colour and dashes of the line of a number."""
+    return {"color": DISTINCT[i % len(DISTINCT)], "ls": DASHES[i % len(DASHES)]}
+
+
+def label_of(name: str, result: Analysis, words: str = "") -> str:
+    """Label of an axis for a named result."""
+    unit = quantity(name, result.definition).shown
+    text = words or name.replace("_", " ")
+    return f"{text} / {unit.replace('deg', '°')}" if unit else text
+
+
+def values_of(name: str, result: Analysis) -> Floats:
+    """Values of a named result in the unit shown."""
+    found: Floats = np.asarray(result.output[name]) * quantity(name, result.definition).scale
+    return found
+
+
+def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
+    """Shade the zone and mark the work height over a quantity."""
+    if not result.zone or over not in result.zone["low"]:
+        return
+    scale = quantity(over, result.definition).scale
+    low, work, high = (result.zone[k][over] * scale for k in ("low", "work", "high"))
+    axes.axvspan(min(low, high), max(low, high), color="0.93", lw=0, zorder=0)
+    axes.axvline(work, color="0.5", lw=0.8, ls=(0, (4, 2)), zorder=1)
+
+
+def way(result: Analysis) -> str:
+    """Name of the result that says how far the output has moved along its axis."""
+    return "x" if result.model.axis == 0 else "height"
