@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import h5py
 import matplotlib
@@ -126,13 +127,14 @@ def test_assessments_show_names_literally():
 
     class Assessed:
         vehicle, standard = "@coach", "en14363"
-        zones = (type("Zone", (), {"zone": "1", "rows": [Row()]}),)
+        zones = (Mock(zone="1", rows=[Row()], information=[], population=Mock()),)
+        zones[0].population.name = "-worn"
 
         def record(self):
             return {"comfort": {}, "wear": {}, "safety": {}}
 
     lines = assessment_csv([Assessed()]).splitlines()
-    assert lines[1] == "'@coach,en14363,1,'=1+1,-0.3"
+    assert lines[1] == "'@coach,en14363,1,'-worn,'=1+1,-0.3"
 
 
 @pytest.mark.parametrize("value", ["9" * 5000, "[" * 3000 + "]" * 3000, "[" * 3000, "a." * 3000])
