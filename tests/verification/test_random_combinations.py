@@ -1,0 +1,147 @@
+"""Vehicle, track, speed, friction, profile and support at random: at half the step, and mirrored.
+
+A seed is a run of some two seconds.  Half the step gives the same status and the same peaks of Q, Y
+and sum of Y within 2 % or 0.5 % of Q0; where wheel loads vibrate by themselves, or wheels lift, the
+instants of their peaks are left to chance, and root mean squares are compared.  The mirrored
+vehicle on the mirrored track gives mirrored forces within 0.01 N.
+
+Seeds are kept: one that fails is a fault to be found (`KNOWN`), and is still run when it is mended.
+"""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.definitions.irregularity import Kink
+from railsim.definitions.loading import load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.definitions.settings import Settings
+
+SEEDS, MORE = 20, 300
+# Vehicle and speed up to which it is run [m/s].  The first seeds draw from the first four, whose
+# step is soon found, on rails at 1:40: their contact tables are those of other tests.
+VEHICLES = (
+    ("coach_manchester", 45.0),
+    ("coach_flexicoil", 55.0),
+    ("benchmark_vehicle1", 45.0),
+    ("wagon_uic_link", 22.0),
+    ("coach_25t", 50.0),
+    ("wagon_y25", 25.0),
+    ("wagon_three_piece_25t", 25.0),
+)
+QUICK = 4
+SUPPORTS = ("rigid", "co-running", "ballasted")
+RADII = (190.0, 250.0, 350.0, 500.0, 800.0, 2000.0, np.inf)
+# Seeds that fail, and why; they are run all the same.
+KNOWN = dict.fromkeys(
+    (6, 11, 14, 19), "in curves with lateral irregularity the division of steps depends on the side"
+)
+DEFICIENCY = 0.13  # m, of cant, at the greatest speed in a curve
+CANT_BASE = 1.5
+GRAVITY = 9.81
+# by themselves: instants of peaks are left to chance
+LIVELY = ("vibrate", "hunt", "lifts off")
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A vehicle on a track at a speed [m/s]."""
+
+    vehicle: str
+    track: railsim.Track
+    speed: float
+
+    def run(self, mirror=False, **settings):
+        """Result of some two seconds."""
+        vehicle, track = load_vehicle(self.vehicle), self.track
+        if mirror:
+            vehicle, track = mirrored_vehicle(vehicle), mirrored_track(track)
+        return railsim.simulate(
+            vehicle, track, speed=self.speed, duration=2.0, settings=Settings(**settings)
+        )
+
+
+@cache
+def drawn(seed):
+    """Case of a seed."""
+    rng = np.random.default_rng(seed)
+    vehicle, fastest = VEHICLES[rng.integers(QUICK if seed < SEEDS else len(VEHICLES))]
+    radius = rng.choice(RADII) * rng.choice((-1.0, 1.0))
+    cant = rng.choice((0.0, 0.05, 0.12)) * (abs(radius) < 1500.0)
+    speed = rng.uniform(0.3, 1.0) * fastest
+    if np.isfinite(radius):
+        speed = min(speed, np.sqrt(abs(radius) * GRAVITY * (cant + DEFICIENCY) / CANT_BASE))
+    straight = {"type": "STR", "length": 10.0}
+    ramp = {"type": "CLO", "length": 0.6 * speed}
+    plan = [straight, ramp, {"type": "CIR", "length": 200.0, "radius": radius}]
+    if not np.isfinite(radius):
+        plan = [{"type": "STR", "length": 300.0}]
+    level = {"type": "CST", "length": 10.0, "cant": 0.0}
+    cant = float(np.copysign(cant, radius))
+    rise = [{"type": "LIR", "length": 0.6 * speed}, {"type": "CST", "length": 200.0, "cant": cant}]
+    irregularities = (
+        [],
+        [Kink(type="kink", s=14.0, length=6.0, offset=float(rng.choice((-4e-3, 4e-3))))],
+        [{"type": "dip", "s": 15.0, "length": 2.0, "depth": 3e-3, "rail": "left"}],
+        [{"type": "random", "spectrum": "erri_b176_low", "seed": int(rng.integers(1000))}],
+    )[rng.integers(4)]
+    track = load_track("straight").replace(
+        plan=plan,
+        cant=[level, *rise] if cant else [],
+        irregularities=irregularities,
+        friction=float(rng.uniform(0.1, 0.55)),
+        inclination=float(rng.choice((0.025, 0.05))) if seed >= SEEDS else 0.025,
+        support={"preset": str(rng.choice(SUPPORTS))},
+    )
+    return Case(vehicle, track, float(speed))
+
+
+def peaks(result):
+    """Largest Q, amounts of Y and of the sum of Y over all steps [N]."""
+    found = result.groups["peaks"]
+    return np.array([np.abs(found[name]).max() for name in ("Q", "Y", "sum_Y")])
+
+
+def deviations(result):
+    """Root mean squares of Q - Q0 and Y [N]."""
+    return np.array(
+        [np.sqrt(np.nanmean(v**2)) for v in (result.Q - result.Q0, result.Y, result.sum_Y)]
+    )
+
+
+def check(seed):
+    case = drawn(seed)
+    result = case.run()
+    half = case.run(step=0.5 * result.attributes["step"])
+    assert half.status == result.status
+    Q0 = float(result.Q0.mean())
+    lively = any(word in remark for remark in result.remarks for word in LIVELY)
+    measure = deviations if lively else peaks
+    now, then = measure(result), measure(half)
+    assert np.all(np.abs(now - then) <= np.maximum(0.02 * then, 0.005 * Q0)), (now, then)
+    mirrored = case.run(mirror=True, step=result.attributes["step"])
+    assert mirrored.status == result.status
+    np.testing.assert_allclose(mirrored.Q[..., ::-1], result.Q, atol=0.01, rtol=0.0)
+    np.testing.assert_allclose(-mirrored.Y[..., ::-1], result.Y, atol=0.01, rtol=0.0)
+
+
+def seeds(numbers):
+    """Parameters of a test, those of `KNOWN` marked."""
+    return [
+        pytest.param(k, marks=[pytest.mark.xfail(reason=KNOWN[k])] if k in KNOWN else [])
+        for k in numbers
+    ]
+
+
+@pytest.mark.parametrize("seed", seeds(range(SEEDS)))
+def test_random_combination(seed):
+    check(seed)
+
+
+@pytest.mark.further
+@pytest.mark.parametrize("seed", seeds(range(SEEDS, SEEDS + MORE)))
+def test_further_random_combination(seed):
+    check(seed)
