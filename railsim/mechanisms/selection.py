@@ -8,10 +8,13 @@ import numpy as np
 from railsim.definitions.mechanism import CatalogueRow
 from railsim.definitions.mechanism_parts import Cylinder, GasSpring
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.checks import ROUNDING, force_range
+from railsim.mechanisms.checks import ROUNDING, Check, checks, force_range
 from railsim.mechanisms.components import gas_temperature_factor, next_size
 from railsim.mechanisms.forces import Rates, actuator_force
 from railsim.mechanisms.kinematics import Motion
+
+# checks are computed beside this module, and offered here
+__all__ = ["Check", "Choice", "checks", "needed_bore", "selection"]
 
 
 @dataclass(frozen=True)
