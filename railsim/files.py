@@ -34,7 +34,9 @@ DEFINITION_BYTES = 4_000_000  # largest vehicle, track, settings or study file
 TABLE_BYTES = 20_000_000  # largest file of points: profiles, recordings
 _SYSTEM = (Path("/proc"), Path("/sys"), Path("/dev"))
 _SHARED_MEMORY = Path("/dev/shm")  # files there are users' own
-_PARTIAL = re.compile(r"\..+\.[a-z0-9_]{8}\.partial", re.DOTALL)  # as `tempfile` makes them
+_SUFFIX = ".railsim.partial"
+# as `tempfile` makes them; other programs have hidden files of such names, without `railsim`
+_PARTIAL = re.compile(rf"\..+\.[a-z0-9_]{{8}}{re.escape(_SUFFIX)}", re.DOTALL)
 _OF_FILES = (*RESULTS, *PICTURES, *TABLES, ".csv", ".json", ".html", ".txt")
 _open_ones: dict[Path, None] = {}  # hidden files of this process
 
@@ -244,7 +246,7 @@ class PartialFile:
                 )
                 raise InputError([fault])
             self._handle, name = tempfile.mkstemp(
-                prefix=_prefix(target.name), suffix=".partial", dir=target.parent
+                prefix=_prefix(target.name), suffix=_SUFFIX, dir=target.parent
             )
             self.path = Path(name)
             _open_ones[self.path] = None
@@ -348,7 +350,7 @@ def _swept(folder: Path, name: str | None = None) -> int:
     except OSError:  # may be written to, but not be listed
         return 0
     for entry in names:
-        if not _PARTIAL.fullmatch(entry) or (name and len(entry) != len(prefix) + 16):
+        if not _PARTIAL.fullmatch(entry) or (name and len(entry) != len(prefix) + 8 + len(_SUFFIX)):
             continue
         path = folder / entry
         try:

@@ -71,9 +71,11 @@ def open_result(path: str | Path) -> Result:
     try:
         if path.stat().st_size == 0:
             raise InputError([Fault(str(path), "", "the file is empty", AS_WRITTEN)])
+        stamp = _stamp(os.stat(path))
         whole = sealed(path)
         with h5py.File(path, "r") as file:
-            return _Reader(file, path).result(whole=whole)
+            _refuse_another(path, file, stamp)
+            return _Reader(file, path, stamp).result(whole=whole)
     except InputError:
         raise
     except Exception as error:  # HDF5 and h5py raise every kind
@@ -136,13 +138,18 @@ class StoredArrays(FrozenArrays):
         The file; it is not kept open.
     shapes : mapping of str to tuple of int
         Shapes of the arrays by their names.
+    stamp : tuple of int
+        What tells the file from another of its name.
     """
 
-    def __init__(self, path: Path, shapes: Mapping[str, tuple[int, ...]]) -> None:
+    def __init__(
+        self, path: Path, shapes: Mapping[str, tuple[int, ...]], stamp: tuple[int, ...]
+    ) -> None:
         super().__init__({})
         self._path = path
         self._absolute = path.absolute()
         self._shapes = dict(shapes)
+        self._stamp = stamp
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._loaded:
@@ -158,19 +165,34 @@ class StoredArrays(FrozenArrays):
     def _read(self, name: str, rows: slice | tuple[()] = ()) -> Array:
         try:
             with h5py.File(self._absolute, "r") as file:
-                dataset = file[name]
-                if dataset.shape == self._shapes[name]:
-                    return frozen(dataset[rows])
+                _refuse_another(self._path, file, self._stamp)
+                return frozen(file[name][rows])
+        except InputError:
+            raise
         except Exception as error:
             raise _unreadable(self._path, name, error) from None
-        found = "is not the array that the file held when it was opened"
-        raise InputError([Fault(str(self._path), name, found, "open it again")])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._shapes)
 
     def __len__(self) -> int:
         return len(self._shapes)
+
+
+def _stamp(facts: os.stat_result) -> tuple[int, ...]:
+    return facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns
+
+
+def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None:
+    """Refuse a file that has taken the place of the one with the stamp, or was changed.
+
+    Raises
+    ------
+    InputError : it is another.
+    """
+    if _stamp(os.fstat(file.id.get_vfd_handle())) != stamp:
+        found = "was replaced or changed after it was opened"
+        raise InputError([Fault(str(path), "", found, "open it again")])
 
 
 def _unreadable(path: Path, name: str, error: Exception) -> InputError:
@@ -186,9 +208,10 @@ def _unreadable(path: Path, name: str, error: Exception) -> InputError:
 class _Reader:
     """Looks at every member of an open file before it is read."""
 
-    def __init__(self, file: h5py.File, path: Path) -> None:
+    def __init__(self, file: h5py.File, path: Path, stamp: tuple[int, ...]) -> None:
         self._file = file
         self._path = path
+        self._stamp = stamp
         self._declared = 0  # bytes that arrays say they have
 
     def fault(self, name: str, found: str, allowed: str = AS_WRITTEN) -> InputError:
@@ -231,7 +254,7 @@ class _Reader:
         }
         self._check_peaks(arrays.get("peaks", {}), quantities, coordinates)
         shapes = {name: datasets[name].shape for name in quantities}
-        stored = StoredArrays(self._path, shapes)
+        stored = StoredArrays(self._path, shapes, self._stamp)
         return Result(
             stored, quantities, coordinates, facts, profiles, arrays, source=str(self._path)
         )

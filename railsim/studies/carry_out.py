@@ -73,6 +73,8 @@ def carry_out(
             known = stack.enter_context(Journal(folder))
         if not (resume or overwrite):
             _refuse_another_study(folder, known, inputs)
+        if known is None and not overwrite:
+            _refuse_files_of_others(folder)
         state = State(folder, plan, known, own, keep, resume=resume, overwrite=overwrite)
         client = None if scheduler is None else cluster(scheduler)
         make_folder(folder)
@@ -161,6 +163,23 @@ def _refuse_another_study(
         found = f"{folder} holds a study with other " + ", ".join(differing)
         allowed = "--resume continues with these inputs, --overwrite computes everything; "
         raise InputError([Fault("--out", "", found, f"{allowed}or another --out")])
+
+
+def _refuse_files_of_others(folder: Path) -> None:
+    """Refuse files that a study would replace and that are of none."""
+    index, table = folder / "study.json", folder / "summary.csv"
+    if is_file(index):
+        try:
+            read_index(index)
+            return
+        except InputError as error:
+            name, found = index.name, f"is not the index of a study ({error.faults[0].found})"
+    elif is_file(table):
+        name, found = table.name, "is not of a study"
+    else:
+        return
+    allowed = "choose another --out, or give --overwrite"
+    raise InputError([Fault("--out", str(folder / name), found, allowed)])
 
 
 def _is_newer(one: Path, other: Path) -> bool:

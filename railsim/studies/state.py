@@ -2,6 +2,8 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 from typing import Protocol
 
@@ -13,6 +15,7 @@ from railsim.studies.keep import Keep
 from railsim.studies.points import Point
 from railsim.studies.summary import finished_record, waiting_record
 
+DAMAGED = "--resume computes it again and keeps this file beside it; or another --out"
 CHANGED = "--resume computes what has changed, --overwrite everything; or another --out"
 
 
@@ -112,7 +115,7 @@ class State:
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
-            return list(error.faults)
+            return [replace(fault, allowed=DAMAGED) for fault in error.faults]
         self._changed.append(case.name)
         return [Fault("--out", str(path), "a result of other inputs", CHANGED)]
 
@@ -122,14 +125,9 @@ class State:
         if self._lines:
             remarks.append(f"{self._lines} damaged lines of {JOURNAL} are ignored")
         for point, record in self.found:
-            if self._keep.summary:
-                (self._folder / record["file"]).unlink()
-                journal.add({**record, "file": ""}, point.key, None)
-            else:
-                journal.add(record, point.key, self._there[record["file"]])
+            journal.add(record, point.key, self._there[record["file"]])
         for path, words in self._damaged.items():
-            kept = path.with_name(f"{path.name}.damaged")
-            os.replace(path, kept)
+            kept = _moved_aside(path)
             remarks.append(f"{words}: it is computed again; the old file is kept as {kept.name}")
         lost = [
             case.name
@@ -154,6 +152,17 @@ class State:
                 for point in self._plan.points
             ],
         )
+
+
+def _moved_aside(path: Path) -> Path:
+    """Give a damaged file another name that is free, and return it."""
+    endings = chain([""], (f"-{number}" for number in count(2)))
+    for ending in endings:
+        kept = path.with_name(f"{path.name}.damaged{ending}")
+        if not os.path.lexists(kept):
+            break
+    os.rename(path, kept)
+    return kept
 
 
 def _files(folder: Path) -> dict[str, os.stat_result]:

@@ -248,3 +248,23 @@ def test_what_is_not_a_result_is_refused(tmp_path, content, words):
         path.write_bytes(content)
     with pytest.raises(InputError, match=words):
         open_result(path)
+
+
+@pytest.mark.parametrize("how", ["replaced", "changed", "removed"])
+def test_open_result_does_not_mix_two_runs(tmp_path, how):
+    """Arrays are read when they are asked for: from the file that was opened, or not at all."""
+    path = example_result().to_hdf5(tmp_path / "run.h5")
+    opened = open_result(path)
+    time = opened["time"]
+    if how == "replaced":  # same names and shapes
+        example_result(gain=2.0).to_hdf5(path, overwrite=True)
+    elif how == "changed":
+        with h5py.File(path, "r+") as file:
+            file["Q"][0] = 0.0
+    else:
+        path.unlink()
+    words = "cannot be read" if how == "removed" else "was replaced or changed after it was opened"
+    for read in (lambda: opened["Q"], lambda: opened.part("Y", slice(0, 3))):
+        with pytest.raises(InputError, match=words):
+            read()
+    np.testing.assert_array_equal(opened["time"], time)  # read before

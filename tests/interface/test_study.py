@@ -268,7 +268,7 @@ def test_damaged_or_foreign_result_is_computed_again_and_kept(tmp_path, simulate
     result.write_bytes(damaged)
     assert main(arguments(tmp_path, 10, 20)) == 2  # nothing is replaced unasked
     assert result.read_bytes() == damaged
-    capsys.readouterr()
+    assert "--resume computes it again and keeps this file beside it" in capsys.readouterr().err
     assert main(arguments(tmp_path, 10, 20, more=["--resume"])) == 0
     assert simulated == [10.0, 20.0, 20.0]
     remark = capsys.readouterr().err
@@ -276,6 +276,43 @@ def test_damaged_or_foreign_result_is_computed_again_and_kept(tmp_path, simulate
     assert f"computed again; the old file is kept as {result.name}.damaged" in remark
     assert (tmp_path / f"{result.name}.damaged").read_bytes() == damaged
     assert [row["status"] for row in rows(tmp_path)] == ["complete", "complete"]
+
+
+def test_files_that_were_damaged_before_are_kept_too(tmp_path, simulated):
+    result = tmp_path / f"{COACH}_{CURVE}_20.h5"
+    for content in ("a", "b", "c"):
+        result.write_text(content)
+        assert main(arguments(tmp_path, 20, more=["--resume"])) == 0
+    kept = sorted(path.read_text() for path in tmp_path.glob("*.damaged*"))
+    assert kept == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("study.json", "is not the index of a study"), ("summary.csv", "is not of a study")],
+)
+def test_files_of_the_user_are_not_replaced(tmp_path, simulated, capsys, name, words):
+    (tmp_path / name).write_text("mine")
+    for more in ([], ["--resume"]):
+        assert main(arguments(tmp_path, 20, more=more)) == 2
+        assert f"{name}: {words}" in capsys.readouterr().err
+    assert (tmp_path / name).read_text() == "mine"
+    assert simulated == []
+    assert main(arguments(tmp_path, 20, more=["--overwrite"])) == 0
+
+
+def test_results_that_exist_are_kept_where_only_the_summary_would_be(tmp_path, simulated):
+    assert main(arguments(tmp_path, 20)) == 0
+    result = tmp_path / f"{COACH}_{CURVE}_20.h5"
+    before = result.read_bytes()
+    (tmp_path / "study.journal").unlink()
+    (tmp_path / "study.json").unlink()
+    (tmp_path / "summary.csv").unlink()
+    for _ in range(2):
+        assert main(arguments(tmp_path, 20, more=["--keep", "summary", "--resume"])) == 0
+        assert result.read_bytes() == before
+    assert simulated == [20.0]
+    assert len(rows(tmp_path)) == 1
 
 
 def test_result_that_was_changed_in_its_file_is_computed_again(tmp_path, simulated):
