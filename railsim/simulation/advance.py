@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
+from railsim.errors import RailsimError
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
@@ -119,7 +120,9 @@ class Run:
     together : int
         Most runs that have shared a call with it, itself included.
     error : Exception or None
-        Error in writing its output.
+        Error in writing its output, or why it cannot begin.
+    stopped : str
+        Why it cannot go on at the speed that it has reached; empty otherwise.
     remarks : list of str
         Remarks for the reader of its result, see `railsim.simulation.remarks`.
     swings : MemorySink
@@ -142,8 +145,14 @@ class Run:
     wall_time: float = 0.0
     together: int = 1
     error: Exception | None = None
+    stopped: str = ""
     remarks: list[str] = field(default_factory=list)
     swings: MemorySink = field(default_factory=lambda: MemorySink(only=SEEN))
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended before its end, but for what the time loop says."""
+        return self.error is not None or bool(self.stopped)
 
     def __post_init__(self) -> None:
         wheelsets = len(self.prepared.model.index.wheelsets)
@@ -260,7 +269,7 @@ class _Convoy:
         return self._runs[0].prepared.left(self._state)
 
     def _errors(self) -> bool:
-        return any(run.error is not None for run in self._runs)
+        return any(run.ended for run in self._runs)
 
     def _paces(self) -> list[tuple[float, int]]:
         """Step and number of steps to the next output of every run; none at the end."""
@@ -273,7 +282,13 @@ class _Convoy:
         for run in self._runs:
             try:
                 paces.append(run.prepared.pace.at(speed, rate))
-            except Exception as error:  # no equilibrium at this speed, or no stable step
+            except RailsimError as error:  # no equilibrium at this speed, or no stable step
+                if self._state[-3] > run.prepared.state[-3]:
+                    run.stopped = f"the run cannot go on at {speed:.3g} m/s: {error}"
+                else:
+                    run.error = error
+                paces.append((math.nan, 0))
+            except Exception as error:
                 run.error = error
                 paces.append((math.nan, 0))
         return paces
@@ -365,7 +380,7 @@ class _Convoy:
         self._give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [
-            [run for run, other in pairs if other == key and run.error is None]
+            [run for run, other in pairs if other == key and not run.ended]
             for key in dict.fromkeys(keys)
         ]
         return [group for group in groups if group]

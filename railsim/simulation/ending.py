@@ -90,6 +90,8 @@ def verdict(run: Run) -> dict[str, str]:
     forces on the way there can have been those of a railway.
     """
     model, Q0 = run.prepared.model, run.prepared.balance.Q0
+    if run.stopped:
+        return {"status": "stopped", "status_reason": run.stopped}
     if run.status == DERAILED:
         where = model.index.wheelsets[run.where]
         if beyond_experience(run_extremes(run.extremes, Q0), Q0, model.index.wheelsets):

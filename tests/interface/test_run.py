@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,8 @@ from started import started
 
 import railsim
 from railsim.cli import main
+from railsim.errors import ModelError
+from railsim.simulation.pace import Pace
 
 COACH = ["run", "coach_manchester", "curve_r250"]
 # Ten metres of straight track: the shortest run that goes through everything.
@@ -277,3 +280,43 @@ def test_help_loads_neither_numba_nor_matplotlib(command):
         [sys.executable, "-c", check, command], capture_output=True, text=True, check=True
     )
     assert f"railsim {command}" in shown.stdout  # the example
+
+
+BRAKING = """
+format = "railsim-settings/1"
+[drive]
+mode = "free"
+traction_table = [[0.0, -150e3], [5.0, -150e3]]
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.parametrize("stable", [True, False])
+def test_braking_to_a_standstill_keeps_the_run(tmp_path, capsys, monkeypatch, stable):
+    """Also where no steady rolling or no stable step is found at a lower speed than at the start.
+
+    Constant force: t = m V / F, with the wheelsets' inertia some 60 t and 1.2 s.
+    """
+    (tmp_path / "braking.toml").write_text(BRAKING)
+    at = Pace.at
+
+    def until_walking_speed(self, speed, rate=0.0):
+        if not stable and speed < 2.0:
+            raise ModelError("no equilibrium")
+        return at(self, speed, rate)
+
+    monkeypatch.setattr(Pace, "at", until_walking_speed)
+    given = ["run", "coach_manchester", "straight", "--speed", "3", "--duration", "9", "--quiet"]
+    given += ["--settings", str(tmp_path / "braking.toml"), "--out", str(tmp_path / "run.h5")]
+    assert main(given) == 3
+    result = railsim.open_result(tmp_path / "run.h5")
+    assert result.status == "stopped"
+    reason = result.attributes["status_reason"]
+    if stable:
+        assert "came to a standstill" in reason
+        assert 0.9 < result.time[-1] < 1.5
+    else:
+        assert re.fullmatch(r"the run cannot go on at (1\.99|2) m/s: no equilibrium", reason)
+        assert 0.3 < result.time[-1] < 0.5
+    assert reason in capsys.readouterr().out
