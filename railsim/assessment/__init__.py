@@ -2,11 +2,16 @@
 
 =====================  =====================================================================
 `assess.py`            `assess`: all runs of a vehicle to one `Assessment`
+`running.py`           running tests: runs, populations, zones, verdicts
 `record.py`            a result read as a measured record, part by part
 `sections.py`          test sections and zones of the track that a run covers
 `en14363.py`           filters and section values of EN 14363 and UIC 518
 `statistics.py`        one- and two-dimensional estimates
-`verdict.py`           estimates against limits, zones, verdict
+`rules.py`             the assessed quantities and their limits
+`zones.py`             section values of a population to estimates and limits
+`conditions.py`        conditions of the test: met, not met, not checked
+`verdict.py`           running safety, track loading, ride: verdicts with reasons
+`influences.py`        for information: multiple regression, steering index
 `track_quality.py`     standard deviations of the track irregularities along a run
 `weighting.py`         frequency weightings Wb, Wc, Wd, Wk
 `comfort.py`           EN 12299, ISO 2631-1, P_CT, P_DE
