@@ -127,7 +127,7 @@ class Service(Definition):
     points: dict[Name, Point] = Field(default_factory=dict)
     """Further points at which accelerations are taken, by name"""
     condition: Text | None = None
-    """Condition in which it is tested, such as `worn, laden`: assessed together with the vehicles
+    """Condition in which it is tested, such as `worn laden`: assessed together with the vehicles
     of this name in other conditions, without pooling their values"""
     fault: Flag = False
     """The condition is a fault, assessed for running safety only"""

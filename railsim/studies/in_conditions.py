@@ -49,7 +49,7 @@ def in_condition(vehicle: Vehicle, name: str, condition: TestCondition) -> Vehic
             allowed = "a key of the vehicle's file"
             raise InputError([Fault(f"conditions.{name}", "remove", key, allowed)])
         del table[last]
-    data.setdefault("service", {}).update(condition=name.replace("_", ", "), fault=condition.fault)
+    data.setdefault("service", {}).update(condition=name.replace("_", " "), fault=condition.fault)
     try:
         return Vehicle.model_validate(data)
     except ValidationError as error:

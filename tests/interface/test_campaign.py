@@ -36,7 +36,7 @@ def test_campaign_meets_the_conditions_of_the_standard(vehicle):
     for state, own in by_condition.items():
         counted = {zone: [] for zone in "1234"}
         for case in own:
-            assert case.vehicle.service.condition == state.replace("_", ", ")
+            assert case.vehicle.service.condition == state.replace("_", " ")
             wheels |= set(flatten(case.vehicle).of_kind("wheelset")[0].wheelset.profile)
             loads.add(case.vehicle.load)
             seeds.append(case.labels["seed"])
@@ -79,7 +79,7 @@ def test_quiet_records_of_the_whole_campaign_pass_and_one_missing_run_does_not()
     (less,) = assess(dict(list(runs.items())[1:]))
     assert less.verdict == "incomplete"
     assert len(less.reasons) == 1
-    assert "zone 1, new, empty: number of sections not met: 14" in less.reasons[0]
+    assert "zone 1, new empty: number of sections not met: 14" in less.reasons[0]
 
 
 FAULTS = """format = "railsim-scenario/1"
