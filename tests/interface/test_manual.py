@@ -95,3 +95,17 @@ def test_main_job_of_the_readme_runs_and_computes_nothing_twice(tmp_path):
     assert "0 of 4 runs computed" in second
     assert len(list((tmp_path / "results").glob("*.h5"))) == 4
     assert (tmp_path / "results" / "report.html").stat().st_size > 100_000
+
+
+def test_every_promise_of_the_manual_names_its_tests():
+    page = (ROOT / "docs" / "user" / "safety.md").read_text(encoding="utf-8")
+    before_limits = page.partition("## Limits")[0]
+    promises = [
+        line for line in before_limits.splitlines() if re.match(r"\| (?!promise|---)", line)
+    ]
+    assert len(promises) > 15
+    for promise in promises:
+        named = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", promise.rpartition(" | ")[2])
+        assert named, promise
+        for file, test in named:
+            assert f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), test
