@@ -169,12 +169,18 @@ def test_creep_forces_stay_within_friction(coach):
 
 
 def test_wider_gauge_lets_the_guiding_wheel_run_further_out(coach):
-    """In flange contact the leading wheelset follows the outer rail: by what the gauge gains."""
+    """In flange contact the leading wheelset follows the outer rail: by what the gauge gains.
+
+    The middle of the rails moves by half of that.
+    """
     widening = 0.006
     rows = ((0.0, widening, 0.0), (1000.0, widening, 0.0))
     usual = simulate(coach, curve(250.0, 0.1, length=150.0), speed=15.0)
     wide = simulate(coach, curve(250.0, 0.1, length=150.0, gauge_widening=rows), speed=15.0)
     moved = wide.wheelset_lateral[-1, 0] - usual.wheelset_lateral[-1, 0]
+    assert moved == pytest.approx(-0.5 * widening, abs=0.1e-3)
+    leading = wide.bodies.index(wide.wheelsets[0])
+    moved = wide.body_position[-1, leading, 1] - usual.body_position[-1, leading, 1]
     assert moved == pytest.approx(-widening, abs=0.1e-3)
 
 
@@ -182,8 +188,10 @@ def test_widening_of_one_rail_moves_the_middle(coach):
     """On the straight the coach settles in the middle of its rails: half of the widening aside."""
     rows = ((0.0, 0.0, 0.004), (1000.0, 0.0, 0.004))
     result = simulate(coach, track(gauge_widening=rows), speed=15.0, until=400.0)
-    last = result.wheelset_lateral[result.distance > 350.0]
-    assert last == pytest.approx(0.002, abs=0.1e-3)
+    last = result.distance > 350.0
+    assert result.wheelset_lateral[last] == pytest.approx(0.0, abs=0.1e-3)
+    wheelsets = [result.bodies.index(name) for name in result.wheelsets]
+    assert result.body_position[last][:, wheelsets, 1] == pytest.approx(0.002, abs=0.1e-3)
 
 
 def test_reverse_curve_mirrors_the_first_one(coach):
