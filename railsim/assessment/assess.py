@@ -187,7 +187,7 @@ def assess(
     >>> import railsim
     >>> settings = railsim.load_settings(None, ["output_rate=1000"])
     >>> run = railsim.simulate(railsim.load_vehicle("coach_manchester"),
-    ...     railsim.load_track("straight"), speed=48.9, until=500.0, settings=settings)
+    ...     railsim.load_track("straight"), speed=36.67, until=500.0, settings=settings)
     >>> (verdict,) = assess(run)
     >>> verdict.verdict, len(verdict.zones[0].values)
     ('incomplete', 1)

@@ -294,6 +294,8 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
     for name in sorted({zone.zone for one in assessments for zone in one.zones}):
         worst = {one.vehicle: one.worst_in(name) for one in assessments}
         rules = list(dict.fromkeys(rule for rows in worst.values() for rule in rows))
+        if not rules:
+            continue  # no section counts; the reasons are among the conditions
         rows: list[list[Cell]] = []
         failed = []
         for rule in rules:
