@@ -66,6 +66,11 @@ FILES = ("critical_speed.json", "critical_speed.png")
     metavar="N",
     help="Speeds of a bifurcation diagram.",
 )
+@click.option(
+    "--excitation",
+    metavar="A,B,...",
+    help="Sizes in m of the disturbances that hunting is sought from; default: 1 to 8 mm.",
+)
 @linearisation_options
 @click.option("--conicity", metavar="G or A:B:N", help="Straight cones as wheels; several: a map.")
 @click.option("--friction", metavar="MU or A:B:N", help="Friction; several values: a map.")
@@ -99,6 +104,7 @@ def command(
     low: float,
     high: float,
     points: int,
+    excitation: str | None,
     conicity: str | None,
     friction: str | None,
     over: tuple[str, ...],
@@ -126,7 +132,7 @@ def command(
       railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.analysis import Folder, load_inputs
+    from railsim.cli.analysis import Folder, load_inputs, values_of
 
     inputs = load_inputs(vehicle, track, settings, assignments, load)
     ranges = _ranges(conicity, friction, over)
@@ -136,6 +142,7 @@ def command(
         "low": low,
         "high": high,
         "points": points,
+        **({"excitations": values_of(excitation, "--excitation")} if excitation else {}),
         **how,
     }
 
@@ -153,7 +160,7 @@ def command(
 
             points_found = stability_map(
                 grid,
-                options,
+                {**options, "over_amplitude": False},
                 folder=folder.path,
                 workers=workers,
                 overwrite=overwrite,
@@ -252,7 +259,7 @@ def _tell_map(
     shape = [len(several) for several in values.values()]
     speeds = {}
     for kind, words in (("linear", "linear"), ("nonlinear", "non-linear")):
-        column = [record[kind]["speed"] if record[kind] else np.nan for record in found]
+        column = [_speed(record, kind) for record in found]
         if kind == "linear" or np.isfinite(column).any():
             speeds[words] = np.array(column).reshape(shape)
     folder.write_json(FILES[0], found)
@@ -261,13 +268,15 @@ def _tell_map(
     if as_json:
         print_json(found)
         return
-    kinds = {"linear": "linear (m/s)"}
-    if any(record.get("nonlinear_by_method") for record in found):
-        kinds["nonlinear"] = "non-linear (m/s)"
+    kinds = {"linear": f"linear, {_linearisation(found[0])} (m/s)"}
+    methods = dict.fromkeys(m for one in found for m in one.get("nonlinear_by_method") or ())
+    if methods:
+        kinds["nonlinear"] = f"non-linear, {', '.join(methods)} (m/s)"
     rows = []
     for record in found:
         point = [f"{record['at'][name]:g}" for name in values]
-        cells = [f"{record[kind]['speed']:.2f}" if record[kind] else "none" for kind in kinds]
+        speeds_here = [_speed(record, kind) for kind in kinds]
+        cells = ["none" if np.isnan(speed) else f"{speed:.2f}" for speed in speeds_here]
         rows.append([*point, *cells])
     header = [*values, *kinds.values()]
     echo("\n".join(table(header, rows, numbers=0)))
@@ -276,40 +285,66 @@ def _tell_map(
     folder.tell()
 
 
+def _speed(record: dict[str, Any], kind: str) -> float:
+    """Critical speed of a record; NaN where there is none."""
+    speed = (record[kind] or {}).get("speed")
+    return float("nan") if speed is None else float(speed)
+
+
+def _linearisation(record: dict[str, Any]) -> str:
+    """How the contact was linearised, in words."""
+    if record.get("linearisation") == "harmonic":
+        return f"harmonic {1e3 * record['amplitude']:g} mm"
+    return "tangent"
+
+
+def _row(
+    words: str, speed: float | None, frequency: float | None, amplitude: float | None, more: str
+) -> list[str]:
+    """A row of the table, empty where there is no number."""
+    if speed is None:
+        return [words, "none", "", "", more]
+    return [
+        words,
+        f"{speed:.2f}",
+        "" if frequency is None else f"{frequency:.2f}",
+        "" if amplitude is None else f"{1e3 * amplitude:.2f}",
+        more,
+    ]
+
+
 def _lines(found: "CriticalSpeed") -> list[str]:
-    rows = []
-    if found.linear is not None:
-        rows.append(
-            [
-                "linear",
-                f"{found.linear['speed']:.2f}",
-                f"{found.linear['frequency']:.2f}",
-                "",
-                found.linear["mode"],
-            ]
-        )
-    else:
-        rows.append(["linear", "none", "", "", ""])
-    for method, lowest in found.nonlinear.items():
-        if lowest.speed is None:
-            rows.append([f"non-linear, {method}", "none", "", "", ""])
-        else:
-            rows.append(
-                [
-                    f"non-linear, {method}",
-                    f"{lowest.speed:.2f}",
-                    f"{lowest.frequency:.2f}",
-                    f"{1e3 * lowest.amplitude:.2f}",
-                    "",
-                ]
-            )
+    linear = found.linear or {}
+    how = f"linear, {_linearisation(found.record())}"
+    rows = [_row(how, linear.get("speed"), linear.get("frequency"), None, linear.get("mode", ""))]
+    if linear.get("speed_of_runs") is not None:
+        rows.append(_row("linear, cells of the runs", linear["speed_of_runs"], None, None, ""))
+    smallest = (found.linear_over_amplitude or {}).get("smallest")
+    if smallest:
+        words = "linear, harmonic, smallest over amplitude"
+        rows.append(_row(words, smallest["speed"], None, smallest["amplitude"], ""))
+    for method, low in found.nonlinear.items():
+        rows.append(_row(f"non-linear, {method}", low.speed, low.frequency, low.amplitude, ""))
+    for jump in found.jumps:
+        words = "jump, speed rising" if jump["direction"] == "up" else "jump, speed falling"
+        more = f"to {1e3 * jump['to']:.2f} mm"
+        rows.append(_row(words, jump["speed"], None, jump["amplitude"], more))
     for words, limit in (
         ("amplitude above {:g} mm", found.amplitude_limit),
         ("rms of sum_Y above {:.3g} kN", found.instability_limit),
     ):
         if limit is not None:
             size = limit["limit"] * (1e3 if "mm" in words else 1e-3)
-            rows.append([words.format(size), f"{limit['speed']:.2f}", "", "", ""])
+            more = "" if limit["reached"] else f"not reached up to {found.high:g} m/s"
+            rows.append(_row(words.format(size), limit["speed"], None, None, more))
     header = ["critical speed", "m/s", "Hz", "mm", "mode"]
     kind = [f"the bifurcation is {found.type}"] if found.type not in ("", "none") else []
-    return [*table(header, rows), *kind, *(f"remark: {remark}" for remark in found.remarks)]
+    if kind and found.onset and found.onset != found.type:
+        kind = [f"{kind[0]}; small motions begin as in a {found.onset} one"]
+    where = found.conditions
+    note = (
+        f"rails {where['rails']}, friction {where['friction']}, creep law {where['law']}"
+        f" (linear: {where['linear_law']}), searched from {found.low:g} to {found.high:g} m/s"
+    )
+    remarks = (f"remark: {remark}" for remark in found.remarks)
+    return [*table(header, rows), note, *kind, *remarks]

@@ -153,7 +153,7 @@ def _over(
     """Root locus over one key of the files."""
     from railsim.cli.analysis import load_inputs, values_of
     from railsim.linear.modes import parameter_locus
-    from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle
+    from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 
     key, _, text = over.partition("=")
     options = dict(how)
@@ -163,9 +163,8 @@ def _over(
 
     def prepared(value: float) -> LinearVehicle:
         here = load_inputs(vehicle, track, settings, [*assignments, f"{key}={value!r}"])
-        return LinearVehicle(
-            here.vehicle, here.track, contact=contact, settings=here.settings, **options
-        )
+        law = smooth_law(here.settings)
+        return LinearVehicle(here.vehicle, here.track, contact=contact, settings=law, **options)
 
     return parameter_locus(prepared, key, values_of(text, "--over"), speed)
 

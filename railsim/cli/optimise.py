@@ -108,21 +108,24 @@ def command(
 
 
 def _lines(found: "Optimisation") -> list[str]:
-    from railsim.studies.designs import with_unit
+    from railsim.studies.designs import values_by_name
 
     definition = found.definition
     if found.chosen is None:
         reasons = {design.reason for design in found.designs if design.reason}
         why = f": {sorted(reasons)[0]}" if reasons else ""
         return [f"none of {len(found.designs)} designs keeps all constraints{why}"]
-    ones = (*definition.objectives, *definition.constraints)
     header = ["", "design", *(path.removeprefix("vehicle.") for path in definition.variables)]
-    header += [with_unit(one) for one in ones]
     step = math.ceil(len(found.front) / MOST_ROWS)
     shown = [*found.front[::step]]
     if found.chosen not in shown:
         shown.append(found.chosen)
-    rows = [_row(design, design is found.chosen) for design in shown]
+    values = values_by_name(definition, shown)
+    header += values
+    rows = [
+        _row(design, list(numbers), design is found.chosen)
+        for design, numbers in zip(shown, zip(*values.values(), strict=True), strict=True)
+    ]
     number = f"front of {len(found.front)} in {len(found.designs)} designs"
     lines = [number, "", *table(header, rows, numbers=1), ""]
     lines += [f"active: {words}" for words in found.active]
@@ -133,6 +136,6 @@ def _lines(found: "Optimisation") -> list[str]:
     return [*lines, *map(str, found.vehicles), str(found.folder / "front.png")]
 
 
-def _row(design: "Design", chosen: bool) -> list[str]:
-    numbers = (*design.variables.values(), *design.objectives, *design.constraints)
+def _row(design: "Design", values: list[float], chosen: bool) -> list[str]:
+    numbers = (*design.variables.values(), *values)
     return ["chosen" if chosen else "", str(design.number), *(f"{value:.5g}" for value in numbers)]

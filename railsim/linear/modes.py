@@ -16,7 +16,7 @@ from railsim.drawn import Drawn
 from railsim.errors import InputError, argument_fault
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of
-from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle
+from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.profiles import Profile
 
 Floats = NDArray[np.float64]
@@ -302,7 +302,7 @@ def modes(
         cant=cant,
         held=held,
         hold=hold,
-        settings=settings,
+        settings=smooth_law(settings),
         profiles=profiles,
     )
     return modes_at(prepared, speed)
@@ -338,7 +338,7 @@ def root_locus(
         vehicle,
         track or load_track("straight"),
         contact=contact,
-        settings=settings,
+        settings=smooth_law(settings),
         profiles=profiles,
         **how,
     )

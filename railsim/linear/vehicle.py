@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.creep_law import CREEP_LAWS
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -32,6 +33,21 @@ WALKING_PACE = 1.0  # m/s
 AMPLITUDE = 3e-3  # m, of the wheelsets where the linearisation is harmonic (EN 14363 practice)
 LINEARISATIONS = ("tangent", "harmonic")
 CONICITIES = (0.005, 0.6)  # of straight cones with the flange of S1002
+CELLS = 100  # along and across a patch, from which on the slopes of the creep force have no steps
+
+
+def smooth_law(settings: Settings | None) -> Settings:
+    """Return settings whose creep law has smooth slopes: cells as fine as makes no difference.
+
+    The cells of a coarse grid change from sticking to sliding one after the other.  What that does
+    to a force is small, its slope jumps: the tangent critical speed of a coach on 10 x 10 cells by
+    2 m/s from friction 0.44 to 0.48, on 100 x 100 by 0.2 m/s.
+    """
+    settings = settings or Settings()
+    if not CREEP_LAWS[settings.creep_law].grid:
+        return settings
+    along, across = (max(CELLS, number) for number in settings.fastsim_grid)
+    return settings.replace(fastsim_grid=(along, across))
 
 
 @dataclass(frozen=True)

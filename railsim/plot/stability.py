@@ -11,11 +11,21 @@ from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
 from railsim.stability.critical_speed import CriticalSpeed
 from railsim.stability.ramp import THRESHOLD, Diagram
 
-COLOURS = {"up": DISTINCT[0], "down": DISTINCT[1], "ramp": "0.6", "continuation": DISTINCT[2]}
+COLOURS = {
+    "up": DISTINCT[0],
+    "down": DISTINCT[1],
+    "further": DISTINCT[3],
+    "threshold": "0.3",
+    "ramp": "0.6",
+    "continuation": DISTINCT[2],
+}
+MARKERS = {"up": "^", "down": "v", "further": "d", "threshold": "x"}
 SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 WORDS = {
     "up": "steps upwards",
     "down": "steps downwards",
+    "further": "from other disturbances",
+    "threshold": "disturbance that decides",
     "ramp": "falling ramp",
     "continuation": "continuation, dashed where unstable",
 }
@@ -43,11 +53,13 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
             shown = np.where(np.array(branch.amplitude) > THRESHOLD, branch.frequency, np.nan)
             _draw(lower, branch, shown, label=False)
         _critical(upper, found)
+        _over_amplitude(upper, found)
         upper.set(
             ylabel="amplitude of the wheelsets (mm)",
             title=f"Hunting{f', {found.type}' if found.type else ''}",
         )
         upper.set_ylim(0.0, None)
+        upper.set_xlim(_shown(found))
         lower.set(xlabel="speed (m/s)", ylabel="frequency (Hz)")
         if found.conicity_over_amplitude is not None:
             _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
@@ -57,6 +69,17 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
                 handles, labels, loc="upper left", fontsize=7.5, borderpad=0.0
             )
     return figure
+
+
+def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
+    """Range of speeds: from somewhat below the slowest hunting to somewhat above the last jump."""
+    alive = [branch.speed[k] for branch in found.branches for k in branch.alive]
+    if not alive:
+        return None, None
+    marks = [jump["speed"] for jump in found.jumps] + [min(alive)]
+    if found.linear is not None:
+        marks.append(found.linear["speed"])
+    return 0.9 * min(marks), min(found.high, 1.25 * max(marks))
 
 
 def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
@@ -103,6 +126,17 @@ def _critical(axes: Axes, found: CriticalSpeed) -> None:
             )
 
 
+def _over_amplitude(axes: Axes, found: CriticalSpeed) -> None:
+    """Linear critical speed over the amplitude for which the contact is linearised."""
+    line = found.linear_over_amplitude
+    if line is not None and any(speed is not None for speed in line["speed"]):
+        speeds = [np.nan if speed is None else speed for speed in line["speed"]]
+        sizes = 1e3 * np.array(line["amplitude"])
+        axes.plot(
+            speeds, sizes, color=LIMIT, lw=0.9, ls=":", label="linear, harmonic, over amplitude"
+        )
+
+
 def _conicity(axes: Axes, conicity: Mapping[str, Any]) -> None:
     """Equivalent conicity, on the amplitudes of the diagram beside it."""
     values, amplitudes = np.array(conicity["conicity"]), 1e3 * np.array(conicity["amplitude"])
@@ -118,9 +152,10 @@ def _draw(axes: Axes, branch: Diagram, values: np.ndarray, *, label: bool) -> No
     speed, stable = np.array(branch.speed), np.array(branch.stable, dtype=bool)
     words = WORDS[branch.direction] if label else None
     colour = COLOURS[branch.direction]
-    if branch.direction in ("up", "down"):
-        marker = "^" if branch.direction == "up" else "v"
-        axes.plot(speed, values, marker=marker, ms=3.5, color=colour, label=words)
+    marker = MARKERS.get(branch.direction)
+    if marker is not None:
+        line = "-" if all(branch.stable) else (0, (4, 2))
+        axes.plot(speed, values, marker=marker, ms=3.5, ls=line, color=colour, label=words)
         return
     for is_stable, line in ((True, "-"), (False, (0, (4, 2)))):
         # a piece reaches to its neighbour of the other kind

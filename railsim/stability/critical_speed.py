@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from railsim.definitions.creep_law import CREEP_LAWS
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -17,24 +18,24 @@ from railsim.errors import InputError, ModelError, argument_fault
 from railsim.linear.eigenmodes import LossOfStability, loss_of_stability
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
-from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle
+from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.profiles import Profile
 from railsim.stability.conicity import conicity_over_amplitude
+from railsim.stability.continuation import followed_branches
+from railsim.stability.diagram import DROP, diagram, jumps
 from railsim.stability.motion import LeftRange, VehicleMotion
-from railsim.stability.periodic import Branch, PeriodicMotion
-from railsim.stability.ramp import RESOLUTION, Diagram, Sustained, bifurcation_type, diagram, ramp
-from railsim.stability.vehicle_flow import VehicleFlow
+from railsim.stability.over_amplitude import linear_over_amplitude
+from railsim.stability.ramp import EXCITATIONS, RESOLUTION, SMALL, Diagram, Sustained, ramp
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation")
 AMPLITUDE_LIMIT = 3e-3  # m
-LARGEST_AMPLITUDE = 5.5e-3  # m, at which a branch is followed no further
-ARC_STEP = 1.0  # units of the arc length, about 1 mm or 1 m/s
-MOST_MOTIONS = 80
-FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken
-ABOVE = 5.0  # m/s above the linear critical speed at which a ramp begins
+LARGEST_EXCITATION = 20e-3  # m
+MARGIN = 1.1  # over the admissible speed, to which a search should go
+NEAR = (0.8, 1.25)  # times the linear critical speed: where most speeds of a diagram stand ...
+SHARE = 0.75  # ... this share of them
 
 
 @dataclass
@@ -45,17 +46,29 @@ class CriticalSpeed(Drawn):
     ----------
     contact : Contact
         How the contact was linearised.
+    conditions : dict of str to str
+        ``rails``, creep ``law`` of the runs, ``linear_law`` of the linearisation, ``friction``.
+    low, high : float
+        Range of the search [m/s].
     linear : dict or None
-        ``speed``, ``frequency``, ``mode`` of the loss of stability; None where there is none.
+        ``speed``, ``frequency``, ``mode`` of the loss of stability, ``speed_of_runs``, the same
+        with the coarser cells of the runs; None where there is none.
+    linear_over_amplitude : dict or None
+        See `railsim.stability.over_amplitude`.
     nonlinear : dict of str to Sustained
         Lowest speed of sustained hunting by method.
     branches : list of Diagram
         Amplitude over speed.
+    jumps : list of dict
+        Where the motion changes to another branch or to rest, see `railsim.stability.diagram`.
     type : "subcritical", "supercritical", "none" or ""
-        How hunting begins; empty where it was not looked for.
+        Whether anything hunts below the speed at which rest loses its stability, in the runs' own
+        law; empty where it was not looked for.
+    onset : "subcritical", "supercritical" or ""
+        How the small motions begin there, whatever else is possible.
     amplitude_limit, instability_limit : dict or None
         Lowest ``speed`` at which an amplitude of 3 mm is exceeded, or half the limit of the
-        track-shifting force as rms, and that ``limit``.
+        track-shifting force as rms, and that ``limit``; ``reached`` and ``searched_to``.
     conicity_over_amplitude : dict or None
         Equivalent conicity of the leading wheelset, see `railsim.stability.conicity`.
     remarks : list of str
@@ -63,21 +76,40 @@ class CriticalSpeed(Drawn):
     """
 
     contact: Contact
+    conditions: dict[str, str] = field(default_factory=dict)
+    low: float = 0.0
+    high: float = 0.0
     linear: dict[str, Any] | None = None
+    linear_over_amplitude: dict[str, Any] | None = None
     nonlinear: dict[str, Sustained] = field(default_factory=dict)
     branches: list[Diagram] = field(default_factory=list)
+    jumps: list[dict[str, Any]] = field(default_factory=list)
     type: str = ""
-    amplitude_limit: dict[str, float] | None = None
-    instability_limit: dict[str, float] | None = None
+    onset: str = ""
+    amplitude_limit: dict[str, Any] | None = None
+    instability_limit: dict[str, Any] | None = None
     conicity_over_amplitude: dict[str, Any] | None = None
     remarks: list[str] = field(default_factory=list)
 
     FIGURE: ClassVar = "railsim.plot.stability:bifurcation_figure"
 
+    @property
+    def lowest(self) -> Sustained | None:
+        """Lowest speed of sustained hunting of all methods; None where there is none."""
+        known = [one for one in self.nonlinear.values() if one.speed is not None]
+        return min(known, key=lambda one: one.speed or 0.0, default=None)
+
     def record(self) -> dict[str, Any]:
         """Return everything as plain data."""
         speeds = {name: found.record() for name, found in self.nonlinear.items()}
-        known = [found for found in speeds.values() if found is not None]
+        lowest = self.lowest
+        nonlinear = None
+        if self.nonlinear:
+            nonlinear = {
+                **((lowest.record() if lowest else None) or {"speed": None}),
+                "reached": lowest is not None,
+                "searched_to": self.high,
+            }
         return {
             "linearisation": self.contact.linearisation,
             "amplitude": (
@@ -85,7 +117,7 @@ class CriticalSpeed(Drawn):
             ),
             "conicity": self.contact.conicity,
             "linear": self.linear,
-            "nonlinear": known[0] if known else None,
+            "nonlinear": nonlinear,
             "nonlinear_by_method": speeds,
             "amplitude_limit": self.amplitude_limit,
             "instability_limit": self.instability_limit,
@@ -93,6 +125,11 @@ class CriticalSpeed(Drawn):
             "branches": [branch.record() for branch in self.branches],
             "conicity_over_amplitude": self.conicity_over_amplitude,
             "remarks": self.remarks,
+            "conditions": self.conditions,
+            "searched": [self.low, self.high],
+            "onset": self.onset,
+            "jumps": self.jumps,
+            "linear_over_amplitude": self.linear_over_amplitude,
         }
 
     def to_xarray(self) -> Any:
@@ -130,6 +167,8 @@ def critical_speed(
     linearisation: str = "tangent",
     amplitude: float = AMPLITUDE,
     conicity: float | None = None,
+    excitations: Sequence[float] = EXCITATIONS,
+    over_amplitude: bool = True,
     settings: Settings | None = None,
     profiles: Mapping[str, Profile] | None = None,
     progress: Progress | None = None,
@@ -150,6 +189,11 @@ def critical_speed(
         Speeds of a bifurcation diagram.
     linearisation, amplitude, conicity
         Of the linear critical speed, as in `railsim.modes`; given cones hold for all methods.
+    excitations : sequence of float
+        Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
+        in the shape of the hunting mode [m].
+    over_amplitude : bool
+        Find the linear critical speed over amplitude too, which takes some seconds.
     settings : Settings, optional
         Scheme, creep law, contact.
     profiles : mapping of str to Profile, optional
@@ -168,40 +212,70 @@ def critical_speed(
     ModelError
         There is no equilibrium, or no stable step.
     """
-    _check(methods, low, high, points)
-    settings = settings or Settings()
-    prepared = LinearVehicle(
-        vehicle,
-        track or load_track("straight"),
-        contact=Contact(linearisation, amplitude, conicity),
-        settings=settings,
-        profiles=profiles,
-    )
-    found = CriticalSpeed(prepared.contact, remarks=list(prepared.remarks))
-    found.conicity_over_amplitude = conicity_over_amplitude(prepared)
-    lost = loss_of_stability(prepared.linearised, low, high)
-    _linear(found, prepared, lost, low, high)
+    _check(methods, low, high, points, excitations)
+    settings, track = settings or Settings(), track or load_track("straight")
+
+    def prepared(settings: Settings, contact: Contact) -> LinearVehicle:
+        return LinearVehicle(vehicle, track, contact=contact, settings=settings, profiles=profiles)
+
+    contact, law = Contact(linearisation, amplitude, conicity), smooth_law(settings)
+    smooth = prepared(law, contact)
+    found = CriticalSpeed(contact, conditions(track, settings), low, high)
+    found.remarks += smooth.remarks
+    found.conicity_over_amplitude = conicity_over_amplitude(smooth)
+    lost = loss_of_stability(smooth.linearised, low, high)
+    _linear(found, smooth, lost)
+    if over_amplitude:
+        found.linear_over_amplitude = linear_over_amplitude(
+            lambda size: prepared(law, Contact("harmonic", size, conicity)), low, high
+        )
     tell = progress or (lambda _: None)
     tell(0.05)
     wanted = [method for method in METHODS if method in methods and method != "linear"]
     if not wanted:
         return found
-    top = min(high, lost.parameter + ABOVE) if lost.parameter else high
-    motion = VehicleMotion(prepared, settings.scheme, (low, top))
+    own = prepared(settings, Contact(conicity=conicity))
+    begins = loss_of_stability(own.linearised, low, high)
+    if found.linear is not None:
+        found.linear["speed_of_runs"] = begins.parameter
+    search = _Search(
+        found, VehicleMotion(own, settings.scheme, begins.modes[-1]), begins, points, excitations
+    )
     for number, method in enumerate(wanted):
 
         def share(fraction: float, number: int = number) -> None:
             tell(0.05 + 0.95 * (number + fraction) / len(wanted))
 
         try:
-            _ACTIONS[method](found, motion, lost, (low, top), points, share)
+            _ACTIONS[method](search, share)
         except (LeftRange, ModelError) as error:
             found.remarks.append(f"{method}: {error}")
-    _limits(found, prepared)
+    _conclude(found, own, begins.parameter)
+    _remark_range(found, vehicle)
     return found
 
 
-def _check(methods: Sequence[str], low: float, high: float, points: int) -> None:
+def conditions(track: Track, settings: Settings) -> dict[str, str]:
+    """Return in words on what rails, with which creep law and friction."""
+
+    def words(settings: Settings) -> str:
+        law = CREEP_LAWS[settings.creep_law]
+        cells = " {} x {} cells".format(*settings.fastsim_grid) if law.grid else ""
+        return f"{law.label}{cells}"
+
+    sides = np.unique(track.friction)
+    friction = "from a table" if track.friction_table else "/".join(f"{mu:g}" for mu in sides)
+    return {
+        "rails": track.support.preset,
+        "law": words(settings),
+        "linear_law": words(smooth_law(settings)),
+        "friction": friction,
+    }
+
+
+def _check(
+    methods: Sequence[str], low: float, high: float, points: int, excitations: Sequence[float]
+) -> None:
     faults = []
     unknown = [method for method in methods if method not in METHODS]
     if unknown:
@@ -224,13 +298,17 @@ def _check(methods: Sequence[str], low: float, high: float, points: int) -> None
         )
     if not 2 <= points <= 200:
         faults.append(argument_fault("points", "", f"found {points}", "2 to 200"))
+    most = LARGEST_EXCITATION
+    wrong = [size for size in excitations if not SMALL <= size <= most]
+    if wrong or not len(excitations):
+        told = f"found {wrong[0]:g} m" if wrong else "no size"
+        allowed = f"{SMALL:g} to {most:g} m"
+        faults.append(argument_fault("excitations", "", told, allowed, "--excitation"))
     if faults:
         raise InputError(faults)
 
 
-def _linear(
-    found: CriticalSpeed, prepared: LinearVehicle, lost: LossOfStability, low: float, high: float
-) -> None:
+def _linear(found: CriticalSpeed, prepared: LinearVehicle, lost: LossOfStability) -> None:
     """Put the linear critical speed into the result, or why there is none."""
     parts = parts_of(prepared.model, prepared.coordinates)
 
@@ -254,150 +332,130 @@ def _linear(
         found.remarks.append(f"unstable at the lower end of the range: {words(0)}")
     else:
         found.remarks.append(
-            f"no linear critical speed from {low:g} to {high:g} m/s; least damped: {words(0)}; "
-            f"{words(1)}"
+            f"no linear critical speed from {found.low:g} to {found.high:g} m/s; least damped: "
+            f"{words(0)}; {words(1)}"
         )
 
 
-Range = tuple[float, float]
+@dataclass(frozen=True)
+class _Search:
+    """What the non-linear methods work on."""
+
+    found: CriticalSpeed
+    motion: VehicleMotion
+    begins: LossOfStability
+    points: int
+    excitations: Sequence[float]
 
 
-def _by_ramp(
-    found: CriticalSpeed,
-    motion: VehicleMotion,
-    lost: LossOfStability,
-    speeds: Range,
-    points: int,
-    progress: Progress,
-) -> None:
-    lowest, branch = ramp(motion, speeds[0], speeds[1], progress)
+def _by_ramp(search: _Search, progress: Progress) -> None:
+    found = search.found
+    lowest, branch = ramp(search.motion, found.low, found.high, progress, search.excitations)
     found.nonlinear["ramp"] = lowest
     found.branches.append(branch)
     if lowest.speed is None:
-        found.remarks.append(f"ramp: nothing hunts from {speeds[0]:g} to {speeds[1]:g} m/s")
+        found.remarks.append(f"ramp: nothing hunts from {found.low:g} to {found.high:g} m/s")
     elif lowest.below:
-        found.remarks.append(f"ramp: hunts still at the lower end, {speeds[0]:g} m/s")
+        found.remarks.append(f"ramp: hunts still at the lower end, {found.low:g} m/s")
+    if branch.top < found.high:
+        found.remarks.append(f"ramp: the vehicle derails above {branch.top:.4g} m/s")
 
 
-def _by_diagram(
-    found: CriticalSpeed,
-    motion: VehicleMotion,
-    lost: LossOfStability,
-    speeds: Range,
-    points: int,
-    progress: Progress,
-) -> None:
-    low = speeds[0]
-    if lost.parameter is not None:  # most of the diagram is where something happens
-        low = max(low, lost.parameter - max(2.0 * ABOVE, 0.2 * lost.parameter))
-    branches, lowest = diagram(motion, np.linspace(low, speeds[1], points).tolist(), progress)
+def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[float]:
+    """Speeds of a diagram: most of them where branches begin and end, the others above."""
+    low, high = found.low, found.high
+    if begins is None:
+        return np.linspace(low, high, points).tolist()
+    least, most = max(low, NEAR[0] * begins), min(high, NEAR[1] * begins)
+    if most >= high or points < 4:
+        return np.linspace(least, high, points).tolist()
+    near = round(SHARE * points)
+    above = np.linspace(most, high, points - near + 1)[1:]
+    return [*np.linspace(least, most, near).tolist(), *above.tolist()]
+
+
+def _by_diagram(search: _Search, progress: Progress) -> None:
+    found, begins = search.found, search.begins.parameter
+    speeds = _speeds(found, begins, search.points)
+    branches, lowest = diagram(
+        search.motion, speeds, progress, excitations=search.excitations, closer=True
+    )
     found.nonlinear["bifurcation"] = lowest
     found.branches += branches
-    found.type = bifurcation_type(branches)
-    if lost.parameter and lowest.speed and lowest.speed < lost.parameter - RESOLUTION:
-        found.type = "subcritical"  # the hysteresis may lie between two steps
-    if len(branches[0].speed) < points:
+    found.jumps = jumps(branches)
+    reached = max(branches[0].speed, default=found.low)
+    if reached < speeds[-1]:
         found.remarks.append(
-            f"bifurcation: the vehicle derails above {branches[0].speed[-1]:.4g} m/s"
+            f"bifurcation: the vehicle derails above {reached:.4g} m/s"
             if branches[0].speed
             else "bifurcation: the vehicle derails at the lower end"
         )
 
 
-def _by_continuation(
-    found: CriticalSpeed,
-    motion: VehicleMotion,
-    lost: LossOfStability,
-    speeds: Range,
-    points: int,
-    progress: Progress,
-) -> None:
-    if lost.parameter is None:
-        found.remarks.append("continuation: it begins at a linear critical speed; there is none")
-        return
-    flow = VehicleFlow(motion, lost.parameter)
-    branch, start = _birth(flow, motion, lost)
-    line = Diagram("continuation")
-    folds: list[PeriodicMotion] = []
-
-    def within(now: PeriodicMotion) -> bool:
-        share = now.amplitude / LARGEST_AMPLITUDE
-        progress(min(0.99, max(share, len(line.speed) / MOST_MOTIONS)))
-        inside = speeds[0] < now.speed < speeds[1] and now.amplitude < LARGEST_AMPLITUDE
-        return inside and len(line.speed) < MOST_MOTIONS
-
-    before = start
-    try:
-        for now in branch.followed(start, ARC_STEP, within):
-            if before.tangent[-1] * now.tangent[-1] < 0.0 and before is not start:
-                length = float(np.linalg.norm(now.tangent)) * ARC_STEP
-                folds.append(branch.fold(before, now, length))
-            _append(line, now)
-            before = now
-    except ModelError as error:
-        found.remarks.append(f"continuation: ended at {before.speed:.4g} m/s: {error}")
-    found.branches.append(line)
-    if not line.speed:
-        return
-    found.type = "subcritical" if line.speed[0] < lost.parameter else "supercritical"
-    lowest = min(folds, key=lambda fold: fold.speed, default=None)
-    if lowest is not None and lowest.speed < lost.parameter:
-        found.nonlinear["continuation"] = Sustained(
-            lowest.speed, lowest.amplitude, lowest.frequency
-        )
-    else:
-        found.nonlinear["continuation"] = Sustained(
-            lost.parameter, 0.0, float(lost.modes[0].frequencies[0])
-        )
-
-
-def _append(line: Diagram, now: PeriodicMotion) -> None:
-    line.speed.append(now.speed)
-    line.amplitude.append(now.amplitude)
-    line.frequency.append(now.frequency)
-    line.sum_Y_rms.append(float("nan"))
-    line.stable.append(now.is_stable)
-
-
-def _birth(
-    flow: VehicleFlow, motion: VehicleMotion, lost: LossOfStability
-) -> tuple[Branch, PeriodicMotion]:
-    """The branch at the bifurcation; its first shape is that of a small motion in the time loop."""
-    speed, mode = float(lost.parameter or 0.0), lost.modes[0]
-    frequency = float(mode.frequencies[0])
-    period = 1.0 / frequency
-    prepared = motion.prepared
-    state = motion.rest(speed, 0.0)
-    names = prepared.coordinates.names
-    indices = prepared.coordinates.indices[[names.index(n) for n in mode.linearisation.names]]
-    wheelsets = [f"{w}.y" for w in motion.model.index.wheelsets]
-    size = max(abs(mode.shapes[0, mode.linearisation.names.index(w)]) for w in wheelsets)
-    state[indices] += FIRST * (mode.shapes[0] / size).real
-    state = motion.stretch(state, speed, speed, 2.0 * period).state  # the scheme's memory settles
-    rest = flow.reduced(motion.prepared.steady(speed).state)
-    begin = flow.reduced(state) - rest
-    quarter = flow.after((rest + begin)[None], np.array([0.25 * period]), np.array([speed]))[0]
-    scale = flow.scale(rest + begin, period, speed, FIRST)
-    branch = Branch(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
-    return branch, branch.beginning(rest, begin - 1j * (quarter - rest), frequency, speed)
+def _by_continuation(search: _Search, progress: Progress) -> None:
+    found, begins = search.found, search.begins
+    lines, folds, remarks = followed_branches(
+        search.motion, begins, found.branches, (found.low, found.high), progress
+    )
+    found.branches += lines
+    found.remarks += remarks
+    born = begins.parameter
+    if born is not None and lines and lines[0].speed:
+        found.onset = "subcritical" if lines[0].speed[0] < born else "supercritical"
+        frequency = float(begins.modes[0].frequencies[0])
+        folds = [*folds, Sustained(born, 0.0, frequency)]
+    if folds:
+        found.nonlinear["continuation"] = min(folds, key=lambda fold: fold.speed or 0.0)
 
 
 _ACTIONS = {"ramp": _by_ramp, "bifurcation": _by_diagram, "continuation": _by_continuation}
 
 
-def _limits(found: CriticalSpeed, prepared: LinearVehicle) -> None:
-    """Lowest speeds at which amplitude and track-shifting force exceed their limits."""
+def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | None) -> None:
+    """Find type and limits from all branches."""
+    lowest = found.lowest
+    if lowest is None or lowest.speed is None:
+        found.type = "none"
+    elif begins is None or lowest.speed < begins - RESOLUTION or found.onset == "subcritical":
+        found.type = "subcritical"
+    else:
+        found.type = "supercritical"
     # EN 14363: sum_Y 10 kN + 2 Q0/3, of which the instability criterion takes half as rms
     force = 0.5 * (10e3 + 2.0 * float(np.min(prepared.Q0)) / 3.0)
-    for name, limit, attribute in (
-        ("amplitude_limit", AMPLITUDE_LIMIT, "amplitude"),
-        ("instability_limit", force, "sum_Y_rms"),
-    ):
-        beyond = [
-            speed
-            for branch in found.branches
-            for speed, value in zip(branch.speed, getattr(branch, attribute), strict=True)
-            if value > limit
-        ]
-        if beyond:
-            setattr(found, name, {"speed": min(beyond), "limit": limit})
+    found.amplitude_limit = _first_beyond(found, AMPLITUDE_LIMIT, "amplitude")
+    found.instability_limit = _first_beyond(found, force, "sum_Y_rms")
+
+
+def _first_beyond(found: CriticalSpeed, limit: float, attribute: str) -> dict[str, Any]:
+    """The lowest speed of stable hunting beyond a limit, between the points of a branch too."""
+    beyond = []
+    for branch in found.branches:
+        points = branch
+        if branch.direction == "ramp":  # it undershoots the end of the branch
+            end = found.nonlinear["ramp"].speed or np.inf
+            points = branch.taken([k for k, v in enumerate(branch.speed) if v >= end])
+        values, alive = getattr(points, attribute), points.alive
+        for k in (k for k in alive if values[k] > limit):
+            beyond.append(points.speed[k])
+            for n in (k - 1, k + 1):  # a neighbour within the limit: the branch passes it between
+                if n in alive and DROP * values[k] < values[n] <= limit:
+                    share = (limit - values[n]) / (values[k] - values[n])
+                    beyond.append(points.speed[n] + share * (points.speed[k] - points.speed[n]))
+    return {
+        "speed": min(beyond, default=None),
+        "limit": limit,
+        "reached": bool(beyond),
+        "searched_to": found.high,
+    }
+
+
+def _remark_range(found: CriticalSpeed, vehicle: Vehicle) -> None:
+    """Say where the search ends below the speed that a vehicle is to be judged at."""
+    if vehicle.service is None:
+        return
+    needed = MARGIN * vehicle.service.admissible_speed
+    if found.high < needed:
+        found.remarks.append(
+            f"searched to {found.high:g} m/s, less than {needed:.4g} m/s, {MARGIN:g} times the "
+            "admissible speed: hunting above is not seen"
+        )

@@ -69,6 +69,8 @@ class PeriodicMotion:
         Direction of the branch in the scaled u.
     along : float64[n]
         Direction of the motion itself at `state`, scaled.
+    matrix : float64[n, n + 2] or None
+        Jacobian of the residual there, with which the search for the next one begins.
     """
 
     state: Floats
@@ -78,6 +80,7 @@ class PeriodicMotion:
     multipliers: NDArray[np.complex128]
     tangent: Floats
     along: Floats
+    matrix: Floats | None = None
 
     @property
     def frequency(self) -> float:
@@ -179,6 +182,25 @@ class Branch:
         """
         return self._solved(now, now.tangent, length)
 
+    def nearest(self, state: Floats, period: float, speed: float) -> PeriodicMotion:
+        """Return the motion at a speed nearest to a state of a run, with a branch that slows down.
+
+        Raises
+        ------
+        ModelError
+            Newton's method does not converge.
+        """
+        n = len(state)
+        begin = np.array([state, state])
+        ends = self._flow.after(begin, np.array([1e-2, 2e-2]) * period, np.full(2, speed))
+        along = (ends[1] - ends[0]) / self._scale[:n]
+        slower = np.zeros(n + 2)
+        slower[-1] = -1.0
+        guess = PeriodicMotion(
+            state, period, speed, 0.0, np.zeros(0, complex), slower, along / np.linalg.norm(along)
+        )
+        return self.at_speed(guess, speed)
+
     def at_speed(self, near: PeriodicMotion, speed: float) -> PeriodicMotion:
         """Return the motion at a given speed [m/s] near to a known one.
 
@@ -201,7 +223,7 @@ class Branch:
         # the tangent leads on also where only the speed is given
         lead = float(now.tangent @ direction)
         u = base + now.tangent * length / lead if abs(lead) > LEAD else base + length * direction
-        matrix: Floats | None = None
+        matrix = now.matrix
         before = np.inf
         for iteration in range(1, MOST_ITERATIONS + 1):
             if matrix is None:
@@ -289,4 +311,5 @@ class Branch:
             tangent / np.linalg.norm(tangent),
             # end of the motion, mirrored back: the direction in which it begins
             matrix[:, n] / np.linalg.norm(matrix[:, n]),
+            matrix,
         )

@@ -1,4 +1,4 @@
-"""Non-linear critical speed by a ramp of falling speed, and bifurcation diagrams by steps of speed.
+"""Non-linear critical speed by a ramp of falling speed.
 
 The non-linear critical speed is the lowest at which an oscillation sustains itself on ideal track.
 A ramp undershoots it: the oscillation decays a few tenths of m/s late.  Hence runs at constant
@@ -20,16 +20,17 @@ Progress = Callable[[float], None]
 
 THRESHOLD = 0.05e-3  # m, amplitude below which nothing hunts
 WINDOW = 1.0  # s, over which an amplitude is taken
-START = 3e-3  # m, displacement that excites hunting; halved where it derails
+EXCITATIONS = (1e-3, 3e-3, 6e-3, 8e-3)  # m, disturbances; those that derail are halved
 SMALL = 1e-5  # m, disturbance at the lower end of a diagram
 HOLD = 10.0  # s, for the oscillation to settle above the critical speed
-DECELERATION = 0.05  # m/s2
+BRAKING = 0.5  # m/s2, to see where about hunting dies
+DECELERATION = 0.05  # m/s2, of the ramp
+LEAD = 6.0  # m/s above the end of that braking, where the ramp begins
 CONSTANT = 20.0  # s, of a run that decides whether an oscillation sustains itself
 CHANGE = 0.02  # of the amplitude over half of it
 MOST_HALVES = 10  # halves of such a run, at most
 RESOLUTION = 0.1  # m/s
-SETTLING = 2.0  # s between looks at a step of a diagram
-MOST_SETTLING = 60  # looks; 1 m/s above a critical speed a coach's hunting grows by 0.1/s
+STEP_DOWN = 0.95  # ratio of speeds, where every disturbance ends in a derailment
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,16 @@ class Sustained:
         return {"speed": self.speed, "amplitude": self.amplitude, "frequency": self.frequency}
 
 
+COLUMNS = ("speed", "amplitude", "frequency", "sum_Y_rms", "stable")
+
+
 @dataclass
 class Diagram:
     """One branch of a bifurcation diagram.
 
     Attributes
     ----------
-    direction : "up", "down", "ramp" or "continuation"
+    direction : "up", "down", "further", "threshold", "ramp" or "continuation"
     speed, amplitude, frequency, sum_Y_rms : list of float
         [m/s], [m], [Hz], [N].
     stable : list of bool
@@ -90,58 +94,131 @@ class Diagram:
         self.stable.append(True)
         self.states.append(seen.state)
 
+    def taken(self, order: Sequence[int]) -> "Diagram":
+        """Return some of the points, in this order."""
+        lists = {name: [getattr(self, name)[k] for k in order] for name in (*COLUMNS, "states")}
+        return Diagram(self.direction, **lists)
+
+    def __add__(self, other: "Diagram") -> "Diagram":
+        """Return the points of both, one after the other."""
+        lists = {name: getattr(self, name) + getattr(other, name) for name in (*COLUMNS, "states")}
+        return Diagram(self.direction, **lists)
+
+    @property
+    def top(self) -> float:
+        """The highest speed [m/s]."""
+        return max(self.speed, default=float("nan"))
+
+    @property
+    def alive(self) -> list[int]:
+        """Numbers of the points with an oscillation that sustains itself."""
+        return [
+            k
+            for k, (a, stable) in enumerate(zip(self.amplitude, self.stable, strict=True))
+            if stable and a > THRESHOLD
+        ]
+
     def record(self) -> dict[str, Any]:
         """Return the branch as plain data."""
-        return {
-            name: getattr(self, name)
-            for name in ("direction", "speed", "amplitude", "frequency", "sum_Y_rms", "stable")
-        }
+        return {name: getattr(self, name) for name in ("direction", *COLUMNS)}
 
 
-def excited(motion: Motion, speed: float) -> Stretch:
+def excited(motion: Motion, speed: float, amplitude: float) -> Stretch:
     """Excite hunting at a speed and let it settle; the end of what it then does.
+
+    Parameters
+    ----------
+    amplitude : float
+        Of the disturbance; halved where it derails [m].
 
     Raises
     ------
     LeftRange
         Even a small disturbance ends in a derailment.
     """
-    amplitude = START
     while True:
         try:
-            settled = motion.stretch(motion.rest(speed, amplitude), speed, speed, HOLD)
-            return motion.stretch(settled.state, speed, speed, 2.0 * WINDOW)
+            reached = motion.stretch(motion.rest(speed, amplitude), speed, speed, HOLD)
+            return motion.stretch(reached.state, speed, speed, 2.0 * WINDOW)
         except LeftRange:
             amplitude *= 0.5
             if amplitude < SMALL:
                 raise
 
 
+def hunting(motion: Motion, speed: float, excitations: Sequence[float]) -> Stretch:
+    """What the largest disturbance ends in, or a smaller one where it dies."""
+    for size in sorted(excitations, reverse=True):
+        seen = excited(motion, speed, size)
+        if seen.amplitude > THRESHOLD:
+            break
+    return seen
+
+
+def moved(motion: Motion, state: Floats, begin: float, end: float) -> Floats:
+    """A state at another speed, after braking or accelerating to it."""
+    if abs(end - begin) < 1e-9:
+        return state
+    return motion.stretch(state, begin, end, abs(end - begin) / BRAKING).state
+
+
 def ramp(
-    motion: Motion, low: float, high: float, progress: Progress | None = None
+    motion: Motion,
+    low: float,
+    high: float,
+    progress: Progress | None = None,
+    excitations: Sequence[float] = EXCITATIONS,
 ) -> tuple[Sustained, Diagram]:
     """Let the speed fall from `high` until hunting dies, then bisect with runs at constant speed.
+
+    Braking hard shows where about it dies; the ramp begins somewhat above, on a state from there.
+
+    Parameters
+    ----------
+    motion : Motion
+    low, high : float
+        Range of speeds [m/s]; where every disturbance derails at `high`, a lower one is taken.
+    excitations : sequence of float
+        Sizes of the disturbances at the highest speed [m].
 
     Returns
     -------
     Sustained, Diagram
         The critical speed, and the amplitude on the ramp.
     """
-    branch = Diagram("ramp")
-    seen = excited(motion, high)
-    branch.add(high, seen)
+    tell = progress or (lambda _: None)
     speed = high
-    while seen.amplitude > THRESHOLD and speed > low:
-        below = max(low, speed - DECELERATION * WINDOW)
-        seen = motion.stretch(seen.state, speed, below, max(WINDOW, (speed - below) / DECELERATION))
-        speed = below
-        branch.add(speed, seen)
-        if progress is not None:
-            progress(0.7 * (high - speed) / (high - low))
-    return _lowest(motion, branch, low), branch
+    while True:
+        try:
+            seen = hunting(motion, speed, excitations)
+            break
+        except LeftRange:
+            if speed <= low:
+                raise
+            speed = max(low, STEP_DOWN * speed)
+    hard = Diagram("ramp")
+    hard.add(speed, seen)
+    _braked(motion, hard, low, BRAKING, lambda share: tell(0.3 * share))
+    begin = min(hard.speed[0], hard.speed[-1] + LEAD)
+    branch = hard.taken([k for k, v in enumerate(hard.speed) if v >= begin])
+    _braked(motion, branch, low, DECELERATION, lambda share: tell(0.3 + 0.4 * share))
+    return lowest_on(motion, branch, low), branch
 
 
-def _lowest(motion: Motion, branch: Diagram, low: float) -> Sustained:
+def _braked(
+    motion: Motion, branch: Diagram, low: float, deceleration: float, tell: Progress
+) -> None:
+    """Append what a system does while its speed falls, until it hunts no more."""
+    top = branch.speed[-1]
+    while branch.amplitude[-1] > THRESHOLD and branch.speed[-1] > low:
+        speed = branch.speed[-1]
+        below = max(low, speed - deceleration * WINDOW)
+        duration = max(WINDOW, (speed - below) / deceleration)
+        branch.add(below, motion.stretch(branch.states[-1], speed, below, duration))
+        tell((top - below) / max(top - low, RESOLUTION))
+
+
+def lowest_on(motion: Motion, branch: Diagram, low: float) -> Sustained:
     """Lowest sustained speed, from states of a branch of falling speed.
 
     The speeds between the last state that hunts and the first that does not are bisected; where
@@ -159,7 +236,7 @@ def _lowest(motion: Motion, branch: Diagram, low: float) -> Sustained:
     best: Sustained | None = None
     upper, step = branch.speed[last], 2.0 * RESOLUTION
     while best is None:
-        found = sustained(motion, _state_at(branch, upper), upper)
+        found = sustained(motion, _state_at(motion, branch, upper), upper)
         if found is not None:
             best = Sustained(upper, found.amplitude, found.frequency)
         elif upper >= branch.speed[0]:
@@ -168,7 +245,7 @@ def _lowest(motion: Motion, branch: Diagram, low: float) -> Sustained:
             lower, upper, step = upper, min(branch.speed[0], upper + step), 2.0 * step
     while upper - lower > RESOLUTION:
         middle = 0.5 * (lower + upper)
-        found = sustained(motion, _state_at(branch, middle), middle)
+        found = sustained(motion, _state_at(motion, branch, middle), middle)
         if found is None:
             lower = middle
         else:
@@ -176,14 +253,14 @@ def _lowest(motion: Motion, branch: Diagram, low: float) -> Sustained:
     return best
 
 
-def _state_at(branch: Diagram, speed: float) -> Floats:
-    """State of the slowest point of a branch that hunts at a speed or above."""
+def _state_at(motion: Motion, branch: Diagram, speed: float) -> Floats:
+    """State at a speed, braked from the slowest point of a branch that hunts there or above."""
     chosen = [
         k
         for k, v in enumerate(branch.speed)
         if v >= speed - 1e-9 and branch.amplitude[k] > THRESHOLD
     ]
-    return branch.states[chosen[-1]]
+    return moved(motion, branch.states[chosen[-1]], branch.speed[chosen[-1]], speed)
 
 
 def sustained(motion: Motion, state: Floats, speed: float) -> Stretch | None:
@@ -203,87 +280,3 @@ def sustained(motion: Motion, state: Floats, speed: float) -> Stretch | None:
             return seen
         before, state = seen.amplitude, seen.state
     return None
-
-
-def settled(motion: Motion, state: Floats, speed: float) -> Stretch:
-    """Run at a constant speed until the amplitude changes no more, or has died."""
-    before = np.inf
-    for _ in range(MOST_SETTLING):
-        seen = motion.stretch(state, speed, speed, SETTLING)
-        if abs(seen.amplitude - before) < 0.1 * CHANGE * seen.amplitude:
-            break
-        if seen.amplitude < 0.02 * THRESHOLD and seen.amplitude < before:
-            break
-        state, before = seen.state, seen.amplitude
-    return seen
-
-
-def diagram(
-    motion: Motion, speeds: Sequence[float], progress: Progress | None = None
-) -> tuple[list[Diagram], Sustained]:
-    """Bifurcation diagram by steps of speed upwards and then downwards with carried states.
-
-    Parameters
-    ----------
-    motion : Motion
-    speeds : sequence of float
-        Rising [m/s].
-
-    Returns
-    -------
-    list of Diagram, Sustained
-        Branches up and down, and the lowest speed at which an oscillation sustains itself.  A
-        branch upwards ends where the vehicle derails.
-    """
-    up, down = Diagram("up"), Diagram("down")
-    total = 2 * len(speeds)
-    state = motion.rest(speeds[0], SMALL)
-    for speed in speeds:
-        try:
-            seen = settled(motion, _disturbed(motion, up, state, speed), speed)
-        except LeftRange:
-            break
-        up.add(speed, seen)
-        state = seen.state
-        if progress is not None:
-            progress(len(up.speed) / total)
-    if not up.speed:
-        return [up, down], Sustained(None)
-    seen = excited(motion, up.speed[-1])
-    for number, speed in enumerate(reversed(up.speed)):
-        seen = settled(motion, seen.state, speed)
-        down.add(speed, seen)
-        if progress is not None:
-            progress((len(speeds) + number + 1) / total)
-    return [up, down], _lowest(motion, down, speeds[0])
-
-
-def _disturbed(motion: Motion, up: Diagram, state: Floats, speed: float) -> Floats:
-    """The carried state, or where it rests again one that is slightly disturbed."""
-    if up.amplitude and up.amplitude[-1] < SMALL:
-        return motion.rest(speed, SMALL)
-    return state
-
-
-def bifurcation_type(branches: Sequence[Diagram], resolution: float = 1.5) -> str:
-    """``subcritical`` where the branches up and down differ at a speed, else ``supercritical``.
-
-    ``none`` where nothing hunts.
-
-    Parameters
-    ----------
-    branches : sequence of Diagram
-        Up and down.
-    resolution : float
-        Ratio of two amplitudes that count as different.
-    """
-    up, down = branches
-    size = {v: a for v, a in zip(up.speed, up.amplitude, strict=True)}
-    if not any(a > THRESHOLD for a in (*up.amplitude, *down.amplitude)):
-        return "none"
-    differ = [
-        v
-        for v, a in zip(down.speed, down.amplitude, strict=True)
-        if a > THRESHOLD and a > resolution * size.get(v, a)
-    ]
-    return "subcritical" if differ else "supercritical"

@@ -43,7 +43,7 @@ class VehicleFlow:
         self._motion = motion
         self._system = motion.system._replace(drive=CONSTANT_SPEED)
         self._work = work_arrays(self._system)
-        self._speed = speed
+        self._step = motion.step_at(speed)
         self._rest = motion.prepared.steady(speed).state.copy()
         self._indices, self._floors = self._moving()
         n = motion.model.index.n_bodies
@@ -99,7 +99,7 @@ class VehicleFlow:
 
     def steps(self, duration: float) -> int:
         """Number of steps in a period of the length of the runs' steps, as nearly as it fits."""
-        steps: int = round(duration / self._motion.step)
+        steps: int = round(duration / self._step)
         return max(8, steps)
 
     def after(self, states: Floats, durations: Floats, speeds: Floats) -> Floats:

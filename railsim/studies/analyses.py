@@ -115,6 +115,7 @@ def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result 
         methods=analysis.methods,
         low=analysis.low,
         high=analysis.high,
+        over_amplitude=False,
         settings=case.settings,
         **_contact(analysis),
     )

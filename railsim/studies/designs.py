@@ -274,3 +274,20 @@ def with_unit(one: Value) -> str:
     """Return the name of a value with its unit."""
     unit = unit_of(one.quantity)
     return f"{name_of(one)} ({unit})" if unit else name_of(one)
+
+
+def values_by_name(wanted: Optimise, designs: Sequence[Design]) -> dict[str, list[float]]:
+    """Return objectives and constraints of designs by name with unit.
+
+    A quantity that is both stands once; twice where its values differ, as the mean over the runs
+    and the worst of them do.
+    """
+    found: dict[str, list[float]] = {}
+    ones = (*wanted.objectives, *wanted.constraints)
+    rows = [(*design.objectives, *design.constraints) for design in designs]
+    for number, one in enumerate(ones):
+        name, values = with_unit(one), [row[number] for row in rows]
+        if not np.array_equal(found.get(name, values), values, equal_nan=True):
+            name = f"{name}, worst of its limit"
+        found[name] = values
+    return found

@@ -31,6 +31,7 @@ from railsim.studies.designs import (
     name_of,
     share_of,
     signs_of,
+    values_by_name,
     with_unit,
 )
 from railsim.studies.front import hypervolume, knee, non_dominated
@@ -306,7 +307,8 @@ def _write(found: Optimisation) -> None:
 def _write_designs(found: Optimisation) -> None:
     definition = found.definition
     names = ["design", *definition.variables]
-    names += [with_unit(one) for one in (*definition.objectives, *definition.constraints)]
+    values = values_by_name(definition, found.designs)
+    names += values
     on_front = {design.number for design in found.front}
     with (
         whole_file(found.folder / "designs.csv") as partial,
@@ -314,8 +316,9 @@ def _write_designs(found: Optimisation) -> None:
     ):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow([*names, "feasible", "front", "reason"])
-        for design in found.designs:
-            numbers = (*design.variables.values(), *design.objectives, *design.constraints)
+        columns = zip(*values.values(), strict=True)
+        for design, own in zip(found.designs, columns, strict=True):
+            numbers = (*design.variables.values(), *own)
             cells = ["" if math.isnan(number) else number for number in numbers]
             on = design.number in on_front
             writer.writerow([design.number, *cells, int(design.feasible), int(on), design.reason])

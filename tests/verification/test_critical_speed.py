@@ -8,7 +8,8 @@ from selection import points
 
 from railsim.linear.modes import modes
 from railsim.stability.critical_speed import critical_speed
-from railsim.stability.ramp import THRESHOLD, bifurcation_type, diagram, ramp
+from railsim.stability.diagram import diagram
+from railsim.stability.ramp import THRESHOLD, ramp
 
 RIGID = load_track("straight").replace(support={"preset": "rigid"})
 
@@ -36,7 +37,6 @@ def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurca
     assert 1e3 * back[68.0] == pytest.approx(9.735, rel=5e-3)
     assert 1e3 * back[70.0] == pytest.approx(10.185, rel=5e-3)
     assert back[66.0] < THRESHOLD
-    assert bifurcation_type([up, down]) == "subcritical"
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
 
 
@@ -51,7 +51,7 @@ def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
 
     The branch is followed up to 2 mm: it turns below that, where it turns.
     """
-    monkeypatch.setattr("railsim.stability.critical_speed.LARGEST_AMPLITUDE", 2e-3)
+    monkeypatch.setattr("railsim.stability.continuation.LARGEST_AMPLITUDE", 2e-3)
     found = critical_speed(
         load_vehicle(name),
         RIGID,
@@ -64,7 +64,7 @@ def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
     assert np.ptp(speeds) < 0.5
     assert found.type == kind
     branches = found.to_xarray()
-    assert list(branches.branch.values) == ["ramp", "up", "down", "continuation"]
+    assert {"ramp", "up", "down", "threshold", "continuation"} <= set(branches.branch.values)
     assert float(branches.amplitude.max()) > 1e-3
 
 
@@ -107,3 +107,80 @@ def test_the_critical_mode_is_undamped_there():
     assert there.least_damped.damping_ratio == pytest.approx(0.0, abs=1e-5)
     assert there.least_damped.frequency == pytest.approx(found.linear["frequency"], rel=1e-6)
     assert "hunting" in found.linear["mode"]
+
+
+@points("support", ["rigid", "ballasted"], always=(0,))
+def test_linear_critical_speed_has_no_jumps_over_friction(support):
+    """FASTSIM's cells go over to sliding one by one: 2 m/s from friction 0.44 to 0.48, 10 x 10."""
+    coach = load_vehicle("coach_flexicoil")
+    found = [
+        critical_speed(
+            coach,
+            RIGID.replace(support={"preset": support}, friction=float(friction)),
+            methods=("linear",),
+            low=55.0,
+            high=90.0,
+            over_amplitude=False,
+        ).linear["speed"]
+        for friction in np.arange(0.30, 0.601, 0.02)
+    ]
+    assert np.max(np.abs(np.diff(found))) < 0.5
+    assert np.all(np.diff(found) < 0.02)  # more friction makes creep forces stiffer
+
+
+@pytest.mark.further
+def test_every_branch_of_the_manchester_coach_is_found():
+    """Braked from the top a plain run hunts on the flange to 40 m/s, at 38.5 m/s it has died.
+
+    That is below the speed at which rest loses its stability; upwards the motion jumps to the
+    flange between 48 and 49 m/s.
+    """
+    found = critical_speed(
+        load_vehicle("coach_manchester"),
+        RIGID.replace(support={"preset": "ballasted"}),
+        methods=("bifurcation",),
+        over_amplitude=False,
+    )
+    lowest = found.nonlinear["bifurcation"].speed
+    assert 38.5 < lowest <= 40.0
+    assert lowest < found.linear["speed_of_runs"]
+    assert found.type == "subcritical"
+    (up,) = [jump for jump in found.jumps if jump["direction"] == "up"]
+    assert 48.0 < up["speed"] < 49.0
+    assert up["to"] > 1.5 * up["amplitude"]
+    record = found.record()
+    for limit in ("amplitude_limit", "instability_limit"):
+        assert record[limit]["reached"]
+        assert lowest <= record[limit]["speed"] < 60.0
+    (between,) = [branch for branch in found.branches if branch.direction == "threshold"]
+    assert not any(between.stable)
+
+
+def test_a_limit_that_is_not_reached_is_said_so():
+    """Nothing hunts from 15 to 25 m/s; 1.1 times the admissible speed is not searched."""
+    found = critical_speed(
+        load_vehicle("coach_manchester"),
+        RIGID,
+        methods=("ramp",),
+        low=15.0,
+        high=25.0,
+        over_amplitude=False,
+    )
+    record = found.record()
+    for name in ("nonlinear", "amplitude_limit", "instability_limit"):
+        assert record[name]["speed"] is None
+        assert record[name]["reached"] is False
+        assert record[name]["searched_to"] == 25.0
+    assert found.type == "none"
+    assert any("1.1 times the admissible speed" in remark for remark in found.remarks)
+
+
+def test_critical_speed_over_amplitude_and_its_smallest():
+    """Conicity falls with the amplitude from 0.3 mm on (EN 15302), so that the speed rises."""
+    found = critical_speed(load_vehicle("coach_manchester"), RIGID, methods=("linear",))
+    line = found.linear_over_amplitude
+    assert line["amplitude"][0] == 0.1e-3
+    assert line["amplitude"][-1] == 6e-3
+    assert np.all(np.diff(line["speed"]) > 0.0)
+    assert line["smallest"]["speed"] == min(line["speed"])
+    assert line["speed"][0] == pytest.approx(found.linear["speed"], rel=0.03)
