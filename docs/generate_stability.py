@@ -1,17 +1,19 @@
 """Make the pictures of ``docs/user/stability.md``.
 
 ``python docs/generate_stability.py`` makes all of them, or those that are named: ``modes``,
-``critical_speed``, ``curving``.  Together they take some minutes on one core.
+``critical_speed``, ``hunting_flexicoil``, ``hunting_benchmark``, ``curving``.  Together they take
+some ten minutes on one core.
 """
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from railsim import critical_speed, curving, load_track, load_vehicle, root_locus
+from railsim import critical_speed, curving, load_vehicle, root_locus
 from railsim.plot.curving import curving_figure
 from railsim.plot.modes import locus_figure
 from railsim.plot.stability import bifurcation_figure
@@ -21,7 +23,6 @@ IMAGES = Path(__file__).parent / "img"
 COACH = "coach_manchester"
 RADII = (250.0, 300.0, 400.0, 500.0, 700.0, 1000.0, 2000.0, 5000.0)
 DEFICIENCIES = (0.0, 0.05, 0.1, 0.15)
-RIGID = {"preset": "rigid"}
 
 
 def modes_picture() -> Figure:
@@ -31,17 +32,11 @@ def modes_picture() -> Figure:
     return locus_figure(locus, f"{coach.name}: contact harmonic 3 mm")
 
 
-def critical_speed_picture() -> Figure:
-    """Bifurcation diagram of the coach by all methods, on rigid rails."""
-    coach = load_vehicle(COACH)
-    found = critical_speed(
-        coach,
-        load_track("straight").replace(support=RIGID),
-        methods=("ramp", "bifurcation", "continuation"),
-        low=25.0,
-        points=16,
-    )
-    return bifurcation_figure(found, f"{coach.name}, rigid rails")
+def hunting_picture(name: str) -> Figure:
+    """Bifurcation diagram of a vehicle by all methods, on the elastic rails of `straight`."""
+    vehicle = load_vehicle(name)
+    found = critical_speed(vehicle, methods=("ramp", "bifurcation", "continuation"))
+    return bifurcation_figure(found, f"{vehicle.name}, elastic rails")
 
 
 def curving_picture() -> Figure:
@@ -53,7 +48,9 @@ def curving_picture() -> Figure:
 
 PICTURES: dict[str, Callable[[], Figure]] = {
     "modes": modes_picture,
-    "critical_speed": critical_speed_picture,
+    "critical_speed": partial(hunting_picture, COACH),
+    "hunting_flexicoil": partial(hunting_picture, "coach_flexicoil"),
+    "hunting_benchmark": partial(hunting_picture, "benchmark_vehicle1"),
     "curving": curving_picture,
 }
 

@@ -296,8 +296,29 @@ def modes(vehicle: Vehicle) -> list[str]:
         f"Straight track, {3.6 * V:.0f} km/h, friction 0.4, up to {FASTEST:g} Hz, undamped "
         "frequency; dry friction sticks:\n",
         listed,
-        verdict + "\n",
+        f"{verdict} {hunting(vehicle)}\n",
     ]
+
+
+def hunting(vehicle: Vehicle) -> str:
+    """From which speed it hunts, found by a ramp."""
+    found = railsim.critical_speed(vehicle)
+    where = found.conditions
+    words = (
+        f"Rails {where['rails']}, friction {where['friction']}, creep law {where['law']}, up to "
+        f"{3.6 * found.high:.0f} km/h: "
+    )
+    if found.linear is None:
+        words += "no loss of stability at rest"
+    else:
+        words += f"rest loses its stability at {3.6 * found.linear['speed']:.0f} km/h"
+    lowest = found.lowest
+    if lowest is None:
+        return f"{words}; from no disturbance tried does it hunt."
+    return (
+        f"{words}; hunting, once excited, lasts down to {3.6 * lowest.speed:.0f} km/h "
+        f"(non-linear critical speed, by ramp), there with {1e3 * lowest.amplitude:.2g} mm."
+    )
 
 
 def least_damped(vehicle: Vehicle, speed: float) -> dict:

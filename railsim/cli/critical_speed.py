@@ -301,7 +301,7 @@ def _linearisation(record: dict[str, Any]) -> str:
 def _row(
     words: str, speed: float | None, frequency: float | None, amplitude: float | None, more: str
 ) -> list[str]:
-    """A row of the table, empty where there is no number."""
+    """A row of the table; cells without a number are empty."""
     if speed is None:
         return [words, "none", "", "", more]
     return [

@@ -59,7 +59,7 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
             title=f"Hunting{f', {found.type}' if found.type else ''}",
         )
         upper.set_ylim(0.0, None)
-        upper.set_xlim(_shown(found))
+        upper.set_xlim(*_shown(found))
         lower.set(xlabel="speed (m/s)", ylabel="frequency (Hz)")
         if found.conicity_over_amplitude is not None:
             _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)

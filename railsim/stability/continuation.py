@@ -5,6 +5,7 @@ there the stable motion meets an unstable one and turns back.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,10 +18,11 @@ from railsim.stability.ramp import Diagram, Sustained
 from railsim.stability.vehicle_flow import VehicleFlow
 
 Progress = Callable[[float], None]
+Start = Callable[[], tuple[Branch, PeriodicMotion] | None]
 
 LARGEST_AMPLITUDE = 12e-3  # m, at which a branch is followed no further
 ARC_STEP = 1.0  # units of the arc length, about 1 mm or 1 m/s
-MOST_MOTIONS = 40  # of one branch
+MOST_MOTIONS = 30  # of one branch
 FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken
 RUNS = ("down", "further")  # branches of which the slowest motion begins another line
 COVERED = 0.05  # relative difference of amplitudes within which a motion is on a known line
@@ -85,10 +87,10 @@ def followed_branches(
     list of Diagram, list of Sustained, list of str
         The branches, the first one that of the small motions; folds; remarks.
     """
-    lines = []
-    starts = [] if lost.parameter is None else [lambda: _birth(motion, lost)]
+    lines: list[_Line] = []
+    starts: list[Start] = [] if lost.parameter is None else [partial(_birth, motion, lost)]
     remarks = [] if starts else ["continuation: no loss of stability at which it could begin"]
-    starts += [_at_end(motion, branch) for branch in known if branch.direction in RUNS]
+    starts += [partial(_at_end, motion, one) for one in known if one.direction in RUNS]
     for number, start in enumerate(starts):
         line = _Line()
 
@@ -128,31 +130,24 @@ def _is_covered(motion: PeriodicMotion, lines: Sequence[Diagram]) -> bool:
     return False
 
 
-def _at_end(
-    motion: VehicleMotion, branch: Diagram
-) -> Callable[[], tuple[Branch, PeriodicMotion] | None]:
-    """How to find the periodic motion at the slowest point of a branch of runs."""
-
-    def start() -> tuple[Branch, PeriodicMotion] | None:
-        if not branch.alive:
-            return None
-        k = min(branch.alive, key=lambda number: branch.speed[number])
-        if branch.amplitude[k] < FIRST or not np.isfinite(branch.frequency[k]):
-            return None  # near the loss of stability, where another begins
-        speed, period = branch.speed[k], 1.0 / branch.frequency[k]
-        flow = VehicleFlow(motion, speed)
-        state = flow.reduced(branch.states[k])
-        scale = flow.scale(state, period, speed, branch.amplitude[k])
-        line = Branch(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
-        try:
-            return line, line.nearest(state, period, speed)
-        except ModelError:
-            raise ModelError(
-                f"the motion of {1e3 * branch.amplitude[k]:.2f} mm at {speed:.4g} m/s is not "
-                "periodic to the accuracy of shooting: its branch is that of the runs"
-            ) from None
-
-    return start
+def _at_end(motion: VehicleMotion, branch: Diagram) -> tuple[Branch, PeriodicMotion] | None:
+    """The periodic motion at the slowest point of a branch of runs; None near rest."""
+    alive = branch.alive
+    k = min(alive, key=lambda number: branch.speed[number]) if alive else 0
+    if not alive or branch.amplitude[k] < FIRST or not np.isfinite(branch.frequency[k]):
+        return None
+    speed, period = branch.speed[k], 1.0 / branch.frequency[k]
+    flow = VehicleFlow(motion, speed)
+    state = flow.reduced(branch.states[k])
+    scale = flow.scale(state, period, speed, branch.amplitude[k])
+    line = Branch(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
+    try:
+        return line, line.nearest(state, period, speed)
+    except ModelError:
+        raise ModelError(
+            f"the motion of {1e3 * branch.amplitude[k]:.2f} mm at {speed:.4g} m/s is not "
+            "periodic to the accuracy of shooting: its branch is that of the runs"
+        ) from None
 
 
 def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Branch, PeriodicMotion]:

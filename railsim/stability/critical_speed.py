@@ -15,7 +15,14 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.drawn import Drawn
 from railsim.errors import InputError, ModelError, argument_fault
-from railsim.linear.eigenmodes import LossOfStability, loss_of_stability
+from railsim.linear.eigenmodes import (
+    SEARCHED,
+    Eigenmodes,
+    LossOfStability,
+    eigenmodes,
+    loss_of_stability,
+    oscillations,
+)
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
@@ -193,7 +200,7 @@ def critical_speed(
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].
     over_amplitude : bool
-        Find the linear critical speed over amplitude too, which takes some seconds.
+        Find the linear critical speed over amplitude too, 3 s of CPU time.
     settings : Settings, optional
         Scheme, creep law, contact.
     profiles : mapping of str to Profile, optional
@@ -238,9 +245,9 @@ def critical_speed(
     begins = loss_of_stability(own.linearised, low, high)
     if found.linear is not None:
         found.linear["speed_of_runs"] = begins.parameter
-    search = _Search(
-        found, VehicleMotion(own, settings.scheme, begins.modes[-1]), begins, points, excitations
-    )
+    shape = _hunting_shape(own, begins.parameter or high)
+    motion = VehicleMotion(own, settings.scheme, shape)
+    search = _Search(found, motion, begins, points, excitations)
     for number, method in enumerate(wanted):
 
         def share(fraction: float, number: int = number) -> None:
@@ -337,6 +344,28 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle, lost: LossOfStability
         )
 
 
+def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
+    """The mode in whose shape hunting is excited: of several the least damped.
+
+    Where none is a hunting mode, the one whose wheelsets move most against all else.
+    """
+    found = oscillations(eigenmodes(prepared.linearised(speed)), SEARCHED[1])
+    parts = parts_of(prepared.model, prepared.coordinates)
+    named = [
+        k
+        for k, value in enumerate(found.eigenvalues)
+        if mode_name(parts, found.shapes[k], complex(value), speed).endswith("hunting")
+    ]
+    if named:
+        return found.taken([min(named, key=lambda k: found.damping_ratios[k])])
+    names = found.linearisation.names
+    lateral = [names.index(f"{wheelset}.y") for wheelset in prepared.model.index.wheelsets]
+    positions = [k for k, name in enumerate(names) if name.endswith(".y")]
+    size = np.abs(found.shapes)
+    share = np.max(size[:, lateral], axis=1) / np.max(size[:, positions], axis=1)
+    return found.taken([int(np.argmax(share))])
+
+
 @dataclass(frozen=True)
 class _Search:
     """What the non-linear methods work on."""
@@ -365,10 +394,10 @@ def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[flo
     """Speeds of a diagram: most of them where branches begin and end, the others above."""
     low, high = found.low, found.high
     if begins is None:
-        return np.linspace(low, high, points).tolist()
+        return list(np.linspace(low, high, points))
     least, most = max(low, NEAR[0] * begins), min(high, NEAR[1] * begins)
     if most >= high or points < 4:
-        return np.linspace(least, high, points).tolist()
+        return list(np.linspace(least, high, points))
     near = round(SHARE * points)
     above = np.linspace(most, high, points - near + 1)[1:]
     return [*np.linspace(least, most, near).tolist(), *above.tolist()]

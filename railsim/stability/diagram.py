@@ -29,7 +29,8 @@ from railsim.stability.ramp import (
     moved,
 )
 
-DROP = 0.6  # ratio of neighbouring amplitudes of a branch between which it is looked at closer
+DROP = 0.75  # ratio of neighbouring amplitudes of a branch between which it may jump
+DEATH = 0.5  # the same of small amplitudes
 ALIKE = 0.1  # relative difference of two amplitudes at a speed that count as one motion
 SETTLING = 2.0  # s between looks at a step of a diagram
 MOST_SETTLING = 60  # looks; 1 m/s above a critical speed a coach's hunting grows by 0.1/s
@@ -191,7 +192,7 @@ def _between(motion: Motion, ends: Diagram) -> Diagram:
     source = int(ends.direction == "further" and ends.amplitude[1] > ends.amplitude[0])
     if abs(ends.speed[1] - ends.speed[0]) <= RESOLUTION or ends.amplitude[source] < THRESHOLD:
         return none
-    if min(ends.amplitude) > DROP * max(ends.amplitude):
+    if not _far_apart(*ends.amplitude):
         return none
     middle = 0.5 * (ends.speed[0] + ends.speed[1])
     try:
@@ -202,6 +203,12 @@ def _between(motion: Motion, ends: Diagram) -> Diagram:
     here.add(middle, seen)
     before, after = ends.taken([0]) + here, here + ends.taken([1])
     return _between(motion, before) + here + _between(motion, after)
+
+
+def _far_apart(one: float, other: float) -> bool:
+    """Whether two amplitudes may belong to different motions."""
+    share = DROP if abs(one - other) > SMALLEST_JUMP else DEATH
+    return min(one, other) < share * max(one, other)
 
 
 def _thresholds(motion: Motion, branches: Sequence[Diagram], tell: Progress) -> list[Diagram]:
@@ -239,14 +246,14 @@ def _at(branch: Diagram, speed: float) -> tuple[int, float]:
 
 
 def _unstable(motion: Motion, speed: float, lower: Stretch, upper: Stretch) -> Stretch:
-    """What a run does at first whose disturbance is at the limit between two motions.
+    """What a run does at first whose disturbance is just too small for the larger of two motions.
 
-    The disturbance has the shape of the larger motion.  The unstable motion that it is near to is
+    The disturbance has the shape of that motion.  The unstable motion that it is near to is
     left within a second or two, for the one or the other.
     """
     rest = motion.rest(speed, 0.0)
     way = upper.amplitude - lower.amplitude
-    least, most = lower.amplitude / upper.amplitude, 1.0
+    least, most, below = lower.amplitude / upper.amplitude, 1.0, lower
     for _ in range(HALVINGS):
         share = 0.5 * (least + most)
         state, first = rest + share * (upper.state - rest), None
@@ -258,9 +265,8 @@ def _unstable(motion: Motion, speed: float, lower: Stretch, upper: Stretch) -> S
         if seen.amplitude > lower.amplitude + 0.5 * way:
             most = share
         else:
-            least = share
-    assert first is not None
-    return first
+            least, below = share, first or seen
+    return below
 
 
 def jumps(branches: Sequence[Diagram]) -> list[dict[str, Any]]:
@@ -279,7 +285,7 @@ def jumps(branches: Sequence[Diagram]) -> list[dict[str, Any]]:
         points = list(zip(branch.speed, branch.amplitude, strict=True))
         for (speed, before), (other, after) in pairwise(points):
             is_jump = abs(after - before) > SMALLEST_JUMP and abs(other - speed) <= RESOLUTION
-            if is_jump and min(before, after) < DROP * max(before, after):
+            if is_jump and _far_apart(before, after):
                 found.append(
                     {
                         "direction": branch.direction,
