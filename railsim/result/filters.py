@@ -97,7 +97,8 @@ def filtered(x: Floats, rate: float, response: Response, margin: float) -> Float
         return np.array(x, dtype=np.float64)
     edge = max(1, math.ceil(margin * rate))
     size = fast_length(min(max(BLOCK, 4 * edge), n + 2 * edge))
-    factor = np.asarray(response(fft.rfftfreq(size, 1.0 / rate)))
+    frequencies = np.asarray(fft.rfftfreq(size, 1.0 / rate), dtype=np.float64)
+    factor = np.asarray(response(frequencies))
     factor = factor.reshape(-1, *(1 for _ in x.shape[1:]))
     out = np.empty_like(x, dtype=np.float64)
     kept = size - 2 * edge
@@ -119,7 +120,7 @@ def fast_length(least: int) -> int:
     [1, 8, 18, 1080, 65610]
     """
     exponents = range(least.bit_length())
-    odd = {3**j * 5**k for j in exponents for k in exponents if 3**j * 5**k < 2 * least}
+    odd: set[int] = {3**j * 5**k for j in exponents for k in exponents if 3**j * 5**k < 2 * least}
     return min(factor << max(0, -(-least // factor) - 1).bit_length() for factor in odd)
 
 

@@ -85,7 +85,7 @@ def wear_loop(
     routes : sequence of Route or (Track, float, float)
         Tracks with their speeds [m/s] and shares of the distance.
     step : float
-        Distance between two profiles that are told [m].  Within a step the profile is updated as
+        Distance between two reported profiles [m].  Within a step the profile is updated as
         often as it has worn by 0.1 mm.
     steps : int
         Number of updates.
