@@ -4,10 +4,23 @@ The code is loaded at the first call of each kernel, by a run of two steps.
 """
 
 import logging
+import sys
+from types import TracebackType
 
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.simulation import simulate
 from railsim.studies.execute import is_compiled
+
+# what a worker meets whose study has ended while it began: no semaphores, no inputs
+STUDY_HAS_ENDED = (FileNotFoundError, EOFError, ConnectionError)
+
+
+def report_unless_ended(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Print why a worker could not begin, as Python does; nothing where its study has ended."""
+    if not isinstance(error, STUDY_HAS_ENDED):
+        sys.__excepthook__(kind, error, trace)
 
 
 def load_compiled_code() -> None:
@@ -22,4 +35,5 @@ def load_compiled_code() -> None:
         logging.disable(logging.NOTSET)
 
 
+sys.excepthook = report_unless_ended  # inherited by the copies of the server
 load_compiled_code()

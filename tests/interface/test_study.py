@@ -570,6 +570,19 @@ def test_interrupt_leaves_only_whole_files(tmp_path, send, name, status):
 
 
 @pytest.mark.slow
+def test_request_to_end_while_workers_begin_leaves_no_traceback(tmp_path):
+    """The server that they are copies of is still importing, for a second or two."""
+    process = started([*arguments(tmp_path, *range(5, 25))[:-2], "--workers", "2"])
+    while not (tmp_path / "study.journal").exists():
+        time.sleep(0.01)
+    time.sleep(0.2)
+    process.terminate()
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 143
+    assert errors.strip() == "railsim: ended by SIGTERM"
+
+
+@pytest.mark.slow
 def test_processes_end_after_a_study_that_was_killed(tmp_path):
     process = begun(tmp_path)
     process.kill()
