@@ -42,7 +42,7 @@ def test_table_of_quantities_is_up_to_date(generate):
 def test_tables_of_the_curving_study_are_up_to_date(generate, coach):
     made = generate.curving_table(coach)
     tables = generated(coach)
-    assert len(tables) == 2  # README and the page on validation
+    assert tables  # on the page on validation, of one coach in README as well
     for table in tables:
         assert NUMBER.sub("", table) == NUMBER.sub("", made), MENDED_BY
         # one unit of the last digit: another processor may round the other way
