@@ -64,9 +64,10 @@ def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
         if found.conicity_over_amplitude is not None:
             _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
         handles, labels = upper.get_legend_handles_labels()
-        if handles:
+        named = dict(zip(labels, handles, strict=True))  # of several branches of a kind once
+        if named:
             figure.add_subplot(grid[1, 1], frame_on=False, xticks=[], yticks=[]).legend(
-                handles, labels, loc="upper left", fontsize=7.5, borderpad=0.0
+                named.values(), named.keys(), loc="upper left", fontsize=7.5, borderpad=0.0
             )
     return figure
 

@@ -394,10 +394,10 @@ def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[flo
     """Speeds of a diagram: most of them where branches begin and end, the others above."""
     low, high = found.low, found.high
     if begins is None:
-        return list(np.linspace(low, high, points))
+        return [float(speed) for speed in np.linspace(low, high, points)]
     least, most = max(low, NEAR[0] * begins), min(high, NEAR[1] * begins)
     if most >= high or points < 4:
-        return list(np.linspace(least, high, points))
+        return [float(speed) for speed in np.linspace(least, high, points)]
     near = round(SHARE * points)
     above = np.linspace(most, high, points - near + 1)[1:]
     return [*np.linspace(least, most, near).tolist(), *above.tolist()]
@@ -443,6 +443,8 @@ _ACTIONS = {"ramp": _by_ramp, "bifurcation": _by_diagram, "continuation": _by_co
 def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | None) -> None:
     """Find type and limits from all branches."""
     lowest = found.lowest
+    if not found.nonlinear:
+        return  # every method failed, as the remarks say
     if lowest is None or lowest.speed is None:
         found.type = "none"
     elif begins is None or lowest.speed < begins - RESOLUTION or found.onset == "subcritical":

@@ -224,11 +224,14 @@ def _thresholds(motion: Motion, branches: Sequence[Diagram], tell: Progress) -> 
     line = Diagram("threshold")
     ends = min(differ), max(differ)
     for number, speed in enumerate(np.linspace(*ends, THRESHOLDS + 2)[1:-1].tolist()):
-        upper, lower = (
-            settled(motion, branch.states[k], branch.speed[k], speed)
-            for branch in (down, up)
-            for k in _at(branch, speed)[:1]
-        )
+        try:
+            upper, lower = (
+                settled(motion, branch.states[k], branch.speed[k], speed)
+                for branch in (down, up)
+                for k in _at(branch, speed)[:1]
+            )
+        except LeftRange:
+            continue
         if lower.amplitude < DROP * upper.amplitude:
             seen = _unstable(motion, speed, lower, upper)
             line.add(speed, seen)
@@ -258,7 +261,11 @@ def _unstable(motion: Motion, speed: float, lower: Stretch, upper: Stretch) -> S
         share = 0.5 * (least + most)
         state, first = rest + share * (upper.state - rest), None
         for _ in range(MOST_LINGERING):
-            seen = motion.stretch(state, speed, speed, WINDOW)
+            try:
+                seen = motion.stretch(state, speed, speed, WINDOW)
+            except LeftRange:  # further than the larger motion
+                seen = upper
+                break
             first, state = first or seen, seen.state
             if abs(seen.amplitude - lower.amplitude - 0.5 * way) > (ARRIVED - 0.5) * way:
                 break
