@@ -1,5 +1,7 @@
 """Track and settings definitions: open ends, contradictions, and what is worth a remark."""
 
+import math
+
 import pytest
 from pydantic import ValidationError
 
@@ -110,6 +112,11 @@ def test_shipped_track_gives_no_cause_for_remarks(name):
 def test_cant_of_the_curving_study_is_high_for_its_radius():
     (remark,) = track_remarks(load_track("curve_r250"))
     assert str(remark) == "plan.2: a cant of 150 mm is more than (R - 100 m)/2 = 75 mm"
+
+
+def test_circle_of_infinite_radius_is_straight_to_the_rules():
+    straight = [{"type": "CIR", "length": 90.0, "radius": -math.inf}]
+    assert track_remarks(track(straight, speed=20.0)) == []
 
 
 # R 300 m at 20 m/s: I + d = 1500 * 400/(9.81 * 300) = 203.9 mm
