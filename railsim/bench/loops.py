@@ -126,7 +126,7 @@ def many_fastsims(system, work, state, patches, n):
 def many_creep_forces(system, work, state, patches, n):
     """Creep forces put on the wheelsets, outputs of the wheels gathered."""
     for _ in range(n):
-        add_creep_forces(system, work, patches, state[-1])
+        add_creep_forces(system, work, patches, state[-1], state)
 
 
 @compiled

@@ -9,7 +9,7 @@ from railsim.bench.ensembles import COACH_IN_CURVE, SIZES, ensembles
 from railsim.bench.machine import SPIN, hardware, vector_instructions, versions
 from railsim.bench.parts import GRIDS, REPETITIONS, fastsim_grids, right_hand_side_parts
 from railsim.bench.runs import speed_and_error, two_cores
-from railsim.bench.scenarios import OTHERS, STUDY, Scenario
+from railsim.bench.scenarios import IRREGULAR, OTHERS, STUDY, Scenario
 from railsim.result import Result
 
 # What a default run may be off from RK4 at 0.125 ms: unloading [1], Y [N], yaw [1].
@@ -65,7 +65,7 @@ class Plan:
 
 FULL = Plan()
 QUICK = Plan(
-    runs=(STUDY[0], STUDY[2]),
+    runs=(STUDY[0], STUDY[2], IRREGULAR[0]),
     repetitions=3,
     batches=2,
     ensembles=(1, 8),

@@ -1,6 +1,6 @@
 """The runs that are timed: the study's four, and the ends of the range of speeds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from railsim.definitions.loading import load_track, load_vehicle
@@ -27,6 +27,8 @@ class Scenario:
         Spectrum of random irregularities on the track.
     settings : tuple of pairs of str and value
         What differs from the default settings.
+    support : str or None
+        Preset of the track's support, its own if None.
     until : float or None
         End of the run [m], the track's end if None.
     target : float or None
@@ -39,6 +41,7 @@ class Scenario:
     speed: float
     irregularity: str | None = None
     settings: tuple[tuple[str, Any], ...] = ()
+    support: str | None = None
     until: float | None = None
     target: float | None = None
 
@@ -49,6 +52,8 @@ class Scenario:
             track = track.replace(
                 irregularities=[{"type": "random", "spectrum": self.irregularity}]
             )
+        if self.support:
+            track = track.replace(support={"preset": self.support})
         return simulate(
             load_vehicle(self.vehicle),
             track,
@@ -93,3 +98,38 @@ OTHERS = (
     ),
 )
 """The reference scheme, low speed, high speed on irregular track."""
+
+IRREGULAR = (
+    Scenario(
+        "Manchester coach, straight, ERRI B176 low, 40 m/s",
+        "coach_manchester",
+        "straight",
+        40.0,
+        irregularity="erri_b176_low",
+        until=600.0,
+    ),
+    replace(OTHERS[-1], until=900.0, target=None),
+    Scenario(
+        "Manchester coach, zone 2 of EN 14363, 44 m/s",
+        "coach_manchester",
+        "en14363_zone2",
+        44.0,
+        until=900.0,
+    ),
+    Scenario(
+        "Manchester coach, zone 4 of EN 14363, 20 m/s",
+        "coach_manchester",
+        "en14363_zone4",
+        20.0,
+        until=400.0,
+    ),
+    Scenario(
+        "Manchester coach, straight, ERRI B176 low, 60 m/s (hunts)",
+        "coach_manchester",
+        "straight",
+        60.0,
+        irregularity="erri_b176_low",
+        until=900.0,
+    ),
+)
+"""Irregular rails: what most people run."""

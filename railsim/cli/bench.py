@@ -8,7 +8,7 @@ from railsim.cli.progress import progress_bar
 
 @click.command()
 @click.option(
-    "--quick", is_flag=True, help="Two runs instead of seven, no start with empty caches."
+    "--quick", is_flag=True, help="Three runs instead of seven, no start with empty caches."
 )
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress bar.")

@@ -36,6 +36,7 @@ from railsim.kernels.support import (
     K_Z_ROLL,
     K_Z_Y,
     K_Z_Z,
+    SKIP,
     STIFFNESS,
     SUPPORT_COLUMNS,
 )
@@ -83,9 +84,11 @@ def creep_slopes(n, patches, speed, G, along, across):
 
 
 @compiled(inline=True)
-def begin_support(support):
-    """Nothing yet acts on the rails."""
+def begin_support(support, support_step):
+    """Nothing yet acts on the rails whose contact is evaluated."""
     for w in range(support.shape[0]):
+        if support_step[w, SKIP] > 0.0:
+            continue
         for side in range(2):
             for k in range(SUPPORT_COLUMNS):
                 support[w, side, k] = 0.0

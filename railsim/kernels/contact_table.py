@@ -231,7 +231,7 @@ def coupled_approaches(coupling, table, stiffness, approach):
     Parameters
     ----------
     stiffness : float64[6]   K, then K2, of the patches; 0 for a patch that is not near
-    approach : float64[3]    p (negative: apart) on entry, e on return, never below 0
+    approach : float64[3]    p (negative: apart) on entry, e of patches that are not on return
     """
     p0, p1, p2 = approach[0], approach[1], approach[2]
     e0, e1, e2 = max(p0, 0.0), max(p1, 0.0), max(p2, 0.0)
@@ -258,4 +258,7 @@ def coupled_approaches(coupling, table, stiffness, approach):
             e0, e1, e2 = max(e0 - x0, 0.0), max(e1 - x1, 0.0), max(e2 - x2, 0.0)
             if abs(x0) + abs(x1) + abs(x2) < SETTLED * (e0 + e1 + e2):
                 break
-    approach[0], approach[1], approach[2] = e0, e1, e2
+    # one that is apart keeps its distance, by which a strike is foreseen
+    approach[0] = e0 if p0 > 0.0 else p0
+    approach[1] = e1 if p1 > 0.0 else p1
+    approach[2] = e2 if p2 > 0.0 else p2

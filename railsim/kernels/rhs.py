@@ -56,6 +56,7 @@ from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
     AS_GIVEN,
+    SKIP,
     evaluations,
     locate_support,
     settle_rates,
@@ -65,6 +66,7 @@ from railsim.kernels.support_step import correct_support
 from railsim.kernels.system import (
     BODY_SIZE,
     COS_ROLL,
+    EVALUATIONS,
     FORCE,
     FREE,
     I_2,
@@ -74,6 +76,7 @@ from railsim.kernels.system import (
     RATES_SIZE,
     RELATIVE_SIZE,
     SIN_ROLL,
+    UNSETTLED,
     Y_0,
     Z_0,
 )
@@ -363,9 +366,11 @@ def internal_rates(system, work, state, derivative):
 
 
 @compiled(inline=True)
-def keep_counts(events, first, to):
+def keep_counts(events, support_step, first, to):
     """Copy the counts of patches: of repeated evaluations only the last one counts."""
     for w in range(events.shape[0]):
+        if support_step.shape[0] > 0 and support_step[w, SKIP] > 0.0:
+            continue
         events[w, to] = events[w, first]
         events[w, to + 1] = events[w, first + 1]
 
@@ -424,9 +429,10 @@ def mechanics(system, work, state, derivative, rails):
         add_axle_torques(system.drives, time, s, system.frame_offset, bodies, speed, state, pose)
     if system.drive.mode == FREE:
         add_traction(system.drive, bodies, work.frames, speed, work.pose)
+    work.parts[EVALUATIONS] += 1
     left = evaluations(system, state, rails)
     as_given = left == 0
-    keep_counts(work.events, 0, 2)
+    keep_counts(work.events, work.support_step, 0, 2)
     while True:  # one call only: it becomes part of this function
         status, where, n_patches = wheel_rail(system, work, speed, state)
         if as_given or status != RUNNING:
@@ -439,8 +445,8 @@ def mechanics(system, work, state, derivative, rails):
             break
         left -= 1
         if left == 0:
-            work.parts[2] += 1
-        keep_counts(work.events, 2, 0)
+            work.parts[UNSETTLED] += 1
+        keep_counts(work.events, work.support_step, 2, 0)
     if status != RUNNING:
         return status, where, n_patches
     dynamics(

@@ -22,12 +22,21 @@ chapter 6; Popp and Schiehlen (2003), System Dynamics and Long-Term Behaviour.
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE
 
 # columns of a wheelset's track in the state: u, u', r_0, s_0, u''
 RAIL_DOF, DOF = 4, 7
 RATE, MEAN_RATE, MEAN_CHANGE, ACCELERATION = DOF, 2 * DOF, 3 * DOF, 4 * DOF
-SUPPORT_SIZE = 5 * DOF
+# then what the slopes of the contact forces have learnt at each wheel, see `learn`: what is added
+# to those of Y and Q over y and over the lateral slip; y and slip of the last step; error of the
+# forces foreseen where the rails have moved for it already; set of the patches, in bits
+LEARNT = 5 * DOF
+L_Y_Y, L_Z_Y, L_Y_SLIP, L_Z_SLIP, L_WAY, L_SLIP, L_ERROR_Y, L_ERROR_Z, L_PATCHES = range(9)
+LEARNT_SIZE = 9
+# and the weight of the mean rate before the last step, g in `support_step`
+WEIGHT = LEARNT + 2 * LEARNT_SIZE
+SUPPORT_SIZE = WEIGHT + 1
 # what an evaluation does to the rails: nothing; settles them after a step of the fast scheme, see
 # `correct_support`; finds the rates of a massless track, see `settle_rates`
 # integers of numpy: a function called with literals of Python is compiled for each value
@@ -37,7 +46,7 @@ AS_GIVEN, AFTER_STEP, BALANCED = map(np.int64, range(3))
 SETTLED, BALANCE = 2e-4, 1e-2
 # share of the static wheel load, lateral and vertical, up to which the forces' slopes say how the
 # forces change as the rails are corrected; beyond it the contact is evaluated again
-BY_SLOPES_Y, BY_SLOPES_Z = 5e-4, 2e-3
+BY_SLOPES_Y, BY_SLOPES_Z = 2e-3, 2e-2
 MOST_CORRECTIONS, MOST_BALANCES = 10, 50
 
 # entries of Support.row: masses, then stiffness and damping of pads and ballast in y, z and roll
@@ -68,6 +77,8 @@ D_Y_Y, D_Y_Z, D_Y_ROLL, D_Z_Y, D_Z_Z, D_Z_ROLL = range(8, 14)
 D_Y_SLIP, D_Z_SLIP = 14, 15
 # position of the contact from the wheelset's centre times its stiffness, and that stiffness
 FOOT_Y_STIFFNESS, FOOT_Z_STIFFNESS, STIFFNESS = 16, 17, 18
+# set of the patches that carry, in bits; errors of the forces foreseen
+PATCHES, ERROR_Y, ERROR_Z = 19, 20, 21
 SUPPORT_COLUMNS = 24  # whole cache lines
 # columns of Work.support_step[w]: 0 to 6 right-hand sides and solution, then the wheelset's motion
 # before the step, see `note_wheelset`, and the factors of pads and ballast
@@ -75,7 +86,11 @@ MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
 # imbalance of the rails one correction ago, what corrections are multiplied by, and whether one
 # waits for the next step
 BEFORE, STRETCH, WAITS = DOF + 13, DOF + 17, DOF + 19
+# whether its contact is not to be evaluated again
+SKIP = DOF + 20
 SUPPORT_STEP = 32
+# share of the creep law's slope that what is learnt may take away: a rail stays damped
+LEAST_SHARE = 0.8
 # mass that makes the imbalance of forces on a massless track an acceleration (kg)
 REFERENCE_MASS = 100.0
 
@@ -106,6 +121,7 @@ def locate_support(system, work, s):
     """
     for w in range(work.support_step.shape[0]):
         work.support_step[w, WAITS] = 0.0
+        work.support_step[w, SKIP] = 0.0
         work.support_step[w, PADS] = 1.0
         work.support_step[w, BALLAST] = 1.0
         if system.support.variation.shape[0] > 0:
@@ -319,6 +335,27 @@ def rail_motions(system, work, state):
             work.rail_motion[w, side, MOTION_Z] = state[i + 1]
             work.rail_motion[w, side, MOTION_Y_RATE] = state[i + RATE]
             work.rail_motion[w, side, MOTION_Z_RATE] = state[i + RATE + 1]
+
+
+@compiled(inline=True)
+def complete_slopes(system, work, state):
+    """Forces on the rails, and what their slopes have learnt at the same set of patches."""
+    for w in range(work.support.shape[0]):
+        if work.support_step[w, SKIP] > 0.0:
+            continue
+        for side in range(2):
+            contact = work.support[w, side]
+            contact[F_Y], contact[F_Z] = work.wheel[w, side, W_Y], work.wheel[w, side, W_Q]
+            i = support_begin(system) + SUPPORT_SIZE * w + LEARNT + LEARNT_SIZE * side
+            if state[i + L_PATCHES] != contact[PATCHES]:
+                continue
+            contact[K_Y_Y] += state[i + L_Y_Y]
+            contact[K_Z_Y] += state[i + L_Z_Y]
+            across = max(-LEAST_SHARE * contact[D_Y_SLIP], state[i + L_Y_SLIP])
+            contact[D_Y_Y] += across
+            contact[D_Y_SLIP] += across
+            contact[D_Z_Y] += state[i + L_Z_SLIP]
+            contact[D_Z_SLIP] += state[i + L_Z_SLIP]
 
 
 @compiled(inline=True)

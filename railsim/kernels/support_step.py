@@ -5,11 +5,11 @@ creep forces damp it at 20 000 1/s.  `step_support` takes all of it implicitly b
 backward differentiation formula (Curtiss and Hirschfelder 1952; L-stable, order two), linearised
 once a step about the last evaluation, with the wheelset's motion over the step already known:
 
-    r = (u_1 - u_0)/h,  u_1' = 3/2 r - 1/2 r_0,  u_1'' = 3/2 (u_1' - u_0')/h - 1/2 s_0
+    r = (u_1 - u_0)/h,  u_1' = (1 + g) r - g r_0,  u_1'' = (1 + g) (u_1' - u_0')/h - g s_0
 
-r_0 and s_0 are the mean rate and the mean acceleration of the step before; the state keeps them, so
-that the step may change.  The forces themselves are always those of the contact at (q, u): the
-linearisation affects only the change of u within one step.
+r_0 and s_0 are the mean rate and the mean acceleration of the step before, of length h_0, and the
+state keeps them; g = h/(h + h_0), 1/2 in equal steps.  The forces themselves are those of the
+contact at (q, u): the linearisation affects only the change of u within one step.
 """
 
 from railsim.kernels import compiled
@@ -42,6 +42,8 @@ from railsim.kernels.support import (
     D_Z_Y,
     D_Z_Z,
     DOF,
+    ERROR_Y,
+    ERROR_Z,
     F_Y,
     F_Z,
     FOOT_Y_STIFFNESS,
@@ -54,25 +56,48 @@ from railsim.kernels.support import (
     K_Z_ROLL,
     K_Z_Y,
     K_Z_Z,
+    L_ERROR_Y,
+    L_ERROR_Z,
+    L_PATCHES,
+    L_SLIP,
+    L_WAY,
+    L_Y_SLIP,
+    L_Y_Y,
+    L_Z_SLIP,
+    L_Z_Y,
+    LEARNT,
+    LEARNT_SIZE,
     M_RAIL,
     MEAN_CHANGE,
     MEAN_RATE,
     MOST_CORRECTIONS,
     MOTION,
+    PATCHES,
     RATE,
     SETTLED,
+    SKIP,
     STIFFNESS,
     STRETCH,
     SUPPORT_SIZE,
     WAITS,
+    WEIGHT,
     imbalance,
     mass_of,
     solve_track,
     support_begin,
     track_forces,
 )
-from railsim.kernels.system import Z_0
+from railsim.kernels.system import AGAIN, WHOLE, WHOLE_TOLERANCE, Z_0
 from railsim.kernels.track_frame import cell_of
+
+# `learn`: scales of way and slip [m, m/s] in a step of this length [s]; share of an error that is
+# learnt, what is added to the squares of way and slip, what a step forgets; share of the static
+# wheel load from which on an error is large
+WAY, SLIP, WHOLE_STEP = 5e-6, 2.5e-3, 1.25e-3
+GAIN, REST, FORGOTTEN = 0.3, 0.05, 0.01
+LARGE_Y, LARGE_Z = 0.1, 0.3
+# bounds of what slopes learn [N/m, N s/m]: a rail stays damped
+LEAST_K, MOST_K, MOST_D = -2e7, 3e8, 3e5
 
 
 @compiled(inline=True)
@@ -90,6 +115,8 @@ def remember_track(system, work, state):
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
         work.support_step[w, WAITS] = 0.0
+        for k in range(2 * LEARNT_SIZE):
+            state[first + LEARNT + k] = 0.0
         for k in range(DOF):
             state[first + MEAN_RATE + k] = state[first + RATE + k]
             state[first + MEAN_CHANGE + k] = 0.0
@@ -100,12 +127,15 @@ def remember_track(system, work, state):
 def note_wheelsets(system, work, state):
     """Store the positions of the wheelsets in the planes of their rails before a step.
 
-    Rails whose correction has waited for the step move now, see `correct_support`.
+    Slopes learn from the forces found, and rails whose correction has waited for the step move, see
+    `correct_support`.
     """
     for w in range(work.support.shape[0]):
         track = work.support_step[w]
+        first = support_begin(system) + SUPPORT_SIZE * w
+        learn(work, state, first + LEARNT, w, system.contact.load[w], abs(state[-4]))
         if track[WAITS] > 0.0:
-            move_rails(track, state, support_begin(system) + SUPPORT_SIZE * w, state[-4])
+            move_rails(track, state, first, state[-4])
             track[WAITS] = 0.0
         note_wheelset(system, work, state, w)
 
@@ -137,10 +167,14 @@ def note_wheelset(system, work, state, w):
 
 
 @compiled(merge=True)
-def step_support(system, work, state, h):
-    """Advance the track under all wheelsets by `h`, with bodies, position and speed after it."""
+def step_support(system, work, state, h, last):
+    """Advance the track under all wheelsets by `h`, with bodies, position and speed after it.
+
+    `last`: length of the step before.
+    """
     support = system.support
     row, before = support.row, work.above
+    g = h / (h + last)
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
         b = system.contact.body[w]
@@ -160,19 +194,19 @@ def step_support(system, work, state, h):
             track[k] = 0.0
         # what is known of -(C u' + K u) after the step
         track_forces(support, track, state, first, 1.0, 0.0, track, -1.0)
-        track_forces(support, track, state, first + MEAN_RATE, 0.0, 1.0, track, 0.5)
+        track_forces(support, track, state, first + MEAN_RATE, 0.0, 1.0, track, g)
         for k in range(DOF):
             track[k] += mass_of(row, k) * (
-                1.5 / h * (state[first + RATE + k] + 0.5 * state[first + MEAN_RATE + k])
-                + 0.5 * state[first + MEAN_CHANGE + k]
+                (1.0 + g) / h * (state[first + RATE + k] + g * state[first + MEAN_RATE + k])
+                + g * state[first + MEAN_CHANGE + k]
             )
         for side in range(2):
             contact = work.support[w, side]
             i = first + 2 * side
             y = track[MOTION] - before[0] - (track[MOTION + 6 + side] - before[6 + side])
             slip = track[MOTION + 8 + side] - before[8 + side]
-            v_y = y_rate + state[i + RATE] + 0.5 * state[i + MEAN_RATE]
-            v_z = z_rate + state[i + RATE + 1] + 0.5 * state[i + MEAN_RATE + 1]
+            v_y = y_rate + state[i + RATE] + g * state[i + MEAN_RATE]
+            v_z = z_rate + state[i + RATE + 1] + g * state[i + MEAN_RATE + 1]
             track[2 * side] += (
                 contact[F_Y]
                 + contact[K_Y_Y] * y
@@ -193,15 +227,64 @@ def step_support(system, work, state, h):
                 + contact[D_Z_ROLL] * roll_rate
                 + contact[D_Z_SLIP] * slip
             )
-        solve_track(support, track, work.support[w], 2.25 / h, 1.5, h)
+            learnt = first + LEARNT + LEARNT_SIZE * side
+            state[learnt + L_WAY] = y
+            state[learnt + L_SLIP] = v_y + slip
+        state[first + WEIGHT] = g
+        solve_track(support, track, work.support[w], (1.0 + g) * (1.0 + g) / h, 1.0 + g, h)
+        for side in range(2):
+            learnt = first + LEARNT + LEARNT_SIZE * side
+            state[learnt + L_WAY] -= h * track[2 * side]
+            state[learnt + L_SLIP] -= (1.0 + g) * track[2 * side]
         for k in range(DOF):
-            rate = 1.5 * track[k] - 0.5 * state[first + MEAN_RATE + k]
+            rate = (1.0 + g) * track[k] - g * state[first + MEAN_RATE + k]
             state[first + k] += h * track[k]
             change = (rate - state[first + RATE + k]) / h
-            state[first + ACCELERATION + k] = 1.5 * change - 0.5 * state[first + MEAN_CHANGE + k]
+            state[first + ACCELERATION + k] = (1.0 + g) * change - g * state[
+                first + MEAN_CHANGE + k
+            ]
             state[first + MEAN_CHANGE + k] = change
             state[first + RATE + k] = rate
             state[first + MEAN_RATE + k] = track[k]
+
+
+@compiled(inline=True)
+def learn(work, state, first, w, load, h):
+    """Take the errors of the forces foreseen in the last step into the slopes at both wheels.
+
+    Normalised least mean squares (Widrow and Hoff 1960): of an error e with the way y and the slip
+    v of the step, in units of `WAY` and `SLIP` at 1.25 ms, the slopes take gain e y/(y^2 + v^2 +
+    rest).  They are forgotten slowly, and at once where the set of patches changes, a wheel lifts
+    or the error is large: there the contact is another one.
+    """
+    share = h / WHOLE_STEP if h > 0.0 else 1.0
+    per_way, per_slip = 1.0 / (WAY * share), 1.0 / (SLIP * share)
+    for side in range(2):
+        contact = work.support[w, side]
+        i = first + LEARNT_SIZE * side
+        # the first error of the step, also where rails have moved for it at once
+        d_y, d_z = state[i + L_ERROR_Y], state[i + L_ERROR_Z]
+        if d_y == 0.0 and d_z == 0.0:
+            d_y, d_z = contact[ERROR_Y], contact[ERROR_Z]
+        y, v = per_way * state[i + L_WAY], per_slip * state[i + L_SLIP]
+        keep, gain = 1.0 - FORGOTTEN * share, GAIN / (y * y + v * v + REST)
+        patches = contact[PATCHES]
+        another = patches == 0.0 or patches != state[i + L_PATCHES]
+        if another or abs(d_y) > LARGE_Y * load or abs(d_z) > LARGE_Z * load:
+            keep, gain = 0.0, 0.0
+        y, v = gain * per_way * y, gain * per_slip * v
+        state[i + L_Y_Y] = bounded(keep * state[i + L_Y_Y] + d_y * y, LEAST_K, MOST_K)
+        state[i + L_Z_Y] = bounded(keep * state[i + L_Z_Y] + d_z * y, -MOST_K, MOST_K)
+        state[i + L_Y_SLIP] = bounded(keep * state[i + L_Y_SLIP] + d_y * v, -MOST_D, MOST_D)
+        state[i + L_Z_SLIP] = bounded(keep * state[i + L_Z_SLIP] + d_z * v, -MOST_D, MOST_D)
+        state[i + L_ERROR_Y] = state[i + L_ERROR_Z] = 0.0
+        state[i + L_PATCHES] = patches
+
+
+@compiled(inline=True)
+def bounded(value, least, most):
+    """The value, not beyond its bounds."""
+    return min(most, max(least, value))
 
 
 @compiled(inline=True)
@@ -225,11 +308,11 @@ def stretch_correction(track, i, stretch):
 
 
 @compiled(inline=True)
-def change_forces(system, work, w, h):
+def change_forces(system, work, w, h, c):
     """Change the forces between wheelset `w` and its rails as moving the rails does, linearly.
 
     The motion is the mean rate r in ``work.support_step[w, :4]`` over a step `h`: displacements
-    change by h r, rates by 1.5 r.  Forces on the wheelset act at its contacts; longitudinal creep
+    change by h r, rates by c r.  Forces on the wheelset act at its contacts; longitudinal creep
     forces, creepages and patches remain those of the evaluation.
     """
     b = system.contact.body[w]
@@ -241,12 +324,12 @@ def change_forces(system, work, w, h):
             continue
         r_y, r_z = track[2 * side], track[2 * side + 1]
         f_y = -(
-            (h * contact[K_Y_Y] + 1.5 * contact[D_Y_Y]) * r_y
-            + (h * contact[K_Y_Z] + 1.5 * contact[D_Y_Z]) * r_z
+            (h * contact[K_Y_Y] + c * contact[D_Y_Y]) * r_y
+            + (h * contact[K_Y_Z] + c * contact[D_Y_Z]) * r_z
         )
         f_z = -(
-            (h * contact[K_Z_Y] + 1.5 * contact[D_Z_Y]) * r_y
-            + (h * contact[K_Z_Z] + 1.5 * contact[D_Z_Z]) * r_z
+            (h * contact[K_Z_Y] + c * contact[D_Z_Y]) * r_y
+            + (h * contact[K_Z_Z] + c * contact[D_Z_Z]) * r_z
         )
         contact[F_Y] += f_y
         contact[F_Z] += f_z
@@ -261,13 +344,14 @@ def change_forces(system, work, w, h):
 @compiled(inline=True)
 def move_rails(track, state, first, h):
     """Add the mean rate in ``track[:7]`` over a step `h` to the motion that led to `state`."""
+    c = 1.0 + state[first + WEIGHT]
     for k in range(DOF):
         r = track[k]
         state[first + k] += h * r
-        state[first + RATE + k] += 1.5 * r
+        state[first + RATE + k] += c * r
         state[first + MEAN_RATE + k] += r
-        state[first + MEAN_CHANGE + k] += 1.5 / h * r
-        state[first + ACCELERATION + k] += 2.25 / h * r
+        state[first + MEAN_CHANGE + k] += c / h * r
+        state[first + ACCELERATION + k] += c * c / h * r
 
 
 @compiled(merge=True)
@@ -280,40 +364,56 @@ def correct_support(system, work, state, left):
     those of the forces foreseen, so that the imbalance F - M u'' - C u' - K u is the difference.
 
     Imbalances up to `SETTLED` of the static wheel load stay.  Up to `BY_SLOPES_Y`, `BY_SLOPES_Z`
-    the forces change by their slopes, once those of all wheelsets are as small, and the rails move
-    before the next step: evaluated again, a state has the same forces, whatever shares the call.
-    Beyond, the rails move at once; where no evaluation is `left`, the slopes serve there, too.
+    the forces change by their slopes and the rails move before the next step: evaluated again, a
+    state has the same forces, whatever shares the call.  Beyond, the rails move at once, and the
+    contact of this wheelset is evaluated again; where no evaluation is `left`, the slopes serve
+    there, too.  In short steps the shares are less in proportion: what counts is by how much the
+    forces lag.
 
     Returns
     -------
     bool : whether rails have moved, so that the forces are to be evaluated again.
     """
     h = state[-4]
+    share = min(1.0, h / work.watch[WHOLE_TOLERANCE])
     moved = False
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
+        track, contact = work.support_step[w], work.support[w]
+        if track[SKIP] > 0.0:
+            continue
         imbalance(system, work, state, w)
-        track = work.support_step[w]
         if left == MOST_CORRECTIONS:
             track[STRETCH] = track[STRETCH + 1] = 0.0
         for k in range(DOF):
             track[k] -= mass_of(system.support.row, k) * state[first + ACCELERATION + k]
+        for side in range(2):
+            contact[side, ERROR_Y] = track[2 * side]
+            contact[side, ERROR_Z] = track[2 * side + 1]
         y, z = max(abs(track[0]), abs(track[2])), max(abs(track[1]), abs(track[3]))
-        load = system.contact.load[w]
+        load = share * system.contact.load[w]
         small = left == 0 or (y < BY_SLOPES_Y * load and z < BY_SLOPES_Z * load)
         track[WAITS] = 1.0 if small and max(y, z) >= SETTLED * load else 0.0
         if small:
+            track[SKIP] = 1.0 - work.parts[WHOLE]
             continue
         moved = True
+        work.events[w, AGAIN] += 1
         for side in range(2):
+            i = first + LEARNT + LEARNT_SIZE * side
+            if state[i + L_ERROR_Y] == 0.0 and state[i + L_ERROR_Z] == 0.0:
+                state[i + L_ERROR_Y] = contact[side, ERROR_Y]
+                state[i + L_ERROR_Z] = contact[side, ERROR_Z]
             stretch_correction(track, 2 * side, STRETCH + side)
-        solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
+        c = 1.0 + state[first + WEIGHT]
+        solve_track(system.support, track, work.support[w], c * c / h, c, h)
         move_rails(track, state, first, h)
     if moved:
         return True
     for w in range(work.support.shape[0]):
         track = work.support_step[w]
         if track[WAITS] > 0.0:
-            solve_track(system.support, track, work.support[w], 2.25 / h, 1.5, h)
-            change_forces(system, work, w, h)
+            c = 1.0 + state[support_begin(system) + SUPPORT_SIZE * w + WEIGHT]
+            solve_track(system.support, track, work.support[w], c * c / h, c, h)
+            change_forces(system, work, w, h, c)
     return False

@@ -8,7 +8,7 @@ State vector (float64[n_state]), for n bodies and m internal element states:
                   angular velocity u_1, u_2, u_3 in body axes (rad/s); a wheelset's axes do not spin
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
-    then 35w      of each wheelset on elastic rails: track under it, see `support`
+    then 54w      of each wheelset on elastic rails: track under it, see `support`
     -4            memory of the fast scheme: length of the last step (s), 0 where there was none
     -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
 
@@ -51,6 +51,21 @@ POSE_SIZE = 24
 SIN_ROLL, COS_ROLL, SIN_PITCH, COS_PITCH = range(9, 13)
 RELATIVE_SIZE = 16
 RATES_SIZE = 8  # of Work.acceleration and Work.rail_force
+# Work.parts: most parts of a step in which a wheel lifts or strikes, 0 where that is not looked
+# for; so far: divided steps, evaluations whose elastic rails did not settle, steps, evaluations;
+# 1 where patches are recorded, so that no wheelset may be left out of an evaluation
+PARTS, DIVIDED, UNSETTLED, STEPS, EVALUATIONS, WHOLE = range(6)
+N_PARTS = 6
+# Work.watch: time for which contact forces are foreseen [s]; share of the static wheel load by
+# which they may change in a step, and what a change of the lateral force counts against that of
+# the vertical one; shortest step that has the full tolerance of forces on elastic rails [s]
+AHEAD, SHARE, SIDEWAYS, WHOLE_TOLERANCE = range(4)
+N_WATCH = 4
+# Work.events, of each wheelset: loaded patches so far, how many of them were outside the range of
+# the creep law; the same kept over corrections; look-ups beyond the yaw of the contact table;
+# evaluations of its contact alone
+AGAIN = 5
+N_EVENTS = 6
 
 
 class Bodies(NamedTuple):
@@ -378,17 +393,12 @@ class Work(NamedTuple):
     compliance : float64[2]     of a rail over one step of the fast scheme, lateral and vertical
                                 [m/(N s)]
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
-    events : int64[w, 5]        of each wheelset: loaded patches so far, and how many of them were
-                                outside the range of the creep law; the same kept over corrections;
-                                look-ups beyond the yaw of the contact table
+    events : int64[w, N_EVENTS]   see there
     swing : float64[w]          largest rate of the contact forces of each wheelset, and of stops
                                 between bodies [N/s]
-    watch : float64[2]          time for which contact forces are foreseen [s]; share of the static
-                                wheel load by which they may change in a step
+    watch : float64[N_WATCH]    see there
     coming : float64[2, COMING] of the wheelset at hand, see `rails.foresee`
-    parts : int64[3]            parts of a step over which a wheel lifts or strikes, 0 where that is
-                                not looked for; steps that were divided so far; evaluations whose
-                                elastic rails did not settle
+    parts : int64[N_PARTS]      see there
     extremes : float64[6, w, EXTREMES]  see `extremes`
     present : float64[EXTREMES] scratch of the extremes
     unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]

@@ -36,17 +36,23 @@ from railsim.kernels.support_step import (
     step_support,
 )
 from railsim.kernels.system import (
+    AHEAD,
     AXLEBOX,
     COS_PITCH,
     COS_ROLL,
+    DIVIDED,
     I_1,
     I_2,
     I_3,
     MASS,
+    PARTS,
+    SHARE,
     SIN_PITCH,
     SIN_ROLL,
+    STEPS,
     TABLE,
     WHEELSET,
+    WHOLE,
 )
 from railsim.kernels.track_frame import OMEGA_S
 from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector_at
@@ -57,6 +63,9 @@ FAST, RK4 = range(2)
 # to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
+# Elastic rails have no such ringing: nothing is smoothed.  An axlebox, as an arm on its bush, keeps
+# the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.
+SMOOTHING_ELASTIC = 1.0
 
 
 class Recorder(NamedTuple):
@@ -279,6 +288,9 @@ def step_fast(system, work, state, derivative, decay, h):
         q = 6 * b
         v = 6 * n + q
         kind = bodies.kind[b]
+        beta = SMOOTHING
+        if system.support.elastic and kind != AXLEBOX:
+            beta = SMOOTHING_ELASTIC
         if kind == WHEELSET:
             soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
         d1 = (h + shift) * rate[q + 3] - (0.5 * h + shift) * before[q + 3]
@@ -303,8 +315,8 @@ def step_fast(system, work, state, derivative, decay, h):
         state[q + 5] += h * (derivative[q + 5] + d3)
         for k in range(6):
             change = rate[q + k] - before[q + k]
-            state[v + k] += h * rate[q + k] + (0.5 * SMOOTHING * h + shift) * change
-            before[q + k] += SMOOTHING * change
+            state[v + k] += h * rate[q + k] + (0.5 * beta * h + shift) * change
+            before[q + k] += beta * change
     drives = first + 6 * n
     ratio = h / last
     for i in range(m):
@@ -319,7 +331,7 @@ def step_fast(system, work, state, derivative, decay, h):
     state[-4] = h
     advance_position(system.drive, state, derivative, h)
     if system.support.elastic:
-        step_support(system, work, state, h)
+        step_support(system, work, state, h, last)
 
 
 @compiled(inline=True)
@@ -419,8 +431,9 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
     status, where, steps, rows : int
         Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
     """
-    parts = work.parts[0]
-    work.watch[0] = h if parts > 0 else 0.0
+    parts = work.parts[PARTS]
+    work.parts[WHOLE] = np.int64(recorder.patch.shape[0] > 0)
+    work.watch[AHEAD] = h if parts > 0 else 0.0
     constant_decays(system.internal, h, work.decay)
     if parts > 0:
         constant_decays(system.internal, h / parts, work.decay_part)
@@ -452,13 +465,13 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                 if scheme == FAST and chunk.fresh and step == first_step:
                     remember(system, work, state, derivative, h)
                 decay, length = work.decay, h
-                w = striking(system.contact, work.swing, h, work.watch[1]) if parts > 0 else -1
+                w = striking(system.contact, work.swing, h, work.watch[SHARE]) if parts > 0 else -1
                 if w >= 0:
                     if system.bodies.references.shape[0] > 1:
                         return STRIKES, w, step - first_step, rows
                     decay, length = work.decay_part, h / parts
                     left = parts
-                    work.parts[1] += 1
+                    work.parts[DIVIDED] += 1
                     if system.support.elastic:
                         step_compliance(system.support, length, work.compliance)
             note_unloaded(work.wheel, length, work.unloaded)
@@ -478,4 +491,5 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
             return status, where, step - first_step, rows
         if left == 0:
             step += 1
+            work.parts[STEPS] += 1
     return RUNNING, 0, chunk.steps, rows

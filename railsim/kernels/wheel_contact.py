@@ -89,7 +89,8 @@ from railsim.kernels.status import (
     WHEEL_LIFT,
     YAW_RANGE,
 )
-from railsim.kernels.system import COS_ROLL, Y_0, Z_0
+from railsim.kernels.support import SKIP
+from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
@@ -113,9 +114,11 @@ def normal_contact(system, work, speed, state):
     jacobian = work.contact_jacobian
     n_bodies = system.bodies.kind.shape[0]
     smoothed = 12 * n_bodies + system.internal.kind.shape[0]
-    ahead = work.watch[0]
+    ahead = work.watch[AHEAD]
     n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
     for w in range(contact.body.shape[0]):
+        if system.support.elastic and work.support_step[w, SKIP] > 0.0:
+            continue
         b = contact.body[w]
         for k in range(6):
             force[b, k] = 0.0
@@ -283,19 +286,21 @@ def patch_contact(system, work, w, side, patch, meet, n):
     p_change = coming[side, COMING_Z] - meet.sign * (
         t[k + G_Y] * coming[side, COMING_Y] + t[k + G_ROLL] * coming[side, COMING_ROLL]
     )
-    if p <= 0.0:
-        ahead = work.watch[0]
-        p += ahead * (p_rate + max(p_change, 0.0))
-        if p > 0.0:
-            root = sqrt(p)
-            soon = p * root * (t[k + 1] + root * t[k + 2]) / ahead
-            work.swing[w] = max(work.swing[w], soon)
-    else:
+    ahead = work.watch[AHEAD]
+    deepest = p + ahead * (p_rate + max(p_change, 0.0))
+    soon, elastic = 0.0, 0.0
+    if p > 0.0:
         root = sqrt(p)
+        elastic = p * root * (t[k + 1] + root * t[k + 2])
         change = max(abs(p_rate), abs(p_rate + p_change))
         soon = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) * change
-        work.swing[w] = max(work.swing[w], soon)
-        elastic = p * root * (t[k + 1] + root * t[k + 2])
+    if deepest > max(p, 0.0):  # also from a light touch, where the stiffness is still small
+        root = sqrt(deepest)
+        soon = max(soon, (deepest * root * (t[k + 1] + root * t[k + 2]) - elastic) / ahead)
+    soon *= max(1.0, work.watch[SIDEWAYS] * abs(t[k + G_Y]))
+    work.swing[w] = max(work.swing[w], soon)
+    if p > 0.0:
+        root = sqrt(p)
         c_y, c_z, a1, b1, tangent = under_load(t, k, elastic)
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)

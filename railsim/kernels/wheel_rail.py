@@ -66,12 +66,12 @@ from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rails import locate_rails
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import F_Y, F_Z, rail_motions
+from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
 
 @compiled(inline=True)
-def add_creep_forces(system, work, n, speed):
+def add_creep_forces(system, work, n, speed, state):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
     patch, force, wheel = work.patch, work.rail_force, work.wheel
@@ -108,6 +108,7 @@ def add_creep_forces(system, work, n, speed):
         along, across = patch[SLOPE_ALONG, k], patch[SLOPE_ACROSS, k]
         if system.support.elastic:
             add_slopes(work.support, w, side, patch, k, across)
+            work.support[w, side, PATCHES] += float(1 << work.patch_index[k, 2])
             # a rail that gives way is in series with the creep force
             across /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
         work.contact_jacobian[b, J_ALONG] += along
@@ -117,10 +118,7 @@ def add_creep_forces(system, work, n, speed):
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
     if system.support.elastic:
-        for w in range(contact.body.shape[0]):
-            for side in range(2):
-                work.support[w, side, F_Y] = wheel[w, side, W_Y]
-                work.support[w, side, F_Z] = wheel[w, side, W_Q]
+        complete_slopes(system, work, state)
 
 
 @compiled(inline=True)
@@ -145,12 +143,14 @@ def wheel_rail(system, work, speed, state):
     )
     if system.support.elastic:
         rail_motions(system, work, state)
-        begin_support(work.support)
+        begin_support(work.support, work.support_step)
     status, w, n = normal_contact(system, work, speed, state)
     if status != RUNNING:
         return status, w, n
     for k in range(system.contact.body.shape[0]):
         b = system.contact.body[k]
+        if system.support.elastic and work.support_step[k, SKIP] > 0.0:
+            continue
         complete_normal_force(b, system.bodies, work.frames, work.relative, state, work.rail_force)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
@@ -168,5 +168,5 @@ def wheel_rail(system, work, speed, state):
     creep_forces(n, contact.law, patches, work.creep)
     G = contact.law.k_adhesion * contact.law.G
     creep_slopes(n, patches, speed, G, patch[SLOPE_ALONG], patch[SLOPE_ACROSS])
-    add_creep_forces(system, work, n, speed)
+    add_creep_forces(system, work, n, speed, state)
     return RUNNING, 0, n

@@ -18,7 +18,8 @@ from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import N_SCALARS, System, Work
+from railsim.kernels.support import LEARNT, SUPPORT_SIZE
+from railsim.kernels.system import N_SCALARS, PARTS, SHARE, SIDEWAYS, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, Recorder, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
@@ -31,8 +32,9 @@ SCHEMES = {"fast": FAST, "rk4": RK4}
 LONGEST_STEP = {"fast": 1.25e-3, "rk4": 0.5e-3}
 # the same on elastic rails: no vibration of the wheel on its rail at 200 Hz is to be followed
 LONGEST_STEP_ELASTIC = LONGEST_STEP | {"fast": 1.0 / 600.0}
-# m of track a step: the shortest waves of irregular track, 3 m, are followed in fifty steps
-LONGEST_TRAVEL = 0.06
+# m of track a step, on rigid and on elastic rails: the shortest waves of irregular track, 3 m, are
+# followed in some fifty steps
+LONGEST_TRAVEL, LONGEST_TRAVEL_ELASTIC = 0.06, 0.067
 SHORTEST_STEP = 1e-6  # s
 # a step is taken if one longer by this factor is stable too: a wheel load of twice the static one
 # raises the frequency of the contact, which goes with the sixth root of the load, by as much
@@ -43,8 +45,10 @@ PART = {FAST: 1e-4, RK4: 2.5e-4}
 # the same of the fast scheme on elastic rails, where a wheel has no such vibration
 PART_ELASTIC = 2.5e-4
 # share of the static wheel load by which a contact force may change in a step that is not divided,
-# on rigid and on elastic rails: on smooth curves no step is
-SWING, SWING_ELASTIC = 0.1, 0.05
+# on rigid and on elastic rails, where no vibration follows: on smooth curves no step is
+SWING, SWING_ELASTIC = 0.1, 0.2
+# what a change of the lateral force counts: flanges strike sideways
+SIDEWAYS_RIGID, SIDEWAYS_ELASTIC = 6.0, 4.0
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
 # and in flange contact, which lasts as long as a curve
 GROWTH, GROWTH_IN_FLANGE = 0.5, 1.0
@@ -90,8 +94,9 @@ def divide_strikes(work: Work, scheme: int, step: float) -> None:
     elastic = len(work.support) > 0
     part = PART_ELASTIC if elastic and scheme == FAST else PART[scheme]
     parts = math.ceil(step / part * (1.0 - 1e-9))
-    work.parts[0] = parts if parts > 1 else 0
-    work.watch[1] = SWING_ELASTIC if elastic else SWING
+    work.parts[PARTS] = parts if parts > 1 else 0
+    work.watch[SHARE] = SWING_ELASTIC if elastic else SWING
+    work.watch[SIDEWAYS] = SIDEWAYS_ELASTIC if elastic else SIDEWAYS_RIGID
 
 
 # Growth in one step up to which friction at its limit may be the cause; steps beyond the stability
@@ -127,8 +132,10 @@ class Stability:
         self._flange: Situation | None = None
         self._settled = False
         self._allowed: dict[bool, float] = {}
-        longest = LONGEST_STEP_ELASTIC if system.support.elastic else LONGEST_STEP
-        self.longest = min(longest[scheme], LONGEST_TRAVEL / float(state[-1]))
+        longest, travel = LONGEST_STEP, LONGEST_TRAVEL
+        if system.support.elastic:
+            longest, travel = LONGEST_STEP_ELASTIC, LONGEST_TRAVEL_ELASTIC
+        self.longest = min(longest[scheme], travel / float(state[-1]))
 
     def choose(self, interval: float) -> float:
         """Longest stable step that divides the output interval, with the margin.
@@ -190,7 +197,8 @@ def _vehicle_growth(model: Model, system: System, state: Floats) -> float:
             raise ModelError("the state of steady rolling lies outside the contact table")
         return derivative.copy()
 
-    return float(np.max(np.linalg.eigvals(_jacobian(rate, state)).real))
+    columns = _jacobian(rate, state, _moving(system, state))
+    return float(np.max(np.linalg.eigvals(columns).real))
 
 
 def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: float) -> float:
@@ -217,20 +225,29 @@ def _step_growth(model: Model, system: System, state: Floats, scheme: str, h: fl
 
     # without masses the reference scheme balances the track's forces to 0.01 N only
     iterates = scheme == "rk4" and system.support.elastic and system.support.massless
-    columns = _jacobian(step, state, 1e-6 if iterates else 1e-8)
+    columns = _jacobian(step, state, _moving(system, state), 1e-6 if iterates else 1e-8)
     if not np.isfinite(columns).all():
         return np.inf
     return float(np.log(np.max(np.abs(np.linalg.eigvals(columns)))) / h)
 
 
-def _jacobian(function, state: Floats, step: float = 1e-8) -> Floats:  # type: ignore[no-untyped-def]
-    """Jacobian by forward differences; position along the track and speed stay as they are."""
-    base = function(state)
-    size = len(state) - N_SCALARS
-    columns = np.empty((size, size))
-    for k in range(size):
+def _jacobian(function, state: Floats, moving: NDArray[np.int64], step: float = 1e-8) -> Floats:  # type: ignore[no-untyped-def]
+    """Jacobian of the entries `moving` by forward differences."""
+    base = function(state)[moving]
+    columns = np.empty((moving.size, moving.size))
+    for column, k in enumerate(moving):
         trial = state.copy()
         change = step * max(1.0, abs(state[k]))
         trial[k] += change
-        columns[:, k] = (function(trial)[:size] - base[:size]) / change
+        columns[:, column] = (function(trial)[moving] - base) / change
     return columns
+
+
+def _moving(system: System, state: Floats) -> NDArray[np.int64]:
+    """Entries of a state that move: not position and speed, nor what slopes have learnt."""
+    end = len(state) - N_SCALARS
+    indices = np.arange(end)
+    if not system.support.elastic:
+        return indices
+    first = end - SUPPORT_SIZE * len(system.contact.body)
+    return indices[(indices < first) | ((indices - first) % SUPPORT_SIZE < LEARNT)]

@@ -15,6 +15,8 @@ from railsim.kernels.system import (
     AXLEBOX,
     CONSTANT,
     FIXED,
+    N_EVENTS,
+    N_PARTS,
     POSE_SIZE,
     RATES_SIZE,
     RELATIVE_SIZE,
@@ -27,6 +29,9 @@ from railsim.kernels.vibration import VIBRATION
 
 Floats = NDArray[np.float64]
 
+
+# shortest step that has the full tolerance of forces on elastic rails (s), see `Work.watch`
+FULL_TOLERANCE = 1.25e-3
 
 CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
 
@@ -71,12 +76,12 @@ def work_arrays(system: System) -> Work:
         support_step=aligned_zeros((n_tracks, SUPPORT_STEP)),
         compliance=aligned_zeros(2),
         vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
-        events=aligned_zeros((n_wheelsets, 5), np.int64),
+        events=aligned_zeros((n_wheelsets, N_EVENTS), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
         swing=aligned_zeros(n_wheelsets),
-        watch=aligned_zeros(2),
+        watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE]),
         coming=aligned_zeros((2, COMING)),
-        parts=aligned_zeros(3, np.int64),
+        parts=aligned_zeros(N_PARTS, np.int64),
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),

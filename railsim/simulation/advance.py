@@ -22,6 +22,7 @@ from railsim.errors import RailsimError
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
+from railsim.kernels.system import AGAIN, N_PARTS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import VIBRATION
 from railsim.model.assembly import Model
@@ -43,8 +44,8 @@ ROWS, STEPS = 500, 64_000
 ROUND_OFF = 1e-9  # s
 
 # state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes,
-# times without load, vibrations
-_Before = tuple[Floats, bool, bool, NDArray[np.int64], Floats, Floats, Floats]
+# times without load, vibrations, counts of steps
+_Before = tuple[Floats, bool, bool, NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64]]
 
 
 @dataclass
@@ -109,10 +110,10 @@ class Run:
         evaluation began.
     unloaded : float64[w, 2]
         Time during which each wheel has carried nothing [s].
-    divided : int
-        Steps that were divided because a wheel lifted or struck.
-    unsettled : int
-        Evaluations in which the forces on elastic rails were not found.
+    parts : int64[N_PARTS]
+        Counts of steps and evaluations, see `railsim.kernels.system`.
+    again : int
+        How often the contact of one wheelset alone was evaluated again.
     vibration : float64[w, 2, VIBRATION]
         Vibrations of the wheel loads, see `railsim.kernels.vibration`; empty at its begin.
     cpu_time, wall_time : float
@@ -138,8 +139,8 @@ class Run:
     status: int = RUNNING
     where: int = 0
     events: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    divided: int = 0
-    unsettled: int = 0
+    parts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(N_PARTS, dtype=np.int64))
+    again: int = 0
     vibration: Floats = field(default_factory=lambda: np.zeros((0, 2, VIBRATION)))
     cpu_time: float = 0.0
     wall_time: float = 0.0
@@ -244,6 +245,7 @@ class _Convoy:
                 self._work.extremes.copy(),
                 self._work.unloaded.copy(),
                 self._work.vibration.copy(),
+                self._work.parts.copy(),
             )
             paces = self._paces()
             if len(set(paces)) > 1 or self._errors():
@@ -376,7 +378,8 @@ class _Convoy:
         if before is not None:
             work = self._work
             self._state, self._fresh, self._due = before[:3]
-            work.events[:], work.extremes[:], work.unloaded[:], work.vibration[:] = before[3:]
+            work.events[:], work.extremes[:], work.unloaded[:] = before[3:6]
+            work.vibration[:], work.parts[:] = before[6:]
         self._give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [
@@ -395,8 +398,8 @@ class _Convoy:
             if self._evaluates:
                 _take_extremes(run.evaluated, self._work.extremes[:, part.wheelsets])
             run.unloaded += self._work.unloaded[part.wheelsets]
-            run.divided += int(self._work.parts[1])
-            run.unsettled += int(self._work.parts[2])
+            run.parts += self._work.parts
+            run.again += int(self._work.events[part.wheelsets, AGAIN].sum())
             run.vibration = self._work.vibration[part.wheelsets].copy()
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.status import DERAILED, NOT_FINITE, STATUS
+from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS
 from railsim.model.assembly import Model
 from railsim.result import Result
 from railsim.result.hunting import hunting
@@ -59,7 +60,10 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         "runs_together": run.together,
         "patches_evaluated": int(run.events[0]),
         "patches_out_of_range": int(run.events[1]),
-        "steps_divided": run.divided,
+        "steps": int(run.parts[STEPS]),
+        "steps_divided": int(run.parts[DIVIDED]),
+        "evaluations": int(run.parts[EVALUATIONS]),
+        "contacts_evaluated_again": run.again,
         "real_time_factor": simulated / run.cpu_time if run.cpu_time > 0.0 else math.inf,
     }
     result = run.sink.close(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
+from railsim.kernels.system import UNSETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
 from railsim.result.hunting import Hunting
@@ -53,7 +54,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         ),
         *creep_range(int(run.events[1]), int(run.events[0])),
         *yaw_range(int(run.events[2])),
-        *unsettled_rails(run.unsettled),
+        *unsettled_rails(int(run.parts[UNSETTLED])),
     ]
     return tuple(dict.fromkeys(found))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import DOF, SUPPORT_SIZE
+from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
@@ -77,7 +77,8 @@ class VehicleFlow:
         if system.support.elastic:
             end = model.n_state - N_SCALARS
             first = end - SUPPORT_SIZE * len(system.contact.body)
-            track = list(range(first, end))
+            # what slopes have learnt is no motion: each period begins without it
+            track = [k for k in range(first, end) if (k - first) % SUPPORT_SIZE < LEARNT]
             indices += track
             kinds = (FLOORS[0], FLOORS[1], FLOORS[1], FLOORS[3], FLOORS[3])
             floors += [kinds[(k - first) % SUPPORT_SIZE // DOF] for k in track]

@@ -1,18 +1,23 @@
 """Every script in `benchmarks/` runs, in a small form: what no test runs does not run for long."""
 
+import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from selection import points
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+KEPT = json.loads((BENCHMARKS / "results" / "irregular.json").read_text(encoding="utf-8"))
 SMALL = {
     "creep_laws.py": ["--patches", "4", "--rounds", "1"],
     "fastsim_benchmark.py": [],
     "growth.py": ["--coaches", "1", "--grids", "5", "--rates", "--lengths"],
+    "irregular.py": ["--counts", "--until", "20"],
     "journal.py": ["40"],
     "mechanisms.py": ["--starts", "1"],
     "optimise.py": ["out", "small.toml", "--side", "3", "--seeds", "0"],
@@ -60,3 +65,16 @@ def test_script_runs_in_its_small_form(script, tmp_path):
     assert done.stdout
     if script == "peers.py" and not find_spec("exudyn"):
         assert "exudyn is not installed: left out" in done.stdout
+
+
+@points("name", list(KEPT), always=(0, 2))
+def test_irregular_runs_evaluate_as_often_as_before(name, monkeypatch):
+    """Within 1 % of the counts that are kept: what makes the loop evaluate more often is seen."""
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    irregular = import_module("irregular")
+    result = irregular.cases(until=150.0)[name].run()
+    found, kept = irregular.counts(result), KEPT[name]
+    assert found["steps"] == kept["steps"]
+    for count in irregular.COUNTS:
+        # divided steps are single ones among thousands
+        assert found[count] == pytest.approx(kept[count], rel=0.01, abs=0.001 * kept["steps"])

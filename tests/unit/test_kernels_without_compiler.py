@@ -72,4 +72,6 @@ def test_a_run_is_the_same_without_compilation(tmp_path):
     assert set(plain.files) == set(compiled)
     for name, values in compiled.items():
         # forces of 1e5 N on bodies of 1e2 kgm2: round-off of 1e3/s2 times some hundred operations
-        np.testing.assert_allclose(plain[name], values, rtol=1e-9, atol=1e-7, err_msg=name)
+        # slopes learn from small differences of forces, round-off over micrometres
+        rtol = 1e-7 if name == "fast" else 1e-9
+        np.testing.assert_allclose(plain[name], values, rtol=rtol, atol=1e-7, err_msg=name)

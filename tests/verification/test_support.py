@@ -244,6 +244,8 @@ def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_move
         uncorrected.append((before - there)[waits])
     by_slopes, uncorrected = np.concatenate(by_slopes), np.concatenate(uncorrected)
     assert len(by_slopes) > 100
-    assert np.abs(by_slopes).max() < 1e-4 * balance.Q0.mean()
+    # of corrections of up to 2 % of the wheel load
+    assert np.abs(by_slopes).max() < 2e-3 * balance.Q0.mean()
     rms = [np.sqrt(np.mean(x**2, axis=(0, 1))) for x in (by_slopes, uncorrected)]
-    assert np.all(rms[0] < 0.1 * rms[1])
+    # of Q next to nothing is left, of Y, where creep slopes are estimates, a quarter
+    assert np.all(rms[0] < np.array([0.1, 0.3]) * rms[1])
