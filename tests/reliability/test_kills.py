@@ -133,6 +133,52 @@ def test_killed_runs_and_studies(whole, tmp_path):
         print(f"\nslowest end after a signal: {max(ends):.2f} s", file=sys.__stderr__)
 
 
+DESIGNS = """
+format = "railsim-study/1"
+name = "eight designs, one second each"
+vehicles = ["coach_manchester"]
+tracks = ["straight"]
+speeds = [20.0]
+duration = 1.0
+
+[optimise.variables]
+"vehicle.assemblies.bogie.elements.secondary_lateral_damper.damping" = { low = 2e4, high = 4e4 }
+
+[[optimise.objectives]]
+quantity = "Q_peak"
+"""
+CONTINUED = {
+    "designs.csv": ["optimise", "designs.toml", "--evaluations", "8", "--workers", "1"],
+    "wear.json": ["wear", "coach_manchester", "--route", "straight", "20", "1",
+                  "--distance", "2", "--step", "1"],
+    "critical_speed.json": ["critical-speed", "coach_manchester", "--method", "linear",
+                            "--conicity", "0.1:0.3:2", "--from", "20", "--to", "60"],
+}  # fmt: skip
+
+
+@pytest.mark.further
+@pytest.mark.parametrize("file", CONTINUED)
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="CPU times are read from /proc")
+def test_killed_search_wear_and_map_go_on_to_the_same_end(file, tmp_path, monkeypatch):
+    """The same command again computes the rest; the end is that of an undisturbed command."""
+    monkeypatch.chdir(tmp_path)
+    Path("designs.toml").write_text(DESIGNS)
+    command = [*CONTINUED[file], "--quiet", "--out"]
+    assert main([*command, "compiled"]) == 0
+    whole = undisturbed([*command, "whole"])
+    expected = (Path("whole") / file).read_bytes()
+
+    def case(seed):
+        moment = np.random.default_rng(seed).uniform(0.1, 1.0)
+        killed([*command, f"case{seed}"], SIGNALS[seed % len(SIGNALS)], moment * whole)
+        found = tmp_path / f"case{seed}" / file
+        if not found.exists():  # else the signal came at the very end
+            assert main([*command, f"case{seed}"]) == 0
+        assert found.read_bytes() == expected
+
+    tried(2, case)
+
+
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="CPU times are read from /proc")
 def test_signal_is_obeyed_while_python_cannot(tmp_path):
     """As while the time loop is compiled: one call outside Python that takes minutes."""
