@@ -467,6 +467,16 @@ REQUESTED: dict[str, Quantity] = _table(
         "on the rail, in the contact plane to the right",
     ),
     Quantity(
+        "patch_T_gamma",
+        "wear number of the patch",
+        r"T\gamma_c",
+        "N",
+        _PATCH,
+        "N",
+        1.0,
+        "T_x xi_x + T_y xi_y, without the spin's part",
+    ),
+    Quantity(
         "sensor_acceleration",
         "reading of the accelerometer",
         "a",

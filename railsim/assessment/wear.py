@@ -19,7 +19,9 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
     """Worn area of a wheel profile per distance (Pearce and Sherratt 1991, Wear 144; recalled).
 
     In mm2/km, D in mm: 0.25 T/D below 100 N, 25/D to 200 N, (1.19 T - 154)/D above.  The last
-    branch begins at 84/D: the law is discontinuous at 200 N.
+    branch begins at 84/D: the law is discontinuous at 200 N.  It holds for one contact: the worn
+    areas of several patches are added, not their wear numbers.  Where spin drives the force against
+    the creepage, T_gamma below zero, there is no wear.
 
     Parameters
     ----------
@@ -40,14 +42,17 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
     [0.01359, 0.02717, 0.15598]
     """
     T = np.asarray(T_gamma, dtype=np.float64)
-    per_km = np.where(T < 100.0, 0.25 * T, np.where(T <= 200.0, 25.0, 1.19 * T - 154.0))
+    per_km = np.where(
+        T < 100.0, 0.25 * np.maximum(T, 0.0), np.where(T <= 200.0, 25.0, 1.19 * T - 154.0)
+    )
     return np.asarray(per_km / (diameter * 1e3) * 1e-9)
 
 
 def usfd(T_gamma_over_A: Floats) -> Floats:
     """Mass loss of a wheel, R8T on 900A (University of Sheffield; Braghin et al. 2006, Wear 261).
 
-    In ug/(m mm2) over x = T_gamma/A in N/mm2: 5.3 x to 10.4; 55.0 to 77.2; 55.0 + 61.9 (x - 77.2).
+    In ug/(m mm2) over x = T_gamma/A in N/mm2, T_gamma and A of one patch: 5.3 x to 10.4; 55.0 to
+    77.2; 55.0 + 61.9 (x - 77.2).  None below zero.
 
     Parameters
     ----------
@@ -64,7 +69,7 @@ def usfd(T_gamma_over_A: Floats) -> Floats:
     >>> (1e3 * usfd(1e6 * np.array([5.0, 40.0, 100.0]))).round(1).tolist()  # ug/(m mm2)
     [26.5, 55.0, 1466.3]
     """
-    x = np.asarray(T_gamma_over_A, dtype=np.float64) * 1e-6
+    x = np.maximum(np.asarray(T_gamma_over_A, dtype=np.float64), 0.0) * 1e-6
     rate = np.where(x <= 10.4, 5.3 * x, np.where(x <= 77.2, 55.0, 55.0 + 61.9 * (x - 77.2)))
     return np.asarray(rate * 1e-3)
 

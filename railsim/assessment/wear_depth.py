@@ -1,8 +1,8 @@
 """Depth of wear over a wheel profile, and the worn profile after a distance.
 
-At each instant the worn area (Pearce and Sherratt 1991) is divided among the contact patches of the
-wheel in proportion to their tangential forces; across each patch it is distributed as a half
-ellipse, at the position of the patch on the profile.  The wheel stays round: the depth is uniform
+At each instant every contact patch wears as its own wear number demands (Pearce and Sherratt 1991);
+the worn area is distributed across the patch as a half ellipse, at the position of the patch on the
+profile.  The wheel stays round: the depth is uniform
 over the circumference.
 """
 
@@ -26,8 +26,7 @@ WORN = " worn"
 DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the profile meanwhile
 UPDATE = 0.1e-3  # m, after which the contact is computed again on the worn profile
 MOST_PARTS = 100  # of a step
-NEEDED = ("T_gamma", "patch_N", "patch_b", "patch_y", "patch_z", "patch_angle", "patch_T_x",
-          "patch_T_y", "body_position")  # fmt: skip
+NEEDED = ("patch_T_gamma", "patch_b", "patch_y", "patch_z", "patch_angle", "body_position")
 
 
 def grid() -> Floats:
@@ -66,17 +65,14 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
     tape = tape_circle_position(wheel.back_to_back)
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
-    area = pearce_sherratt_1991(result["T_gamma"][at], 2.0 * wheel.radius[side]) * ways
-    forces = np.hypot(result["patch_T_x"][at], result["patch_T_y"][at])
-    total = forces.sum(axis=-1, keepdims=True)
-    shares = np.where(total > 0.0, forces / np.where(total > 0.0, total, 1.0), 0.0)
+    areas = pearce_sherratt_1991(result["patch_T_gamma"][at], 2.0 * wheel.radius[side])
     body = result.bodies.index(result.wheelsets[wheelset])
     roll = result["body_position"][:, body, 3, None]
     # from the axes of the track to those of the wheelset
     across = result["patch_y"][at] + roll * result["patch_z"][at]
     centres = (-1.0, 1.0)[side] * across - tape
     widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))
-    return spread(centres, widths, shares * area[:, None]) / float(np.sum(ways))
+    return spread(centres, widths, areas * ways[:, None]) / float(np.sum(ways))
 
 
 def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:

@@ -35,12 +35,14 @@ class WheelWear:
     bound : float
         Largest deviation of a percentile from that of the whole record [N].
     pearce_sherratt : float
-        Worn area of the wheel profile per distance [m2/m].
+        Worn area of the wheel profile per distance, sum over the contact patches; of a result
+        without them that of `T_gamma`, as if all forces acted in one [m2/m].
     usfd : float or None
         Worn area of the wheel profile per distance [m2/m]; None without contact patches.
     rail_damage : float
         Whole Life Rail Model, mean over the distance; only forces on the rail against the direction
-        of travel count [1].
+        of travel count.  With contact patches that of tread, flange root or flange, whichever has
+        the largest magnitude: what one part of the rail suffers, another does not repair [1].
     fatigue_index : float or None
         Largest FI_surf [1]; None without contact patches.
     utilised_friction, pressure_ratio : float or None
@@ -91,31 +93,34 @@ def wear_report(
     radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])
     shape = radii.shape
     streams = [[StreamingPercentiles(CELL) for _ in SIDES] for _ in radii]
-    sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "damage", "usfd")}
+    sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "usfd")}
+    damage: Floats = np.zeros((*shape, 1))
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
-    patches = all(name in record.result for name in PATCHES)
+    patches = all(name in record.result for name in (*PATCHES, "patch_T_gamma"))
     way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
         T_gamma = record.result.part("T_gamma", rows)
         ways = way[rows, None, None]
-        # the force on the rail has the sign of the creepage
-        against = np.ones(T_gamma.shape, dtype=bool)
-        if not all_forces:
-            against = record.result.part("xi_x", rows) < 0.0
         sums["T_gamma"] += np.sum(T_gamma * ways, axis=0)
-        sums["pearce"] += np.sum(pearce_sherratt_1991(T_gamma, 1.0) / (2 * radii) * ways, axis=0)
-        sums["damage"] += np.sum(np.where(against, model(T_gamma), 0.0) * ways, axis=0)
         length += float(np.sum(ways))
         for w, sides in enumerate(streams):
             for side, stream in enumerate(sides):
                 stream.add(T_gamma[:, w, side])
+        # the force on the rail has the sign of the creepage
+        each, along = T_gamma[..., None], record.result.part("xi_x", rows)[..., None]
         if patches:
+            each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
             area, fatigue = _patches(record, rows, yield_in_shear)
-            mass = np.where(area > 0.0, usfd(T_gamma / np.where(area > 0.0, area, 1.0)) * area, 0.0)
-            sums["usfd"] += np.sum(mass * ways, axis=0)
+            mass = usfd(each / np.where(area > 0.0, area, 1.0)) * area
+            sums["usfd"] += np.sum(mass.sum(axis=-1) * ways, axis=0)
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
+        against = np.ones_like(each, dtype=bool) if all_forces else along < 0.0
+        passes = np.where(against, model(each), 0.0) * ways[..., None]
+        damage = damage + np.sum(passes, axis=0)
+        lost = pearce_sherratt_1991(each, 1.0).sum(axis=-1) / (2.0 * radii)
+        sums["pearce"] += np.sum(lost * ways, axis=0)
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
         raise record.fault("time", found, f"more than the first {START:g} s, which do not count")
@@ -127,7 +132,7 @@ def wear_report(
             bound=streams[w][k].width,
             pearce_sherratt=float(sums["pearce"][w, k] / length),
             usfd=_area_per_distance(sums["usfd"][w, k] / length, radii[w, k]) if patches else None,
-            rail_damage=float(sums["damage"][w, k] / length),
+            rail_damage=float(damage[w, k, np.argmax(np.abs(damage[w, k]))] / length),
             fatigue_index=float(worst[0, w, k]) if patches else None,
             utilised_friction=float(worst[1, w, k]) if patches else None,
             pressure_ratio=float(worst[2, w, k]) if patches else None,
@@ -138,7 +143,7 @@ def wear_report(
 
 
 def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
-    """Area of all patches of each wheel [m2]; its largest fatigue index with T/N and p0/k."""
+    """Area of each patch [m2]; largest fatigue index of each wheel, with T/N and p0/k."""
     N, a, b, T_x, T_y = (record.result.part(name, rows) for name in PATCHES)
     loaded = N > 0.0
     safe = np.where(loaded, N, 1.0)
@@ -151,7 +156,7 @@ def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
     all_of = all_of.reshape(*all_of.shape[:3], -1)
     at = np.argmax(all_of[0], axis=-1)[None, ..., None]
     worst = np.take_along_axis(all_of, at, axis=-1)[..., 0]
-    return np.sum(np.where(loaded, np.pi * a * b, 0.0), axis=-1), worst
+    return np.where(loaded, np.pi * a * b, 0.0), worst
 
 
 def _area_per_distance(mass_per_metre: float, radius: float) -> float:

@@ -349,7 +349,7 @@ class OutputPlan:
             if not self._readings_only:
                 values |= motions(self._sensors, values, self._model.index.bodies)
         if self._asked.contact_patches:
-            values |= _patches(recorder.patch[:rows])
+            values |= _patches(recorder.patch[:rows], recorder.state[:rows, -1])
         if self._asked.frictional_power:
             values["frictional_power"] = frictional_power(values, recorder.state[:rows, -1])
         if self._asked.drives:
@@ -412,9 +412,12 @@ def _elements(raw: Floats) -> dict[str, Floats]:
     }
 
 
-def _patches(raw: Floats) -> dict[str, Floats]:
+def _patches(raw: Floats, speed: Floats) -> dict[str, Floats]:
     a, b, N = raw[..., patch.A], raw[..., patch.B], raw[..., patch.NORMAL]
     area = np.where(N > 0.0, np.pi * a * b, 1.0)
+    # written over the speed of travel, as T_gamma of the wheel
+    scale = raw[..., patch.PATCH_SPEED] / speed[:, None, None, None]
+    work = raw[..., patch.T_X] * raw[..., patch.XI_X] + raw[..., patch.T_Y] * raw[..., patch.XI_Y]
     return {
         "patch_N": N,
         "patch_pressure": 1.5 * N / area,
@@ -426,4 +429,5 @@ def _patches(raw: Floats) -> dict[str, Floats]:
         "patch_z": raw[..., patch.C_Z],
         "patch_T_x": raw[..., patch.T_X],
         "patch_T_y": raw[..., patch.T_Y],
+        "patch_T_gamma": scale * work,
     }

@@ -14,6 +14,7 @@ from railsim.cli import main
 from railsim.cli.assess import FILES
 from railsim.definitions.vehicle import Service
 from railsim.errors import InputError
+from railsim.notation import PATCHES, REQUESTED
 from railsim.result import Result
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
@@ -246,6 +247,33 @@ def test_wear_of_a_known_wear_number():
     assert 1e6 * left.rail_damage == pytest.approx(10.0)
     assert 1e9 * right.pearce_sherratt == pytest.approx(0.1560, rel=5e-4)
     assert left.percentiles["95"] == pytest.approx(65.0, abs=left.bound)
+
+
+def test_laws_of_wear_hold_for_each_patch():
+    """150 N and 50 N on 12.57 mm2 each, D 920 mm, by hand.
+
+    Pearce and Sherratt (25 + 12.5)/D; USFD 55 ug/(m mm2) A and 5.3 ug/(m N) 50 N; WLRM 2.27e-6 and
+    7e-6, of which one part of the rail has the larger.
+    """
+    whole = made(track(STRAIGHT), FAST, T_gamma=lambda t, s: both_sides(200.0 + 0.0 * s))
+    each = np.zeros((*whole.T_gamma.shape, 3))
+    each[..., 0], each[..., 2] = 150.0, 50.0
+    loaded = np.sign(each)
+    patches = {
+        "patch_T_gamma": each, "patch_N": 40e3 * loaded, "patch_a": 2e-3 * loaded,
+        "patch_b": 2e-3 * loaded, "patch_T_x": -5e3 * loaded, "patch_T_y": 0.0 * each,
+    }  # fmt: skip
+    run = Result(
+        {name: whole[name] for name in whole} | patches,
+        dict(whole.quantities) | {name: REQUESTED[name] for name in patches},
+        dict(whole.coordinates) | {"patch": PATCHES}, whole.attributes, whole.profiles,
+    )  # fmt: skip
+    (found,) = assess(run, "wear")
+    wheel = next(iter(found.wear.values()))[0]
+    assert wheel.pearce_sherratt == pytest.approx(37.5 / 920.0 * 1e-9)
+    mass = (55.0 * np.pi * 2.0**2 + 5.3 * 50.0) * 1e-9  # kg/m
+    assert wheel.usfd == pytest.approx(mass / (7850.0 * np.pi * 0.92))
+    assert wheel.rail_damage == pytest.approx(7e-6)
 
 
 def test_command_prints_writes_and_fails_only_when_asked(hunting, tmp_path, capsys):

@@ -403,4 +403,4 @@ def test_worst_patch_stands_on_the_shakedown_map_where_its_index_says():
     assert pressure.item() == pytest.approx(p0 / 300e6)
     assert friction.item() == pytest.approx(np.hypot(0.1 * 80e3 + 5.0, 0.3 * 80e3) / 80e3)
     assert index.item() == pytest.approx(friction.item() - 1.0 / pressure.item())
-    assert area.ravel() == pytest.approx(np.pi * 6e-3 * 4e-3 * np.array([2.0, 1.0]))
+    assert area.ravel() == pytest.approx(np.pi * 6e-3 * 4e-3 * np.array([1.0, 1.0, 1.0, 0.0]))

@@ -18,10 +18,11 @@ from railsim.assessment.wear_depth import (
     worn_depth,
     worn_profile,
 )
-from railsim.contact.curves import wheel_curve
+from railsim.contact.curves import tape_circle_position, wheel_curve
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
 from railsim.profiles import load_profile
+from railsim.result import Result
 from railsim.studies.wear_loop import wear_loop
 
 
@@ -123,9 +124,42 @@ def test_outer_leading_wheel_wears_at_its_flange_in_a_curve():
     inner = worn_depth(run, 0, 1)
     assert abs(grid()[np.argmax(inner)]) < 0.03
     ways = np.gradient(run.distance)
-    area = np.sum(pearce_sherratt_1991(run.T_gamma[:, 0, 0], 0.92) * ways) / np.sum(ways)
+    patches = pearce_sherratt_1991(run.patch_T_gamma[:, 0, 0], 0.92).sum(axis=-1)
+    area = np.sum(patches * ways) / np.sum(ways)
     assert np.sum(depth) * SPACING == pytest.approx(area, rel=1e-6)
     assert steady.any()
+
+
+def test_law_is_applied_to_each_patch():
+    """Two patches of 150 N: 25/D each, 50/D together, as much on the tread as on the flange."""
+    made = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"), speed=20.0,
+        duration=0.2, settings=Settings(outputs={"contact_patches": True}),
+    )  # fmt: skip
+    each = np.zeros_like(made.patch_N)
+    across, forces, zero = each.copy(), each.copy(), each.copy()
+    each[..., 0] = each[..., 2] = 150.0
+    forces[..., 0], forces[..., 2] = 5e3, 20e3
+    across[:, :, 1, 0], across[:, :, 1, 2] = 0.75, 0.70
+    changed = {
+        "patch_T_gamma": each, "patch_T_x": forces, "patch_y": across, "patch_angle": zero,
+        "patch_z": zero, "patch_b": zero + 2e-3, "T_gamma": made.T_gamma * 0.0 + 300.0,
+    }  # fmt: skip
+    arrays = {name: changed.get(name, made[name]) for name in made}
+    run = Result(arrays, made.quantities, made.coordinates, made.attributes)
+    depth = worn_depth(run, 0, 1) * SPACING
+    middle = 0.5 * (0.75 + 0.70) - tape_circle_position(1.36)
+    assert np.sum(depth) == pytest.approx(50.0 / 920.0 * 1e-9, rel=1e-9)
+    assert np.sum(depth[grid() < middle]) == pytest.approx(25.0 / 920.0 * 1e-9, rel=1e-9)
+
+
+def test_wear_numbers_of_the_patches_are_those_of_the_wheels():
+    run = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250"), speed=20.0,
+        start=385.0, duration=0.5, settings=Settings(outputs={"contact_patches": True}),
+    )  # fmt: skip
+    assert np.max(np.sum(run.patch_N[:, 0, 0] > 0.0, axis=-1)) > 1
+    np.testing.assert_allclose(run.patch_T_gamma.sum(axis=-1), run.T_gamma, rtol=1e-9, atol=1e-9)
 
 
 def test_run_without_patches_is_refused():
