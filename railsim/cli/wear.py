@@ -1,7 +1,7 @@
 """``railsim wear``: wheel profile over the distance run, with updates of the worn profile."""
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,6 +22,7 @@ from railsim.cli.progress import progress_bar
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from railsim.cli.analysis import Folder
     from railsim.profiles import Profile
     from railsim.studies.wear_loop import Route, WearStep
 
@@ -66,7 +67,8 @@ def command(
 
     Each step runs every track once with the wheel profile of the step, averages the wear of all
     wheels and subtracts it from the profile.  With --out finished steps are kept: the same command
-    continues after them, and so does one with a longer distance and --overwrite.
+    continues after them, and so does one with a longer distance and --overwrite.  A loop that ends
+    early, since a run does or a step wears too much, writes what was done.
 
     \b
     Example:
@@ -74,7 +76,8 @@ def command(
           --distance 6000 --step 1000 --out worn
     """  # noqa: D301 - click reads the escape
     from railsim.cli.analysis import Folder, load_inputs
-    from railsim.studies.wear_loop import Route, wear_loop, wear_rows
+    from railsim.errors import RailsimError
+    from railsim.studies.wear_loop import Route, WearStep, wear_loop, wear_rows
 
     steps = _number_of_steps(distance, step)
     inputs = [load_inputs(vehicle, name, settings, assignments, load) for name, _, _ in routes]
@@ -82,35 +85,62 @@ def command(
         Route(one.track, speed, share)
         for one, (_, speed, share) in zip(inputs, routes, strict=True)
     ]
-    profiles = [f"wheel_{1e-3 * at:g}_km.csv" for at in _ends(steps, 1e3 * step)]
+    profiles = [_file_name(1e3 * step * (number + 1)) for number in range(steps)]
     folder = Folder(out, (*FILES, *profiles), overwrite)
     coach = inputs[0].vehicle
-    with progress_bar("wear", quiet=quiet) as progress:
-        found = wear_loop(
-            coach, ways, step=1e3 * step, steps=steps, settings=inputs[0].settings,
-            folder=None if folder.path is None else folder.path / STEPS, progress=progress,
-            on_remark=lambda words: echo(f"remark: {words}", err=True),
-        )  # fmt: skip
-    rows = wear_rows(found, coach, ways[0].track)
-    record = {
+    found: list[WearStep] = []
+    remarks: list[str] = []
+
+    def remark(words: str) -> None:
+        remarks.append(words)
+        echo(f"remark: {words}", err=True)
+
+    ended = None
+    try:
+        with progress_bar("wear", quiet=quiet) as progress:
+            wear_loop(
+                coach, ways, step=1e3 * step, steps=steps, settings=inputs[0].settings,
+                folder=None if folder.path is None else folder.path / STEPS, progress=progress,
+                on_step=found.append, on_remark=remark,
+            )  # fmt: skip
+    except RailsimError as error:
+        if not found:
+            raise
+        ended = error
+    record: dict[str, Any] = {
         "vehicle": coach.name,
         "routes": [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways],
         "step": 1e3 * step,
-        "rows": rows,
+        "rows": wear_rows(found, coach, ways[0].track),
+        "remarks": remarks,
+        "ended": None if ended is None else str(ended),
     }
-    folder.write_json(FILES[0], record)
-    if folder.path is not None:
-        from railsim.plot.wear import wear_figure
-
-        for name, done in zip(profiles, found, strict=True):
-            folder.written.append(_write_profile(folder.path / name, done.worn))
-        title = f"{coach.name}: wear of the wheels"
-        folder.write_picture(FILES[1], wear_figure(_wheels(found), rows, title))
-    if as_json:
+    _write(folder, record, found)
+    if not as_json:
+        echo("\n".join(_lines(coach.name, ways, record["rows"])))
+        folder.tell()
+    elif ended is None:
         print_json(record)
+    if ended is not None:
+        raise ended
+
+
+def _write(folder: "Folder", record: "dict[str, Any]", found: "list[WearStep]") -> None:
+    """Write record, profiles and picture of what was done."""
+    folder.write_json(FILES[0], record)
+    if folder.path is None:
         return
-    echo("\n".join(_lines(coach.name, ways, rows)))
-    folder.tell()
+    from railsim.plot.wear import wear_figure
+
+    wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
+    for distance, worn in wheels[1:]:
+        folder.written.append(_write_profile(folder.path / _file_name(distance), worn))
+    title = f"{record['vehicle']}: wear of the wheels"
+    folder.write_picture(FILES[1], wear_figure(wheels, record["rows"], title))
+
+
+def _file_name(distance: float) -> str:
+    return f"wheel_{1e-3 * distance:g}_km.csv"
 
 
 def _number_of_steps(distance: float, step: float) -> int:
@@ -129,15 +159,6 @@ def _number_of_steps(distance: float, step: float) -> int:
         allowed = f"the distance divided by a whole number from 1 to {MOST_STEPS}"
         raise InputError([Fault("--step", "", found, allowed)])
     return steps
-
-
-def _ends(steps: int, step: float) -> list[float]:
-    return [(number + 1) * step for number in range(steps)]
-
-
-def _wheels(found: "list[WearStep]") -> "list[tuple[float, Profile]]":
-    """Distance [m] and wheel, from the new one on."""
-    return [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
 
 
 def _write_profile(path: "Path", profile: "Profile") -> "Path":

@@ -19,18 +19,23 @@ import numpy as np
 from railsim.assessment.wear_depth import parts_of_step, worn_depth, worn_profile
 from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
-from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
+from railsim.definitions.settings import InitialState, Settings
+from railsim.definitions.track import Straight, Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError, ModelError
+from railsim.errors import Fault, InputError, ModelError, RailsimError
 from railsim.profiles import Profile, load_profile
 from railsim.result import Result
 from railsim.result.filters import Floats
+from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
 from railsim.studies.kept import keep, read_kept
 from railsim.version import __version__
 
 AMPLITUDE = 3e-3  # m, at which EN 15302 compares equivalent conicities
+DISTURBED = 6e-3  # m, of the leading wheelset, about the play in the track
+TESTED = 20.0  # s, of a disturbed run
+ROOM = 100.0  # m of its track, for the vehicle
+KEPT = 2  # layout of stored steps
 _LOG = logging.getLogger(__name__)
 
 
@@ -64,6 +69,13 @@ class WearStep:
     depth: Floats
 
 
+class _Wear(NamedTuple):
+    """Mean depth of wear per distance [m/m]; sentences on hunting by track and speed."""
+
+    depth: Floats
+    hunts: dict[str, str]
+
+
 def wear_loop(
     vehicle: Vehicle,
     routes: Sequence[tuple[Track, float, float]],
@@ -94,10 +106,11 @@ def wear_loop(
     folder : Path, optional
         Folder for finished steps: the same call, or one with more steps, continues after them.
     on_step : callable, optional
-        Called after each step.
+        Called after each step; before an error also with the part of the step that was finished.
     on_remark : callable, optional
-        Called with a sentence on every stored step that is damaged and computed again; by default
-        these sentences are logged.
+        Called with a sentence on every stored step that is damaged and computed again, and on
+        every route on which the vehicle hunts: it wears as no service does.  By default these
+        sentences are logged.
     progress : callable, optional
         Called repeatedly with the finished fraction.
 
@@ -114,31 +127,40 @@ def wear_loop(
     outputs = given.outputs.model_copy(update={"contact_patches": True})
     given = given.model_copy(update={"outputs": outputs})
     tell, remark = progress or (lambda _: None), on_remark or _LOG.warning
-    profile, found, whole = load_profile(name), [], steps * step
-    for number in range(steps):
-        worn, at, lost = profile, number * step, np.zeros(1)
-        left = step
-        while left > 0.0:
-            path = None if folder is None else folder / _file_name(vehicle, ways, given, step, worn)
-            depth = _kept(path, remark)
-            if depth is None:
-                try:
-                    part = partial(_tell_part, tell, at / whole, left / whole)
-                    depth = _depth(vehicle, ways, given, {name: worn}, part)
-                except ModelError as error:
-                    words = f"wheel {worn.name} after {1e-3 * at:.4g} km {error}"
-                    raise ModelError(words) from None
-                if path is not None:
-                    keep(path, {"distance": at, "depth": depth.tolist()})
-            length = left / parts_of_step(worn, depth, left)
-            worn = worn_profile(worn, depth, length)
-            lost = lost + depth * length
-            at, left = at + length, left - length
-        done = WearStep(number * step, step, profile, worn, lost / step)
-        found.append(done)
-        tell((number + 1) / steps)
+    profile, whole = load_profile(name), steps * step
+    found: list[WearStep] = []
+    hunting: set[str] = set()
+
+    def finish(start: float, length: float, worn: Profile, lost: Floats) -> None:
+        found.append(WearStep(start, length, profile, worn, lost / length))
         if on_step is not None:
-            on_step(done)
+            on_step(found[-1])
+
+    for number in range(steps):
+        start = at = number * step
+        worn, left, lost = profile, step, np.zeros(1)
+        try:
+            while left > 0.0:
+                part = partial(_tell_part, tell, at / whole, left / whole)
+                file = _file_name(vehicle, ways, given, step, worn)
+                path = None if folder is None else folder / file
+                wear = _kept(path, remark) or _wear(vehicle, ways, given, {name: worn}, at, part)
+                if path is not None and not path.exists():
+                    keep(path, {"distance": at, **wear._asdict(), "depth": wear.depth.tolist()})
+                for route, words in wear.hunts.items():
+                    if route not in hunting:
+                        remark(f"after {1e-3 * at:.4g} km on {route}: {words}")
+                hunting |= wear.hunts.keys()
+                length = left / parts_of_step(worn, wear.depth, left)
+                worn = worn_profile(worn, wear.depth, length)
+                lost = lost + wear.depth * length
+                at, left = at + length, left - length
+        except RailsimError:
+            if at > start:
+                finish(start, at - start, worn, lost)
+            raise
+        finish(start, step, worn, lost)
+        tell((number + 1) / steps)
         profile = worn
     return found
 
@@ -223,34 +245,37 @@ def _file_name(
     """Name of the file of a step: a hash of all its inputs."""
     rails = {rail for route in routes for rail in route.track.rail}
     inputs: list[Any] = [
-        __version__, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
+        __version__, KEPT, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
         [(route.track.to_toml(), route.speed, route.share) for route in routes],
         [load_profile(rail).key().hex() for rail in sorted(rails)],
     ]  # fmt: skip
     return f"{hashlib.sha256(json.dumps(inputs).encode()).hexdigest()[:24]}.json"
 
 
-def _kept(path: Path | None, remark: Callable[[str], None]) -> Floats | None:
-    """Wear of a step that has been computed before."""
+def _kept(path: Path | None, remark: Callable[[str], None]) -> _Wear | None:
+    """Wear of a step that has been computed before; a damaged record is removed."""
     if path is None or not path.exists():
         return None
     try:
-        return np.asarray(read_kept(path)["depth"], dtype=np.float64)
+        record = read_kept(path)
     except InputError as error:
         remark(f"{error.faults[0]}: it is computed again")
+        path.unlink()
         return None
+    return _Wear(np.asarray(record["depth"], dtype=np.float64), record["hunts"])
 
 
-def _depth(
+def _wear(
     vehicle: Vehicle,
     routes: Sequence[Route],
     settings: Settings,
     worn: dict[str, Profile],
+    at: float,
     progress: Callable[[float], None],
-) -> Floats:
-    """Depth of wear per distance, mean of all wheels and of the routes weighted by their shares."""
+) -> _Wear:
+    """Mean of all wheels and of the routes weighted by their shares."""
     total = sum(route.share for route in routes)
-    depths = []
+    depths, hunts = [], dict[str, str]()
     for number, (track, speed, share) in enumerate(routes):
 
         def part(done: float, before: int = number) -> None:
@@ -262,9 +287,43 @@ def _depth(
                 vehicle, track, speed=speed, settings=settings, profiles=rails | worn, progress=part
             )
             depths.append(share / total * _mean_depth(result))
+            words = _hunting(result) or _hunting_when_disturbed(
+                vehicle, routes[number], settings, rails | worn
+            )
         except ModelError as error:
-            raise ModelError(f"on {track.name}: {error}") from None
-    return np.asarray(np.sum(depths, axis=0))
+            (wheel,) = worn.values()
+            place = f"wheel {wheel.name} after {1e-3 * at:.4g} km on {track.name}"
+            raise ModelError(f"{place}: {error}") from None
+        if words:
+            hunts[f"{track.name} at {speed:g} m/s"] = words
+    return _Wear(np.asarray(np.sum(depths, axis=0)), hunts)
+
+
+def _hunting(result: Result) -> str | None:
+    return next((words for words in result.remarks if words.startswith(HUNTS)), None)
+
+
+def _hunting_when_disturbed(
+    vehicle: Vehicle, route: Route, settings: Settings, profiles: dict[str, Profile]
+) -> str | None:
+    """Say whether the vehicle hunts on the straights of a route: nothing disturbs it there."""
+    track = route.track
+    if not any(isinstance(element, Straight) for element in track.plan):
+        return None
+    plain = track.replace(
+        plan=[{"type": "STR", "length": route.speed * TESTED + ROOM}],
+        cant=[], vertical=[], irregularities=[], gauge_widening=None,
+    )  # fmt: skip
+    leading = flatten(vehicle).of_kind("wheelset")[0].name
+    given = settings.model_copy(update={"initial": {leading: InitialState(y=DISTURBED)}})
+    result = simulate(
+        vehicle, plain, speed=route.speed, duration=TESTED, settings=given, profiles=profiles
+    )
+    how = f"disturbed by {1e3 * DISTURBED:g} mm"
+    if result.status != "complete":
+        return f"A run {how} is {result.status}, {result.attributes['status_reason']}"
+    words = _hunting(result)
+    return words and f"{words.split(', from s')[0]}, {how}."
 
 
 def _mean_depth(result: Result) -> Floats:

@@ -7,7 +7,9 @@ import pytest
 
 import railsim
 from railsim.cli import main
+from railsim.errors import ModelError
 from railsim.profiles import load_profile
+from railsim.studies.wear_loop import wear_loop
 
 SHORT = """format = "railsim-track/1"
 name = "some metres of a curve"
@@ -84,3 +86,45 @@ def test_bad_input_is_met_before_anything_is_computed(command, tmp_path, capsys,
     assert said in found.err
     assert "Traceback" not in found.err
     assert not (tmp_path / "worn").exists()
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_loop_that_is_refused_keeps_what_was_done(command, tmp_path, capsys, monkeypatch):
+    """Of 200 km 150 are done: a whole step and a part of the second."""
+    folder = tmp_path / "worn"
+    parts_of_step = railsim.studies.wear_loop.parts_of_step
+    parts = iter([1, 2])
+
+    def refused_at_last(*given):
+        parts_of_step(*given)
+        if (number := next(parts, None)) is None:
+            raise ModelError("worn too far")
+        return number
+
+    monkeypatch.setattr("railsim.studies.wear_loop.parts_of_step", refused_at_last)
+    assert main([*command, "--distance", "200"]) == 2
+    said = capsys.readouterr()
+    assert "worn too far" in said.err
+    firsts = [line.split()[0] for line in said.out.splitlines() if line]
+    assert [first for first in firsts if first.isdigit()] == ["0", "100", "150"]
+    record = json.loads((folder / "wear.json").read_text())
+    assert [row["distance"] for row in record["rows"]] == [0.0, 1e5, 1.5e5]
+    assert record["ended"] == "worn too far"
+    files = {path.name for path in folder.iterdir()}
+    assert files == {"wear.json", "wear.png", "steps", "wheel_100_km.csv", "wheel_150_km.csv"}
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+@pytest.mark.parametrize(("speed", "hunts"), [(30.0, False), (60.0, True)])
+def test_straight_above_the_critical_speed_is_a_remark(speed, hunts, tmp_path):
+    """The coach hunts at 60 m/s, not at 30; its own run on a smooth straight shows neither."""
+    straight = railsim.load_track("straight").replace(plan=[{"type": "STR", "length": 60.0}])
+    coach, told = railsim.load_vehicle("coach_manchester"), []
+    for _ in range(2):  # the second time it is read
+        wear_loop(coach, [(straight, speed, 1.0)], step=1e5, steps=1, folder=tmp_path,
+                  on_remark=told.append)  # fmt: skip
+    assert len(told) == (2 if hunts else 0)
+    if hunts:
+        assert told[0] == told[1]
+        assert told[0].startswith(f"after 0 km on {straight.name} at 60 m/s: The vehicle hunts at")
+        assert told[0].endswith("disturbed by 6 mm.")
