@@ -5,6 +5,7 @@ The wear number T_gamma = T_x xi_x + T_y xi_y [N] is the energy dissipated per m
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,65 @@ YIELD_IN_SHEAR = 300e6
 """Yield stress in shear k of rail steel, default value [Pa]."""
 
 
-def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
+DENSITY = 7850.0
+"""Density of wheel and rail steel [kg/m3]."""
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Contact patches, arrays of one shape or that are broadcast to it.
+
+    Attributes
+    ----------
+    T_gamma : ndarray
+        Wear number of each patch [N].
+    area : ndarray
+        Its area, zero where it carries nothing [m2].
+    diameter : float or ndarray
+        Diameter of its wheel [m].
+    """
+
+    T_gamma: Floats
+    area: Floats
+    diameter: float | Floats
+
+
+def _pearce_sherratt(patches: Patches) -> Floats:
+    return pearce_sherratt_1991(patches.T_gamma, patches.diameter)
+
+
+def _usfd(patches: Patches) -> Floats:
+    area = patches.area
+    mass = usfd(patches.T_gamma / np.where(area > 0.0, area, 1.0)) * area
+    return np.asarray(mass / (DENSITY * np.pi * patches.diameter))
+
+
+@dataclass(frozen=True)
+class WearLaw:
+    """A law for the wear of a wheel.
+
+    Attributes
+    ----------
+    name, source : str
+        As in heads of columns; authors and year.
+    worn_area : callable
+        Patches to the worn area of the wheel profile per distance, patch by patch [m2/m].
+    """
+
+    name: str
+    source: str
+    worn_area: Callable[[Patches], Floats]
+
+
+LAWS = {
+    "pearce_sherratt": WearLaw("Pearce", "Pearce and Sherratt (1991)", _pearce_sherratt),
+    "usfd": WearLaw("USFD", "University of Sheffield (Braghin et al. 2006)", _usfd),
+}
+"""Laws of wear by name: a further law is added here."""
+DEFAULT_LAW = "pearce_sherratt"
+
+
+def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:
     """Worn area of a wheel profile per distance (Pearce and Sherratt 1991, Wear 144; recalled).
 
     In mm2/km, D in mm: 0.25 T/D below 100 N, 25/D to 200 N, (1.19 T - 154)/D above.  The last
@@ -27,7 +86,7 @@ def pearce_sherratt_1991(T_gamma: Floats, diameter: float) -> Floats:
     ----------
     T_gamma : ndarray
         Wear number [N].
-    diameter : float
+    diameter : float or ndarray
         Wheel diameter [m].
 
     Returns

@@ -1,7 +1,7 @@
 """Depth of wear over a wheel profile, and the worn profile after a distance.
 
-At each instant every contact patch wears as its own wear number demands (Pearce and Sherratt 1991);
-the worn area is distributed across the patch as a half ellipse, at the position of the patch on the
+At each instant every contact patch wears after a law of `railsim.assessment.wear.LAWS`; the worn
+area is distributed across the patch as a half ellipse, at the position of the patch on the
 profile.  The wheel stays round: the depth is uniform
 over the circumference.
 """
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from railsim.assessment.wear import pearce_sherratt_1991
+from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches
 from railsim.contact.curves import tape_circle_position
 from railsim.definitions.flatten import flatten
 from railsim.errors import Fault, InputError
@@ -26,7 +26,15 @@ WORN = " worn"
 DEEPEST = 1e-3  # m, in one step: beyond it the contact would have moved on the profile meanwhile
 UPDATE = 0.1e-3  # m, after which the contact is computed again on the worn profile
 MOST_PARTS = 100  # of a step
-NEEDED = ("patch_T_gamma", "patch_b", "patch_y", "patch_z", "patch_angle", "body_position")
+NEEDED = (
+    "patch_T_gamma",
+    "patch_a",
+    "patch_b",
+    "patch_y",
+    "patch_z",
+    "patch_angle",
+    "body_position",
+)
 
 
 def grid() -> Floats:
@@ -35,7 +43,7 @@ def grid() -> Floats:
     return np.asarray(RANGE[0] + SPACING * (np.arange(count) + 0.5), dtype=np.float64)
 
 
-def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
+def worn_depth(result: Result, wheelset: int, side: int, law: str = DEFAULT_LAW) -> Floats:
     """Depth of wear of a wheel profile per distance, over `grid`.
 
     Parameters
@@ -44,6 +52,8 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
         Run with `outputs.contact_patches`.
     wheelset, side : int
         From 0; side 0 left, 1 right.
+    law : str
+        Name of a law of `railsim.assessment.wear.LAWS`.
 
     Returns
     -------
@@ -65,7 +75,9 @@ def worn_depth(result: Result, wheelset: int, side: int) -> Floats:
     tape = tape_circle_position(wheel.back_to_back)
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
-    areas = pearce_sherratt_1991(result["patch_T_gamma"][at], 2.0 * wheel.radius[side])
+    size = np.pi * result["patch_a"][at] * result["patch_b"][at]
+    patches = Patches(result["patch_T_gamma"][at], size, 2.0 * wheel.radius[side])
+    areas = LAWS[law].worn_area(patches)
     body = result.bodies.index(result.wheelsets[wheelset])
     roll = result["body_position"][:, body, 3, None]
     # from the axes of the track to those of the wheelset

@@ -6,11 +6,12 @@ import numpy as np
 
 from railsim.assessment.record import START, Record
 from railsim.assessment.wear import (
+    DEFAULT_LAW,
+    LAWS,
     YIELD_IN_SHEAR,
+    Patches,
     WholeLifeRailModel,
-    pearce_sherratt_1991,
     surface_fatigue_index,
-    usfd,
 )
 from railsim.definitions.flatten import flatten
 from railsim.notation import SIDES
@@ -34,11 +35,10 @@ class WheelWear:
         Of the wear number over time [N], by per cent.
     bound : float
         Largest deviation of a percentile from that of the whole record [N].
-    pearce_sherratt : float
-        Worn area of the wheel profile per distance, sum over the contact patches; of a result
-        without them that of `T_gamma`, as if all forces acted in one [m2/m].
-    usfd : float or None
-        Worn area of the wheel profile per distance [m2/m]; None without contact patches.
+    worn_area : dict of str to float or None
+        Worn area of the wheel profile per distance by each law of `railsim.assessment.wear.LAWS`,
+        sum over the contact patches [m2/m].  Of a result without them that of Pearce and Sherratt
+        is the one of `T_gamma`, as if all forces acted in one patch, and the others are None.
     rail_damage : float
         Whole Life Rail Model, mean over the distance; only forces on the rail against the direction
         of travel count.  With contact patches that of tread, flange root or flange, whichever has
@@ -53,8 +53,7 @@ class WheelWear:
     T_gamma: float
     percentiles: dict[str, float]
     bound: float
-    pearce_sherratt: float
-    usfd: float | None
+    worn_area: dict[str, float | None]
     rail_damage: float
     fatigue_index: float | None
     utilised_friction: float | None
@@ -62,10 +61,8 @@ class WheelWear:
 
     def record(self) -> dict[str, object]:
         """Return it as plain numbers and strings, SI."""
-        return dict(self.__dict__)
-
-
-DENSITY = 7850.0  # kg/m3, of wheel steel
+        plain = {name: value for name, value in self.__dict__.items() if name != "worn_area"}
+        return plain | self.worn_area
 
 
 def wear_report(
@@ -93,45 +90,47 @@ def wear_report(
     radii = np.array([w.wheelset.radius for w in flat.of_kind("wheelset") if w.wheelset])
     shape = radii.shape
     streams = [[StreamingPercentiles(CELL) for _ in SIDES] for _ in radii]
-    sums = {name: np.zeros(shape) for name in ("T_gamma", "pearce", "usfd")}
+    mean = np.zeros(shape)
     damage: Floats = np.zeros((*shape, 1))
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
     patches = all(name in record.result for name in (*PATCHES, "patch_T_gamma"))
+    worn = {name: np.zeros(shape) for name in LAWS if patches or name == DEFAULT_LAW}
     way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
         T_gamma = record.result.part("T_gamma", rows)
         ways = way[rows, None, None]
-        sums["T_gamma"] += np.sum(T_gamma * ways, axis=0)
+        mean += np.sum(T_gamma * ways, axis=0)
         length += float(np.sum(ways))
         for w, sides in enumerate(streams):
             for side, stream in enumerate(sides):
                 stream.add(T_gamma[:, w, side])
         # the force on the rail has the sign of the creepage
+        area = np.zeros_like(T_gamma)[..., None]
         each, along = T_gamma[..., None], record.result.part("xi_x", rows)[..., None]
         if patches:
             each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
             area, fatigue = _patches(record, rows, yield_in_shear)
-            mass = usfd(each / np.where(area > 0.0, area, 1.0)) * area
-            sums["usfd"] += np.sum(mass.sum(axis=-1) * ways, axis=0)
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
         against = np.ones_like(each, dtype=bool) if all_forces else along < 0.0
         passes = np.where(against, model(each), 0.0) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
-        lost = pearce_sherratt_1991(each, 1.0).sum(axis=-1) / (2.0 * radii)
-        sums["pearce"] += np.sum(lost * ways, axis=0)
+        for name in worn:
+            lost = LAWS[name].worn_area(Patches(each, area, 2.0 * radii[..., None]))
+            worn[name] += np.sum(lost.sum(axis=-1) * ways, axis=0)
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
         raise record.fault("time", found, f"more than the first {START:g} s, which do not count")
     return [
         WheelWear(
             place=f"wheelset {w + 1} {side}",
-            T_gamma=float(sums["T_gamma"][w, k] / length),
+            T_gamma=float(mean[w, k] / length),
             percentiles={f"{p:g}": streams[w][k].percentile(p) for p in (50.0, 95.0, 99.85)},
             bound=streams[w][k].width,
-            pearce_sherratt=float(sums["pearce"][w, k] / length),
-            usfd=_area_per_distance(sums["usfd"][w, k] / length, radii[w, k]) if patches else None,
+            worn_area={
+                name: float(worn[name][w, k] / length) if name in worn else None for name in LAWS
+            },
             rail_damage=float(damage[w, k, np.argmax(np.abs(damage[w, k]))] / length),
             fatigue_index=float(worst[0, w, k]) if patches else None,
             utilised_friction=float(worst[1, w, k]) if patches else None,
@@ -157,8 +156,3 @@ def _patches(record: Record, rows: slice, k: float) -> tuple[Floats, Floats]:
     at = np.argmax(all_of[0], axis=-1)[None, ..., None]
     worst = np.take_along_axis(all_of, at, axis=-1)[..., 0]
     return np.where(loaded, np.pi * a * b, 0.0), worst
-
-
-def _area_per_distance(mass_per_metre: float, radius: float) -> float:
-    """Worn area of the profile per distance: mass per metre over density and circumference."""
-    return float(mass_per_metre / (DENSITY * 2.0 * np.pi * radius))

@@ -287,15 +287,19 @@ def _comfort_lines(assessment: "Assessment") -> list[str]:
 
 
 def _wear_lines(assessment: "Assessment") -> list[str]:
+    from railsim.assessment.wear import LAWS
+
+    columns = [f"{law.name} (mm2/1000 km)" for law in LAWS.values()]
     lines: list[str] = []
     for run, wheels in assessment.wear.items():
-        header = [run, "T_gamma (N)", "95 %", "99.85 %", "Pearce (mm2/1000 km)",
-                  "USFD (mm2/1000 km)", "WLRM (1e-6)", "FI_surf"]  # fmt: skip
+        header = [run, "T_gamma (N)", "95 %", "99.85 %", *columns, "WLRM (1e-6)",
+                  "FI_surf"]  # fmt: skip
         rows = [
             [
                 w.place, f"{w.T_gamma:.1f}", f"{w.percentiles['95']:.0f}",
-                f"{w.percentiles['99.85']:.0f}", f"{1e12 * w.pearce_sherratt:.2f}",
-                "" if w.usfd is None else f"{1e12 * w.usfd:.2f}", f"{1e6 * w.rail_damage:.2f}",
+                f"{w.percentiles['99.85']:.0f}",
+                *("" if area is None else f"{1e12 * area:.2f}" for area in w.worn_area.values()),
+                f"{1e6 * w.rail_damage:.2f}",
                 "" if w.fatigue_index is None else f"{w.fatigue_index:.3f}",
             ]
             for w in wheels

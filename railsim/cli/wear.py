@@ -43,6 +43,10 @@ MOST_STEPS = 1000
     "--step", required=True, type=float, metavar="KM",
     help="Distance in km between two updates of the wheel profile.",
 )  # fmt: skip
+@click.option(
+    "--law", default="pearce_sherratt", show_default=True, metavar="NAME",
+    help="Law of wear; a wrong name shows all.",
+)  # fmt: skip
 @click.option("--out", metavar="DIR", help="Folder for wear.json, wear.png and the profiles.")
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
 @load_option
@@ -55,6 +59,7 @@ def command(
     routes: tuple[tuple[str, float, float], ...],
     distance: float,
     step: float,
+    law: str,
     out: str | None,
     settings: str | None,
     load: str | None,
@@ -75,6 +80,7 @@ def command(
       railsim wear coach_manchester --route curve_r500 20 0.3 --route straight 40 0.7 \\
           --distance 6000 --step 1000 --out worn
     """  # noqa: D301 - click reads the escape
+    from railsim.assessment.wear import LAWS
     from railsim.cli.analysis import Folder, load_inputs
     from railsim.errors import RailsimError
     from railsim.studies.wear_loop import Route, WearStep, wear_loop, wear_rows
@@ -99,7 +105,7 @@ def command(
     try:
         with progress_bar("wear", quiet=quiet) as progress:
             wear_loop(
-                coach, ways, step=1e3 * step, steps=steps, settings=inputs[0].settings,
+                coach, ways, step=1e3 * step, steps=steps, law=law, settings=inputs[0].settings,
                 folder=None if folder.path is None else folder.path / STEPS, progress=progress,
                 on_step=found.append, on_remark=remark,
             )  # fmt: skip
@@ -111,13 +117,14 @@ def command(
         "vehicle": coach.name,
         "routes": [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways],
         "step": 1e3 * step,
+        "law": law,
         "rows": wear_rows(found, coach, ways[0].track),
         "remarks": remarks,
         "ended": None if ended is None else str(ended),
     }
     _write(folder, record, found)
     if not as_json:
-        echo("\n".join(_lines(coach.name, ways, record["rows"])))
+        echo("\n".join(_lines(coach.name, ways, LAWS[law].source, record["rows"])))
         folder.tell()
     elif ended is None:
         print_json(record)
@@ -172,7 +179,9 @@ def _write_profile(path: "Path", profile: "Profile") -> "Path":
     return path
 
 
-def _lines(vehicle: str, ways: "list[Route]", rows: "list[dict[str, float | None]]") -> list[str]:
+def _lines(
+    vehicle: str, ways: "list[Route]", source: str, rows: "list[dict[str, float | None]]"
+) -> list[str]:
     total = sum(way.share for way in ways)
     shares = ", ".join(
         f"{way.share / total:.0%} {way.track.name} at {way.speed:g} m/s" for way in ways
@@ -189,6 +198,6 @@ def _lines(vehicle: str, ways: "list[Route]", rows: "list[dict[str, float | None
             "" if conicity is None else f"{conicity:.3f}",
         ])  # fmt: skip
     header = ["distance (km)", "worn area (mm2)", "deepest (mm)", "at y (mm)", "conicity at 3 mm"]
-    note = "Pearce and Sherratt (1991), mean of all wheels; y from the nominal rolling circle, "
+    note = f"{source}, mean of all wheels; y from the nominal rolling circle, "
     note += "negative towards the flange"
     return [vehicle, f"  {shares}", f"  {note}", "", *table(header, cells, numbers=0)]

@@ -11,11 +11,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from railsim.assessment.wear import DEFAULT_LAW, LAWS
 from railsim.assessment.wear_depth import parts_of_step, worn_depth, worn_profile
 from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
@@ -82,6 +84,7 @@ def wear_loop(
     *,
     step: float,
     steps: int,
+    law: str = DEFAULT_LAW,
     settings: Settings | None = None,
     folder: Path | None = None,
     on_step: Callable[[WearStep], None] | None = None,
@@ -101,6 +104,8 @@ def wear_loop(
         often as it has worn by 0.1 mm.
     steps : int
         Number of updates.
+    law : str
+        Name of a law of `railsim.assessment.wear.LAWS`.
     settings : Settings, optional
         `outputs.contact_patches` is switched on.
     folder : Path, optional
@@ -123,6 +128,8 @@ def wear_loop(
     name = _profile_name(vehicle)
     ways = [Route(*route) for route in routes]
     _check(ways, step, steps)
+    if law not in LAWS:
+        raise InputError([Fault("wear", "law", f"found '{law}'", "one of " + ", ".join(LAWS))])
     given = settings or Settings()
     outputs = given.outputs.model_copy(update={"contact_patches": True})
     given = given.model_copy(update={"outputs": outputs})
@@ -142,9 +149,11 @@ def wear_loop(
         try:
             while left > 0.0:
                 part = partial(_tell_part, tell, at / whole, left / whole)
-                file = _file_name(vehicle, ways, given, step, worn)
+                file = _file_name(vehicle, ways, given, step, law, worn)
                 path = None if folder is None else folder / file
-                wear = _kept(path, remark) or _wear(vehicle, ways, given, {name: worn}, at, part)
+                wear = _kept(path, remark) or _wear(
+                    vehicle, ways, given, law, {name: worn}, at, part
+                )
                 if path is not None and not path.exists():
                     keep(path, {"distance": at, **wear._asdict(), "depth": wear.depth.tolist()})
                 for route, words in wear.hunts.items():
@@ -240,12 +249,17 @@ def _check(routes: Sequence[Route], step: float, steps: int) -> None:
 
 
 def _file_name(
-    vehicle: Vehicle, routes: Sequence[Route], settings: Settings, step: float, profile: Profile
+    vehicle: Vehicle,
+    routes: Sequence[Route],
+    settings: Settings,
+    step: float,
+    law: str,
+    profile: Profile,
 ) -> str:
     """Name of the file of a step: a hash of all its inputs."""
     rails = {rail for route in routes for rail in route.track.rail}
     inputs: list[Any] = [
-        __version__, KEPT, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
+        __version__, KEPT, law, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
         [(route.track.to_toml(), route.speed, route.share) for route in routes],
         [load_profile(rail).key().hex() for rail in sorted(rails)],
     ]  # fmt: skip
@@ -269,6 +283,7 @@ def _wear(
     vehicle: Vehicle,
     routes: Sequence[Route],
     settings: Settings,
+    law: str,
     worn: dict[str, Profile],
     at: float,
     progress: Callable[[float], None],
@@ -286,7 +301,7 @@ def _wear(
             result = simulate(
                 vehicle, track, speed=speed, settings=settings, profiles=rails | worn, progress=part
             )
-            depths.append(share / total * _mean_depth(result))
+            depths.append(share / total * _mean_depth(result, law))
             words = _hunting(result) or _hunting_when_disturbed(
                 vehicle, routes[number], settings, rails | worn
             )
@@ -326,8 +341,9 @@ def _hunting_when_disturbed(
     return words and f"{words.split(', from s')[0]}, {how}."
 
 
-def _mean_depth(result: Result) -> Floats:
+def _mean_depth(result: Result, law: str) -> Floats:
     if result.status != "complete":
         raise ModelError(f"{result.status}, {result.attributes['status_reason']}")
-    depths = [worn_depth(result, w, side) for w in range(len(result.wheelsets)) for side in (0, 1)]
+    wheels = product(range(len(result.wheelsets)), (0, 1))
+    depths = [worn_depth(result, wheelset, side, law) for wheelset, side in wheels]
     return np.asarray(np.mean(depths, axis=0))

@@ -245,7 +245,7 @@ def test_wear_of_a_known_wear_number():
     (found,) = assess(made(track(STRAIGHT), FAST, T_gamma=T_gamma), "wear")
     left, right = next(iter(found.wear.values()))[:2]
     assert 1e6 * left.rail_damage == pytest.approx(10.0)
-    assert 1e9 * right.pearce_sherratt == pytest.approx(0.1560, rel=5e-4)
+    assert 1e9 * right.worn_area["pearce_sherratt"] == pytest.approx(0.1560, rel=5e-4)
     assert left.percentiles["95"] == pytest.approx(65.0, abs=left.bound)
 
 
@@ -270,9 +270,9 @@ def test_laws_of_wear_hold_for_each_patch():
     )  # fmt: skip
     (found,) = assess(run, "wear")
     wheel = next(iter(found.wear.values()))[0]
-    assert wheel.pearce_sherratt == pytest.approx(37.5 / 920.0 * 1e-9)
+    assert wheel.worn_area["pearce_sherratt"] == pytest.approx(37.5 / 920.0 * 1e-9)
     mass = (55.0 * np.pi * 2.0**2 + 5.3 * 50.0) * 1e-9  # kg/m
-    assert wheel.usfd == pytest.approx(mass / (7850.0 * np.pi * 0.92))
+    assert wheel.worn_area["usfd"] == pytest.approx(mass / (7850.0 * np.pi * 0.92))
     assert wheel.rail_damage == pytest.approx(7e-6)
 
 

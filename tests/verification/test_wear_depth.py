@@ -1,6 +1,7 @@
 """Depth of wear over the profile: areas are kept, positions are those of the patches."""
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import railsim
-from railsim.assessment.wear import pearce_sherratt_1991
+from railsim.assessment.wear import LAWS, pearce_sherratt_1991
 from railsim.assessment.wear_depth import (
+    NEEDED,
     SPACING,
     deepest,
     grid,
@@ -130,27 +132,60 @@ def test_outer_leading_wheel_wears_at_its_flange_in_a_curve():
     assert steady.any()
 
 
-def test_law_is_applied_to_each_patch():
-    """Two patches of 150 N: 25/D each, 50/D together, as much on the tread as on the flange."""
-    made = railsim.simulate(
+@cache
+def undisturbed():
+    return railsim.simulate(
         railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"), speed=20.0,
         duration=0.2, settings=Settings(outputs={"contact_patches": True}),
     )  # fmt: skip
+
+
+def changed(run, arrays):
+    """A run with other arrays."""
+    arrays = {name: arrays.get(name, run[name]) for name in run}
+    return Result(arrays, run.quantities, run.coordinates, run.attributes)
+
+
+def test_law_is_applied_to_each_patch():
+    """Two patches of 150 N: 25/D each, 50/D together, as much on the tread as on the flange."""
+    made = undisturbed()
     each = np.zeros_like(made.patch_N)
     across, forces, zero = each.copy(), each.copy(), each.copy()
     each[..., 0] = each[..., 2] = 150.0
     forces[..., 0], forces[..., 2] = 5e3, 20e3
     across[:, :, 1, 0], across[:, :, 1, 2] = 0.75, 0.70
-    changed = {
+    patches = {
         "patch_T_gamma": each, "patch_T_x": forces, "patch_y": across, "patch_angle": zero,
         "patch_z": zero, "patch_b": zero + 2e-3, "T_gamma": made.T_gamma * 0.0 + 300.0,
     }  # fmt: skip
-    arrays = {name: changed.get(name, made[name]) for name in made}
-    run = Result(arrays, made.quantities, made.coordinates, made.attributes)
-    depth = worn_depth(run, 0, 1) * SPACING
+    depth = worn_depth(changed(made, patches), 0, 1) * SPACING
     middle = 0.5 * (0.75 + 0.70) - tape_circle_position(1.36)
     assert np.sum(depth) == pytest.approx(50.0 / 920.0 * 1e-9, rel=1e-9)
     assert np.sum(depth[grid() < middle]) == pytest.approx(25.0 / 920.0 * 1e-9, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("place", [-0.034, -0.020, 0.0, 0.02])
+def test_worn_area_of_the_laws_is_that_of_the_profiles(law, place):
+    """Patch to profile by each law, to 1e-4; between contours, as a polygon (Gauss)."""
+    made = undisturbed()
+    patches = {name: np.zeros_like(made.patch_N) for name in NEEDED if name.startswith("patch_")}
+    patches["patch_T_gamma"][..., 0], patches["patch_a"][..., 0] = 150.0, 4e-3
+    patches["patch_b"][..., 0] = 3e-3
+    patches["patch_y"][:, :, 1] = tape_circle_position(1.36) + place
+    depth = worn_depth(changed(made, patches), 0, 1, law)
+    new, distance = load_profile("S1002"), 1e5
+    worn = worn_profile(new, depth, distance)
+    y = np.concatenate([new.y, np.asarray(worn.y)[::-1]])
+    z = np.concatenate([new.z, np.asarray(worn.z)[::-1]])
+    between = 0.5 * abs(np.sum(y * np.roll(z, -1) - z * np.roll(y, -1)))
+    size = np.pi * 4e-3 * 3e-3
+    expected = {
+        "pearce_sherratt": 25.0 / 920.0 * 1e-9,
+        "usfd": 5.3e-9 * 150.0 / (7850.0 * np.pi * 0.92),  # x = 4 N/mm2
+    }
+    assert 150.0 / (1e6 * size) < 10.4
+    assert between == pytest.approx(expected[law] * distance, rel=1e-4)
 
 
 def test_wear_numbers_of_the_patches_are_those_of_the_wheels():
