@@ -477,6 +477,9 @@ REQUESTED: dict[str, Quantity] = _table(
         "T_x xi_x + T_y xi_y, without the spin's part",
     ),
     Quantity(
+        "patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH, "1", 1.0
+    ),
+    Quantity(
         "sensor_acceleration",
         "reading of the accelerometer",
         "a",

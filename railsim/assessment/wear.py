@@ -7,9 +7,13 @@ The wear number T_gamma = T_x xi_x + T_y xi_y [N] is the energy dissipated per m
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from railsim.definitions.loading import load_wear_law
+from railsim.definitions.wear_law import ArchardMap, FrictionWork
+from railsim.errors import Fault, InputError
 from railsim.result.filters import Floats
 
 YIELD_IN_SHEAR = 300e6
@@ -32,11 +36,17 @@ class Patches:
         Its area, zero where it carries nothing [m2].
     diameter : float or ndarray
         Diameter of its wheel [m].
+    N, friction, speed : ndarray
+        Its normal force [N], coefficient of friction [1] and speed of travel [m/s]; only laws of
+        files need them.
     """
 
     T_gamma: Floats
     area: Floats
     diameter: float | Floats
+    N: Floats | float = math.nan
+    friction: Floats | float = math.nan
+    speed: Floats | float = math.nan
 
 
 def _pearce_sherratt(patches: Patches) -> Floats:
@@ -44,8 +54,52 @@ def _pearce_sherratt(patches: Patches) -> Floats:
 
 
 def _usfd(patches: Patches) -> Floats:
-    area = patches.area
-    mass = usfd(patches.T_gamma / np.where(area > 0.0, area, 1.0)) * area
+    mass = usfd(_over(patches.T_gamma, patches.area)) * patches.area
+    return np.asarray(mass / (DENSITY * np.pi * patches.diameter))
+
+
+def _over(part: Floats, whole: Floats | float) -> Floats:
+    """Quotient, zero where there is nothing to divide by."""
+    whole = np.asarray(whole)
+    return np.where(whole > 0.0, part / np.where(whole > 0.0, whole, 1.0), 0.0)
+
+
+def archard(patches: Patches, law: ArchardMap) -> Floats:
+    """Worn area of a wheel profile per distance (Archard 1953, J. Appl. Phys. 24, V = k N s/H).
+
+    Where the patch slides its traction is mu p, and only there energy is lost: N s, the sum of
+    pressure times sliding distance, is T_gamma/mu per metre, also in partial slip.  The coefficient
+    k is that of the map (Jendel 2002, Wear 253) at the patch's largest pressure and at its sliding
+    speed, mean over the load, V T_gamma/(mu N).
+
+    Returns
+    -------
+    ndarray
+        [m2/m]
+    """
+    sliding = _over(np.maximum(patches.T_gamma, 0.0), patches.friction)
+    speed = _over(patches.speed * sliding, patches.N)
+    first, second = law.speeds
+    k = np.where(speed < first, law.slow, np.where(speed < second, law.medium, law.fast))
+    pressure = _over(1.5 * np.asarray(patches.N), patches.area)
+    k = np.where(pressure > law.pressure * law.hardness, law.seizure, k)
+    return np.asarray(k * sliding / law.hardness / (np.pi * patches.diameter))
+
+
+def krause_poll(patches: Patches, law: FrictionWork) -> Floats:
+    """Worn area of a wheel profile per distance (Krause and Poll 1986, Wear 113).
+
+    The mass is proportional to the work of friction, by a factor that changes from mild to severe
+    wear at a power of friction over the area of the patch.
+
+    Returns
+    -------
+    ndarray
+        [m2/m]
+    """
+    work = np.maximum(patches.T_gamma, 0.0)
+    severe = _over(patches.speed * work, patches.area) > law.transition
+    mass = np.where(severe, law.severe, law.mild) * work
     return np.asarray(mass / (DENSITY * np.pi * patches.diameter))
 
 
@@ -59,11 +113,14 @@ class WearLaw:
         As in heads of columns; authors and year.
     worn_area : callable
         Patches to the worn area of the wheel profile per distance, patch by patch [m2/m].
+    constants : str
+        Text of its file.
     """
 
     name: str
     source: str
     worn_area: Callable[[Patches], Floats]
+    constants: str = ""
 
 
 LAWS = {
@@ -72,6 +129,31 @@ LAWS = {
 }
 """Laws of wear by name: a further law is added here."""
 DEFAULT_LAW = "pearce_sherratt"
+
+
+def wear_law(name: str) -> WearLaw:
+    """Law of the table, or of a file.
+
+    Parameters
+    ----------
+    name : str
+        A name of `LAWS`, or the path of a file `railsim-wear-law/1`.
+
+    Raises
+    ------
+    InputError : there is neither; the file is not one of a law.
+    """
+    if name in LAWS:
+        return LAWS[name]
+    if not name.endswith(".toml"):
+        allowed = "one of " + ", ".join(LAWS) + ", or a file .toml"
+        raise InputError([Fault("wear", "law", f"found '{name}'", allowed)])
+    file = load_wear_law(name)
+    if file.archard is not None:
+        law: Callable[[Patches], Floats] = partial(archard, law=file.archard)
+    elif file.krause_poll is not None:
+        law = partial(krause_poll, law=file.krause_poll)
+    return WearLaw(file.name, f"{file.name} ({file.source})", law, file.to_toml())
 
 
 def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:

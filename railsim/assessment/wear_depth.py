@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches
+from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
 from railsim.contact.curves import tape_circle_position
 from railsim.definitions.flatten import flatten
 from railsim.errors import Fault, InputError
@@ -28,6 +28,8 @@ UPDATE = 0.1e-3  # m, after which the contact is computed again on the worn prof
 MOST_PARTS = 100  # of a step
 NEEDED = (
     "patch_T_gamma",
+    "patch_N",
+    "patch_friction",
     "patch_a",
     "patch_b",
     "patch_y",
@@ -43,7 +45,9 @@ def grid() -> Floats:
     return np.asarray(RANGE[0] + SPACING * (np.arange(count) + 0.5), dtype=np.float64)
 
 
-def worn_depth(result: Result, wheelset: int, side: int, law: str = DEFAULT_LAW) -> Floats:
+def worn_depth(
+    result: Result, wheelset: int, side: int, law: WearLaw = LAWS[DEFAULT_LAW]
+) -> Floats:
     """Depth of wear of a wheel profile per distance, over `grid`.
 
     Parameters
@@ -52,8 +56,8 @@ def worn_depth(result: Result, wheelset: int, side: int, law: str = DEFAULT_LAW)
         Run with `outputs.contact_patches`.
     wheelset, side : int
         From 0; side 0 left, 1 right.
-    law : str
-        Name of a law of `railsim.assessment.wear.LAWS`.
+    law : WearLaw
+        One of `railsim.assessment.wear.LAWS`, or of a file: `railsim.assessment.wear.wear_law`.
 
     Returns
     -------
@@ -76,8 +80,12 @@ def worn_depth(result: Result, wheelset: int, side: int, law: str = DEFAULT_LAW)
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
     size = np.pi * result["patch_a"][at] * result["patch_b"][at]
-    patches = Patches(result["patch_T_gamma"][at], size, 2.0 * wheel.radius[side])
-    areas = LAWS[law].worn_area(patches)
+    speed = (ways / np.gradient(result["time"]))[:, None]
+    patches = Patches(
+        result["patch_T_gamma"][at], size, 2.0 * wheel.radius[side], result["patch_N"][at],
+        result["patch_friction"][at], speed,
+    )  # fmt: skip
+    areas = law.worn_area(patches)
     body = result.bodies.index(result.wheelsets[wheelset])
     roll = result["body_position"][:, body, 3, None]
     # from the axes of the track to those of the wheelset

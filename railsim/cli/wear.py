@@ -44,7 +44,7 @@ MOST_STEPS = 1000
     help="Distance in km between two updates of the wheel profile.",
 )  # fmt: skip
 @click.option(
-    "--law", default="pearce_sherratt", show_default=True, metavar="NAME",
+    "--law", default="pearce_sherratt", show_default=True, metavar="NAME_OR_FILE",
     help="Law of wear; a wrong name shows all.",
 )  # fmt: skip
 @click.option("--out", metavar="DIR", help="Folder for wear.json, wear.png and the profiles.")
@@ -80,7 +80,7 @@ def command(
       railsim wear coach_manchester --route curve_r500 20 0.3 --route straight 40 0.7 \\
           --distance 6000 --step 1000 --out worn
     """  # noqa: D301 - click reads the escape
-    from railsim.assessment.wear import LAWS
+    from railsim.assessment.wear import wear_law
     from railsim.cli.analysis import Folder, load_inputs
     from railsim.errors import RailsimError
     from railsim.studies.wear_loop import Route, WearStep, wear_loop, wear_rows
@@ -124,7 +124,7 @@ def command(
     }
     _write(folder, record, found)
     if not as_json:
-        echo("\n".join(_lines(coach.name, ways, LAWS[law].source, record["rows"])))
+        echo("\n".join(_lines(coach.name, ways, wear_law(law).source, record["rows"])))
         folder.tell()
     elif ended is None:
         print_json(record)

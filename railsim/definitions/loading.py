@@ -43,6 +43,7 @@ from railsim.definitions.spring import (
 from railsim.definitions.study import STUDY_FORMAT, Study
 from railsim.definitions.track import TRACK_FORMAT, Track
 from railsim.definitions.vehicle import VEHICLE_FORMAT, Vehicle
+from railsim.definitions.wear_law import WEAR_LAW_FORMAT, WearLawFile
 from railsim.errors import Fault, InputError
 from railsim.files import is_file
 from railsim.text import shortened
@@ -112,6 +113,7 @@ FORMATS: dict[str, Format] = {
     PUBLISHED_FORMAT: Format("published", Published),
     STUDY_FORMAT: Format("study", Study, free=("grid",)),
     STATIONARY_LIMITS_FORMAT: Format("limits", StationaryLimits),
+    WEAR_LAW_FORMAT: Format("limits", WearLawFile),
 }
 
 
@@ -204,6 +206,11 @@ def load_running_limits(path: str | Path, overrides: Iterable[str] | str = ()) -
 def load_comfort_limits(path: str | Path, overrides: Iterable[str] | str = ()) -> ComfortLimits:
     """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
     return _loaded(ComfortLimits, _file_source(path, "limits"), overrides)
+
+
+def load_wear_law(path: str | Path) -> WearLawFile:
+    """Load a law of wear with constants of the user's own."""
+    return _loaded(WearLawFile, sources.read_source(Path(path), "limits"), ())
 
 
 def load_study(path: str | Path, overrides: Iterable[str] | str = ()) -> Study:

@@ -430,4 +430,5 @@ def _patches(raw: Floats, speed: Floats) -> dict[str, Floats]:
         "patch_T_x": raw[..., patch.T_X],
         "patch_T_y": raw[..., patch.T_Y],
         "patch_T_gamma": scale * work,
+        "patch_friction": raw[..., patch.MU_N] / np.where(N > 0.0, N, 1.0),
     }

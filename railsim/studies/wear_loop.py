@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.assessment.wear import DEFAULT_LAW, LAWS
+from railsim.assessment.wear import DEFAULT_LAW, WearLaw, wear_law
 from railsim.assessment.wear_depth import parts_of_step, worn_depth, worn_profile
 from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
@@ -105,7 +105,7 @@ def wear_loop(
     steps : int
         Number of updates.
     law : str
-        Name of a law of `railsim.assessment.wear.LAWS`.
+        Name of a law of `railsim.assessment.wear.LAWS`, or the path of a file of one.
     settings : Settings, optional
         `outputs.contact_patches` is switched on.
     folder : Path, optional
@@ -128,8 +128,7 @@ def wear_loop(
     name = _profile_name(vehicle)
     ways = [Route(*route) for route in routes]
     _check(ways, step, steps)
-    if law not in LAWS:
-        raise InputError([Fault("wear", "law", f"found '{law}'", "one of " + ", ".join(LAWS))])
+    chosen = wear_law(law)
     given = settings or Settings()
     outputs = given.outputs.model_copy(update={"contact_patches": True})
     given = given.model_copy(update={"outputs": outputs})
@@ -149,10 +148,10 @@ def wear_loop(
         try:
             while left > 0.0:
                 part = partial(_tell_part, tell, at / whole, left / whole)
-                file = _file_name(vehicle, ways, given, step, law, worn)
+                file = _file_name(vehicle, ways, given, step, chosen, worn)
                 path = None if folder is None else folder / file
                 wear = _kept(path, remark) or _wear(
-                    vehicle, ways, given, law, {name: worn}, at, part
+                    vehicle, ways, given, chosen, {name: worn}, at, part
                 )
                 if path is not None and not path.exists():
                     keep(path, {"distance": at, **wear._asdict(), "depth": wear.depth.tolist()})
@@ -253,13 +252,14 @@ def _file_name(
     routes: Sequence[Route],
     settings: Settings,
     step: float,
-    law: str,
+    law: WearLaw,
     profile: Profile,
 ) -> str:
     """Name of the file of a step: a hash of all its inputs."""
     rails = {rail for route in routes for rail in route.track.rail}
     inputs: list[Any] = [
-        __version__, KEPT, law, step, vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
+        __version__, KEPT, law.name, law.constants, step,
+        vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
         [(route.track.to_toml(), route.speed, route.share) for route in routes],
         [load_profile(rail).key().hex() for rail in sorted(rails)],
     ]  # fmt: skip
@@ -283,7 +283,7 @@ def _wear(
     vehicle: Vehicle,
     routes: Sequence[Route],
     settings: Settings,
-    law: str,
+    law: WearLaw,
     worn: dict[str, Profile],
     at: float,
     progress: Callable[[float], None],
@@ -341,7 +341,7 @@ def _hunting_when_disturbed(
     return words and f"{words.split(', from s')[0]}, {how}."
 
 
-def _mean_depth(result: Result, law: str) -> Floats:
+def _mean_depth(result: Result, law: WearLaw) -> Floats:
     if result.status != "complete":
         raise ModelError(f"{result.status}, {result.attributes['status_reason']}")
     wheels = product(range(len(result.wheelsets)), (0, 1))

@@ -27,14 +27,17 @@ from railsim.assessment.safety import climb_distance, flange_angle, nadal, overt
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
 from railsim.assessment.wear import (
+    Patches,
     WholeLifeRailModel,
     pearce_sherratt_1991,
     surface_fatigue_index,
     usfd,
+    wear_law,
 )
 from railsim.assessment.wear_report import _patches
 from railsim.assessment.weighting import WEIGHTINGS
 from railsim.contact.geometry import contact_geometry
+from railsim.errors import InputError
 from railsim.profiles import load_profile
 from railsim.result.filters import (
     StreamingPercentiles,
@@ -352,6 +355,60 @@ def test_wear_laws():
     )
     damage = 1e6 * WholeLifeRailModel()(np.array([40.0, 65.0, 120.0]))
     np.testing.assert_allclose(damage, [5.0, 10.0, 5.0], rtol=1e-9)
+
+
+KTH = """format = "railsim-wear-law/1"
+name = "made up"
+source = "round numbers for a test"
+[archard]
+hardness = 3e9
+pressure = 0.8
+speeds = [0.2, 0.7]
+slow = 5e-4
+medium = 35e-4
+fast = 4e-4
+seizure = 350e-4
+"""
+POLL = """format = "railsim-wear-law/1"
+name = "made up"
+source = "round numbers for a test"
+[krause_poll]
+mild = 1e-10
+severe = 1e-9
+transition = 4e6
+"""
+
+
+@pytest.mark.parametrize(
+    ("load", "speed", "k"),
+    # V T_gamma/(mu N) is V/100 at 50 kN; 1.5 N/A is 2.4 GPa, 0.8 of the hardness, at 503 kN
+    [(50e3, 19.0, 5e-4), (50e3, 21.0, 35e-4), (50e3, 80.0, 4e-4), (600e3, 21.0, 350e-4)],
+)
+def test_archard_with_a_map(load, speed, k, tmp_path):
+    """By hand: T_gamma/mu = 500 N slides a metre per metre; volume k N s/H over pi D."""
+    (path := tmp_path / "law.toml").write_text(KTH)
+    size = np.array([np.pi * 1e-4])
+    patches = Patches(np.array([150.0]), size, 0.92, np.array([load]), np.array([0.3]), speed)
+    worn = wear_law(str(path)).worn_area(patches)
+    assert worn == pytest.approx(k * 500.0 / 3e9 / (np.pi * 0.92))
+
+
+@pytest.mark.parametrize(("speed", "factor"), [(2.6, 1e-10), (2.7, 1e-9)])
+def test_krause_and_poll(speed, factor, tmp_path):
+    """By hand: 150 N on 100 mm2 reach 4 W/mm2 at 2.67 m/s."""
+    (path := tmp_path / "law.toml").write_text(POLL)
+    patches = Patches(np.array([150.0]), np.array([1e-4]), 0.92, speed=speed)
+    worn = wear_law(str(path)).worn_area(patches)
+    assert worn == pytest.approx(factor * 150.0 / 7850.0 / (np.pi * 0.92))
+
+
+def test_file_of_a_law_has_one_law(tmp_path):
+    (path := tmp_path / "law.toml").write_text(KTH + POLL[POLL.index("[") :])
+    with pytest.raises(InputError, match="one of the tables archard and krause_poll"):
+        wear_law(str(path))
+    path.write_text(KTH.replace("[0.2, 0.7]", "[0.7, 0.2]"))
+    with pytest.raises(InputError, match=r"archard\.speeds must increase"):
+        wear_law(str(path))
 
 
 def test_rail_damage_begins_at_the_threshold_and_turns_into_wear():

@@ -173,7 +173,7 @@ def test_worn_area_of_the_laws_is_that_of_the_profiles(law, place):
     patches["patch_T_gamma"][..., 0], patches["patch_a"][..., 0] = 150.0, 4e-3
     patches["patch_b"][..., 0] = 3e-3
     patches["patch_y"][:, :, 1] = tape_circle_position(1.36) + place
-    depth = worn_depth(changed(made, patches), 0, 1, law)
+    depth = worn_depth(changed(made, patches), 0, 1, LAWS[law])
     new, distance = load_profile("S1002"), 1e5
     worn = worn_profile(new, depth, distance)
     y = np.concatenate([new.y, np.asarray(worn.y)[::-1]])
@@ -195,6 +195,7 @@ def test_wear_numbers_of_the_patches_are_those_of_the_wheels():
     )  # fmt: skip
     assert np.max(np.sum(run.patch_N[:, 0, 0] > 0.0, axis=-1)) > 1
     np.testing.assert_allclose(run.patch_T_gamma.sum(axis=-1), run.T_gamma, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(run.patch_friction[run.patch_N > 0.0], 0.4, rtol=1e-12)  # of R 250
 
 
 def test_run_without_patches_is_refused():

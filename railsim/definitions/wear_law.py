@@ -1,0 +1,62 @@
+"""Files of a law of wear, `railsim-wear-law/1`: constants of the user's own, with their source."""
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from railsim.definitions.base import Definition, FileDefinition, NonNegative, Positive, Text
+
+WEAR_LAW_FORMAT = "railsim-wear-law/1"
+
+
+class ArchardMap(Definition):
+    """Archard's law with coefficients by sliding speed and pressure, as in KTH's map."""
+
+    hardness: Positive
+    """Hardness of the softer material [Pa]"""
+    pressure: Positive
+    """Largest pressure over the hardness above which `seizure` holds at every speed [1]"""
+    speeds: tuple[Positive, Positive]
+    """Sliding speeds between `slow`, `medium` and `fast` [m/s]"""
+    slow: NonNegative
+    """Coefficient of wear below the first speed [1]"""
+    medium: NonNegative
+    """Between the speeds [1]"""
+    fast: NonNegative
+    """Above the second speed [1]"""
+    seizure: NonNegative
+    """Above the pressure [1]"""
+
+
+class FrictionWork(Definition):
+    """Wear in proportion to the work of friction, mild or severe (Krause and Poll 1986)."""
+
+    mild: NonNegative
+    """Mass worn per work [kg/J]"""
+    severe: NonNegative
+    """The same above `transition` [kg/J]"""
+    transition: Positive
+    """Power of friction over the area of the patch [W/m2]"""
+
+
+class WearLawFile(FileDefinition):
+    """A law of wear: one of the tables, with constants of the user's own."""
+
+    format: Literal["railsim-wear-law/1"]
+    """Kind and version of the file"""
+    name: Text
+    """How tables call it"""
+    source: Text
+    """Where the constants are from"""
+    archard: ArchardMap | None = None
+    """Archard with a map of coefficients"""
+    krause_poll: FrictionWork | None = None
+    """Work of friction, mild and severe"""
+
+    @model_validator(mode="after")
+    def _one(self) -> "WearLawFile":
+        if (self.archard is None) == (self.krause_poll is None):
+            raise ValueError("give one of the tables archard and krause_poll")
+        if self.archard is not None and self.archard.speeds[0] >= self.archard.speeds[1]:
+            raise ValueError("archard.speeds must increase")
+        return self
