@@ -407,11 +407,19 @@ def result_data(result: "Result") -> dict[str, Any]:
     """Return what a result holds, without its arrays."""
     inputs = ("vehicle_toml", "track_toml", "settings_json")
     attributes = {k: v for k, v in result.attributes.items() if k not in (*inputs, "remarks")}
+    coordinates = {name: list(labels) for name, labels in result.coordinates.items()}
+    # by the dimensions: the arrays of a long run are not read for their shapes
+    lengths = {"time": len(result["time"])} | {
+        dim: len(names) for dim, names in coordinates.items()
+    }
     quantities = {
-        name: {"dims": quantity.dims, "shape": result[name].shape, "unit": quantity.unit}
+        name: {
+            "dims": quantity.dims,
+            "shape": tuple(lengths[dim] for dim in quantity.dims),
+            "unit": quantity.unit,
+        }
         for name, quantity in result.quantities.items()
     }
-    coordinates = {name: list(labels) for name, labels in result.coordinates.items()}
     return {
         "kind": "result",
         "attributes": attributes,
