@@ -39,6 +39,7 @@ SPEED = 20.0
 def train(coaches: int) -> Vehicle:
     """Several coaches, one behind the other, without couplings."""
     data = tomllib.loads(load_vehicle("coach_manchester").to_toml())
+    data.pop("loads", None)  # they name the bodies of one coach
     coach = {key: data.pop(key) for key in ("bodies", "assemblies")}
     coach["placements"] = [
         {"name": f"coach{k}", "position": [-COACH_LENGTH * k, 0.0, 0.0]} for k in range(coaches)

@@ -81,8 +81,10 @@ class Memory:
         return [self._found[int(k)] for k in np.linspace(0, len(self._found) - 1, 11)]
 
     def _watch(self) -> None:
-        while not self._end.wait(1.0):
+        while True:
             self._found.append(sum(_resident(pid) for pid in _family(os.getpid())) / 1e6)
+            if self._end.wait(1.0):
+                return
 
 
 def _family(root: int) -> set[int]:

@@ -66,6 +66,7 @@ SMOOTHING = 0.3
 # Elastic rails have no such ringing: nothing is smoothed.  An axlebox, as an arm on its bush, keeps
 # the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.
 SMOOTHING_ELASTIC = 1.0
+SPIN = 4  # component of a body about its y axis
 
 
 class Recorder(NamedTuple):
@@ -315,8 +316,10 @@ def step_fast(system, work, state, derivative, decay, h):
         state[q + 5] += h * (derivative[q + 5] + d3)
         for k in range(6):
             change = rate[q + k] - before[q + k]
-            state[v + k] += h * rate[q + k] + (0.5 * beta * h + shift) * change
-            before[q + k] += beta * change
+            # the spin of a wheelset keeps it too: a brake that holds would chatter
+            weight = SMOOTHING if kind == WHEELSET and k == SPIN else beta
+            state[v + k] += h * rate[q + k] + (0.5 * weight * h + shift) * change
+            before[q + k] += weight * change
     drives = first + 6 * n
     ratio = h / last
     for i in range(m):

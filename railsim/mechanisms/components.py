@@ -120,7 +120,7 @@ def table_value(rows: NDArray[np.float64], x: Any) -> Any:
 
     Examples
     --------
-    >>> float(table_value(np.array([[0.1, 50.0], [0.2, 20.0]]), 0.15))
+    >>> float(table_value(np.array([[0.0, 50.0], [2.0, 20.0]]), 1.0))
     35.0
     """
     k = np.clip(np.searchsorted(rows[:, 0], np.real(x), side="right") - 1, 0, len(rows) - 2)

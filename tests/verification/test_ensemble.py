@@ -143,7 +143,8 @@ def test_the_one_that_finds_no_step_on_the_way_fails_by_itself(monkeypatch):
     fine, failure = outcomes(vehicles, load_track("straight"), until=20.0,
                              settings=Settings(drive=drive))  # fmt: skip
     assert fine.status == "complete"
-    assert isinstance(failure, ModelError)
+    assert failure.status == "stopped"  # and kept, up to there
+    assert "no stable step" in failure.attributes["status_reason"]
 
 
 def test_the_one_that_overturns_ends_as_alone_and_the_others_go_on():

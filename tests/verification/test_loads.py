@@ -150,7 +150,7 @@ def test_design_load_equals_a_load_case_of_the_same_numbers(straight):
         ('load = "ladden"\n[loads.laden.bodies.carbody]\nmass = 1.0\n', "no load case 'ladden'"),
         ("[loads.laden.bodies.carbdy]\nmass = 1.0\n", "no body 'carbdy'"),
         ("[loads.laden.assemblies.bogey.bodies.frame]\nmass = 1.0\n", "no assembly 'bogey'"),
-        ("[loads.laden.bodies.carbody]\n", "is needed"),
+        ("[loads.own.bodies.carbody]\n", "is needed"),
         ("[loads.laden.bodies.carbody]\nmass = -1.0\n", "mass"),
     ],
 )
