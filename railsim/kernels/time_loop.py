@@ -64,7 +64,8 @@ FAST, RK4 = range(2)
 # at 200 Hz, which errors of the estimated damping would feed.
 SMOOTHING = 0.3
 # Elastic rails have no such ringing: nothing is smoothed.  An axlebox, as an arm on its bush, keeps
-# the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.
+# the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.  So does the
+# spin of a driven or braked wheelset: a brake that holds it would chatter.
 SMOOTHING_ELASTIC = 1.0
 SPIN = 4  # component of a body about its y axis
 
@@ -292,8 +293,12 @@ def step_fast(system, work, state, derivative, decay, h):
         beta = SMOOTHING
         if system.support.elastic and kind != AXLEBOX:
             beta = SMOOTHING_ELASTIC
+        spin = beta
         if kind == WHEELSET:
             soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
+            for e in range(system.drives.body.shape[0]):
+                if system.drives.body[e, 1] == b:
+                    spin = SMOOTHING
         d1 = (h + shift) * rate[q + 3] - (0.5 * h + shift) * before[q + 3]
         d2 = (h + shift) * rate[q + 4] - (0.5 * h + shift) * before[q + 4]
         d3 = (h + shift) * rate[q + 5] - (0.5 * h + shift) * before[q + 5]
@@ -316,8 +321,7 @@ def step_fast(system, work, state, derivative, decay, h):
         state[q + 5] += h * (derivative[q + 5] + d3)
         for k in range(6):
             change = rate[q + k] - before[q + k]
-            # the spin of a wheelset keeps it too: a brake that holds would chatter
-            weight = SMOOTHING if kind == WHEELSET and k == SPIN else beta
+            weight = spin if k == SPIN else beta
             state[v + k] += h * rate[q + k] + (0.5 * weight * h + shift) * change
             before[q + k] += weight * change
     drives = first + 6 * n

@@ -68,7 +68,7 @@ def simulate_together(
     --------
     >>> import railsim
     >>> soft = railsim.load_vehicle("coach_manchester")
-    >>> hard = railsim.load_vehicle("coach_flexicoil")
+    >>> hard = soft.with_values({"primary.stiffness.y": 1e6})
     >>> track = railsim.load_track("curve_r250")
     >>> results = railsim.simulate_together([soft, hard], track, speed=20.0, until=10.0)
     >>> [result.attributes["runs_together"] for result in results]

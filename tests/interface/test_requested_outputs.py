@@ -36,7 +36,8 @@ def test_loads_of_the_patches_make_up_the_wheel_loads(result):
     N, T_y, angle = result.patch_N, result.patch_T_y, result.patch_angle
     Q = (N * np.cos(angle) - T_y * np.sin(angle)).sum(axis=-1)
     Y = (N * np.sin(angle) + T_y * np.cos(angle)).sum(axis=-1)
-    np.testing.assert_allclose(Q, result.Q, rtol=1e-6)
+    # small corrections of the forces on elastic rails are not divided among the patches
+    np.testing.assert_allclose(Q, result.Q, atol=1e-3 * result.Q0.mean())
     # the patch's angle is the mean of slope and force direction (see kernels/wheel_rail): in the
     # flange root the sum differs from the force, elsewhere they agree
     np.testing.assert_allclose(Y[:, :, 1], result.Y[:, :, 1], atol=200.0)
