@@ -290,10 +290,8 @@ def step_fast(system, work, state, derivative, decay, h):
         q = 6 * b
         v = 6 * n + q
         kind = bodies.kind[b]
-        beta = SMOOTHING
-        if system.support.elastic and kind != AXLEBOX:
-            beta = SMOOTHING_ELASTIC
-        spin = beta
+        follows = system.support.elastic and kind != AXLEBOX
+        beta = spin = SMOOTHING_ELASTIC if follows else SMOOTHING
         if kind == WHEELSET:
             soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
             for e in range(system.drives.body.shape[0]):
