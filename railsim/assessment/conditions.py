@@ -8,18 +8,15 @@ Fault modes need none of them.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.zones import Population, ZoneReport
-from railsim.contact.geometry import ContactGeometry, contact_geometry
+from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
 from railsim.definitions.vehicle import Service
-from railsim.errors import InputError
-from railsim.profiles import Profile
 from railsim.result import Result
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"
@@ -247,26 +244,7 @@ def leading_geometry(result: Result) -> ContactGeometry | None:
     names = [*wheelset.profile, *track.rail] if wheelset else ["?"]
     if wheelset is None or any(name not in known for name in names):
         return None
-    wheels = known[wheelset.profile[0]], known[wheelset.profile[1]]
-    rails = known[track.rail[0]], known[track.rail[1]]
-    return _geometry(
-        wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
-    )
-
-
-@lru_cache(32)
-def _geometry(
-    wheels: tuple[Profile, Profile],
-    rails: tuple[Profile, Profile],
-    radius: float,
-    gauge: float,
-    inclination: float,
-    back_to_back: float,
-) -> ContactGeometry | None:
-    try:
-        return contact_geometry(wheels, rails, radius, gauge, inclination, back_to_back)
-    except InputError:
-        return None
+    return geometry_of(wheelset, track, known)
 
 
 def conicity_of(geometry: ContactGeometry | None) -> float:

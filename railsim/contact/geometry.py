@@ -9,14 +9,18 @@ The search is exact (least vertical gap over candidates 0.03 mm apart, refined b
 shares the prepared profiles with the table but nothing else.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from railsim.contact.conicity import equivalent_conicity
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Wheelset
 from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile
@@ -190,3 +194,25 @@ def contact_geometry(
         wheel_y=contacts[..., kernel.R_U] - tape,
         centre_z=0.5 * (gap[:, 0] + gap[:, 1]),
     )
+
+
+def geometry_of(
+    wheelset: Wheelset, track: Track, profiles: Mapping[str, Profile]
+) -> ContactGeometry | None:
+    """Geometry of a wheelset on a track; None where it does not fit between the rails.
+
+    `profiles` holds those of both by their names.
+    """
+    wheels = profiles[wheelset.profile[0]], profiles[wheelset.profile[1]]
+    rails = profiles[track.rail[0]], profiles[track.rail[1]]
+    return _fitting(
+        wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
+    )
+
+
+@lru_cache(32)  # maps, optimisations and sections ask for the same profiles over and over
+def _fitting(*arguments: Any) -> ContactGeometry | None:
+    try:
+        return contact_geometry(*arguments)
+    except InputError:
+        return None

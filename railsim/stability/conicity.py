@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.contact.geometry import contact_geometry
-from railsim.errors import InputError
+from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.linear.vehicle import LinearVehicle
-from railsim.profiles import Profile
 
 AMPLITUDES = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
@@ -28,13 +26,10 @@ def conicity_over_amplitude(prepared: LinearVehicle) -> dict[str, Any] | None:
     wheelset, track, known = body.wheelset, prepared.track, prepared.model.profiles
     if wheelset is None:
         return None
-    wheels = known[wheelset.profile[0]], known[wheelset.profile[1]]
-    rails = known[track.rail[0]], known[track.rail[1]]
-    values = _values(
-        wheels, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
-    )
-    if values is None:
+    geometry = geometry_of(wheelset, track, known)
+    if geometry is None:
         return None
+    values = _values(geometry)
     there = np.isfinite(values)
     return {
         "wheelset": body.name,
@@ -43,17 +38,6 @@ def conicity_over_amplitude(prepared: LinearVehicle) -> dict[str, Any] | None:
     }
 
 
-@lru_cache(8)  # maps and optimisations ask for the same profiles over and over
-def _values(
-    wheels: tuple[Profile, Profile],
-    rails: tuple[Profile, Profile],
-    radius: float,
-    gauge: float,
-    inclination: float,
-    back_to_back: float,
-) -> NDArray[np.float64] | None:
-    try:
-        geometry = contact_geometry(wheels, rails, radius, gauge, inclination, back_to_back)
-    except InputError:
-        return None
+@lru_cache(8)  # maps and optimisations ask for the same geometry over and over
+def _values(geometry: ContactGeometry) -> NDArray[np.float64]:
     return geometry.equivalent_conicity(AMPLITUDES)
