@@ -5,12 +5,34 @@ from here; docs/notation.md is made from this table.
 """
 
 from dataclasses import dataclass, replace
+from math import pi
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 SIDES = ("left", "right")
 EXTREMES = ("max", "min")
 DECIMALS = {"kN": 2, "mm": 2, "mrad": 2, "%": 2, "-": 3, "N": 1, "1e-3": 3, "s": 2, "m": 1}
 """Decimals in printed tables by shown unit; four digits for the others."""
+
+SHOWN_UNITS = {
+    "mm": ("m", 1e3),
+    "km": ("m", 1e-3),
+    "mm2": ("m2", 1e6),
+    "1/km": ("1/m", 1e3),
+    "km/h": ("m/s", 3.6),
+    "t": ("kg", 1e-3),
+    "kN": ("N", 1e-3),
+    "kN m": ("N m", 1e-3),
+    "kN/m": ("N/m", 1e-3),
+    "N/mm": ("N/m", 1e-3),
+    "MPa": ("Pa", 1e-6),
+    "kW": ("W", 1e-3),
+    "mrad": ("rad", 1e3),
+    "deg": ("rad", 180.0 / pi),
+    "%": ("1", 100.0),
+    "1e-3": ("1", 1e3),
+    "per mille": ("1", 1e3),
+}
+"""SI unit of values shown in another one, and shown value over SI value."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """What the commands share: options, tables, machine-readable output."""
 
 import json
+import os
 import re
 import shutil
 import sys
@@ -15,6 +16,7 @@ from railsim.text import printable
 if TYPE_CHECKING:
     from railsim.definitions.base import FileDefinition, Remark
     from railsim.definitions.loading import Format
+    from railsim.table import Table
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -48,6 +50,18 @@ def echo(text: object = "", *, err: bool = False) -> None:
     parts = _STYLED.split(str(text))
     codes = "".join(f"\x1b[{STYLES[p]}m" if p in STYLES else printable(p) for p in parts)
     click.echo(codes, err=err)  # without the codes where this is no terminal
+
+
+def show(*parts: "str | Table") -> None:
+    """Print lines and tables; a terminal gets tables of its width, coloured unless ``NO_COLOR``."""
+    terminal = sys.stdout.isatty()
+    width = shutil.get_terminal_size().columns if terminal else None
+    for part in parts:
+        if isinstance(part, str):
+            echo(part)
+        else:  # texts of tables are literal already
+            lines = part.lines(width, colour=terminal and not os.environ.get("NO_COLOR"))
+            click.echo("\n".join(lines))
 
 
 def names_of(kind: str) -> Callable[..., list[Any]]:

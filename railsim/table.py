@@ -1,0 +1,252 @@
+"""Tables: columns are quantities, rows are values.
+
+An analysis returns a `Table` of numbers in SI units; it is rendered where it is shown: for a
+terminal (`lines`, ``str``), a notebook or a page (`html`), a program (`records`) or a spreadsheet
+(`csv`).  Texts, which may come from files of other sources, are shown literally everywhere.
+
+>>> wheels = Table(
+...     [Column("wheelset"), Column("Q0", "static wheel load", "kN", ".2f")],
+...     [["leading", 61234.5], ["trailing", None]],
+... )
+>>> wheels
+wheelset  static wheel load (kN)
+leading                    61.23
+trailing
+>>> wheels.records()
+[{'wheelset': 'leading', 'Q0': 61234.5}, {'wheelset': 'trailing', 'Q0': None}]
+>>> wheels["Q0"]
+[61234.5, None]
+"""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from math import isfinite, isnan
+from typing import Any, NamedTuple
+
+from railsim.notation import DECIMALS, SHOWN_UNITS, Quantity
+from railsim.text import printable, spreadsheet_cell
+
+GOOD, BAD = ("pass", "complete"), ("fail", "failed", "derailed", "exceeded", "waiting")
+"""Cells that a terminal shows in green, in red; the rows of the latter have a class in pages."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A quantity in a table.
+
+    Attributes
+    ----------
+    name : str
+        Key in `Table.records`, and heading in CSV.
+    words : str
+        Heading where people read; `name` by default.
+    unit : str
+        Unit in which values are shown; those of `SHOWN_UNITS` are converted from SI.
+    format : str
+        Format of shown numbers (``.2f``), ``>`` for texts aligned to the right, or empty for
+        texts.
+    symbol : str
+        Symbol of the quantity, in mathtext.
+    """
+
+    name: str
+    words: str = ""
+    unit: str = ""
+    format: str = ""
+    symbol: str = ""
+
+    @classmethod
+    def of(cls, quantity: Quantity, words: str = "") -> "Column":
+        """Return the column of a quantity of `railsim.notation`.
+
+        Examples
+        --------
+        >>> from railsim.notation import QUANTITIES
+        >>> Column.of(QUANTITIES["sum_Y"], "sum Y").heading
+        'sum Y (kN)'
+        """
+        unit = quantity.shown_unit
+        decimals = DECIMALS.get(unit)
+        shown = ".4g" if decimals is None else f".{decimals}f"
+        unit = "" if unit == "-" else unit
+        return cls(quantity.name, words or quantity.long_name, unit, shown, quantity.symbol)
+
+    @property
+    def si_unit(self) -> str:
+        """Unit of the values."""
+        return SHOWN_UNITS.get(self.unit, (self.unit, 1.0))[0]
+
+    @property
+    def heading(self) -> str:
+        """Words with the shown unit."""
+        words = self.words or self.name
+        return f"{words} ({self.unit})" if self.unit else words
+
+    def text(self, value: Any) -> str:
+        """Return a value as shown; nothing for None, ``-`` for a number that is undefined.
+
+        Examples
+        --------
+        >>> Column("speed", unit="km/h", format=".0f").text(20.0)
+        '72'
+        """
+        if isinstance(value, Amount):
+            return value.column.text(value.value)
+        if value is None:
+            return ""
+        if isinstance(value, str):
+            return value
+        if isnan(value):
+            return "-"
+        return format(value * SHOWN_UNITS.get(self.unit, ("", 1))[1], self.format)
+
+
+class Amount(NamedTuple):
+    """A cell whose quantity is not its column's, as where rows are quantities."""
+
+    value: Any
+    column: Column
+
+
+class Table:
+    """Values in rows under quantities.
+
+    Parameters
+    ----------
+    columns : iterable of Column or str
+        Quantities; a text alone is a column of texts.
+    rows : iterable of sequences or mappings
+        Values in SI units: numbers, texts, None where there is none, or `Amount`.  Mappings by
+        the columns' names.
+    caption : str
+    """
+
+    def __init__(
+        self,
+        columns: Iterable[Column | str],
+        rows: Iterable[Sequence[Any] | Mapping[str, Any]],
+        caption: str = "",
+    ) -> None:
+        self.columns = [Column(one) if isinstance(one, str) else one for one in columns]
+        self.caption = caption
+        names = [column.name for column in self.columns]
+        self.rows = [
+            [row.get(name) for name in names] if isinstance(row, Mapping) else list(row)
+            for row in rows
+        ]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, name: str) -> list[Any]:
+        return [record[name] for record in self.records()]
+
+    def __repr__(self) -> str:
+        return "\n".join(self.lines())
+
+    def texts(self) -> list[list[str]]:
+        """Return the cells as shown, without the headings."""
+        return [
+            [printable(column.text(cell)) for column, cell in zip(self.columns, row, strict=True)]
+            for row in self.rows
+        ]
+
+    def transposed(self, heading: Column | str = "") -> "Table":
+        """Return the table with a row for every quantity; the first column becomes the heading."""
+        first, *others = self.columns
+        names = [Column(first.text(row[0]), format=">") for row in self.rows]
+        rows = [
+            [column.heading, *(Amount(row[number], column) for row in self.rows)]
+            for number, column in enumerate(others, start=1)
+        ]
+        return Table([heading, *names], rows, self.caption)
+
+    def lines(self, width: int | None = None, *, colour: bool = False) -> list[str]:
+        """Return the lines for a terminal: long cells take several where `width` is less.
+
+        Colours are escape sequences, for verdicts and headings.
+        """
+        cells = [[printable(column.heading) for column in self.columns], *self.texts()]
+        if colour or width is not None:
+            lines = self._drawn(cells, width or 100_000, colour)
+        else:  # rich takes 0.2 ms a cell
+            widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+            signs = [">" if column.format else "<" for column in self.columns]
+            shapes = [f"{sign}{width}" for sign, width in zip(signs, widths, strict=True)]
+            lines = ["  ".join(map(format, row, shapes)) for row in cells]
+        lines = [re.sub(r" +((?:\x1b\[0m)?)$", r"\1", line).rstrip() for line in lines]
+        return [printable(self.caption), *lines] if self.caption else lines
+
+    def _drawn(self, cells: list[list[str]], width: int, colour: bool) -> list[str]:
+        from rich.console import Console
+        from rich.table import Table as Drawn
+        from rich.text import Text
+
+        drawn = Drawn(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+        for column, heading in zip(self.columns, cells[0], strict=True):
+            drawn.add_column(
+                Text(heading), justify="right" if column.format else "left", overflow="fold"
+            )
+        for row in cells[1:]:
+            drawn.add_row(*(Text(cell, _style(cell)) for cell in row))
+        stream = io.StringIO()
+        console = Console(
+            file=stream,
+            width=width,
+            force_terminal=colour,
+            color_system="standard" if colour else None,
+            legacy_windows=False,
+            _environ={},
+        )
+        console.print(drawn)
+        return stream.getvalue().splitlines()
+
+    def html(self) -> str:
+        """Return the table for pages; columns of texts, rows that fail have classes for styles."""
+        classes = ["" if column.format else ' class="words"' for column in self.columns]
+
+        def line(cells: Iterable[str], tag: str, kind: str = "") -> str:
+            marked = (
+                f"<{tag}{words}>{escape(printable(cell))}</{tag}>"
+                for words, cell in zip(classes, cells, strict=True)
+            )
+            return f"<tr{kind}>{''.join(marked)}</tr>"
+
+        title = f"<caption>{escape(printable(self.caption))}</caption>" if self.caption else ""
+        head = line((column.heading for column in self.columns), "th")
+        body = "".join(
+            line(row, "td", ' class="failed"' if set(BAD).intersection(row) else "")
+            for row in self.texts()
+        )
+        return f"<table>{title}<thead>{head}</thead><tbody>{body}</tbody></table>"
+
+    _repr_html_ = __html__ = html
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the rows by the columns' names, in SI units; undefined numbers are None."""
+        names = [column.name for column in self.columns]
+        return [dict(zip(names, map(_plain, row), strict=True)) for row in self.rows]
+
+    def csv(self) -> str:
+        """Return comma-separated values in SI units, under the columns' names."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(column.name for column in self.columns)
+        for record in self.records():
+            writer.writerow(map(spreadsheet_cell, record.values()))
+        return text.getvalue()
+
+
+def _style(cell: str) -> str:
+    return "green" if cell in GOOD else "red" if cell in BAD else ""
+
+
+def _plain(cell: Any) -> Any:
+    """Return a cell as a value of Python."""
+    value = cell.value if isinstance(cell, Amount) else cell
+    value = value.item() if hasattr(value, "item") else value  # numbers of numpy
+    return None if isinstance(value, float) and not isfinite(value) else value
