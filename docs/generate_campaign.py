@@ -70,7 +70,7 @@ def campaign(found: list[dict]) -> str:
         "complete",
         "largest wheel unloading (%), track",
         "largest derailment quotient, track",
-        "largest track shifting force (kN), track",
+        "largest track shift force (kN), track",
     )
     every = len(library_files("vehicle")) * len(library_files("track"))
     text = f"{len(found)} of {every} combinations have been computed.\n\n"

@@ -139,7 +139,7 @@ def picture(omega, density):
             ax.legend(loc="lower left")
         axes[0].set_ylim(1e-11, 1e-4)
         axes[1].set_ylim(1e-11, 1e-5)
-        figure.suptitle("ERRI B176 low, 3 to 70 m: asked for (dashed) and generated")
+        figure.suptitle("ERRI B176 low, 3 to 70 m: target (dashed) and generated")
         save(figure, DOCS / "img" / "irregularity_spectra.png", overwrite=True)
 
 

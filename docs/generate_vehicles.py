@@ -88,7 +88,7 @@ def introduction(text: str) -> str:
             break
         head.append(line.lstrip("# "))
     words = " ".join(head)
-    words = re.split(r"(?:Trust of the numbers|Sources of the numbers|Trust):", words)[0].strip()
+    words = re.split(r"(?:Sources? (?:quality )?of the numbers|Source quality):", words)[0].strip()
     return words + ("" if words.endswith(".") else ".")
 
 

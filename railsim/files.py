@@ -55,7 +55,7 @@ def check_file(
     option : str
         What the user knows the path by, for messages.
     endings : sequence of str
-        How its name may end, in small or capital letters; by default as it likes.
+        How its name may end, in small or capital letters; by default any.
 
     Raises
     ------
@@ -204,7 +204,16 @@ def read_text(path: str | Path, limit: int) -> str:
     try:
         return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError([Fault(str(path), "", "not a UTF-8 text", "a text file")]) from None
+        raise InputError(
+            [
+                Fault(
+                    str(path),
+                    "",
+                    "is not UTF-8",
+                    "UTF-8 text (convert it: iconv -f latin1 -t utf-8)",
+                )
+            ]
+        ) from None
 
 
 # writing ------------------------------------------------------------------------------------------

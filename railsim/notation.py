@@ -185,7 +185,7 @@ QUANTITIES: dict[str, Quantity] = _table(
     ),
     Quantity(
         "Y",
-        "lateral wheel force",
+        "guiding force",
         "Y",
         "N",
         _WHEEL,
@@ -215,7 +215,7 @@ QUANTITIES: dict[str, Quantity] = _table(
     ),
     Quantity(
         "sum_Y",
-        "track shifting force",
+        "track shift force",
         r"\Sigma Y",
         "N",
         _AXLE,
@@ -223,7 +223,7 @@ QUANTITIES: dict[str, Quantity] = _table(
         1e-3,
         "on the track, positive to the right",
     ),
-    Quantity("sum_abs_Y", "lateral force of the wheelset", r"\Sigma |Y|", "N", _AXLE, "kN", 1e-3),
+    Quantity("sum_abs_Y", "sum of guiding-force magnitudes", r"\Sigma |Y|", "N", _AXLE, "kN", 1e-3),
     Quantity(
         "wheelset_lateral",
         "wheelset lateral displacement",

@@ -334,7 +334,7 @@ def dominant_frequency(x: Floats, rate: float) -> float:
 
 
 def hunting_spectrum(record: Record, sections: Sequence[TestSection]) -> Floats:
-    """Power of the track shifting forces of all wheelsets in zones 1 and 2, over `FREQUENCIES`."""
+    """Power of the track shift forces of all wheelsets in zones 1 and 2, over `FREQUENCIES`."""
     found = np.zeros(len(FREQUENCIES))
     for group in _stretches([s for s in sections if s.zone in HUNTING_ZONES]):
         rows = record.rows_between(group[0].begin, group[-1].end, 0.0)

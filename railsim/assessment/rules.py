@@ -66,9 +66,9 @@ def _acceleration(
 
 
 RULES = (
-    _kN("sum_Y", "safety", SAFETY, "track shifting force, 2 m"),
+    _kN("sum_Y", "safety", SAFETY, "track shift force, 2 m"),
     Rule("Y_over_Q", "safety", SAFETY, NORMAL, "derailment quotient, 2 m", "-"),
-    _kN("instability", "largest", SAFETY, "rms of track shifting force, 100 m"),
+    _kN("instability", "largest", SAFETY, "rms of track shift force, 100 m"),
     _kN("Q", "loading", LOADING, "wheel load"),
     _kN("Q_qst", "quasi_static", LOADING, "quasi-static wheel load"),
     _kN("Y_qst", "quasi_static", LOADING, "quasi-static guiding force"),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 PICTURES = ("creep_curves.png", "traction.png")
 TABLES = ("creep_curves.csv",)
 FIELD_SIZE = 1.2
-"""Size of the normalised creepage of the traction fields."""
+"""Magnitude of the normalised creepage of the traction fields."""
 
 TABLE_FILE = "creep_table.npz"
 

@@ -365,7 +365,7 @@ def track_lines(track: "Track", speeds: Sequence[float]) -> list[str]:
     if track.third_body != (1.0, 1.0):
         lines.append(f"  third body: Kalker's coefficients times {_either(track.third_body)}")
     lines += [f"  source: {track.source}"] if track.source else []
-    header = ["plan", "from m", "to m", "radius m", "cant mm", "balanced at", "150 mm at"]
+    header = ["plan", "from m", "to m", "radius m", "cant mm", "equilibrium speed", "150 mm at"]
     header += [f"{speed:g} m/s" for speed in speeds]
     rows = [_plan_cells(row, speeds) for row in data["plan"]]
     lines += ["", *table(header, rows)]

@@ -10,8 +10,8 @@ import click
 from railsim.cli.common import echo, json_option, overwrite_option, print_json, table
 
 PROFILES = "profiles"
-# Marks of trust beside a number, as the shipped files explain them: read, re-entered, computed,
-# recalled, assumed; a short name of the source may follow, [D G].
+# Letters of source quality beside a number, as the shipped files explain them: read, re-entered,
+# computed, recalled, assumed; a short name of the source may follow, [D G].
 MARK = re.compile(r"\[(D|R|C|M|A|assumed)(?: \w+)?\]")
 MEANING = {
     "D": "data sheet or printed table, read",
@@ -62,10 +62,10 @@ def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: 
             for entry in entries
             if entry["kind"] == kind
         ]
-        echo("\n".join([f"{kind}", *table(["name", "trust", ""], rows, numbers=3), ""]))
+        echo("\n".join([f"{kind}", *table(["name", "source quality", ""], rows, numbers=3), ""]))
     if any(entry["trust"] for entry in entries):
         meanings = ", ".join(f"{letter} {meaning}" for letter, meaning in MEANING.items())
-        echo(f"trust of the numbers, the most frequent first: {meanings}")
+        echo(f"source quality, the most frequent first: {meanings}")
 
 
 def _entries(kind: str) -> list[dict[str, Any]]:
@@ -98,7 +98,7 @@ def _entries(kind: str) -> list[dict[str, Any]]:
 
 
 def trust(text: str) -> str:
-    r"""Return the letters of trust of a file's numbers, the most frequent first.
+    r"""Return the letters of source quality of a file's numbers, the most frequent first.
 
     Examples
     --------

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from railsim.plot.study import Column
 
 # default quantities of the picture of a study
-DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_abs_Y_abs", "T_gamma_abs")
+DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 
 
 @click.command()

@@ -227,7 +227,7 @@ def result_record(result: "Result") -> dict[str, Any]:
 
 
 def _assumption_lines(case: "Case") -> list[str]:
-    """Return what the run rests on, in the habits of the field."""
+    """Return what the run rests on, in customary units."""
     from railsim.definitions.flatten import flatten
     from railsim.simulation.right_samples import output_words
 

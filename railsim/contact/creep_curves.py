@@ -17,7 +17,7 @@ CASES = {
     "lateral": (0.0, 1.0, 0.0),
     "spin": (0.0, 0.0, 1.0),
     "lateral and spin, same sign": (0.0, 1.0, 1.0),
-    "lateral and spin, opposed": (0.0, 1.0, -0.5),
+    "lateral and spin, opposite sign": (0.0, 1.0, -0.5),
     "longitudinal and spin": (1.0, 0.0, 1.0),
 }
 """Directions of the normalised creepages (x, y, spin)."""

@@ -207,7 +207,7 @@ class _Geometry:
         edges = np.flatnonzero(np.diff(np.concatenate(([False], overlap, [False])).astype(int)))
         widths = 2.5e-5 * (edges[1::2] - edges[::2])
         whole = 2.5e-5 * (edges[-1] - edges[0])
-        # a sliver that has just touched must not set the size of all elements
+        # a contact that has only just formed must not set the size of all elements
         ds = max(float(widths.min()) / elements, float(widths.max()) / (3 * elements), 2e-5)
         n_s = int(np.ceil(whole / ds)) + 2
         centre = s[edges[0]] - ds + ds * np.arange(n_s)

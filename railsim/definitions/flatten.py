@@ -299,7 +299,7 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
     for group, frame in _frames(vehicle, _Frame()):
         faults += _side_faults(group, frame)
         faults += _torque_faults(group, frame, {body.name: body.kind for body in flat.bodies})
-    # a definition that stands several times is reported once
+    # a definition used several times is reported once
     return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
 

@@ -67,7 +67,7 @@ class ByZone(Sourced):
 
 
 class ByAxleLoad(Sourced):
-    """Track shifting force: k1 (constant + factor Q0)."""
+    """Track shift force: k1 (constant + factor Q0)."""
 
     constant: NonNegative
     """[N]"""
@@ -242,7 +242,7 @@ class RunningLimits(FileDefinition):
     statistics: Statistics
     """Factors of the statistics"""
     sum_Y: ByAxleLoad
-    """Track shifting force, 2 m mean"""
+    """Track shift force, 2 m mean"""
     Y_over_Q: Constant
     """Derailment quotient, 2 m mean"""
     Q: WheelLoad
@@ -270,7 +270,7 @@ class RunningLimits(FileDefinition):
     body_y_qst: Constant
     """Quasi-static lateral acceleration of the body"""
     instability: Share
-    """Root mean square over the limit of the track shifting force or frame acceleration"""
+    """Root mean square over the limit of the track shift force or frame acceleration"""
 
 
 class Classes(Sourced):
@@ -311,7 +311,7 @@ class Twist(Sourced):
 
 
 class Guiding(Sourced):
-    """Guiding force in a tight level curve over the least wheel load on twisted track."""
+    """Guiding force in a tight level curve over the smallest wheel load on twisted track."""
 
     value: Positive
     """Y/Q [1]"""

@@ -1,7 +1,7 @@
 """The mirror images of vehicles and tracks: left and right exchanged.
 
 A right-hand curve becomes the left-hand one, a lopsided load changes sides.  Mirrored vehicle on
-mirrored track gives the mirrored result: the sharpest check of signs there is.
+mirrored track gives the mirrored result, which checks all signs.
 """
 
 from typing import TypeVar

@@ -1,6 +1,6 @@
 """Overrides: ``key.path=value`` as ``--set`` gives them, or keys and values of Python.
 
-Values of `--set` are TOML; what is no TOML is a number with a unit (``5mm``) or text, so that
+Values of `--set` are TOML; what is not TOML is a number with a unit (``5mm``) or text, so that
 ``rail=60E1`` needs no quotes.  A path may be short where it is unique: ``primary.stiffness.x``.
 """
 
@@ -134,7 +134,7 @@ def _assign(
 
 
 def _value(written: str, text_expected: bool) -> Any:
-    """Return a written value: TOML, and what is no TOML is text without its quotes."""
+    """Return a written value: TOML, and what is not TOML is text without its quotes."""
     try:
         value = tomllib.loads(f"value = {written}")["value"]
     except tomllib.TOMLDecodeError:

@@ -79,7 +79,7 @@ class InitialState(Definition):
 
 
 class Drive(Definition):
-    """How the speed goes along the track."""
+    """Speed profile along the track."""
 
     mode: Literal["constant", "table", "free"] = "constant"
     """`constant`: the speed of the run; `table`: after `speed_table`; `free`: the run's speed at
@@ -170,7 +170,7 @@ class Settings(FileDefinition):
     poisson: NonNegative = 0.28
     """Poisson's ratio of wheels and rails [1]"""
     drive: Drive = Drive()
-    """How the speed goes along the track"""
+    """Speed profile along the track"""
     start_state: Literal["run-in", "steady"] = "run-in"
     """Of a run that begins in a curve: the end of some 10 s over an auxiliary track, or the steady
     state by Newton's method"""

@@ -131,7 +131,7 @@ class Clothoid(Definition):
     radius_start: Radius | None = None
     """Radius at its beginning, `inf` if straight [m]; by default that of the element before"""
     radius_end: Radius | None = None
-    """Radius at its end [m]; by default that of the element behind"""
+    """Radius at its end [m]; by default that of the following element"""
 
 
 class ConstantCant(Definition):
@@ -153,7 +153,7 @@ class CantRamp(Definition):
     cant_start: Cant | None = None
     """Cant at its beginning [m]; by default that of the element before"""
     cant_end: Cant | None = None
-    """Cant at its end [m]; by default that of the element behind"""
+    """Cant at its end [m]; by default that of the following element"""
 
 
 class ConstantGradient(Definition):
@@ -175,7 +175,7 @@ class GradientRamp(Definition):
     gradient_start: Gradient | None = None
     """Gradient at its beginning [1]; by default that of the element before"""
     gradient_end: Gradient | None = None
-    """Gradient at its end [1]; by default that of the element behind"""
+    """Gradient at its end [1]; by default that of the following element"""
 
 
 PlanElement = Annotated[Straight | Clothoid | Circle, Field(discriminator="type")]

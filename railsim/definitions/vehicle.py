@@ -114,7 +114,7 @@ class Point(Definition):
 
 
 class Service(Definition):
-    """What the vehicle is admitted for: the base of its assessment."""
+    """Approved operating conditions of the vehicle: the base of its assessment."""
 
     admissible_speed: Positive
     """Highest speed in service [m/s]"""
@@ -147,10 +147,10 @@ class Vehicle(FileDefinition, Drawn):
     loads: dict[Name, LoadCase] = Field(default_factory=dict)
     """Load cases by name"""
     reference: Text | None = None
-    """Full name of the body whose way is the vehicle's `distance`; by default the first body,
-    else the first wheelset"""
+    """Full name of the body whose travelled distance is the vehicle's `distance`; by default the
+    first body, else the first wheelset"""
     service: Service | None = None
-    """What the vehicle is admitted for; assessments need it"""
+    """Approved operating conditions of the vehicle; assessments need it"""
     sensors: dict[Name, Point] = Field(default_factory=dict)
     """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
     standard ones"""

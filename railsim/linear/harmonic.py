@@ -124,7 +124,7 @@ class ContactPath:
             ).T
             pose = pose - np.linalg.solve(slopes, value)
         else:
-            raise ModelError("the contact path is not found")
+            raise ModelError("no contact path at this amplitude; try a smaller one")
         x = base.copy()
         x[indices] += (y, *pose)
         return x, pose

@@ -40,7 +40,7 @@ class Standing:
     Q, Q0 : float64[wheelset, side]
         Wheel loads, and those on straight level track [N].
     Y : float64[wheelset, side] or None
-        Lateral wheel forces of rolling wheelsets [N].
+        Guiding forces of rolling wheelsets [N].
     """
 
     state: Floats

@@ -66,7 +66,7 @@ def rotation_potential(stiffness: Sequence[float]) -> Triple:
     Returns
     -------
     tuple of 3 floats
-        K_d [N m]; negative entries are in order.
+        K_d [N m]; they may be negative.
 
     Examples
     --------

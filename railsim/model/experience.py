@@ -1,4 +1,4 @@
-"""Remarks on a vehicle that is allowed but unlike any that railways have: slips of sign and unit.
+"""Remarks on implausible values of a vehicle, often errors of sign or unit.
 
 What is looked at needs no rails and no run: where the bodies lie, the vertical modes of the bodies
 on their springs with the wheelsets held, and how the weight is shared by the supports.
@@ -252,7 +252,7 @@ def _other_loads(supports: Iterable[_Support]) -> list[Remark]:
             if compression > SPRING_TRAVEL * free:
                 text = (
                     f"is compressed by {1e3 * compression:.3g} of {1e3 * free:.3g} mm at rest: "
-                    "its coils would be on each other"
+                    "it would be coil-bound"
                 )
                 names.setdefault(text, []).append(support.element.name)
     return [gathered(text, parts) for text, parts in names.items()]

@@ -275,9 +275,7 @@ def _filled(model: Model, tension: Floats, preload: Floats) -> Model:
 def least_squares(matrix: Floats, right_side: Floats, rcond: float) -> Floats:
     """Return the least-squares solution of least size."""
     if not (np.isfinite(matrix).all() and np.isfinite(right_side).all()):
-        raise ModelError(
-            "no static equilibrium: masses, forces or stiffnesses are out of all proportion"
-        )
+        raise ModelError("no static equilibrium: masses, forces or stiffnesses are implausible")
     solution, *_ = np.linalg.lstsq(matrix, right_side, rcond=rcond)
     return np.asarray(solution, dtype=float)
 

@@ -62,7 +62,7 @@ def creep_curves_figure(
         for panel in panels[::3]:
             panel.set_ylabel("force over $\\mu N$")
         for panel in panels[3:]:
-            panel.set_xlabel("size of the normalised creepage")
+            panel.set_xlabel("magnitude of the normalised creepage")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(
             [*handles], [*labels], loc="lower center", ncols=len(labels), bbox_to_anchor=(0.5, 0.0)

@@ -59,7 +59,7 @@ def _pair(axes: Axes, values: Array, feasible: Flags, front: list[int], chosen: 
     others[front] = False
     axes.plot(*values[others & feasible].T, "o", color="0.72", ms=3.5, label="designs")
     if (~feasible).any():
-        axes.plot(*values[~feasible].T, "x", color="0.6", ms=4, label="break a constraint")
+        axes.plot(*values[~feasible].T, "x", color="0.6", ms=4, label="infeasible")
     # a line joins the front only where it orders it
     line = "-" if values.shape[1] == 2 and _ordered(values[front]) else ""
     axes.plot(*values[front].T, "o", ls=line, color=DISTINCT[0], ms=4.5, label="front")

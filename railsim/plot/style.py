@@ -69,7 +69,7 @@ LIMIT = "#b3122b"
 
 
 class Picture(Figure):
-    """A figure that a notebook shows when it is the value of a cell, without pyplot."""
+    """A figure that a notebook displays, without pyplot."""
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()

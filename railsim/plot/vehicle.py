@@ -30,7 +30,7 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
 
     Bodies are crosses at their centres of gravity, axleboxes squares, wheels circles or lines;
     every element is drawn between its points, with a thin line from each point to the body that it
-    holds on to.
+    is attached to.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _line(axes: Axes, points: Sequence[Vector], across: int, upright: int, **sty
 def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D]:
     yield Line2D([], [], ls="", marker="+", ms=9, mew=1.8, color=BODY, label="centre of gravity")
     yield Line2D([], [], color=WHEEL, lw=2.0, label="wheelset")
-    yield Line2D([], [], color=LEVER, lw=0.8, label="holds on to")
+    yield Line2D([], [], color=LEVER, lw=0.8, label="attached to")
     if flat.of_kind("axlebox"):
         yield Line2D([], [], **BOX, label="axlebox")
     for kind, colour in colours.items():

@@ -24,7 +24,7 @@ MEANING = {
     "sum_Y": "shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static axle load "
     "(Prud'homme)",
     "Y_over_Q": "flange climbing of the outer wheel",
-    "instability": "instability: half of the limit of the track shifting force",
+    "instability": "instability: half of the limit of the track shift force",
     "Q": "track loading: 90 kN + Q0, at most a value that depends on the speed",
     "Q_qst": "quasi-static vertical wheel force on the outer rail in curves",
     "Y_qst": "quasi-static guiding force on the outer rail, by the mean radius of the sections",
@@ -228,7 +228,7 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
     service = vehicle.service
     rows = [("vehicle", f"{vehicle.name}. {vehicle.source or ''}")]
     if service:
-        rows.append(("admitted for", f"{3.6 * service.admissible_speed:.0f} km/h, cant deficiency "
+        rows.append(("approved for", f"{3.6 * service.admissible_speed:.0f} km/h, cant deficiency "
                      f"{1e3 * service.cant_deficiency:.0f} mm, {service.category}"))  # fmt: skip
     rows += [
         (f"measuring point {name}", f"on {s.body}, {s.offset + s.arm[0]:.2f} m ahead of the "

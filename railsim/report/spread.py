@@ -122,7 +122,7 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
     if len(names) <= most:
         return names
     ranked = []
-    for name in ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_abs_Y_abs", "T_gamma_abs"):
+    for name in ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs"):
         values = columns(records).get(name, {"values": []})["values"]
         pairs = [(-value, number) for number, value in enumerate(values) if value is not None]
         ranked.append([number for _, number in sorted(pairs)])

@@ -301,8 +301,8 @@ class Result:
             "settings": self.settings(),
             "speed": self.speed,
             "start": float(facts.get("start", 0.0)),
-            "duration": facts.get("asked_duration"),
-            "until": facts.get("asked_until"),
+            "duration": facts.get("requested_duration"),
+            "until": facts.get("requested_until"),
             "profiles": self.profiles,
             "resume": states.get("start"),
         }

@@ -355,7 +355,7 @@ def _mid_curve(result: Result, names: list[str], section: Section) -> MidCurve:
             continue
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # a wheel that never carries: NaN
-            # a wheel in the air has no quotient; where there is none, it takes half of the time
+            # Y/Q is undefined for an unloaded wheel; where there is none, it takes half of the time
             percentile = np.nanpercentile if np.isnan(over).any() else np.percentile
             bounds = percentile(over, (DEVIATION[0], 50.0, DEVIATION[1]), axis=0)
         medians[name], scatter[name] = bounds[1], 0.5 * (bounds[2] - bounds[0])

@@ -30,9 +30,9 @@ ATTRIBUTES = ("status", "vehicle_toml", "track_toml", "settings_json")
 ARRAYS = ("time", "distance")
 DIMENSIONS = ("wheelset", "side", "body")
 NUMBERS = (
-    "speed", "start", "duration", "evaluation_start", "asked_duration", "asked_until", "step",
-    "wall_time", "cpu_time", "real_time_factor", "runs_together", "patches_evaluated",
-    "patches_out_of_range", "hunting_frequency", "hunting_amplitude",
+    "speed", "start", "duration", "evaluation_start", "requested_duration",
+    "requested_until", "step", "wall_time", "cpu_time", "real_time_factor", "runs_together",
+    "patches_evaluated", "patches_out_of_range", "hunting_frequency", "hunting_amplitude",
 )  # fmt: skip
 STATES = ("complete", "derailed", "stopped")
 

@@ -44,7 +44,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         "duration": simulated,
         "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[-3]),
         **{
-            f"asked_{name}": float(value)
+            f"requested_{name}": float(value)
             for name, value in (("duration", inputs.duration), ("until", inputs.until))
             if value is not None
         },

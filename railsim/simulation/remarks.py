@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 # Vertical impacts: twice the ratio at which North American wagons are taken out of service (AAR
 # Rule 41: 400 kN on wheels of 159 kN)
 MOST_Q = 5.0  # times the static wheel load
-# Track shifting forces: this many times the limit 10 kN + P0/3 of EN 14363, P0 the axle load
+# Track shift forces: this many times the limit 10 kN + P0/3 of EN 14363, P0 the axle load
 MOST_SUM_Y = 3.0
 VIBRATES = 0.05  # amplitude of a wheel load over the static one
 UNDISTURBED = 1e-5  # m, largest displacement of a wheelset that nothing has moved
@@ -165,8 +165,8 @@ def unsettled_rails(evaluations: int) -> tuple[str, ...]:
         return ()
     return (
         f"In {evaluations} evaluations the forces between wheels and elastic rails took all "
-        f"{MOST_CORRECTIONS} corrections and may be off by more than {SETTLED:.2%} of the static "
-        "wheel load: --check-step shows whether that matters.",
+        f"{MOST_CORRECTIONS} corrections without converging; their error may exceed {SETTLED:.2%} "
+        "of the static wheel load: --check-step shows whether that matters.",
     )
 
 
@@ -182,7 +182,8 @@ def creep_range(outside: int, patches: int) -> tuple[str, ...]:
         return ()
     return (
         f"{outside} of {patches} contact patches in the time loop ({outside / patches:.1e}) were "
-        "narrower or wider than the creep law's range of a/b; they got the force of its end.",
+        "narrower or wider than the creep law's range of a/b; the force at the end of the range "
+        "was used.",
     )
 
 

@@ -44,7 +44,7 @@ def low_pass_remark(settings: Settings) -> str:
         return ""
     if asked.phase == "causal":
         return f"Values are low-passed by a causal Butterworth filter, {asked.frequency:g} Hz."
-    return f"Values are low-passed without phase, flat to {asked.frequency:g} Hz."
+    return f"Values are zero-phase low-pass filtered, flat to {asked.frequency:g} Hz."
 
 
 def output_words(settings: Settings) -> str:

@@ -147,7 +147,7 @@ def ride_height_table(results: Sequence[RideHeight]) -> Texts:
         ]
         for result in results
     ]
-    return ["ride height", "P / kN", "random / mm", "worst case / mm"], rows
+    return ["ride height", "P (kN)", "statistical, RSS (mm)", "worst case (mm)"], rows
 
 
 def search_table(result: "SearchResult") -> Texts:

@@ -84,7 +84,13 @@ def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> 
     """
     table = suspension.vehicle
     if table is None:
-        raise InputError([Fault(suspension.name, "vehicle", "missing", "needed: where it goes")])
+        raise InputError(
+            [
+                Fault(
+                    suspension.name, "vehicle", "missing", "needed: where the suspension is mounted"
+                )
+            ]
+        )
     name = table.load if load is None else load
     _, (case,) = load_cases(suspension, {name: suspension.loads[name]})
     nest, remarks = _nest(suspension, table, case)

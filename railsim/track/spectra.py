@@ -6,8 +6,8 @@ the variance is the integral of S over the positive variable.  `Spectrum.density
 S(omega) in m2/(rad/m); the cross level, whatever the form in the source, to that of the angle
 (height difference over the rails' distance) in rad2/(rad/m).
 
-Trust of the coefficients: [R] table re-entered in public code that names its source, [M] recalled
-and confirmed in one value only.
+Source quality of the coefficients: [R] table re-entered in public code that names its source, [M]
+recalled and confirmed in one value only.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +33,7 @@ class Spectrum:
     label : str
         What it is called in tables and plots.
     source : str
-        Where the coefficients come from, with their trust.
+        Where the coefficients come from, with their source quality.
     densities : mapping of str to function
         By channel (`lateral`, `vertical`, `cross_level`, `gauge`): S over the source's variable.
     per_cycle : bool

@@ -163,7 +163,7 @@ def test_derailed_run_is_no_pass():
 def test_excess_is_a_failure_even_with_few_sections():
     (found,) = assess(made(track(STRAIGHT), FAST, Y=lambda t, s: both_sides(60e3 + 0.0 * s)))
     assert found.verdict == "fail"
-    assert any("track shifting force" in reason for reason in found.reasons)
+    assert any("track shift force" in reason for reason in found.reasons)
 
 
 def test_track_quality_stands_beside_the_sections():
