@@ -5,7 +5,6 @@ the half-space solver on several grids, and runs the curving study with every cr
 """
 
 import csv
-import os
 import sys
 from pathlib import Path
 
@@ -24,12 +23,11 @@ from railsim.plot.style import save
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "validation" / "creep.md"
-REFERENCE = Path(os.environ.get("RAILSIM_REFERENCE", DOCS.parent.parent / "shared" / "reference"))
 sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
-from creep_curves import creep_curves  # noqa: E402
+from creep_curves import DATA, creep_curves  # noqa: E402
 from curving_study import COACHES, measured, published  # noqa: E402
 
-CURVES = creep_curves(REFERENCE)
+CURVES = creep_curves()
 RATIOS = (0.3, 1.0, 3.0)
 
 
@@ -94,7 +92,7 @@ def laws_table():
 
 def curves_table():
     """Largest error of each curve."""
-    with open(REFERENCE / "contact" / "creep_curve_errors_dev.csv", newline="") as stream:
+    with open(DATA / "creep_curve_errors_dev.csv", newline="") as stream:
         listed = {(float(r["a_over_b"]), r["curve"]): r for r in csv.DictReader(stream)}
     forces = {"table": law("table"), "fastsim": law("fastsim", 100), "fastrip": law("fastrip", 100)}
     errors = {name: CURVES.errors(force, "contact_ext") for name, force in forces.items()}
@@ -128,7 +126,7 @@ def solver_table():
 
 def coefficients_table():
     """Creepage coefficients by the solver, by CONTACT and as printed."""
-    with open(REFERENCE / "contact" / "kalker_coefficients_computed.csv", newline="") as stream:
+    with open(DATA / "kalker_coefficients_computed.csv", newline="") as stream:
         computed = {
             float(r["a_over_b"]): r for r in csv.DictReader(stream) if float(r["nu"]) == 0.28
         }

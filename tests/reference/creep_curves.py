@@ -1,13 +1,17 @@
 """Creep curves of the program CONTACT and of converged FASTSIM as arrays in SI units.
 
-Source: reference/contact/creep_curves_dev.csv (README beside it: CONTACT rev. 2707, Vollebregt and
-Kalker; `fastsim3_continuum` by an independent program).  Signs turned to those of the interface.
+Source: tests/data/contact/creep_curves_dev.csv (CONTACT rev. 2707, Vollebregt and Kalker;
+`fastsim3_continuum` by an independent program; tests/data/SOURCES.md).  Signs turned to those of
+the interface.
 """
 
 import csv
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+DATA = Path(__file__).parents[1] / "data" / "contact"
 
 
 class CreepCurves(NamedTuple):
@@ -48,9 +52,9 @@ class CreepCurves(NamedTuple):
         return np.hypot(difference[0], difference[1]), np.abs(difference[2])
 
 
-def creep_curves(folder):
-    """Read the development points."""
-    with open(folder / "contact" / "creep_curves_dev.csv", newline="") as stream:
+def creep_curves():
+    """Read the points."""
+    with open(DATA / "creep_curves_dev.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
     text = ("case", "curve")
     columns = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from creep_curves import creep_curves
+from creep_curves import DATA, creep_curves
 from selection import points
 
 from railsim.contact.creep import LAWS, creep_force
@@ -17,8 +17,8 @@ REFERENCE = 0.003  # accuracy of the reference (pure spin on a circle uses 0.002
 
 
 @pytest.fixture(scope="module")
-def curves(reference_dir):
-    return creep_curves(reference_dir)
+def curves():
+    return creep_curves()
 
 
 def forces(curves, law, n=10):
@@ -31,9 +31,9 @@ def test_table_within_two_hundredths_on_every_point(curves):
     assert moment.max() < 0.03
 
 
-def test_fastrip_no_worse_than_the_listed_one(curves, reference_dir):
+def test_fastrip_no_worse_than_the_listed_one(curves):
     error, moment = curves.errors(forces(curves, "fastrip", 100), "contact_ext")
-    with open(reference_dir / "contact" / "creep_curve_errors_dev.csv", newline="") as stream:
+    with open(DATA / "creep_curve_errors_dev.csv", newline="") as stream:
         listed = list(csv.DictReader(stream))
     for row in listed:
         chosen = (curves.curve == row["curve"]) & (curves.ratio == float(row["a_over_b"]))
@@ -107,7 +107,7 @@ def generate():
     ],
     always=(0, 1, 2),
 )
-def test_tables_of_the_page_on_creep_are_up_to_date(generate, reference_dir, name, maker):
+def test_tables_of_the_page_on_creep_are_up_to_date(generate, name, maker):
     page = generate.PAGE.read_text("utf-8")
     written = page.split(f"<!-- generated: {name} -->\n\n")[1].split("\n<!-- end -->")[0]
     made = getattr(generate, maker)()

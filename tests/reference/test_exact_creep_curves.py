@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from creep_curves import creep_curves
+from creep_curves import DATA, creep_curves
 
 from railsim.contact.creep_table import linear_coefficients
 from railsim.contact.exact_creep import exact_creep_force
@@ -17,8 +17,8 @@ POINTS = (
 
 
 @pytest.fixture(scope="module")
-def curves(reference_dir):
-    return creep_curves(reference_dir)
+def curves():
+    return creep_curves()
 
 
 def worst_errors(curves, chosen, **grid):
@@ -60,8 +60,8 @@ def test_every_point_within_a_hundredth(curves):
     assert moment < 0.01
 
 
-def test_small_creepage_gives_the_recomputed_coefficients(reference_dir):
-    with open(reference_dir / "contact" / "kalker_coefficients_computed.csv", newline="") as stream:
+def test_small_creepage_gives_the_recomputed_coefficients():
+    with open(DATA / "kalker_coefficients_computed.csv", newline="") as stream:
         rows = [row for row in csv.DictReader(stream) if row["nu"] == "0.28"]
     for row in rows:
         ratio = float(row["a_over_b"])

@@ -4,14 +4,14 @@ import csv
 
 import numpy as np
 import pytest
-from creep_curves import creep_curves
+from creep_curves import DATA, creep_curves
 
 from railsim.contact.creep import creep_force
 
 
 @pytest.fixture(scope="module")
-def curves(reference_dir):
-    return creep_curves(reference_dir)
+def curves():
+    return creep_curves()
 
 
 def fastsim(curves, n):
@@ -27,9 +27,9 @@ def test_distance_to_converged_fastsim(curves, n, limit):
     assert error_m.max() < limit
 
 
-def test_errors_against_the_full_theory_are_those_listed(curves, reference_dir):
+def test_errors_against_the_full_theory_are_those_listed(curves):
     error, error_m = curves.errors(fastsim(curves, 100), "contact_ext")
-    with open(reference_dir / "contact" / "creep_curve_errors_dev.csv", newline="") as stream:
+    with open(DATA / "creep_curve_errors_dev.csv", newline="") as stream:
         listed = list(csv.DictReader(stream))
     for row in listed:
         chosen = (curves.curve == row["curve"]) & (curves.ratio == float(row["a_over_b"]))

@@ -1,16 +1,17 @@
-"""Hertz contact against exact values made by another program (`contact/hertz.csv`)."""
+"""Hertz contact against exact values made by another program (`tests/data/contact/hertz.csv`)."""
 
 import csv
 
 import numpy as np
 import pytest
+from creep_curves import DATA
 
 from railsim.contact import hertz
 
 
 @pytest.fixture
-def rows(reference_dir):
-    with (reference_dir / "contact" / "hertz.csv").open() as file:
+def rows():
+    with (DATA / "hertz.csv").open() as file:
         return list(csv.DictReader(file))
 
 

@@ -1,13 +1,14 @@
 """Kalker's coefficients: printed table and a recomputation with the full half-space theory.
 
-Kalker (1990), table E.3, as in reference/contact/kalker_coefficients_published.csv; recomputed
-values by CONTACT (README there says how), not for C33 where they are marked unreliable.
+Kalker (1990), table E.3, as in tests/data/contact/kalker_coefficients_published.csv; recomputed
+values by CONTACT (tests/data/SOURCES.md), not for C33 where they are marked unreliable.
 """
 
 import csv
 
 import numpy as np
 import pytest
+from creep_curves import DATA
 
 from railsim.contact.kalker import creep_tables, kalker_coefficients
 from railsim.errors import ModelError
@@ -15,22 +16,22 @@ from railsim.kernels.fastsim import kalker_lookup
 from railsim.kernels.patches import Patches
 
 
-def rows(reference_dir, name):
-    with open(reference_dir / "contact" / name, newline="") as stream:
+def rows(name):
+    with open(DATA / name, newline="") as stream:
         return list(csv.DictReader(stream))
 
 
-def test_printed_values_are_met_at_every_node(reference_dir):
-    for row in rows(reference_dir, "kalker_coefficients_published.csv"):
+def test_printed_values_are_met_at_every_node():
+    for row in rows("kalker_coefficients_published.csv"):
         found = kalker_coefficients(float(row["a_over_b"]), float(row["nu"]))
         printed = [float(row[name]) for name in ("C11", "C22", "C23", "C33")]
         # ratios above 1 are given there with 8 digits: 1e-7 of slope 10
         np.testing.assert_allclose(found, printed, rtol=1e-6)
 
 
-def test_recomputed_values_agree_within_what_the_reference_states(reference_dir):
+def test_recomputed_values_agree_within_what_the_reference_states():
     limit = {"C11": 0.009, "C22": 0.009, "C23": 0.009, "C33": 0.013}
-    for row in rows(reference_dir, "kalker_coefficients_computed.csv"):
+    for row in rows("kalker_coefficients_computed.csv"):
         ratio, nu = float(row["a_over_b"]), float(row["nu"])
         found = kalker_coefficients(ratio, nu)
         for value, (name, tolerance) in zip(found, limit.items(), strict=True):
