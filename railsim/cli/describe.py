@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from railsim.cli.common import table
 
 if TYPE_CHECKING:
-    from railsim.definitions.element_base import Element
+    from railsim.definitions.elements.base import Element
     from railsim.definitions.irregularity import Irregularity
     from railsim.definitions.layout import Section
     from railsim.definitions.mechanism import Mechanism

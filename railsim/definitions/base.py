@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, NoReturn, Self
 
 import tomli_w
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -210,6 +211,17 @@ class Remark:
 
     def __str__(self) -> str:
         return f"{self.key}: {self.text}"
+
+
+def rises(what: str) -> AfterValidator:
+    """Return the check that the first column of rows, called `what`, increases strictly."""
+
+    def check(rows: Any) -> Any:
+        if not rising(rows):
+            raise ValueError(f"the {what} must increase from row to row")
+        return rows
+
+    return AfterValidator(check)
 
 
 def rising(rows: Sequence[Sequence[float]]) -> bool:

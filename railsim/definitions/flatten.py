@@ -12,8 +12,8 @@ from typing import Literal
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Vector
-from railsim.definitions.element_base import Element
-from railsim.definitions.given_elements import AxleTorque
+from railsim.definitions.elements.base import Element
+from railsim.definitions.elements.traction import AxleTorque
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
 from railsim.definitions.offered import offers

@@ -7,7 +7,7 @@ mirrored track gives the mirrored result, which checks all signs.
 from typing import TypeVar
 
 from railsim.definitions.base import Vector
-from railsim.definitions.element_base import Element
+from railsim.definitions.elements.base import Element
 from railsim.definitions.track import (
     CantElement,
     Circle,

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
 from railsim.definitions.base import Remark
-from railsim.definitions.element_base import FreeLength
+from railsim.definitions.elements.base import FreeLength
+from railsim.definitions.elements.side_bearer import SideBearer
+from railsim.definitions.elements.spring_damper import SpringDamper
 from railsim.definitions.flatten import FlatElement, FlatVehicle, flatten
-from railsim.definitions.friction_elements import Friction, SideBearer, Wedge
-from railsim.definitions.spring_elements import Airspring, Bushing, ShearSpring, SpringDamper
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import ModelError
 from railsim.model.assembly import Model, without_rails
@@ -195,7 +195,7 @@ def _supports(vehicle: Vehicle, balanced: Model | None) -> list[Remark]:
 def _as_they_are(balanced: Model) -> bool:
     """Whether the preloads of a model with preloads carry it in its nominal position."""
     return balanced.design is None and not any(
-        getattr(element.definition, "has_free_length", False) for element in balanced.flat.elements
+        element.definition.has_free_length for element in balanced.flat.elements
     )
 
 
@@ -225,11 +225,10 @@ def _idle(supports: Iterable[_Support]) -> list[Remark]:
 
 def _carries_from_below(element: FlatElement, kinds: Mapping[str, str]) -> bool:
     """Whether an element is a support that carries from below; others may hang."""
-    law = element.definition
-    if isinstance(law, ShearSpring | Airspring | SideBearer | Wedge):
-        return True
-    ends = {kinds[element.body1], kinds.get(element.body2, "")}
-    return isinstance(law, Bushing | Friction) and bool(ends & {"wheelset", "axlebox"})
+    if element.definition.SUPPORTS == "on axles":
+        ends = {kinds[element.body1], kinds.get(element.body2, "")}
+        return bool(ends & {"wheelset", "axlebox"})
+    return element.definition.SUPPORTS == "always"
 
 
 def _other_loads(supports: Iterable[_Support]) -> list[Remark]:

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.flatten import FlatElement
-from railsim.definitions.friction_elements import Wedge
 from railsim.errors import ModelError
 from railsim.kernels.aligned import aligned
 from railsim.kernels.element_columns import FRICTION, ONE_SIDED
@@ -60,10 +59,10 @@ def _key(model: Model) -> bytes:
             element.name,
             element.body1,
             element.body2,
-            getattr(element.definition, "preload", None),
+            element.definition.given_preload,
             element.definition.vertical_stiffness,
-            getattr(element.definition, "has_free_length", False),
-            getattr(element.definition, "levelling", False),
+            element.definition.has_free_length,
+            element.definition.has_levelling,
         )
         for element in model.flat.elements
     ]
@@ -85,7 +84,7 @@ def _solved(model: Model) -> Model:
     conditions = _conditions(model.system)
     # springs carry the weight of a fixed body where they can
     weights = [(int(body), 2) for body in model.system.bodies.fixed]
-    free_lengths = any(getattr(e.definition, "has_free_length", False) for e in model.flat.elements)
+    free_lengths = any(e.definition.has_free_length for e in model.flat.elements)
     for wanted in [[*conditions, *weights], conditions] if weights else [conditions]:
         filled, rest = _with_solved_preloads(model, _auto_preloads(model), wanted)
         unbalanced = [] if free_lengths else _unbalanced(model, wanted, rest)
@@ -109,8 +108,8 @@ def _with_pressing_wedges(model: Model) -> Model:
     wrong = [
         element.name
         for element in model.flat.elements
-        if isinstance(element.definition, Wedge)
-        and force[element.name] < (1.0 if element.definition.preload == "auto" else 0.0)
+        if element.definition.MUST_PRESS
+        and force[element.name] < (1.0 if element.definition.preload_is_free else 0.0)
     ]
     if wrong:
         raise ModelError(
@@ -176,7 +175,7 @@ def _levelled(model: Model) -> Model:
     carried = _carried_by_levelled_springs(model)
     if not carried:
         return model
-    names = {e.name for e in model.flat.elements if getattr(e.definition, "levelling", False)}
+    names = {e.name for e in model.flat.elements if e.definition.has_levelling}
     support = {
         (group, i): stiffness
         for (group, i), stiffness in _auto_preloads(model).items()
@@ -192,9 +191,9 @@ def _carried_by_levelled_springs(model: Model) -> set[int]:
     on: dict[str, list[bool]] = {}
     for element in model.flat.elements:
         law = element.definition
-        if law.vertical_stiffness > 0.0 and getattr(law, "preload", 0.0) != 0.0:
+        if law.vertical_stiffness > 0.0 and law.given_preload != 0.0:
             for body in (element.body1, element.body2):
-                on.setdefault(body, []).append(bool(getattr(law, "levelling", False)))
+                on.setdefault(body, []).append(law.has_levelling)
     return {model.index.bodies.index(name) for name, kinds in on.items() if all(kinds)}
 
 
@@ -288,8 +287,8 @@ def _auto_preloads(model: Model, *, known_lengths: bool = False) -> dict[tuple[s
     auto = {
         element.name: element.definition.vertical_stiffness
         for element in model.flat.elements
-        if getattr(element.definition, "preload", None) == "auto"
-        or (known_lengths and getattr(element.definition, "has_free_length", False))
+        if element.definition.preload_is_free
+        or (known_lengths and element.definition.has_free_length)
     }
     groups = {"links": model.index.links, "mounts": model.index.mounts}
     return {

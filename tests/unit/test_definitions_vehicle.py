@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from railsim.definitions.element_base import two_sided
+from railsim.definitions.elements.base import two_sided
 from railsim.definitions.flatten import flatten
 from railsim.definitions.loading import load_vehicle, load_vehicle_text
 from railsim.definitions.names import resolve

@@ -1,10 +1,11 @@
 """What all force elements of a vehicle file have in common: bodies, points, sides, preloads."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from railsim.definitions.base import (
     Definition,
@@ -15,9 +16,12 @@ from railsim.definitions.base import (
     Vector,
     rising,
 )
+from railsim.definitions.elements.rows import NOTHING, Row, Rows, Triple
 
-Signs = tuple[float, float, float]
-Rows = tuple[tuple[float, float], ...]
+Signs = Triple
+Compression = Annotated[
+    Literal["auto"] | Annotated[Finite, Field(ge=0)], Field(union_mode="left_to_right")
+]
 
 
 def _characteristic(rows: Rows) -> Rows:
@@ -27,10 +31,6 @@ def _characteristic(rows: Rows) -> Rows:
         raise ValueError("the first column must increase from row to row")
     if any(after[1] < before[1] for before, after in pairwise(rows)):
         raise ValueError("the force must not fall from row to row (negative stiffness or damping)")
-    return rows
-
-
-def _through_zero(rows: Rows) -> Rows:
     first, last = rows[0][0], rows[-1][0]
     if first > 0.0 or last <= 0.0:
         raise ValueError("the first column must begin at 0 (same in both directions) or below 0")
@@ -41,11 +41,7 @@ def _through_zero(rows: Rows) -> Rows:
     return rows
 
 
-Characteristic = Annotated[
-    tuple[tuple[Finite, Finite], ...],
-    AfterValidator(_characteristic),
-    AfterValidator(_through_zero),
-]
+Characteristic = Annotated[tuple[tuple[Finite, Finite], ...], AfterValidator(_characteristic)]
 
 
 def two_sided(rows: Rows) -> Rows:
@@ -61,16 +57,25 @@ def two_sided(rows: Rows) -> Rows:
     return tuple((-x, -force) for x, force in reversed(rows[1:])) + tuple(rows)
 
 
-def times(vector: tuple[float, float, float], signs: Signs) -> tuple[float, float, float]:
+def times(vector: Triple, signs: Signs) -> Triple:
     """Return a vector with the signs of a mirrored placement."""
     return (vector[0] * signs[0], vector[1] * signs[1], vector[2] * signs[2])
 
 
 class Element(Definition):
-    """What all force elements have in common."""
+    """What all force elements have in common; those that carry weight say how."""
+
+    SUPPORTS: ClassVar[str] = "no"
+    """Whether body 2 stands on it: `always`, `on axles` (one body is a wheelset or axlebox), `no`."""
+    MUST_PRESS: ClassVar[bool] = False
+    """Whether it stands the wrong way round where it would have to pull at rest."""
 
     bodies: tuple[Text, ...]
     """Names of the bodies, found from the innermost assembly outwards"""
+
+    @abstractmethod
+    def rows(self) -> Sequence[Row]:
+        """Return what it becomes in the arrays of the model."""
 
     def end_points(self) -> tuple[Vector, Vector] | None:
         """Points on body 1 and body 2 as written [m]; None where the element has none."""
@@ -92,28 +97,34 @@ class Element(Definition):
         return self
 
     @property
-    @abstractmethod
     def vertical_stiffness(self) -> float:
         """Static stiffness with which it carries weight [N/m]; a link's along its line."""
+        return 0.0
 
     @property
-    @abstractmethod
     def vertical_damping(self) -> float:
         """Damping at small velocities in parallel with it [N s/m], 0 behind a spring in series."""
-
-
-class CarriesNoWeight(Definition):
-    """An element that does not carry its bodies."""
-
-    @property
-    def vertical_stiffness(self) -> float:
-        """None [N/m]."""
         return 0.0
 
     @property
-    def vertical_damping(self) -> float:
-        """None [N s/m]."""
-        return 0.0
+    def given_preload(self) -> Any:
+        """Its preload as written; 0 where it has none."""
+        return getattr(self, "preload", 0.0)
+
+    @property
+    def preload_is_free(self) -> bool:
+        """Whether the static equilibrium finds its preload."""
+        return bool(self.given_preload == "auto")
+
+    @property
+    def has_free_length(self) -> bool:
+        """Whether the preload follows from a length."""
+        return False
+
+    @property
+    def has_levelling(self) -> bool:
+        """Whether a levelling valve keeps its height."""
+        return bool(getattr(self, "levelling", False))
 
 
 class PairElement(Element):
@@ -152,7 +163,7 @@ class PointElement(SidedElement):
         return self.point, self.point
 
 
-class FreeLength(Definition):
+class FreeLength(PairElement):
     """A spring whose preload follows from its length."""
 
     free_length: Positive | None = None
@@ -183,7 +194,7 @@ class FreeLength(Definition):
         return self
 
 
-class PreloadAlongAxes(Definition):
+class PreloadAlongAxes(PairElement):
     """An element with a preload along the axes of body 1."""
 
     if TYPE_CHECKING:  # the field of its kinds
@@ -194,6 +205,11 @@ class PreloadAlongAxes(Definition):
         if self.preload == "auto":
             return self
         return self.model_copy(update={"preload": times(self.preload, signs)})
+
+    @property
+    def known_preload(self) -> Triple:
+        """The preload as given, 0 where the equilibrium finds it [N]."""
+        return NOTHING if self.preload == "auto" else self.preload
 
 
 class VerticalSpring(PreloadAlongAxes, FreeLength):

@@ -1,0 +1,59 @@
+"""Torques on wheelsets: what drives and brakes have in common, and the drive."""
+
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import Finite, NonNegative, Positive, rises
+from railsim.definitions.elements.base import PairElement
+from railsim.definitions.elements.rows import Drive
+
+
+class AxleTorque(PairElement):
+    """A torque between a wheelset and the body that takes its reaction."""
+
+    BRAKES: ClassVar[bool]
+    if TYPE_CHECKING:  # the field of its kinds
+        torque_table: tuple[tuple[float, float], ...]
+
+    demand_table: (
+        Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), rises("time or distance")]
+        | None
+    ) = None
+    """Rows [time s or distance m, factor of the torque], linear in between, constant beyond"""
+    over: Literal["time", "distance"] = "time"
+    """First column of `demand_table`: time, or the arc length of the wheelset's nominal position"""
+    slip_control: tuple[NonNegative, Positive] | None = None
+    """Slip (omega r - V)/V at which the torque begins to fall, and slip at which it is gone [1]"""
+
+    @model_validator(mode="after")
+    def _slip_rises(self) -> Self:
+        if self.slip_control is not None and self.slip_control[0] >= self.slip_control[1]:
+            raise ValueError("'slip_control' needs two rising slips, such as [0.01, 0.02]")
+        return self
+
+    def rows(self) -> list[Drive]:
+        """One drive."""
+        return [
+            Drive(
+                torque_table=self.torque_table,
+                demand_table=self.demand_table,
+                slip_control=self.slip_control,
+                brakes=self.BRAKES,
+                over_distance=self.over == "distance",
+            )
+        ]
+
+
+class Traction(AxleTorque):
+    """Driving torque on a wheelset over the vehicle's speed; body 1 takes the reaction.
+
+    It drives forwards wherever the element stands, in mirrored placements too.
+    """
+
+    BRAKES: ClassVar = False
+    kind: Literal["traction"]
+    torque_table: Annotated[
+        tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), rises("speed")
+    ]
+    """Rows [speed m/s, torque on the wheelset N m], forwards positive, linear, constant beyond"""
