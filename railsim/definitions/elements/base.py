@@ -66,7 +66,7 @@ class Element(Definition):
     """What all force elements have in common; those that carry weight say how."""
 
     SUPPORTS: ClassVar[str] = "no"
-    """Whether body 2 stands on it: `always`, `on axles` (one body is a wheelset or axlebox), `no`."""
+    """Whether body 2 stands on it: `always`, `on axles` where one body is one, `no`."""
     MUST_PRESS: ClassVar[bool] = False
     """Whether it stands the wrong way round where it would have to pull at rest."""
 
