@@ -5,23 +5,20 @@ Reading: only regular files of a known kind and of bounded size (`read_bytes`, `
 Writing: a name is refused before anything is computed (`check_file`, `check_folder`); a file is
 written under a hidden name beside its own and gets its name when it is whole and on the disk
 (`PartialFile`, `whole_file`).  The hidden name cannot be foreseen, the file is created exclusively
-and locked for as long as its writer lives: what a process that was killed has left is known by the
-lock that nobody holds, and is removed (`sweep`).
+and is itself locked for as long as its writer lives: no lock file is needed, and what a process
+that was killed has left is known by the lock that nobody holds, and is removed (`sweep`).
 """
 
 import errno
-import fcntl
 import os
 import re
 import stat
 import tempfile
-import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from railsim.errors import Fault, InputError, argument_fault
@@ -35,10 +32,10 @@ TABLE_BYTES = 20_000_000  # largest file of points: profiles, recordings
 _SYSTEM = (Path("/proc"), Path("/sys"), Path("/dev"))
 _SHARED_MEMORY = Path("/dev/shm")  # files there are users' own
 _SUFFIX = ".railsim.partial"
-# as `tempfile` makes them; other programs have hidden files of such names, without `railsim`
-_PARTIAL = re.compile(rf"\..+\.[a-z0-9_]{{8}}{re.escape(_SUFFIX)}", re.DOTALL)
+_RANDOM = rf"\.[a-z0-9_]{{8}}{re.escape(_SUFFIX)}"  # as `tempfile` names files
 _OF_FILES = (*RESULTS, *PICTURES, *TABLES, ".csv", ".json", ".html", ".txt")
-_open_ones: dict[Path, None] = {}  # hidden files of this process
+_NO_WAITING = getattr(os, "O_NONBLOCK", 0)
+_own_partial_files: set[Path] = set()
 
 
 def check_file(
@@ -55,16 +52,16 @@ def check_file(
     option : str
         What the user knows the path by, for messages.
     endings : sequence of str
-        How its name may end, in small or capital letters; by default any.
+        Allowed endings of its name, in small letters; by default any.
 
     Raises
     ------
-    InputError : its name ends in something else, it exists and may not be overwritten, is a
-        folder, or its folder cannot be written to.
+    InputError : one of these is not fulfilled.
     """
     ending = path.suffix
-    if problem := _impossible(path):
-        found, allowed = problem, "choose another name"
+    found, allowed = _invalid_name(path), "choose another name"
+    if found:
+        pass
     elif path.is_dir():
         found, allowed = f"{path} is a folder", "give the name of a file"
     elif endings and ending.lower() not in endings:
@@ -76,53 +73,29 @@ def check_file(
         found, allowed = f"the folder {path.parent} cannot be written to", "choose another"
     elif path.exists() and not overwrite:
         found, allowed = f"{path} exists", "give --overwrite or another name"
-    else:
-        return
-    raise InputError([argument_fault("path", "", found, allowed, option)])
+    _refuse(found, allowed, option)
 
 
 def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = False) -> None:
-    """Refuse a folder for output.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder; it need not exist.
-    names : iterable of str
-        Files that will be written there.
-    overwrite : bool
-        Whether they may exist.
+    """Refuse a folder for output, which need not exist, and in which `names` will be written.
 
     Raises
     ------
-    InputError : it is a file or called like one, cannot be written to, or holds one of `names`.
+    InputError : it is a file or called like one, cannot be written to, or holds one of `names` and
+        not `overwrite`.
     """
-    if problem := _impossible(folder):
-        raise InputError([argument_fault("path", "", problem, "choose another name", "--out")])
-    there = [name for name in names if (folder / name).exists()]
-    if folder.exists() and not folder.is_dir():
+    found, allowed = _invalid_name(folder), "choose another name"
+    if found:
+        pass
+    elif folder.exists() and not folder.is_dir():
         found, allowed = f"{folder} is a file", "give the name of a folder"
     elif not folder.exists() and folder.suffix.lower() in _OF_FILES:
         found, allowed = f"{folder.name} is the name of a file", "give the name of a folder"
-    elif problem := _unwritable(folder):
-        found, allowed = problem, "choose another folder"
-    elif there and not overwrite:
+    elif found := _unwritable(folder):
+        allowed = "choose another folder"
+    elif not overwrite and (there := [name for name in names if (folder / name).exists()]):
         found, allowed = f"{folder} holds {', '.join(there)}", "give --overwrite or another folder"
-    else:
-        return
-    raise InputError([argument_fault("path", "", found, allowed, "--out")])
-
-
-def _unwritable(folder: Path) -> str:
-    """Say why nothing can be written into a folder, which may still have to be made."""
-    if folder.is_symlink() and not folder.exists():
-        return f"{folder} is a link that leads nowhere"
-    existing = folder.absolute()
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir():
-        return f"{existing} is a file"
-    return "" if os.access(existing, os.W_OK | os.X_OK) else f"{existing} cannot be written to"
+    _refuse(found, allowed)
 
 
 def make_folder(folder: Path) -> None:
@@ -135,14 +108,26 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        found = f"cannot make {folder} ({error.strerror})"
-        raise InputError(
-            [argument_fault("path", "", found, "choose another folder", "--out")]
-        ) from None
+        _refuse(f"cannot make {folder} ({error.strerror})", "choose another folder")
 
 
-def _impossible(path: Path) -> str:
-    """Say why the system cannot even look for a path: its name is too long, or is no name."""
+def _refuse(found: str, allowed: str, option: str = "--out") -> None:
+    if found:
+        raise InputError([argument_fault("path", "", found, allowed, option)]) from None
+
+
+def _unwritable(folder: Path) -> str:
+    """Return why nothing can be written into a folder, which may still have to be made."""
+    if folder.is_symlink() and not folder.exists():
+        return f"{folder} is a link that leads nowhere"
+    existing = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists())
+    if not existing.is_dir():
+        return f"{existing} is a file"
+    return "" if os.access(existing, os.W_OK | os.X_OK) else f"{existing} cannot be written to"
+
+
+def _invalid_name(path: Path) -> str:
+    """Return why the system cannot even look for a path: its name is too long, or is no name."""
     try:
         os.lstat(path)
     except ValueError:
@@ -165,14 +150,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_bytes(path: str | Path, limit: int) -> bytes:
-    """Read a regular file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; a link may lead to it, but not to the files of the system.
-    limit : int
-        Largest size [bytes].
+    """Read a regular file of at most `limit` bytes; a link may lead to it.
 
     Raises
     ------
@@ -186,7 +164,7 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         if system and not resolved.is_relative_to(_SHARED_MEMORY):
             raise InputError([Fault(str(path), "", "a file of the system", "give one of your own")])
         # a pipe would wait for its writer
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+        with open(os.open(path, os.O_RDONLY | _NO_WAITING), "rb") as file:
             facts = os.fstat(file.fileno())
             if not stat.S_ISREG(facts.st_mode):
                 raise InputError([Fault(str(path), "", "not a regular file", "give a file")])
@@ -204,16 +182,7 @@ def read_text(path: str | Path, limit: int) -> str:
     try:
         return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(
-            [
-                Fault(
-                    str(path),
-                    "",
-                    "is not UTF-8",
-                    "UTF-8 text (convert it: iconv -f latin1 -t utf-8)",
-                )
-            ]
-        ) from None
+        raise InputError([Fault(str(path), "", "not a UTF-8 text", "a text file")]) from None
 
 
 # writing ------------------------------------------------------------------------------------------
@@ -246,38 +215,31 @@ class PartialFile:
 
     def __init__(self, target: Path, *, alone: bool = False, option: str = "--out") -> None:
         self.target = target
-        with _one_at_a_time(target.parent):
-            writers = _swept(target.parent, target.name)
-            if alone and writers:
-                found = f"{target} is being written by another process"
-                fault = argument_fault(
-                    "path", "", found, "wait for it, or choose another name", option
-                )
-                raise InputError([fault])
-            self._handle, name = tempfile.mkstemp(
-                prefix=_prefix(target.name), suffix=_SUFFIX, dir=target.parent
-            )
-            self.path = Path(name)
-            _open_ones[self.path] = None
-            with suppress(OSError):  # a file system without locks
-                fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._create()
+        if _sweep(target.parent, _prefix(target.name), self.path) and alone:
+            self.remove()
+            words = f"{target} is being written by another process"
+            _refuse(words, "wait for it, or choose another name", option)
+
+    def _create(self) -> None:
+        folder, prefix = self.target.parent, _prefix(self.target.name)
+        self._handle, name = tempfile.mkstemp(_SUFFIX, prefix, folder)
+        self.path = Path(name)
+        _own_partial_files.add(self.path)
+        with suppress(OSError):  # a file system without locks
+            locked(self._handle)
+        if not os.fstat(self._handle).st_nlink:  # swept by another process before it was locked
+            self.remove()
+            self._create()
 
     def finish(self, *, overwrite: bool = True) -> Path:
-        """Give the file its name, once it is on the disk.
+        """Give the file its name, once it is on the disk, and return the name.
 
-        Parameters
-        ----------
-        overwrite : bool
-            Replace a file of that name.  Otherwise, where one has appeared in the meantime, the new
-            one gets the next free name: ``run-2.h5``.
-
-        Returns
-        -------
-        Path
-            The name that it has got.
+        Without `overwrite`, where a file of that name has appeared in the meantime, the new one
+        gets the next free name: ``run-2.h5``.
         """
         os.fsync(self._handle)
-        os.fchmod(self._handle, _usual_mode(self.target))
+        os.chmod(self.path, _usual_mode(self.target))
         path = self.target
         if overwrite:
             os.replace(self.path, path)
@@ -294,10 +256,9 @@ class PartialFile:
         return path
 
     def remove(self) -> None:
-        """Remove the hidden file, if it is still there, and let go of its lock; may be repeated."""
-        with suppress(FileNotFoundError):
-            self.path.unlink()
-        _open_ones.pop(self.path, None)
+        """Remove the hidden file, if it is still there, and release its lock; may be repeated."""
+        self.path.unlink(missing_ok=True)
+        _own_partial_files.discard(self.path)
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
@@ -305,12 +266,7 @@ class PartialFile:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.remove()
 
 
@@ -331,51 +287,57 @@ def whole_file(path: Path) -> Iterator[Path]:
             yield partial.path
             partial.finish()
     except OSError as error:  # a full disk is reported with the name that the user knows
-        hidden = error.filename is None or _PARTIAL.fullmatch(Path(str(error.filename)).name)
-        if error.errno is None or not hidden:
+        if error.errno is None or not str(error.filename or _SUFFIX).endswith(_SUFFIX):
             raise
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
+def locked(handle: int) -> bool:
+    """Lock an open file for as long as it stays open; return False where another process has.
+
+    Raises
+    ------
+    OSError : a file system without locks.
+    """
+    from filelock import lock_descriptor  # a tenth of the time of `railsim --help`
+
+    return lock_descriptor(handle, blocking=False)
+
+
 def remove_partial_files() -> None:
     """Remove all hidden files of this process, which is about to end without further ado."""
-    for path in list(_open_ones):
+    for path in list(_own_partial_files):
         with suppress(OSError):
             path.unlink()
 
 
 def sweep(folder: Path) -> None:
     """Remove the hidden files that dead processes have left in a folder."""
-    with _one_at_a_time(folder):
-        _swept(folder)
+    _sweep(folder)
 
 
-def _swept(folder: Path, name: str | None = None) -> int:
-    """Remove what dead processes have left, of one target or all; count what is being written."""
-    prefix = "." if name is None else _prefix(name)
+def _sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
+    """Remove what dead processes have left, of all targets or one; count what is being written."""
+    partial = re.compile((re.escape(prefix[:-1]) if prefix else r"\..+") + _RANDOM, re.DOTALL)
     alive = 0
     try:
-        names = [entry for entry in os.listdir(folder) if entry.startswith(prefix)]
+        paths = [folder / name for name in os.listdir(folder) if partial.fullmatch(name)]
     except OSError:  # may be written to, but not be listed
         return 0
-    for entry in names:
-        if not _PARTIAL.fullmatch(entry) or (name and len(entry) != len(prefix) + 8 + len(_SUFFIX)):
-            continue
-        path = folder / entry
-        try:
-            handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
-        except OSError:
-            continue
-        try:
-            if stat.S_ISREG(os.fstat(handle).st_mode):
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                path.unlink(missing_ok=True)
-        except BlockingIOError:
-            alive += 1
-        except OSError:  # no locks here: nobody can tell
-            pass
-        finally:
-            os.close(handle)
+    for path in paths:
+        with suppress(OSError):  # a link, gone by now, or on a file system without locks
+            if path == own:
+                continue
+            handle = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | _NO_WAITING)
+            try:
+                if not stat.S_ISREG(os.fstat(handle).st_mode):
+                    continue
+                if locked(handle):
+                    path.unlink(missing_ok=True)
+                else:
+                    alive += 1
+            finally:
+                os.close(handle)
     return alive
 
 
@@ -384,25 +346,6 @@ def _prefix(name: str) -> str:
     if len(os.fsencode(name)) > 200:
         name = f"{name[:40]}~{zlib.crc32(os.fsencode(name)):08x}"
     return f".{name}."
-
-
-@contextmanager
-def _one_at_a_time(folder: Path) -> Iterator[None]:
-    """Let no other process create hidden files in a folder within the block."""
-    try:
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError:
-        yield
-        return
-    try:
-        for _ in range(100):  # others hold it for a moment only
-            with suppress(OSError):
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            time.sleep(0.01)
-        yield
-    finally:
-        os.close(handle)
 
 
 def _usual_mode(target: Path) -> int:
