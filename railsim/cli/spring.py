@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from railsim.springs.design import Design
     from railsim.springs.search import SearchResult
     from railsim.springs.tolerance import RideHeight
-    from railsim.springs.verification import Fatigue, Verification
-    from railsim.springs.verification_checks import Case
+    from railsim.springs.verification import Case, Fatigue, Verification
 
 REPORT = "report.html"
 

@@ -22,8 +22,7 @@ from railsim.springs.arm import Arm
 from railsim.springs.design import Design
 from railsim.springs.summary import coils_by_wire
 from railsim.springs.tolerance import RideHeight
-from railsim.springs.verification import Fatigue, Verification
-from railsim.springs.verification_checks import Case, built, solid_heights
+from railsim.springs.verification import Case, Fatigue, Verification, built, solid_heights
 from railsim.text import unformatted
 
 if TYPE_CHECKING:

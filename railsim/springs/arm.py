@@ -33,14 +33,13 @@ Everything broadcasts: a thousand nests under five loads are one call with array
 (nest, 1) in the springs and (load,) in the load.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from railsim.errors import ModelError
+from railsim.definitions.spring import TrailingArmSuspension
 from railsim.springs import helical
 from railsim.springs.helical import Values
 
@@ -51,190 +50,157 @@ SETTLING = 0.025
 order of the parallelism of ground ends)."""
 
 _COMPLEX_STEP = 1e-30
-_ROTATION_TOLERANCE = 1e-14
 
 
 @dataclass(frozen=True)
 class Coil:
-    """One spring as it stands on the arm; all fields broadcast.
+    """One spring as it stands on the arm; all fields broadcast."""
 
-    Attributes
-    ----------
-    K_V : float or ndarray
-        Vertical stiffness [N/m].
-    D, H0 : float or ndarray
-        Mean coil diameter, free height [m].
-    seat : float or ndarray
-        Height of the lower seat above the axle's centre [m].
-    start : float or ndarray
-        Deflection with the arm horizontal; negative while the spring does not touch yet [m].
-    """
-
-    K_V: Values
-    D: Values
-    H0: Values
-    seat: Values
-    start: Values
+    K_V: Values  # vertical stiffness [N/m]
+    D: Values  # mean coil diameter [m]
+    H0: Values  # free height [m]
+    seat: Values  # height of the lower seat above the axle's centre [m]
+    start: Values  # deflection, arm horizontal; negative: the spring does not touch yet [m]
 
 
 @dataclass(frozen=True)
 class Arm:
-    """The arm, its bush and its springs, outer spring first.
+    """The arm, its bush and its springs; the first spring's deflection is the nest's."""
 
-    Attributes
-    ----------
-    length : float
-        Hinge to axle [m].
-    bush : float or ndarray
-        Torsional stiffness of the hinge's bush [N m/rad].
-    nu : float
-        Poisson's ratio of the springs.
-    coils : tuple of Coil
-        The springs; the first one's deflection is the nest's.
-    form : {"grossi", "energy"}
-        Form of the nest's moment.
-    """
-
-    length: float
-    bush: Values
-    nu: float
-    coils: tuple[Coil, ...]
-    form: Form = "grossi"
+    length: float  # hinge to axle [m]
+    bush: Values  # torsional stiffness of the hinge's bush [N m/rad]
+    nu: float  # Poisson's ratio of the springs
+    coils: tuple[Coil, ...]  # outer spring first
+    form: Form = "grossi"  # form of the nest's moment
 
 
 @dataclass(frozen=True)
 class CoilState:
-    """One spring under load; arrays of the shape of the load cases.
+    """One spring under load; arrays of the shape of the load cases."""
 
-    Attributes
-    ----------
-    deflection : ndarray
-        Vertical deflection, 0 while the spring does not touch [m].
-    lateral : ndarray
-        Sideways displacement of the lower seat, positive towards the hinge [m].
-    height : ndarray
-        Height under load [m].
-    K_L, K_C : ndarray
-        Lateral [N/m] and tilting [N m/rad] stiffness at this deflection, 0 without contact.
-    force : ndarray
-        Vertical force [N].
+    deflection: Values  # 0 while the spring does not touch [m]
+    lateral: Values  # sideways displacement of the lower seat, positive towards the hinge [m]
+    height: Values  # height under load [m]
+    K_L: Values  # lateral stiffness at this deflection, 0 without contact [N/m]
+    K_C: Values  # tilting stiffness, likewise [N m/rad]
+    force: Values  # vertical force [N]
+
+
+def nest(
+    suspension: TrailingArmSuspension,
+    springs: Sequence[tuple[Values, Values, Values]],
+    start: Values,
+    seats: Sequence[float] | None = None,
+) -> Arm:
+    """Return the arm of a file with springs (K_V, D, H0), the first one deflected by `start`.
+
+    The second begins to work at the file's engagement; the seats are the file's by default.
     """
+    arm = suspension.arm
+    starts = (start, start - suspension.engagement)
+    coils = tuple(
+        Coil(*spring, seat, each)
+        for spring, seat, each in zip(
+            springs, seats or suspension.seat_heights, starts[: len(springs)], strict=True
+        )
+    )
+    return Arm(
+        arm.length, arm.bush_torsional_stiffness, poisson_ratio(suspension), coils, arm.equilibrium
+    )
 
-    deflection: Values
-    lateral: Values
-    height: Values
-    K_L: Values
-    K_C: Values
-    force: Values
+
+def poisson_ratio(suspension: TrailingArmSuspension) -> float:
+    """Poisson's ratio of a file's material."""
+    return float(helical.poisson_number(suspension.material.E, suspension.material.G))
 
 
-def displacement(length: ArrayLike, seat: ArrayLike, phi: ArrayLike) -> tuple[Values, Values]:
+def displacement(length: Values, seat: Values, phi: Values) -> tuple[Values, Values]:
     """Rise and sideways displacement of a seat when the arm turns by `phi` [m]."""
-    length, seat, phi = np.asarray(length), np.asarray(seat), np.asarray(phi)
     sine, versine = np.sin(phi), 2.0 * np.sin(phi / 2.0) ** 2
     return length * sine - seat * versine, length * versine + seat * sine
 
 
-def rotation_of_rise(length: ArrayLike, seat: ArrayLike, rise: ArrayLike) -> Values:
+def rotation_of_rise(length: Values, seat: Values, rise: Values) -> Values:
     """Rotation at which a seat has risen by `rise`; nan beyond the arm's reach.
 
     `L sin(phi) + h cos(phi) = R sin(phi + delta)` with `R^2 = L^2 + h^2`, `tan(delta) = h/L`.
     """
-    length, seat = np.asarray(length), np.asarray(seat)
-    sine = (np.asarray(rise) + seat) / np.hypot(length, seat)
-    reachable = np.abs(sine) <= 1.0
-    turned = np.arcsin(np.where(reachable, sine, 0.0)) - np.arctan2(seat, length)
-    return np.where(reachable, turned, np.nan)
+    sine = (rise + seat) / np.hypot(length, seat)
+    with np.errstate(invalid="ignore"):
+        return np.arcsin(sine) - np.arctan2(seat, length)
 
 
-def coil_state(arm: Arm, coil: Coil, phi: ArrayLike) -> CoilState:
+def coil_state(arm: Arm, coil: Coil, phi: Values) -> CoilState:
     """One spring of the arm at rotation `phi` [rad]."""
     rise, lateral = displacement(arm.length, coil.seat, phi)
     travel = coil.start + rise
-    touching = travel > 0.0
-    deflection = np.where(touching, travel, 0.0)
-    flush = _flush(deflection, coil.D)
-    K_L = helical.lateral_stiffness(coil.K_V, coil.D, coil.H0, deflection, arm.nu)
-    K_C = helical.tilting_stiffness(coil.K_V, coil.D, coil.H0, deflection, arm.nu)
-    return CoilState(
-        deflection=deflection,
-        lateral=lateral,
-        height=coil.H0 - deflection,
-        K_L=flush * K_L,
-        K_C=flush * K_C,
-        force=coil.K_V * deflection,
-    )
+    deflection = np.where(travel.real > 0.0, travel, 0.0)
+    beam = (coil.K_V, coil.D, coil.H0, deflection, arm.nu)
+    K_L, K_C = (_flush(deflection, coil.D) * K for K in helical.lateral_and_tilting(*beam))
+    height, force = coil.H0 - deflection, coil.K_V * deflection
+    return CoilState(deflection, lateral, height, K_L, K_C, force)
 
 
-def unit_moment(arm: Arm, coil: Coil, phi: ArrayLike) -> Values:
+def unit_moment(arm: Arm, coil: Coil, phi: Values) -> Values:
     """Moment of one spring about the hinge over its vertical stiffness [m^2/rad].
 
     All stiffnesses of a helical spring are proportional to `K_V`, hence so is its moment: the
     design equations are linear in the stiffnesses sought.
     """
     if arm.form == "energy":
-        turned = np.asarray(phi) + 1j * _COMPLEX_STEP
-        return _unit_energy(arm, coil, turned).imag / _COMPLEX_STEP
-    unit = Coil(1.0, coil.D, coil.H0, coil.seat, coil.start)
-    state = coil_state(arm, unit, phi)
+        return _unit_energy(arm, coil, phi + 1j * _COMPLEX_STEP).imag / _COMPLEX_STEP
+    state = coil_state(arm, replace(coil, K_V=1.0), phi)
     shearing = helical.seat_moment(state.deflection, state.K_L, state.height)
     return (
         state.deflection * arm.length
         + state.K_L * state.lateral * coil.seat
-        + state.K_C * np.asarray(phi)
+        + state.K_C * phi
         + shearing * state.lateral
     )
 
 
-def moment(arm: Arm, phi: ArrayLike) -> Values:
+def moment(arm: Arm, phi: Values) -> Values:
     """Moment about the hinge with which nest and bush resist at rotation `phi` [N m].
 
     Grossi's equation, with a signed rotation:
     `sum(K_V dz L + K_L dx h + K_C phi + 0.5 dx (K_V dz + K_L H_s)) + K_s phi`.
     """
-    total = arm.bush * np.asarray(phi)
-    for coil in arm.coils:
-        total = total + coil.K_V * unit_moment(arm, coil, phi)
-    return total
+    return arm.bush * phi + sum(coil.K_V * unit_moment(arm, coil, phi) for coil in arm.coils)
 
 
-def load(arm: Arm, phi: ArrayLike) -> Values:
+def load(arm: Arm, phi: Values) -> Values:
     """Load at the axle that holds the arm at rotation `phi`, `moment / (L cos(phi))` [N]."""
     return moment(arm, phi) / (arm.length * np.cos(phi))
 
 
-def stored_energy(arm: Arm, phi: ArrayLike) -> Values:
+def stored_energy(arm: Arm, phi: Values) -> Values:
     """Energy of nest and bush at rotation `phi` [J].
 
     `U = sum(K_V dz^2/2 + K_L dx^2/2 + (K_V dz + K_L H_s)/2 dx phi + K_C phi^2/2) + K_s phi^2/2`:
     the energy of a sheared and tilted beam under axial load, to second order in dx and phi.  Its
     derivative is the moment of the form `energy`.
     """
-    total = 0.5 * arm.bush * np.asarray(phi) ** 2
-    for coil in arm.coils:
-        total = total + coil.K_V * _unit_energy(arm, coil, np.asarray(phi))
-    return total
+    springs = sum(coil.K_V * _unit_energy(arm, coil, phi) for coil in arm.coils)
+    return 0.5 * arm.bush * phi**2 + springs
 
 
-def rotation(arm: Arm, P: ArrayLike) -> Values:
-    """Rotation of the arm under the load `P`, converged to round-off [rad].
+def rotation(arm: Arm, P: Values) -> Values:
+    """Rotation of the arm under the load `P` [N], converged to round-off [rad].
 
-    Parameters
-    ----------
-    arm : Arm
-        The arm with its springs.
-    P : float or ndarray
-        Load at the axle, positive [N].
-
-    Returns
-    -------
-    phi : ndarray
-        Rotation; nan where no rotation between lift-off and a spring pressed to a tenth of its
-        free height carries the load; one of them where near lift-off on high seats several do.
+    nan where no rotation between lift-off and a spring pressed to a tenth of its free height
+    carries the load; one of them where near lift-off on high seats several do.
     """
-    P = np.asarray(P, dtype=float)
-    low, high = rotation_range(arm)
-    return _bracketed_root(lambda phi: load(arm, phi) - P, low, high, P.shape)
+    from scipy.optimize.elementwise import (
+        find_root,
+    )  # imported where it is needed: it takes a while
+
+    def excess(phi: Values, P: Values, bush: Values, *fields: Values) -> Values:
+        coils = tuple(Coil(*fields[i : i + 5]) for i in range(0, len(fields), 5))
+        return load(replace(arm, bush=bush, coils=coils), phi) - P
+
+    fields = [value for coil in arm.coils for value in vars(coil).values()]
+    found = find_root(excess, rotation_range(arm), args=(P, arm.bush, *fields))
+    return np.where(found.success, found.x, np.nan)
 
 
 def rotation_range(arm: Arm) -> tuple[Values, Values]:
@@ -243,9 +209,9 @@ def rotation_range(arm: Arm) -> tuple[Values, Values]:
     The springs are solid long before that; where, depends on the wire (`checks`).
     """
     first = arm.coils[0]
-    low = rotation_of_rise(arm.length, first.seat, -np.asarray(first.start))
+    low = rotation_of_rise(arm.length, first.seat, -first.start)
     low = np.where(np.isnan(low), -0.5 * np.pi + 1e-3, low)
-    high = np.asarray(np.inf)
+    high = np.inf
     for coil in arm.coils:
         reach = rotation_of_rise(arm.length, coil.seat, 0.9 * coil.H0 - coil.start)
         top = 0.5 * np.pi - np.arctan2(coil.seat, arm.length) - 1e-3
@@ -253,80 +219,38 @@ def rotation_range(arm: Arm) -> tuple[Values, Values]:
     return low, high
 
 
-def mounting_deflection(
-    P: ArrayLike, stiffnesses: Sequence[Values], gaps: Sequence[Values]
-) -> Values:
-    """Deflection of the first of some springs in parallel under `P`, arm horizontal [m].
+def mounting_deflection(P: float, stiffnesses: Sequence[Values], engagement: float) -> Values:
+    """Deflection of the first of the springs under `P` [N], arm horizontal [m].
 
     Parameters
     ----------
-    P : float or ndarray
+    P : float
         Load [N].
     stiffnesses : sequence of float or ndarray
-        Vertical stiffnesses, first spring first [N/m].
-    gaps : sequence of float or ndarray
-        Deflection of the first spring at which each one starts to work; 0 for the first [m].
+        Vertical stiffnesses of one spring or two, first spring first [N/m].
+    engagement : float
+        Deflection of the first spring at which the second starts to work [m].
     """
-    alone = np.asarray(P) / stiffnesses[0]
+    alone = P / stiffnesses[0]
     if len(stiffnesses) == 1:
         return alone
-    together = (np.asarray(P) + stiffnesses[1] * np.asarray(gaps[1])) / (
-        stiffnesses[0] + np.asarray(stiffnesses[1])
-    )
-    return np.where(alone <= gaps[1], alone, together)
+    together = (P + stiffnesses[1] * engagement) / (stiffnesses[0] + stiffnesses[1])
+    return np.where(alone <= engagement, alone, together)
 
 
 def _unit_energy(arm: Arm, coil: Coil, phi: Values) -> Values:
-    rise, lateral = displacement(arm.length, coil.seat, phi)
+    """Stored energy of one spring over its vertical stiffness, at a real or complex rotation."""
+    rise, dx = displacement(arm.length, coil.seat, phi)
     travel = coil.start + rise
-    touching = travel.real > 0.0
-    dz = np.where(touching, travel, 0.0)
-    K_L = helical.lateral_stiffness(1.0, coil.D, coil.H0, dz, arm.nu)
-    K_C = helical.tilting_stiffness(1.0, coil.D, coil.H0, dz, arm.nu)
+    dz = np.where(travel.real > 0.0, travel, 0.0)
+    beam = (1.0, coil.D, coil.H0, dz, arm.nu)
+    K_L, K_C = helical.lateral_and_tilting(*beam)
     coupling = helical.seat_moment(dz, K_L, coil.H0 - dz)
-    sheared = 0.5 * (K_L * lateral**2 + K_C * phi**2) + coupling * lateral * phi
-    energy = 0.5 * dz**2 + _flush(dz, coil.D) * sheared
-    return np.where(touching, energy, 0.0)
+    sheared = 0.5 * (K_L * dx**2 + K_C * phi**2) + coupling * dx * phi
+    return 0.5 * dz**2 + _flush(dz, coil.D) * sheared
 
 
 def _flush(deflection: Values, D: Values) -> Values:
     """Share of the lateral and tilting stiffness that a spring has at a deflection: 0 to 1."""
-    share = np.minimum(np.real(deflection) / (SETTLING * np.asarray(D)), 1.0)
+    share = np.minimum(deflection.real / (SETTLING * D), 1.0)
     return share**2 * (3.0 - 2.0 * share)
-
-
-def _bracketed_root(
-    function: Callable[[Values], Values], low: Values, high: Values, shape: tuple[int, ...]
-) -> Values:
-    """Root of an array function between `low` and `high`, nan where there is no change of sign.
-
-    Regula falsi with the Illinois step, bisecting where that is slow.
-    """
-    shape = np.broadcast_shapes(np.shape(low), np.shape(high), shape)
-    a, b = np.broadcast_to(low, shape).copy(), np.broadcast_to(high, shape).copy()
-    fa, fb = function(a), function(b)
-    shape = np.broadcast_shapes(shape, np.shape(fa))
-    a, b, fa, fb = (np.broadcast_to(value, shape).copy() for value in (a, b, fa, fb))
-    bracketed = fa * fb <= 0.0
-    kept = np.zeros(shape)  # +1: the end b was kept last time, -1: the end a
-    root = 0.5 * (a + b)
-    for iteration in range(200):
-        width = b - a
-        with np.errstate(invalid="ignore", divide="ignore"):
-            guess = b - fb * width / (fb - fa)
-        outside = ~((guess > a) & (guess < b))
-        root = np.where(outside | (iteration % 10 == 9), a + 0.5 * width, guess)
-        root = np.where(fa == 0.0, a, np.where(fb == 0.0, b, root))
-        value = function(root)
-        left = np.sign(value) == np.sign(fa)
-        step = np.minimum(np.abs(root - a), np.abs(root - b))
-        fb_next = np.where(left, np.where(kept == 1, 0.5 * fb, fb), value)
-        fa_next = np.where(left, value, np.where(kept == -1, 0.5 * fa, fa))
-        a, b = np.where(left, root, a), np.where(left, b, root)
-        fa, fb, kept = fa_next, fb_next, np.where(left, 1.0, -1.0)
-        done = (value == 0.0) | (step < _ROTATION_TOLERANCE) | ~bracketed
-        if np.all(done):
-            break
-    else:
-        raise ModelError("the arm's equilibrium did not converge")
-    return np.where(bracketed, root, np.nan)

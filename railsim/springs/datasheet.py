@@ -7,12 +7,9 @@ lateral stiffness by several methods.  Tolerances, material and tests are left t
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension
+from railsim.definitions.spring import TrailingArmSuspension
 from railsim.springs import checks, helical
-from railsim.springs.verification import Verification, stress
-from railsim.springs.verification_checks import built, solid_heights
+from railsim.springs.verification import Verification, built, solid_heights, stress
 
 LATERAL = ("Grossi", "EN 13906-1", "Wahl, C_l = 1")
 """Methods of the lateral stiffness; no free source gives those of Gross and Sparing."""
@@ -20,24 +17,13 @@ LATERAL = ("Grossi", "EN 13906-1", "Wahl, C_l = 1")
 
 @dataclass(frozen=True)
 class Loaded:
-    """One spring under one load.
+    """One spring under one load."""
 
-    Attributes
-    ----------
-    force, height : float
-        Vertical force [N], height under load [m].
-    tau, tau_k : float
-        Shear stress without correction, and with the factor for the curvature of the wire and the
-        lateral load [Pa].
-    lateral : dict of str to float
-        Lateral stiffness by method, `LATERAL` [N/m].
-    """
-
-    force: float
-    height: float
-    tau: float
-    tau_k: float
-    lateral: Mapping[str, float]
+    force: float  # vertical [N]
+    height: float  # under load [m]
+    tau: float  # shear stress without correction [Pa]
+    tau_k: float  # with the factor for the curvature of the wire and the lateral load [Pa]
+    lateral: Mapping[str, float]  # lateral stiffness by method, `LATERAL` [N/m]
 
 
 @dataclass(frozen=True)
@@ -59,52 +45,41 @@ class Sheet:
 
 def data_sheets(suspension: TrailingArmSuspension, result: Verification) -> dict[str, Sheet]:
     """Data sheets of all springs of a verified suspension, by the springs' names."""
-    solid = solid_heights(suspension)
+    material, limits = suspension.material, suspension.checks
     sheets = {}
-    for name, coil in zip(suspension.springs, result.arm.coils, strict=True):
-        spring = suspension.springs[name]
+    for (name, spring), coil in zip(suspension.springs.items(), result.arm.coils, strict=True):
+        (d, n), D, H0 = built(spring), spring.mean_diameter, spring.free_height
+        n_t = checks.total_coils(n, limits.dead_coils, limits.end_coils)
+        solid = solid_heights(suspension)[name]
         loads = {}
         for case in result.cases:
             state = case.springs[name]
-            d, _ = built(spring)
             force = float(state.force)
-            at = (coil.K_V, spring.mean_diameter, spring.free_height, state.deflection)
-            nu = result.arm.nu
+            at = (coil.K_V, D, H0, state.deflection, result.arm.nu)
             methods = (
-                float(state.K_L),
-                float(helical.beam_lateral_stiffness(*at, nu)),
-                float(helical.lateral_stiffness_wahl(*at, nu)),
+                state.K_L,
+                helical.beam_lateral_stiffness(*at),
+                helical.lateral_stiffness_wahl(*at),
             )
-            lateral = dict(zip(LATERAL, methods, strict=True)) if force > 0.0 else {}
+            lateral = dict(zip(LATERAL, map(float, methods), strict=True)) if force > 0.0 else {}
+            tau = checks.shear_stress(force, d, D)
             loads[case.name] = Loaded(
-                force,
-                float(state.height),
-                8.0 * spring.mean_diameter * force / (np.pi * d**3),
-                stress(spring, state),
-                lateral,
+                force, float(state.height), tau, stress(spring, state), lateral
             )
-        sheets[name] = Sheet(_values(suspension, spring, float(coil.K_V), solid[name]), loads)
+        values = {
+            "d": d,
+            "D": D,
+            "D_outer": D + d,
+            "D_inner": D - d,
+            "index": D / d,
+            "n": n,
+            "n_total": n_t,
+            "H0": H0,
+            "L_solid": solid,
+            "K_V": coil.K_V,
+            "mass": checks.mass(d, D, n_t, material.density),
+            "surge_frequency": float(checks.surge_frequency(d, D, n, material.G, material.density)),
+            "tau_solid": checks.solid_stress(coil.K_V, d, D, H0 - solid),
+        }
+        sheets[name] = Sheet(values, loads)
     return sheets
-
-
-def _values(
-    suspension: TrailingArmSuspension, spring: HelicalSpring, K_V: float, solid: float
-) -> dict[str, float]:
-    d, n = built(spring)
-    D, material = spring.mean_diameter, suspension.material
-    n_t = float(checks.total_coils(n, suspension.checks.dead_coils, suspension.checks.end_coils))
-    return {
-        "d": d,
-        "D": D,
-        "D_outer": D + d,
-        "D_inner": D - d,
-        "index": D / d,
-        "n": n,
-        "n_total": n_t,
-        "H0": spring.free_height,
-        "L_solid": solid,
-        "K_V": K_V,
-        "mass": float(checks.mass(d, D, n_t, material.density)),
-        "surge_frequency": float(checks.surge_frequency(d, D, n, material.G, material.density)),
-        "tau_solid": float(checks.solid_stress(K_V, d, D, spring.free_height - solid)),
-    }

@@ -17,31 +17,22 @@ Both stiffnesses are positive only for target loads between those that either sp
 carry there: `target_load_range` gives them, and with it the advice what to change.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from railsim.definitions.spring import Point, TrailingArmSuspension
+from railsim.definitions.spring import TrailingArmSuspension
 from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
-from railsim.springs.arm import Arm, Coil
+from railsim.springs.arm import Arm
 from railsim.springs.helical import Values
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a nest shall do; all fields broadcast.
-
-    Attributes
-    ----------
-    mounting_load, target_load : float or ndarray
-        Loads [N].
-    mounting_deflection, target_deflection : float or ndarray
-        Deflections of the outer spring under them [m].
-    """
+    """Loads [N] and the deflections of the outer spring under them [m]; all fields broadcast."""
 
     mounting_load: Values
     mounting_deflection: Values
@@ -51,37 +42,19 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Design:
-    """Stiffnesses that meet two wanted deflections.
+    """Stiffnesses that meet two wanted deflections."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the springs, outer first.
-    rotation : float
-        Rotation of the arm at the target, positive above the mounting load [rad].
-    K_tot : float
-        Mounting load over mounting deflection [N/m].
-    K_V : tuple of float
-        Vertical stiffnesses, outer spring first [N/m].
-    K_L, K_C : float
-        Lateral [N/m] and tilting [N m/rad] stiffness at the target, summed over the springs.
-    n : tuple of (float or None)
-        Active coils for the file's wire diameters; None where it gives none.
-    load_range : tuple of float
-        Target loads between which both stiffnesses are positive [N].
-    """
-
-    names: tuple[str, ...]
-    rotation: float
-    K_tot: float
-    K_V: tuple[float, ...]
-    K_L: float
-    K_C: float
-    n: tuple[float | None, ...]
-    load_range: tuple[float, float]
+    names: tuple[str, ...]  # of the springs, outer first
+    rotation: float  # of the arm at the target, positive above the mounting load [rad]
+    K_tot: float  # mounting load over mounting deflection [N/m]
+    K_V: tuple[float, ...]  # vertical stiffnesses, outer spring first [N/m]
+    K_L: float  # lateral stiffness at the target, summed over the springs [N/m]
+    K_C: float  # tilting stiffness, likewise [N m/rad]
+    n: tuple[float | None, ...]  # active coils for the file's wires; None where it gives none
+    load_range: tuple[float, float]  # target loads between which both K_V are positive [N]
 
 
-def stiffnesses(frame: Arm, gap: ArrayLike, wanted: Wanted) -> tuple[Values, Values, Values]:
+def stiffnesses(frame: Arm, engagement: float, wanted: Wanted) -> tuple[Values, Values, Values]:
     """Vertical stiffnesses of both springs and the arm's rotation at the target.
 
     Parameters
@@ -89,7 +62,7 @@ def stiffnesses(frame: Arm, gap: ArrayLike, wanted: Wanted) -> tuple[Values, Val
     frame : Arm
         Arm with two springs at their deflections under the mounting load (`Coil.start`); their
         `K_V` are not used.
-    gap : float or ndarray
+    engagement : float
         Deflection of the outer spring at which the inner one starts to work [m].
     wanted : Wanted
         The two wanted deflections.
@@ -101,39 +74,36 @@ def stiffnesses(frame: Arm, gap: ArrayLike, wanted: Wanted) -> tuple[Values, Val
     phi : float or ndarray
         Rotation at the target, nan where the arm does not reach so far [rad].
     """
-    phi = target_rotation(frame, wanted)
-    m1, m2 = (trailing_arm.unit_moment(frame, coil, phi) for coil in frame.coils)
-    alone = np.asarray(wanted.mounting_load) / wanted.mounting_deflection
-    shared = np.maximum(1.0 - np.asarray(gap) / wanted.mounting_deflection, 0.0)
+    phi, m1, m2, alone, shared = _at_target(frame, engagement, wanted)
     balance = wanted.target_load * frame.length * np.cos(phi) - frame.bush * phi
     with np.errstate(divide="ignore", invalid="ignore"):
         K_inner = (balance - alone * m1) / (m2 - shared * m1)
     return alone - shared * K_inner, K_inner, phi
 
 
-def target_rotation(frame: Arm, wanted: Wanted) -> Values:
-    """Rotation of the arm between mounting and target deflection [rad]."""
-    rise = np.asarray(wanted.target_deflection) - wanted.mounting_deflection
-    return trailing_arm.rotation_of_rise(frame.length, frame.coils[0].seat, rise)
-
-
-def target_load_range(frame: Arm, gap: float, wanted: Wanted) -> tuple[Values, Values]:
+def target_load_range(frame: Arm, engagement: float, wanted: Wanted) -> tuple[Values, Values]:
     """Target loads between which both stiffnesses are positive, ascending [N].
 
     One end is carried by the outer spring alone, the other by the inner one alone (where the inner
     spring works at the mounting load; else by an inner spring of any stiffness: no upper end).
     """
-    phi = target_rotation(frame, wanted)
-    m1, m2 = (trailing_arm.unit_moment(frame, coil, phi) for coil in frame.coils)
+    phi, m1, m2, alone, shared = _at_target(frame, engagement, wanted)
     lever = frame.length * np.cos(phi)
-    alone = np.asarray(wanted.mounting_load) / wanted.mounting_deflection
-    shared = np.maximum(1.0 - gap / np.asarray(wanted.mounting_deflection), 0.0)
     outer_only = (alone * m1 + frame.bush * phi) / lever
     with np.errstate(divide="ignore", invalid="ignore"):
         inner_only = np.where(
             shared > 0.0, (alone / shared * m2 + frame.bush * phi) / lever, np.inf * np.sign(m2)
         )
     return np.minimum(outer_only, inner_only), np.maximum(outer_only, inner_only)
+
+
+def _at_target(frame: Arm, engagement: float, wanted: Wanted) -> tuple[Values, ...]:
+    """Rotation, unit moments, stiffness of the outer spring alone, share of the inner one."""
+    rise = wanted.target_deflection - wanted.mounting_deflection
+    phi = trailing_arm.rotation_of_rise(frame.length, frame.coils[0].seat, rise)
+    m1, m2 = (trailing_arm.unit_moment(frame, coil, phi) for coil in frame.coils)
+    alone = wanted.mounting_load / wanted.mounting_deflection
+    return phi, m1, m2, alone, np.maximum(1.0 - engagement / wanted.mounting_deflection, 0.0)
 
 
 def design(suspension: TrailingArmSuspension) -> Design:
@@ -153,28 +123,25 @@ def design(suspension: TrailingArmSuspension) -> Design:
     [64.699, 30.748]
     """
     wanted, frame = design_task(suspension)
-    gap = suspension.engagement
-    K_outer, K_inner, phi = (float(value) for value in stiffnesses(frame, gap, wanted))
-    if not (K_outer > 0.0 and K_inner > 0.0):
-        raise InputError(_unphysical(suspension, frame, wanted, (K_outer, K_inner)))
-    K_V = (K_outer, K_inner)
-    coils = tuple(replace(coil, K_V=k) for coil, k in zip(frame.coils, K_V, strict=True))
+    *K_V, phi = (float(value) for value in stiffnesses(frame, suspension.engagement, wanted))
+    if not all(stiffness > 0.0 for stiffness in K_V):
+        raise InputError(list(_unphysical(suspension, frame, wanted, K_V)))
+    coils = [replace(coil, K_V=k) for coil, k in zip(frame.coils, K_V, strict=True)]
     states = [trailing_arm.coil_state(frame, coil, phi) for coil in coils]
-    G = suspension.material.G
-    springs = suspension.springs
-    low, high = target_load_range(frame, gap, wanted)
+    low, high = target_load_range(frame, suspension.engagement, wanted)
     return Design(
-        names=tuple(springs),
+        names=tuple(suspension.springs),
         rotation=phi,
         K_tot=wanted.mounting_load / wanted.mounting_deflection,
-        K_V=K_V,
+        K_V=tuple(K_V),
         K_L=float(sum(state.K_L for state in states)),
         K_C=float(sum(state.K_C for state in states)),
         n=tuple(
-            None
-            if spring.wire_diameter is None
-            else float(helical.active_coils(G, spring.wire_diameter, spring.mean_diameter, k))
-            for spring, k in zip(springs.values(), K_V, strict=True)
+            spring.wire_diameter
+            and helical.active_coils(
+                suspension.material.G, spring.wire_diameter, spring.mean_diameter, k
+            )
+            for spring, k in zip(suspension.springs.values(), K_V, strict=True)
         ),
         load_range=(float(low), float(high)),
     )
@@ -189,140 +156,92 @@ def design_task(suspension: TrailingArmSuspension) -> tuple[Wanted, Arm]:
         No target, no inner spring, or deflections that springs or arm cannot reach.
     """
     target, mounting, inner = suspension.target, suspension.mounting, suspension.inner
-    faults = []
-    if target is None:
-        faults.append(_fault(suspension, "target", "missing", "needed: load and deflection"))
-    if inner is None:
-        faults.append(
-            _fault(suspension, "inner", "missing", "a design needs both springs' diameters")
-        )
     if target is None or inner is None:
-        raise InputError(faults)
-    faults = _reach_faults(suspension, {"mounting": mounting, "target": target})
+        needed = {"target": "needed: load and deflection"} if target is None else {}
+        needed |= {"inner": "a design needs both springs' diameters"} if inner is None else {}
+        raise InputError(
+            [Fault(suspension.name, key, "missing", words) for key, words in needed.items()]
+        )
+    wanted = Wanted(mounting.load, mounting.deflection, target.load, target.deflection)
+    springs = [(1.0, s.mean_diameter, s.free_height) for s in suspension.springs.values()]
+    frame = trailing_arm.nest(suspension, springs, mounting.deflection)
+    faults = [
+        *_reach_faults(suspension, "mounting", mounting.deflection),
+        *_reach_faults(suspension, "target", target.deflection),
+    ]
+    found, remedy = "", ""
     if abs(target.deflection - mounting.deflection) < 1e-6:
-        faults.append(
-            _fault(
-                suspension,
-                "target.deflection",
-                f"{target.deflection * 1e3:.2f} mm, the same as mounting.deflection",
-                "choose a target that turns the arm, above or below the mounting load",
-            )
-        )
+        found = f"{target.deflection * 1e3:.2f} mm, the same as mounting.deflection"
+        remedy = "choose a target that turns the arm, above or below the mounting load"
     elif target.deflection <= suspension.engagement:
-        faults.append(
-            _fault(
-                suspension,
-                "target.deflection",
-                f"{target.deflection * 1e3:.1f} mm: the inner spring starts to work at "
-                f"{suspension.engagement * 1e3:.1f} mm",
-                "raise target.deflection, or let the inner spring start earlier",
-            )
+        found = (
+            f"{target.deflection * 1e3:.1f} mm: the inner spring starts to work at "
+            f"{suspension.engagement * 1e3:.1f} mm"
         )
+        remedy = "raise target.deflection, or let the inner spring start earlier"
+    elif not faults and np.isnan(_at_target(frame, suspension.engagement, wanted)[0]):
+        found = (
+            f"{(target.deflection - mounting.deflection) * 1e3:.1f} mm from the mounting "
+            "deflection: the arm does not reach so far"
+        )
+        remedy = "bring target.deflection nearer to mounting.deflection, or raise arm.length"
+    if found:
+        faults.append(Fault(suspension.name, "target.deflection", found, remedy))
     if faults:
         raise InputError(faults)
-    starts = (mounting.deflection, mounting.deflection - suspension.engagement)
-    frame = Arm(
-        length=suspension.arm.length,
-        bush=suspension.arm.bush_torsional_stiffness,
-        nu=float(helical.poisson_number(suspension.material.E, suspension.material.G)),
-        coils=tuple(
-            Coil(1.0, spring.mean_diameter, spring.free_height, seat, start)
-            for spring, seat, start in zip(
-                suspension.springs.values(), suspension.seat_heights, starts, strict=True
-            )
-        ),
-        form=suspension.arm.equilibrium,
-    )
-    wanted = Wanted(mounting.load, mounting.deflection, target.load, target.deflection)
-    if np.isnan(target_rotation(frame, wanted)):
-        raise InputError(
-            [
-                _fault(
-                    suspension,
-                    "target.deflection",
-                    f"{(target.deflection - mounting.deflection) * 1e3:.1f} mm from the mounting "
-                    "deflection: the arm does not reach so far",
-                    "bring target.deflection nearer to mounting.deflection, or raise arm.length",
-                )
-            ]
-        )
     return wanted, frame
 
 
-def _reach_faults(suspension: TrailingArmSuspension, points: Mapping[str, Point]) -> list[Fault]:
-    """Deflections that press a spring flat or buckle it."""
-    nu = helical.poisson_number(suspension.material.E, suspension.material.G)
-    faults = []
+def _reach_faults(
+    suspension: TrailingArmSuspension, table: str, deflection: float
+) -> Iterator[Fault]:
+    """Springs that a deflection presses flat or buckles."""
+    nu, key = trailing_arm.poisson_ratio(suspension), f"{table}.deflection"
     for name, spring in suspension.springs.items():
-        buckling = float(
-            helical.buckling_deflection(
-                spring.free_height, spring.mean_diameter, nu, suspension.checks.seating
+        D, H0 = spring.mean_diameter, spring.free_height
+        buckling = helical.buckling_deflection(H0, D, nu, suspension.checks.seating)
+        if deflection >= 0.9 * H0:
+            found = f"{deflection * 1e3:.1f} mm, of {name}.free_height {H0 * 1e3:.1f} mm"
+            yield Fault(suspension.name, key, found, f"reduce it, or raise {name}.free_height")
+        elif deflection >= buckling:
+            found = (
+                f"{deflection * 1e3:.1f} mm: the {name} spring buckles at {buckling * 1e3:.1f} mm"
             )
-        )
-        for key, point in points.items():
-            where = f"{key}.deflection"
-            deflection = f"{point.deflection * 1e3:.1f} mm"
-            if point.deflection >= 0.9 * spring.free_height:
-                found = f"{deflection}, of {name}.free_height {spring.free_height * 1e3:.1f} mm"
-                faults.append(
-                    _fault(suspension, where, found, f"reduce it, or raise {name}.free_height")
-                )
-            elif point.deflection >= buckling:
-                found = f"{deflection}: the {name} spring buckles at {buckling * 1e3:.1f} mm"
-                mend = f"reduce {name}.free_height or raise {name}.mean_diameter"
-                faults.append(_fault(suspension, where, found, mend))
-    return faults
+            remedy = f"reduce {name}.free_height or raise {name}.mean_diameter"
+            yield Fault(suspension.name, key, found, remedy)
 
 
 def _unphysical(
-    suspension: TrailingArmSuspension, frame: Arm, wanted: Wanted, K_V: tuple[float, float]
-) -> list[Fault]:
+    suspension: TrailingArmSuspension, frame: Arm, wanted: Wanted, K_V: list[float]
+) -> Iterator[Fault]:
     """Why a stiffness comes out negative, and what would mend it."""
     low, high = target_load_range(frame, suspension.engagement, wanted)
     name, value = ("inner", K_V[1]) if not K_V[1] > 0.0 else ("outer", K_V[0])
-    too_low = wanted.target_load < low
-    deflection = f"{wanted.target_deflection * 1e3:.2f} mm"
-    if np.isinf(high):
-        window = f"above {low * 1e-3:.3f} kN"
-    else:
+    load, deflection = wanted.target_load * 1e-3, f"{wanted.target_deflection * 1e3:.2f} mm"
+    window = f"above {low * 1e-3:.3f} kN"
+    if np.isfinite(high):
         window = f"between {low * 1e-3:.3f} and {high * 1e-3:.3f} kN"
-    found = (
-        f"{wanted.target_load * 1e-3:.3f} kN at {deflection} has no physical solution "
-        f"(K_V of the {name} spring would be {value * 1e-3:.1f} N/mm)"
+    yield Fault(
+        suspension.name,
+        "target.load",
+        f"{load:.3f} kN at {deflection} has no physical solution (K_V of the {name} spring would "
+        f"be {value * 1e-3:.1f} N/mm)",
+        f"{'raise' if wanted.target_load < low else 'reduce'} target.load: a nest that carries "
+        f"mounting.load at mounting.deflection can reach {deflection} under loads {window} only",
     )
-    load_advice = (
-        f"{'raise' if too_low else 'reduce'} target.load: a nest that carries mounting.load at "
-        f"mounting.deflection can reach {deflection} under loads {window} only"
+    shortest = min(coil.H0 for coil in frame.coils)
+    tried = np.linspace(suspension.engagement + 1e-6, 0.6 * shortest, 4001)
+    low, high = target_load_range(
+        frame, suspension.engagement, replace(wanted, target_deflection=tried)
     )
-    faults = [_fault(suspension, "target.load", found, load_advice)]
-    window_of_deflections = _deflection_range(suspension, frame, wanted)
-    if window_of_deflections is not None:
-        lowest, highest = window_of_deflections
-        verb = "raise" if wanted.target_deflection < lowest else "reduce"
-        faults.append(
-            _fault(
-                suspension,
-                "target.deflection",
-                f"{deflection} does not go with this load",
-                f"or {verb} target.deflection: for {wanted.target_load * 1e-3:.3f} kN between "
-                f"{lowest * 1e3:.2f} and {highest * 1e3:.2f} mm",
-            )
+    turned = np.abs(tried - wanted.mounting_deflection) > 1e-5
+    fitting = tried[(low < wanted.target_load) & (wanted.target_load < high) & turned]
+    if fitting.size:
+        verb = "raise" if wanted.target_deflection < fitting[0] else "reduce"
+        yield Fault(
+            suspension.name,
+            "target.deflection",
+            f"{deflection} does not go with this load",
+            f"or {verb} target.deflection: for {load:.3f} kN between {fitting[0] * 1e3:.2f} and "
+            f"{fitting[-1] * 1e3:.2f} mm",
         )
-    return faults
-
-
-def _deflection_range(
-    suspension: TrailingArmSuspension, frame: Arm, wanted: Wanted
-) -> tuple[float, float] | None:
-    """Target deflections that go with the target load; None if there are none in reach [m]."""
-    shortest = min(float(coil.H0) for coil in frame.coils)
-    deflections = np.linspace(suspension.engagement + 1e-6, 0.6 * shortest, 4001)
-    candidates = replace(wanted, target_deflection=deflections)
-    low, high = target_load_range(frame, suspension.engagement, candidates)
-    turned = np.abs(deflections - wanted.mounting_deflection) > 1e-5
-    fitting = deflections[(low < wanted.target_load) & (wanted.target_load < high) & turned]
-    return (float(fitting[0]), float(fitting[-1])) if fitting.size else None
-
-
-def _fault(suspension: TrailingArmSuspension, key: str, found: str, allowed: str) -> Fault:
-    return Fault(suspension.name, key, found, allowed)

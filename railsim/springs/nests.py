@@ -6,7 +6,6 @@ kept, and nan where a nest has no physical solution.  The formulas are those of 
 `design` and `checks`; nothing is computed differently here than in design and verification.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +20,7 @@ from railsim.springs.design import Wanted, stiffnesses
 from railsim.springs.verification import dynamic_loads
 
 Floats = NDArray[np.float64]
-Pair = tuple[Floats, Floats]
+Pair = tuple[Floats, Floats]  # outer and inner spring
 
 # Diameters of hot rolled round steel bars for general purposes, EN 10060:2003, 10 to 60 mm [m].
 EN_10060 = (
@@ -34,82 +33,36 @@ _STIFFNESS_RATIO_MIN = 0.02  # each spring carries 2 % of the nest's stiffness a
 
 @dataclass(frozen=True)
 class Task:
-    """All that stays fixed during a search.
-
-    Attributes
-    ----------
-    suspension : TrailingArmSuspension
-        The file's content.
-    limits : Search
-        Its table `[search]`.
-    wanted : Wanted
-        Loads and deflections to be met.
-    wires : ndarray
-        Wire diameters to choose from [m].
-    nu : float
-        Poisson's ratio.
-    gap : float
-        Deflection of the outer spring at which the inner one starts to work [m].
-    height_difference : float
-        Free height of the outer spring less that of the inner one [m].
-    loads : ndarray, shape (3,)
-        Load for the solid height, highest and lowest dynamic load [N].
-    """
+    """All that stays fixed during a search."""
 
     suspension: TrailingArmSuspension
-    limits: Search
-    wanted: Wanted
-    wires: Floats
-    nu: float
-    gap: float
-    height_difference: float
-    loads: Floats
+    limits: Search  # its table [search]
+    wanted: Wanted  # loads and deflections to be met
+    wires: Floats  # wire diameters to choose from [m]
+    height_difference: float  # free height of the outer spring less that of the inner one [m]
+    loads: Floats  # for the solid height, highest and lowest dynamic load [N]
 
 
 @dataclass(frozen=True)
 class Dimensions:
-    """Free dimensions of nests; arrays of one shape.
+    """Free dimensions of nests [m]; arrays of one shape."""
 
-    Attributes
-    ----------
-    d_outer, d_inner : ndarray
-        Wire diameters [m].
-    D_outer, D_inner : ndarray
-        Mean coil diameters [m].
-    H0 : ndarray
-        Free height of the outer spring [m].
-    """
-
-    d_outer: Floats
+    d_outer: Floats  # wire diameters
     d_inner: Floats
-    D_outer: Floats
+    D_outer: Floats  # mean coil diameters
     D_inner: Floats
-    H0: Floats
+    H0: Floats  # free height of the outer spring
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What nests do; arrays of the shape of their dimensions.
+    """What nests do; arrays of the shape of their dimensions."""
 
-    Attributes
-    ----------
-    n : tuple of ndarray
-        Active coils, outer and inner.
-    mass : ndarray
-        Mass of both springs [kg].
-    margin : tuple of ndarray
-        Fatigue margins, outer and inner; `inf` without a table `[fatigue]`.
-    slack : dict of str to ndarray
-        Relative distance to each limit, negative where it is broken, nan where unknown.
-    deflection_error : tuple of ndarray
-        Deviation from the mounting and the target deflection [m].
-    """
-
-    n: Pair
-    mass: Floats
-    margin: Pair
-    slack: dict[str, Floats]
-    deflection_error: Pair
+    n: Pair  # active coils
+    mass: Floats  # of both springs [kg]
+    margin: Pair  # fatigue margins; inf without a table [fatigue]
+    slack: dict[str, Floats]  # distance to each limit, relative; negative: broken, nan: unknown
+    deflection_error: Pair  # deviation from the mounting and the target deflection [m]
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -126,10 +79,9 @@ def task_of(suspension: TrailingArmSuspension) -> Task:
     InputError : a table that the search needs is missing.
     """
     limits, target, inner = suspension.search, suspension.target, suspension.inner
-    needed: dict[str, object] = {"search": limits, "target": target, "inner": inner}
-    if limits is not None and limits.objective == "fatigue":
-        needed["fatigue"] = suspension.fatigue
-    missing = [name for name, table in needed.items() if table is None]
+    missing = [name for name in ("search", "target", "inner") if getattr(suspension, name) is None]
+    if limits is not None and limits.objective == "fatigue" and suspension.fatigue is None:
+        missing.append("fatigue")
     if limits is None or target is None or inner is None or missing:
         raise InputError(
             [Fault(suspension.name, name, "missing", "the search needs it") for name in missing]
@@ -144,33 +96,31 @@ def task_of(suspension: TrailingArmSuspension) -> Task:
         limits=limits,
         wanted=Wanted(mounting.load, mounting.deflection, target.load, target.deflection),
         wires=np.array(limits.wire_diameters or EN_10060),
-        nu=float(helical.poisson_number(suspension.material.E, suspension.material.G)),
-        gap=suspension.engagement,
         height_difference=suspension.outer.free_height - inner.free_height,
         loads=np.array([solid_load, *dynamic]),
     )
 
 
 def evaluate(task: Task, x: Dimensions, n: Pair | None = None) -> Evaluation:
-    """Evaluate nests, all in one call.
+    """Evaluate nests of shape (nest,), all in one call.
 
-    Parameters
-    ----------
-    task : Task
-        What stays fixed.
-    x : Dimensions
-        The nests; arrays of shape (nest,).
-    n : tuple of ndarray, optional
-        Numbers of coils as built; by default those that the wanted deflections need.
+    `n` are numbers of coils as built; by default those that the wanted deflections need.
     """
     springs = _springs(task, x)
+    errors = (np.zeros_like(x.H0), np.zeros_like(x.H0))
     if n is None:
         n, frame = _as_designed(task, springs)
-        errors = (np.zeros_like(x.H0), np.zeros_like(x.H0))
     else:
         frame = _as_built(task, springs, n)
-        errors = _deflection_errors(task, frame)
-    across = _with_load_axis(frame)
+        at_target = trailing_arm.rotation(frame, task.wanted.target_load)
+        deflection = trailing_arm.coil_state(frame, frame.coils[0], at_target).deflection
+        errors = (
+            frame.coils[0].start - task.wanted.mounting_deflection,
+            deflection - task.wanted.target_deflection,
+        )
+    # the same arms with a last axis for the loads
+    coils = (Coil(*(np.expand_dims(v, -1) for v in vars(coil).values())) for coil in frame.coils)
+    across = replace(frame, coils=tuple(coils))
     phi = trailing_arm.rotation(across, task.loads)
     weaker = np.minimum(*(coil.K_V for coil in frame.coils))
     share = weaker * task.wanted.mounting_deflection / task.wanted.mounting_load
@@ -178,15 +128,18 @@ def evaluate(task: Task, x: Dimensions, n: Pair | None = None) -> Evaluation:
     lost = np.isfinite(weaker) & np.any(np.isnan(phi), axis=-1)
     slack["equilibrium"] = np.where(lost, -1.0, 1.0)
     mass, margins = np.zeros_like(x.H0), []
-    for name, spring, coils, coil in zip(("outer", "inner"), springs, n, across.coils, strict=True):
+    for name, spring, built, coil in zip(("outer", "inner"), springs, n, across.coils, strict=True):
         state = trailing_arm.coil_state(across, coil, phi)
-        limits = task.suspension.checks
-        n_t = checks.total_coils(coils, limits.dead_coils, limits.end_coils)
-        mass = mass + checks.mass(spring.d, spring.D, n_t, task.suspension.material.density)
+        limits, density = task.suspension.checks, task.suspension.material.density
+        n_t = checks.total_coils(built, limits.dead_coils, limits.end_coils)
+        mass = mass + checks.mass(spring.d, spring.D, n_t, density)
         margins.append(_margin(task, spring, state))
-        slack |= _strength_slack(task, name, spring, coils, n_t, coil, state)
+        slack |= {
+            f"{limit}_{name}": value
+            for limit, value in _strength_slack(task, spring, built, n_t, state).items()
+        }
         slack[f"fatigue_{name}"] = margins[-1] / task.limits.fatigue_margin_min - 1.0
-        slack[f"coils_{name}"] = coils / task.limits.active_coils_min - 1.0
+        slack[f"coils_{name}"] = built / task.limits.active_coils_min - 1.0
     return Evaluation(n, mass, (margins[0], margins[1]), slack, errors)
 
 
@@ -197,80 +150,44 @@ class _Spring:
     d: Floats
     D: Floats
     H0: Floats
-    seat: float
 
 
 def _springs(task: Task, x: Dimensions) -> tuple[_Spring, _Spring]:
     H0 = x.H0 - task.height_difference
     sane = (x.D_outer > x.d_outer) & (x.D_inner > x.d_inner)
     sane &= task.wanted.target_deflection < np.minimum(x.H0, H0)
-    seat = task.suspension.arm.seat_height
 
-    def spring(d: Floats, D: Floats, H0: Floats, seat: float) -> _Spring:
-        return _Spring(d, np.where(sane, D, np.nan), np.where(sane, H0, np.nan), seat)
+    def spring(d: Floats, D: Floats, H0: Floats) -> _Spring:
+        return _Spring(d, np.where(sane, D, np.nan), np.where(sane, H0, np.nan))
 
-    return (
-        spring(x.d_outer, x.D_outer, x.H0, seat),
-        spring(x.d_inner, x.D_inner, H0, seat + task.height_difference - task.gap),
-    )
+    return spring(x.d_outer, x.D_outer, x.H0), spring(x.d_inner, x.D_inner, H0)
 
 
 def _as_designed(task: Task, springs: tuple[_Spring, _Spring]) -> tuple[Pair, Arm]:
     """Coils that meet the wanted deflections, and the arm with them."""
-    start = task.wanted.mounting_deflection
-    K_outer, K_inner, _ = stiffnesses(
-        _frame(task, springs, (1.0, 1.0), start), task.gap, task.wanted
-    )
+    start, suspension = task.wanted.mounting_deflection, task.suspension
+    frame = trailing_arm.nest(suspension, [(1.0, spring.D, spring.H0) for spring in springs], start)
+    K_outer, K_inner, _ = stiffnesses(frame, suspension.engagement, task.wanted)
     physical = (K_outer > 0.0) & (K_inner > 0.0)
-    K_V = tuple(np.where(physical, value, np.nan) for value in (K_outer, K_inner))
-    G = task.suspension.material.G
-    outer, inner = (
-        helical.active_coils(G, spring.d, spring.D, k)
+    K_V = [np.where(physical, value, np.nan) for value in (K_outer, K_inner)]
+    n_outer, n_inner = (
+        helical.active_coils(suspension.material.G, spring.d, spring.D, k)
         for spring, k in zip(springs, K_V, strict=True)
     )
-    return (outer, inner), _frame(task, springs, K_V, start)
+    built = tuple(replace(coil, K_V=k) for coil, k in zip(frame.coils, K_V, strict=True))
+    return (n_outer, n_inner), replace(frame, coils=built)
 
 
 def _as_built(task: Task, springs: tuple[_Spring, _Spring], n: Pair) -> Arm:
-    """The arm with given numbers of coils, horizontal under the mounting load."""
-    G = task.suspension.material.G
+    """The arm with stated numbers of coils, horizontal under the mounting load."""
+    suspension = task.suspension
     K_V = [
-        helical.vertical_stiffness(G, spring.d, spring.D, coils)
+        helical.vertical_stiffness(suspension.material.G, spring.d, spring.D, coils)
         for spring, coils in zip(springs, n, strict=True)
     ]
-    start = trailing_arm.mounting_deflection(task.wanted.mounting_load, K_V, (0.0, task.gap))
-    return _frame(task, springs, K_V, start)
-
-
-def _deflection_errors(task: Task, frame: Arm) -> Pair:
-    """Deviation from the mounting and the target deflection [m]."""
-    outer = frame.coils[0]
-    at_target = trailing_arm.rotation(frame, task.wanted.target_load)
-    deflection = trailing_arm.coil_state(frame, outer, at_target).deflection
-    return (
-        outer.start - task.wanted.mounting_deflection,
-        deflection - task.wanted.target_deflection,
-    )
-
-
-def _frame(
-    task: Task, springs: Sequence[_Spring], K_V: Sequence[Floats | float], start: Floats | float
-) -> Arm:
-    arm = task.suspension.arm
-    starts = (start, start - task.gap)
-    coils = tuple(
-        Coil(k, spring.D, spring.H0, spring.seat, each)
-        for k, spring, each in zip(K_V, springs, starts, strict=True)
-    )
-    return Arm(arm.length, arm.bush_torsional_stiffness, task.nu, coils, arm.equilibrium)
-
-
-def _with_load_axis(frame: Arm) -> Arm:
-    """The same arms with a last axis for the loads."""
-    coils = tuple(
-        Coil(*(np.expand_dims(value, -1) for value in vars(coil).values())) for coil in frame.coils
-    )
-    return replace(frame, coils=coils)
+    start = trailing_arm.mounting_deflection(task.wanted.mounting_load, K_V, suspension.engagement)
+    nest = [(k, spring.D, spring.H0) for k, spring in zip(K_V, springs, strict=True)]
+    return trailing_arm.nest(suspension, nest, start)
 
 
 def _space_slack(task: Task, x: Dimensions, share: Floats) -> dict[str, Floats]:
@@ -292,23 +209,24 @@ def _space_slack(task: Task, x: Dimensions, share: Floats) -> dict[str, Floats]:
 
 
 def _strength_slack(
-    task: Task, name: str, spring: _Spring, n: Floats, n_t: Floats, coil: Coil, state: CoilState
+    task: Task, spring: _Spring, n: Floats, n_t: Floats, state: CoilState
 ) -> dict[str, Floats]:
-    limits, search = task.suspension.checks, task.limits
+    limits, search, material = task.suspension.checks, task.limits, task.suspension.material
     solid = checks.solid_height(n_t, spring.d)
     factor = max(limits.clearance_factor, limits.standard_clearance_factor)
     smallest = solid + checks.coil_clearance(n, spring.D, spring.d, factor)
-    buckling = helical.buckling_deflection(spring.H0, spring.D, task.nu, limits.seating)
+    nu = trailing_arm.poisson_ratio(task.suspension)
+    buckling = helical.buckling_deflection(spring.H0, spring.D, nu, limits.seating)
     highest = np.max(state.deflection, axis=-1)
     slack = {
-        f"height_{name}": state.height[..., 0] / smallest - 1.0,
-        f"buckling_{name}": 1.0 - highest / (search.buckling_ratio_max * buckling),
+        "height": state.height[..., 0] / smallest - 1.0,
+        "buckling": 1.0 - highest / (search.buckling_ratio_max * buckling),
     }
-    table = task.suspension.material.tau_allowable
-    if table is not None:
-        stress = checks.solid_stress(coil.K_V[..., 0], spring.d, spring.D, spring.H0 - solid)
-        allowed = search.stress_ratio_max * checks.allowable_stress(table, spring.d)
-        slack[f"yield_{name}"] = 1.0 - stress / allowed
+    if material.tau_allowable is not None:
+        K_V = helical.vertical_stiffness(material.G, spring.d, spring.D, n)
+        stress = checks.solid_stress(K_V, spring.d, spring.D, spring.H0 - solid)
+        allowable = checks.allowable_stress(material.tau_allowable, spring.d)
+        slack["yield"] = 1.0 - stress / (search.stress_ratio_max * allowable)
     return slack
 
 
@@ -317,14 +235,8 @@ def _margin(task: Task, spring: _Spring, state: CoilState) -> Floats:
     table = task.suspension.fatigue
     if table is None:
         return np.full(spring.d.shape, np.inf)
-    stress = checks.corrected_stress(
-        spring.d[..., None],
-        spring.D[..., None],
-        state.force,
-        state.K_L * state.lateral,
-        state.height,
-        state.lateral,
-    )[..., 1:]
+    d, D, shear = spring.d[..., None], spring.D[..., None], state.K_L * state.lateral
+    stress = checks.corrected_stress(d, D, state.force, shear, state.height, state.lateral)[..., 1:]
     tau_min, tau_max = np.min(stress, axis=-1), np.max(stress, axis=-1)
     with np.errstate(divide="ignore"):  # no equilibrium: no stress, and a slack that says so
         margin: Floats = checks.goodman_limit(table.goodman, tau_min) / tau_max

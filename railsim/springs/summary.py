@@ -12,8 +12,7 @@ from railsim.springs.design import Design
 from railsim.springs.helical import active_coils
 from railsim.springs.nests import EN_10060
 from railsim.springs.tolerance import RideHeight
-from railsim.springs.verification import Fatigue, Verification
-from railsim.springs.verification_checks import Case, Check
+from railsim.springs.verification import Case, Check, Fatigue, Verification
 
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult

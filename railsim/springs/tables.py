@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from railsim.springs.datasheet import LATERAL, Sheet
 from railsim.springs.tolerance import RideHeight
-from railsim.springs.verification import Fatigue, Verification
-from railsim.springs.verification_checks import Check
+from railsim.springs.verification import Check, Fatigue, Verification
 
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult

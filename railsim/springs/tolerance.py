@@ -10,7 +10,7 @@ deviations (root of the sum of squares); and the worst case, the extremes over a
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -21,37 +21,22 @@ from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
-from railsim.springs.verification import load_cases
-from railsim.springs.verification_checks import built
+from railsim.springs.verification import built, load_cases
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class RideHeight:
-    """Scatter of the ride height under one load, relative to the nominal nest [m].
+    """Scatter of the ride height under one load, relative to the nominal nest [m]."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the load.
-    load : float
-        Load at the axle [N].
-    lowest, highest : float
-        Worst case: all deviations at their limits, in the worst combination [m].
-    random : float
-        Root of the sum of squares of the single deviations: the 3 sigma range if every tolerance
-        is 3 sigma of an independent scatter [m].
-    single : dict of str to (float, float)
-        Ride height with one deviation at its lower and at its upper limit [m].
-    """
-
-    name: str
-    load: float
-    lowest: float
+    name: str  # of the load
+    load: float  # at the axle [N]
+    lowest: float  # worst case: all deviations at their limits, in the worst combination
     highest: float
-    random: float
-    single: Mapping[str, tuple[float, float]]
+    random: float  # root of the sum of squares of the single deviations: the 3 sigma range if every
+    # tolerance is 3 sigma of an independent scatter
+    single: Mapping[str, tuple[float, float]]  # one deviation at its lower and at its upper limit
 
 
 def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
@@ -65,18 +50,17 @@ def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
     frame, cases = load_cases(suspension, suspension.loads)
     loads = np.array([case.load for case in cases])
     nominal = -frame.length * np.sin([case.rotation for case in cases])
-    names = list(limits)
 
     def heights(shares: Floats) -> Floats:
         """Deviation of the height, shape (combination, load), for shares -1 to 1 of the limits."""
-        deviation = {name: shares[:, i, None] * limits[name] for i, name in enumerate(names)}
+        deviation = {name: shares[:, i, None] * limits[name] for i, name in enumerate(limits)}
         phi = trailing_arm.rotation(_deviating(suspension, frame, deviation), loads)
         height: Floats = -frame.length * np.sin(phi) - nominal
         return np.broadcast_to(height, (len(shares), len(loads)))
 
-    alone = np.eye(len(names))
+    alone = np.eye(len(limits))
     lower, upper = heights(-alone), heights(alone)
-    worst = heights(np.array(list(product((-1.0, 1.0), repeat=len(names)))))
+    worst = heights(np.array(list(product((-1.0, 1.0), repeat=len(limits)))))
     random = np.sqrt(np.sum((0.5 * (upper - lower)) ** 2, axis=0))
     return tuple(
         RideHeight(
@@ -85,7 +69,9 @@ def ride_heights(suspension: TrailingArmSuspension) -> tuple[RideHeight, ...]:
             lowest=float(np.min(worst[:, i])),
             highest=float(np.max(worst[:, i])),
             random=float(random[i]),
-            single={name: (float(lower[j, i]), float(upper[j, i])) for j, name in enumerate(names)},
+            single={
+                name: (float(lower[j, i]), float(upper[j, i])) for j, name in enumerate(limits)
+            },
         )
         for i, case in enumerate(cases)
     )
@@ -96,12 +82,12 @@ def deviations(suspension: TrailingArmSuspension) -> dict[str, float]:
     table = suspension.tolerances
     if table is None:
         raise InputError([Fault(suspension.name, "tolerances", "missing", "needed: the scatter")])
-    by_spring = {
+    every = {
         f"{spring}.{key}": float(getattr(table, key))
         for spring in suspension.springs
         for key in ("wire_diameter", "mean_diameter", "active_coils", "free_height")
     }
-    every = {**by_spring, "material.G": table.G, "arm.bush_torsional_stiffness": table.bush}
+    every |= {"material.G": table.G, "arm.bush_torsional_stiffness": table.bush}
     return {name: value for name, value in every.items() if value > 0.0}
 
 
@@ -109,23 +95,18 @@ def _deviating(
     suspension: TrailingArmSuspension, frame: Arm, deviation: Mapping[str, Floats]
 ) -> Arm:
     """The nominal arm with springs that deviate; the seats on frame and arm stay in place."""
-
-    def of(name: str) -> Floats | float:
-        return deviation.get(name, 0.0)
-
-    G = suspension.material.G * (1.0 + of("material.G"))
+    G = suspension.material.G * (1.0 + deviation.get("material.G", 0.0))
     coils = []
     for (name, spring), coil in zip(suspension.springs.items(), frame.coils, strict=True):
-        nominal_d, n = built(spring)
-        d = nominal_d + of(f"{name}.wire_diameter")
-        D = spring.mean_diameter + of(f"{name}.mean_diameter")
-        taller = of(f"{name}.free_height")
-        K_V = helical.vertical_stiffness(G, d, D, n + of(f"{name}.active_coils"))
+        d, n, D, taller = (
+            nominal + deviation.get(f"{name}.{key}", 0.0)
+            for nominal, key in zip(
+                (*built(spring), spring.mean_diameter, 0.0),
+                ("wire_diameter", "active_coils", "mean_diameter", "free_height"),
+                strict=True,
+            )
+        )
+        K_V = helical.vertical_stiffness(G, d, D, n)
         coils.append(Coil(K_V, D, coil.H0 + taller, coil.seat, coil.start + taller))
-    return Arm(
-        length=frame.length,
-        bush=frame.bush * (1.0 + of("arm.bush_torsional_stiffness")),
-        nu=frame.nu,
-        coils=tuple(coils),
-        form=frame.form,
-    )
+    bush = frame.bush * (1.0 + deviation.get("arm.bush_torsional_stiffness", 0.0))
+    return replace(frame, bush=bush, coils=tuple(coils))

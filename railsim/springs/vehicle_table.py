@@ -22,8 +22,7 @@ from railsim.constants import GRAVITY
 from railsim.definitions.flatten import FlatVehicle
 from railsim.definitions.spring import TrailingArmSuspension, VehicleTable
 from railsim.errors import Fault, InputError
-from railsim.springs.verification import load_cases
-from railsim.springs.verification_checks import Case
+from railsim.springs.verification import Case, load_cases
 
 LIKELY = (0.75, 1.25)
 """Load of an axlebox in the vehicle over the load at which the springs are taken."""

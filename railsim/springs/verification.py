@@ -6,71 +6,105 @@ loads.  A load that the nest cannot carry (solid, buckled, lifted off) is an inp
 what to change; a check that is not met is a result.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension
+from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension, radial_clearance
 from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
 from railsim.springs.arm import Arm, Coil, CoilState
-from railsim.springs.verification_checks import (
-    Case,
-    Check,
-    Obstacle,
-    buckling_checks,
-    built,
-    grouped,
-    height_checks,
-    obstacle_of,
-    solid_heights,
-    space_checks,
-    vertical_stiffness,
-    yield_checks,
-)
 
 TARE_MAX, TARE_MIN = 1.20, 0.65  # dynamic loads over the tare load: + 20 %, - 35 %
 
 
 @dataclass(frozen=True)
-class Fatigue:
-    """Fatigue of one spring between the lowest and the highest dynamic load.
+class Case:
+    """The suspension under one load."""
 
-    Attributes
-    ----------
-    tau_max, tau_min : float
-        Corrected stress under the highest and the lowest load [Pa].
-    limit : float
-        Allowable upper stress at `tau_min` [Pa].
-    margin : float
-        `limit / tau_max`.
-    """
+    name: str
+    load: float  # at the axle [N]
+    rotation: float  # of the arm, positive above the mounting load [rad]
+    deflection: float  # of the outer spring [m]
+    K_sys: float  # system stiffness, load over deflection [N/m]
+    rate: float  # slope of the load over the rise of the axle: what small movements feel [N/m]
+    springs: Mapping[str, CoilState]
 
-    tau_max: float
-    tau_min: float
+    @property
+    def theta(self) -> float:
+        """Amount of the rotation, as the reference counts it [rad]."""
+        return abs(self.rotation)
+
+    @property
+    def K_L(self) -> float:
+        """Lateral stiffness summed over the springs [N/m]."""
+        return float(sum(state.K_L for state in self.springs.values()))
+
+    @property
+    def K_C(self) -> float:
+        """Tilting stiffness summed over the springs [N m/rad]."""
+        return float(sum(state.K_C for state in self.springs.values()))
+
+    def lateral(self, spring: str) -> float:
+        """Sideways displacement of a spring's seat, counted as theta: positive both ways [m]."""
+        displacement = float(self.springs[spring].lateral)
+        return displacement if self.rotation >= 0.0 else -displacement
+
+
+@dataclass(frozen=True)
+class Check:
+    """A value against its limit, in SI units."""
+
+    name: str  # what is checked, with the spring's name
+    value: float
     limit: float
-    margin: float
+    unit: str
+    sense: Literal["above", "below"]  # side of the limit on which the value must lie
+    note: str  # what the limit comes from
+
+    @property
+    def ok(self) -> bool:
+        """Whether the check is met."""
+        return self.value > self.limit if self.sense == "above" else self.value < self.limit
+
+
+@dataclass(frozen=True)
+class Fatigue:
+    """Fatigue of one spring between the lowest and the highest dynamic load."""
+
+    tau_max: float  # corrected stress under the highest load [Pa]
+    tau_min: float  # and under the lowest
+    limit: float  # allowable upper stress at `tau_min` [Pa]
+    margin: float  # limit over tau_max
 
 
 @dataclass(frozen=True)
 class Verification:
-    """All loads and checks of a suspension.
-
-    Attributes
-    ----------
-    arm : Arm
-        The suspension as computed.
-    cases : tuple of Case
-        In the order of the file's loads.
-    checks : tuple of Check
-        All checks; see `Check.ok`.
-    """
+    """The suspension as computed, its loads in the order of the file, and all checks."""
 
     arm: Arm
     cases: tuple[Case, ...]
     checks: tuple[Check, ...]
+
+
+def built(spring: HelicalSpring) -> tuple[float, float]:
+    """Wire diameter and active coils of a spring that has both (`mounted` checks that)."""
+    if spring.wire_diameter is None or spring.active_coils is None:
+        raise ValueError("the spring has no wire diameter or no number of coils")
+    return spring.wire_diameter, spring.active_coils
+
+
+def solid_heights(suspension: TrailingArmSuspension) -> dict[str, float]:
+    """Solid height of each spring [m]."""
+    limits = suspension.checks
+    return {
+        name: checks.solid_height(checks.total_coils(n, limits.dead_coils, limits.end_coils), d)
+        for name, spring in suspension.springs.items()
+        for d, n in (built(spring),)
+    }
 
 
 def mounted(suspension: TrailingArmSuspension) -> Arm:
@@ -81,103 +115,74 @@ def mounted(suspension: TrailingArmSuspension) -> Arm:
     InputError
         A wire diameter or a number of coils is missing, or a spring is solid unloaded.
     """
+    needed = {
+        "wire_diameter": "the wire diameter [m]",
+        "active_coils": "the number of active coils; see design",
+    }
     faults = [
         Fault(suspension.name, f"{name}.{key}", "missing", f"needed: {meaning}")
         for name, spring in suspension.springs.items()
-        for key, value, meaning in (
-            ("wire_diameter", spring.wire_diameter, "the wire diameter [m]"),
-            ("active_coils", spring.active_coils, "the number of active coils; see design"),
-        )
-        if value is None
+        for key, meaning in needed.items()
+        if getattr(spring, key) is None
     ]
-    if not faults:
-        faults = [
-            Fault(
-                suspension.name,
-                f"{name}.free_height",
-                f"{suspension.springs[name].free_height * 1e3:.1f} mm, but the spring is solid at "
-                f"{solid * 1e3:.1f} mm",
-                f"raise it, or reduce {name}.active_coils or {name}.wire_diameter",
-            )
-            for name, solid in solid_heights(suspension).items()
-            if solid >= suspension.springs[name].free_height
-        ]
+    faults = faults or [
+        Fault(
+            suspension.name,
+            f"{name}.free_height",
+            f"{spring.free_height * 1e3:.1f} mm, but the spring is solid at {solid * 1e3:.1f} mm",
+            f"raise it, or reduce {name}.active_coils or {name}.wire_diameter",
+        )
+        for (name, spring), solid in zip(
+            suspension.springs.items(), solid_heights(suspension).values(), strict=True
+        )
+        if solid >= spring.free_height
+    ]
     if faults:
         raise InputError(faults)
-    springs = list(suspension.springs.values())
-    K_V = [vertical_stiffness(suspension, spring) for spring in springs]
-    gaps = (0.0, suspension.engagement)[: len(springs)]
-    start = float(trailing_arm.mounting_deflection(suspension.mounting.load, K_V, gaps))
-    return Arm(
-        length=suspension.arm.length,
-        bush=suspension.arm.bush_torsional_stiffness,
-        nu=float(helical.poisson_number(suspension.material.E, suspension.material.G)),
-        coils=tuple(
-            Coil(k, spring.mean_diameter, spring.free_height, seat, start - gap)
-            for k, spring, seat, gap in zip(
-                K_V, springs, suspension.seat_heights, gaps, strict=True
-            )
-        ),
-        form=suspension.arm.equilibrium,
-    )
+    G = suspension.material.G
+    springs = [
+        (helical.vertical_stiffness(G, d, s.mean_diameter, n), s.mean_diameter, s.free_height)
+        for s in suspension.springs.values()
+        for d, n in (built(s),)
+    ]
+    K_V = [stiffness for stiffness, _, _ in springs]
+    load = suspension.mounting.load
+    start = float(trailing_arm.mounting_deflection(load, K_V, suspension.engagement))
+    return trailing_arm.nest(suspension, springs, start)
 
 
 def load_cases(
     suspension: TrailingArmSuspension, loads: Mapping[str, float], key: str = "loads"
 ) -> tuple[Arm, tuple[Case, ...]]:
-    """Equilibrium under each load.
-
-    Parameters
-    ----------
-    suspension : TrailingArmSuspension
-        The file's content.
-    loads : mapping of str to float
-        Loads by name [N].
-    key : str
-        Table or dotted key of the file that holds them, for messages.
+    """Return the mounted arm and its state under each of some loads [N].
 
     Raises
     ------
     InputError
-        A spring lifts off, goes solid or buckles under a load.
+        The nest cannot carry a load; `key` is the table of the file that gives them.
     """
     frame = mounted(suspension)
-    phi = np.atleast_1d(trailing_arm.rotation(frame, np.array(list(loads.values()))))
-    met: list[tuple[str, Obstacle]] = []
+    rotations = trailing_arm.rotation(frame, np.array(list(loads.values()))).tolist()
     cases = []
-    for (name, load), turned in zip(loads.items(), phi.tolist(), strict=True):
-        obstacle = obstacle_of(suspension, frame, load, turned)
-        if obstacle is not None:
-            met.append((name, obstacle))
+    obstacles: dict[str, list[tuple[str, str, str]]] = {}
+    for (name, load), phi in zip(loads.items(), rotations, strict=True):
+        if (obstacle := _obstacle(suspension, frame, load, phi)) is not None:
+            obstacles.setdefault(obstacle[0], []).append((name, *obstacle[1:]))
             continue
         states = {
-            spring: trailing_arm.coil_state(frame, coil, turned)
+            spring: trailing_arm.coil_state(frame, coil, phi)
             for spring, coil in zip(suspension.springs, frame.coils, strict=True)
         }
         deflection = float(states["outer"].deflection)
-        cases.append(
-            Case(
-                name=name,
-                load=load,
-                rotation=turned,
-                deflection=deflection,
-                K_sys=load / deflection,
-                rate=_rate(frame, turned),
-                springs=states,
-            )
-        )
-    if met:
-        raise InputError(grouped(suspension, key, met))
+        rate = _rate(frame, phi)
+        cases.append(Case(name, load, phi, deflection, load / deflection, rate, states))
+    if obstacles:
+        raise InputError([_grouped(suspension, key, found) for found in obstacles.values()])
     return frame, tuple(cases)
 
 
 def verify(suspension: TrailingArmSuspension) -> Verification:
     """Verify a suspension under all its loads.
-
-    Parameters
-    ----------
-    suspension : TrailingArmSuspension
-        The file's content; every spring with its wire diameter and number of coils.
 
     Raises
     ------
@@ -192,25 +197,7 @@ def verify(suspension: TrailingArmSuspension) -> Verification:
     101.888
     """
     frame, cases = load_cases(suspension, suspension.loads)
-    results = [
-        *height_checks(suspension, cases),
-        *yield_checks(suspension),
-        *buckling_checks(suspension, cases),
-        *space_checks(suspension),
-    ]
-    if suspension.fatigue is not None:
-        results += [
-            Check(
-                f"fatigue_{name}",
-                result.margin,
-                suspension.checks.fatigue_margin,
-                "1",
-                "above",
-                "allowable over actual upper stress on the Goodman-Smith line",
-            )
-            for name, result in fatigue(suspension).items()
-        ]
-    return Verification(frame, cases, tuple(results))
+    return Verification(frame, cases, tuple(_checks(suspension, frame, cases)))
 
 
 def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
@@ -232,39 +219,33 @@ def fatigue(suspension: TrailingArmSuspension) -> dict[str, Fatigue]:
         raise InputError(
             [Fault(suspension.name, "fatigue", "missing", "needed: goodman = [[0, ...], ...]")]
         )
-    goodman = suspension.fatigue.goodman
-    loads = dynamic_loads(suspension)
-    _, (highest, lowest) = load_cases(suspension, loads, "fatigue")
+    _, cases = load_cases(suspension, dynamic_loads(suspension), "fatigue")
     results = {}
     for name, spring in suspension.springs.items():
-        at_highest, at_lowest = (stress(spring, case.springs[name]) for case in (highest, lowest))
-        tau_min, tau_max = sorted((at_highest, at_lowest))
-        limit = float(checks.goodman_limit(goodman, tau_min))
+        tau_min, tau_max = sorted(stress(spring, case.springs[name]) for case in cases)
+        limit = float(checks.goodman_limit(suspension.fatigue.goodman, tau_min))
         results[name] = Fatigue(tau_max, tau_min, limit, limit / tau_max)
     return results
 
 
 def dynamic_loads(suspension: TrailingArmSuspension) -> dict[str, float]:
-    """The highest and the lowest dynamic load, given or from the tare load [N]."""
+    """The highest and the lowest dynamic load, stated or from the tare load [N]."""
     table = suspension.fatigue
     if table is None:
         raise ValueError("the suspension has no fatigue table")
-    given = {"max_load": table.max_load, "min_load": table.min_load}
-    factors = {"max_load": TARE_MAX, "min_load": TARE_MIN}
+    stated = {"max_load": (table.max_load, TARE_MAX), "min_load": (table.min_load, TARE_MIN)}
     return {
-        key: factors[key] * suspension.loads[table.tare] if load is None else load
-        for key, load in given.items()
+        key: factor * suspension.loads[table.tare] if load is None else load
+        for key, (load, factor) in stated.items()
     }
 
 
 def stress(spring: HelicalSpring, state: CoilState) -> float:
     """Largest corrected shear stress of a spring under load [Pa]."""
-    d, _ = built(spring)
     shear = state.K_L * state.lateral
+    dimensions = (built(spring)[0], spring.mean_diameter)
     return float(
-        checks.corrected_stress(
-            d, spring.mean_diameter, state.force, shear, state.height, state.lateral
-        )
+        checks.corrected_stress(*dimensions, state.force, shear, state.height, state.lateral)
     )
 
 
@@ -273,3 +254,111 @@ def _rate(frame: Arm, phi: float) -> float:
     step = 1e-5  # rad: error of the difference about 1e-9, round-off about 1e-10 of the rate
     low, high = trailing_arm.load(frame, np.array([phi - step, phi + step])).tolist()
     return float(high - low) / (2.0 * step * frame.length * float(np.cos(phi)))
+
+
+def _obstacle(
+    suspension: TrailingArmSuspension, frame: Arm, load: float, phi: float
+) -> tuple[str, str, str] | None:
+    """What makes a load impossible, if anything does: cause, what was found, remedy."""
+    under = f"{load * 1e-3:.3f} kN"
+    lowest_phi, highest_phi = (float(value) for value in trailing_arm.rotation_range(frame))
+    lowest = float(trailing_arm.load(frame, lowest_phi))
+    if load <= lowest:
+        found = f"{under} lifts the arm off its springs (below {lowest * 1e-3:.3f} kN)"
+        return "lifted", found, "raise this load, or reduce mounting.load against it"
+
+    def load_at(coil: Coil, deflection: float) -> str:
+        """Load at which a spring reaches a deflection, nan beyond the arm's reach."""
+        turned = trailing_arm.rotation_of_rise(frame.length, coil.seat, deflection - coil.start)
+        return f"{float(trailing_arm.load(frame, turned)) * 1e-3:.1f} kN"
+
+    met: list[tuple[float, tuple[str, str, str]]] = []
+    solid = solid_heights(suspension)
+    for name, coil in zip(suspension.springs, frame.coils, strict=True):
+        rise, _ = trailing_arm.displacement(
+            frame.length, coil.seat, highest_phi if np.isnan(phi) else phi
+        )
+        H0, seating = float(coil.H0), suspension.checks.seating
+        buckling = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, seating))
+        if coil.start + rise >= buckling:
+            found = (
+                f"{under} buckles the {name} spring: it buckles at {buckling * 1e3:.1f} mm, under "
+                f"{load_at(coil, buckling)}"
+            )
+            remedy = (
+                f"reduce {name}.free_height, raise {name}.mean_diameter, or hold the seats against "
+                "sideways movement (checks.seating = 0.5)"
+            )
+            met.append((buckling / H0, (f"{name} buckled", found, remedy)))
+        travel = H0 - solid[name]
+        if coil.start + rise >= travel:
+            found = (
+                f"{under} is beyond the solid height of the {name} spring: {solid[name] * 1e3:.1f} "
+                f"mm is reached under {load_at(coil, travel)}"
+            )
+            remedy = (
+                f"reduce this load, {name}.active_coils or {name}.wire_diameter, or raise "
+                f"{name}.free_height"
+            )
+            met.append((travel / H0, (f"{name} solid", found, remedy)))
+    if met:
+        return min(met, key=lambda item: item[0])[1]
+    if np.isnan(phi):
+        found = f"{under}: no equilibrium of the arm up to {np.degrees(highest_phi):.1f} degrees"
+        return "no equilibrium", found, "reduce this load or stiffen the springs"
+    return None
+
+
+def _grouped(
+    suspension: TrailingArmSuspension, key: str, obstacles: list[tuple[str, str, str]]
+) -> Fault:
+    """One fault for loads with the same obstacle, at the first that meets it."""
+    (name, found, remedy), *others = obstacles
+    also = f" (also {', '.join(other for other, _, _ in others)})" if others else ""
+    return Fault(suspension.name, f"{key}.{name}", found + also, remedy)
+
+
+def _checks(
+    suspension: TrailingArmSuspension, frame: Arm, cases: tuple[Case, ...]
+) -> Iterator[Check]:
+    """All checks of heights, yield, buckling, space and fatigue."""
+    limits, solid = suspension.checks, solid_heights(suspension)
+    case = max(cases, key=lambda case: case.load)
+    if limits.solid_load is not None:
+        case = next(case for case in cases if case.name == limits.solid_load)
+    springs = {
+        name: (*built(spring), coil)
+        for (name, spring), coil in zip(suspension.springs.items(), frame.coils, strict=True)
+    }
+    for kind, factor, origin in (
+        ("solid_height", limits.clearance_factor, "solid height + {} n (D + d), Grossi (2025)"),
+        ("coil_clearance", limits.standard_clearance_factor, "the same with {}, EN 13906-1 static"),
+    ):
+        note = f"height at {case.name} against " + origin.format(factor)
+        for name, (d, n, coil) in springs.items():
+            least = solid[name] + checks.coil_clearance(n, coil.D, d, factor)
+            height = float(case.springs[name].height)
+            yield Check(f"{kind}_{name}", height, least, "m", "above", note)
+    if (table := suspension.material.tau_allowable) is not None:
+        note = "stress of the solid spring against material.tau_allowable"
+        for name, (d, _, coil) in springs.items():
+            tau = checks.solid_stress(coil.K_V, d, coil.D, coil.H0 - solid[name])
+            allowable = float(checks.allowable_stress(table, d))
+            yield Check(f"yield_{name}", tau, allowable, "Pa", "below", note)
+    for name, (_, _, coil) in springs.items():
+        note = f"largest deflection against buckling, EN 13906-1, seating {limits.seating:g}"
+        limit = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, limits.seating))
+        if np.isinf(limit):
+            limit = coil.H0
+            note += ": does not buckle, limit is the free height"
+        deflection = max(float(case.springs[name].deflection) for case in cases)
+        yield Check(f"buckling_{name}", deflection, limit, "m", "below", note)
+    if suspension.inner is not None:
+        gap = radial_clearance(suspension.outer, suspension.inner)
+        note = "gap between inner and outer spring"
+        yield Check("radial_clearance", gap, limits.radial_clearance, "m", "above", note)
+    if suspension.fatigue is not None:
+        note = "allowable over actual upper stress on the Goodman-Smith line"
+        for name, found in fatigue(suspension).items():
+            limit = limits.fatigue_margin
+            yield Check(f"fatigue_{name}", found.margin, limit, "1", "above", note)

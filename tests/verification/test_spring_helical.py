@@ -36,9 +36,7 @@ def test_smooth_form_equals_printed_form_under_load(spring, fraction):
     assert helical.beam_lateral_stiffness(K_V, D, H0, fraction * H0, NU) == pytest.approx(
         C_q, 1e-11
     )
-    assert helical.beam_tilting_stiffness(K_V, D, H0, fraction * H0, NU) == pytest.approx(
-        C_r, 1e-11
-    )
+    assert helical.beam_stiffnesses(K_V, D, H0, fraction * H0, NU)[1] == pytest.approx(C_r, 1e-11)
 
 
 @given(K_V=stiffnesses, D=diameters, H0=heights, load=st.floats(0.0, 1e-9))
@@ -51,7 +49,7 @@ def test_without_load_the_spring_is_a_shear_beam(K_V, D, H0, load):
     assert helical.beam_lateral_stiffness(K_V, D, H0, load * H0, NU) == pytest.approx(
         shear_beam, rel=1e-6
     )
-    assert helical.beam_tilting_stiffness(K_V, D, H0, load * H0, NU) == pytest.approx(
+    assert helical.beam_stiffnesses(K_V, D, H0, load * H0, NU)[1] == pytest.approx(
         clamped, rel=1e-6
     )
 
@@ -64,8 +62,7 @@ def test_series_and_closed_form_meet_without_a_step(K_V, D, H0):
     roots = np.roots([factor * (0.5 / (1 + NU) - 1.0), factor * H0, -y])
     dz = min(root.real for root in roots if root.real > 0)
     below, above = dz * (1 - 1e-9), dz * (1 + 1e-9)
-    for function in (helical.beam_lateral_stiffness, helical.beam_tilting_stiffness):
-        a, b = function(K_V, D, H0, np.array([below, above]), NU)
+    for a, b in helical.beam_stiffnesses(K_V, D, H0, np.array([below, above]), NU):
         # 2e-9 of travel, and 1e-13 of cut and cancelled digits
         assert abs(b / a - 1.0) < 1e-8
 
@@ -96,7 +93,7 @@ def test_squat_spring_never_buckles(H0, slenderness):
 def test_stiffnesses_scale_with_size_and_modulus(K_V, D, H0, fraction, scale):
     dz = fraction * H0
     lateral = helical.lateral_stiffness(K_V, D, H0, dz, NU)
-    tilting = helical.tilting_stiffness(K_V, D, H0, dz, NU)
+    tilting = helical.lateral_and_tilting(K_V, D, H0, dz, NU)[1]
     # stiffer material: both in proportion; larger spring of the same K_V: K_L same, K_C squared.
     # rel: the closed forms amplify round-off near buckling, where K_L crosses zero
     tolerance = 1e-9 * K_V
@@ -106,9 +103,8 @@ def test_stiffnesses_scale_with_size_and_modulus(K_V, D, H0, fraction, scale):
     assert helical.lateral_stiffness(K_V, scale * D, scale * H0, scale * dz, NU) == pytest.approx(
         lateral, rel=1e-6, abs=1e-6 * K_V
     )
-    assert helical.tilting_stiffness(K_V, scale * D, scale * H0, scale * dz, NU) == pytest.approx(
-        scale**2 * tilting, rel=1e-6
-    )
+    _, scaled = helical.lateral_and_tilting(K_V, scale * D, scale * H0, scale * dz, NU)
+    assert scaled == pytest.approx(scale**2 * tilting, rel=1e-6)
 
 
 def test_number_of_coils_inverts_vertical_stiffness():
