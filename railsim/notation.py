@@ -4,8 +4,10 @@ Everything that names a quantity to a user (HDF5 attributes, plot axes, printed 
 from here; docs/notation.md is made from this table.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from math import pi
+from typing import Any
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 SIDES = ("left", "right")
@@ -31,8 +33,12 @@ SHOWN_UNITS = {
     "%": ("1", 100.0),
     "1e-3": ("1", 1e3),
     "per mille": ("1", 1e3),
+    "-": ("1", 1.0),
 }
 """SI unit of values shown in another one, and shown value over SI value."""
+
+
+Formula = Callable[[Mapping[str, Any]], Any]
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,10 @@ class Quantity:
         Shown value = stored value times `scale`.
     sign : str
         What a positive value means; empty for magnitudes and where the name says it.
+    request : str
+        Key of `settings.outputs` that asks for it; empty for the usual quantities.
+    formula : callable, optional
+        Its values from those of other quantities by name, `speed` of the vehicle among them (SI).
     """
 
     name: str
@@ -66,6 +76,8 @@ class Quantity:
     shown_unit: str
     scale: float
     sign: str = ""
+    request: str = ""
+    formula: Formula | None = field(default=None, compare=False, repr=False)
 
     def text(self, value: float) -> str:
         """Return a stored value as text in the shown unit, without the unit.
@@ -104,14 +116,7 @@ class Quantity:
         def own(units: str) -> str:
             return units.split(", ")[-1 if rotation else 0]
 
-        symbol = {
-            "x": "x",
-            "y": "y",
-            "z": "z",
-            "roll": r"\varphi",
-            "pitch": r"\theta",
-            "yaw": r"\psi",
-        }[name]
+        symbol = {"roll": r"\varphi", "pitch": r"\theta", "yaw": r"\psi"}.get(name, name)
         dots = {"body_velocity": r"\dot ", "body_acceleration": r"\ddot "}.get(self.name, "")
         return replace(
             self,
@@ -122,523 +127,475 @@ class Quantity:
         )
 
 
+_RUN = ("time",)
 _WHEEL = ("time", "wheelset", "side")
 _AXLE = ("time", "wheelset")
 _BODY = ("time", "body", "component")
-
-
-def _table(*rows: Quantity) -> dict[str, Quantity]:
-    return {row.name: row for row in rows}
-
-
-QUANTITIES: dict[str, Quantity] = _table(
-    Quantity("time", "time", "t", "s", ("time",), "s", 1.0),
-    Quantity(
-        "distance",
-        "distance of the reference body",
-        "s",
-        "m",
-        ("time",),
-        "m",
-        1.0,
-        "along the track; 0 at the start of the track",
-    ),
-    Quantity(
-        "mileage",
-        "mileage of the reference body",
-        "s_m",
-        "m",
-        ("time",),
-        "m",
-        1.0,
-        "as the track's file gives it; the distance where it does not",
-    ),
-    Quantity(
-        "curvature",
-        "curvature at the reference body",
-        r"\kappa",
-        "1/m",
-        ("time",),
-        "1/km",
-        1e3,
-        "positive to the right",
-    ),
-    Quantity(
-        "cant",
-        "cant at the reference body",
-        "h",
-        "m",
-        ("time",),
-        "mm",
-        1e3,
-        "positive with the left rail higher",
-    ),
-    Quantity(
-        "Q",
-        "vertical wheel force",
-        "Q",
-        "N",
-        _WHEEL,
-        "kN",
-        1e-3,
-        "on the rail, perpendicular to the track plane, positive pressing on the rail",
-    ),
-    Quantity(
-        "Y",
-        "guiding force",
-        "Y",
-        "N",
-        _WHEEL,
-        "kN",
-        1e-3,
-        "on the rail, in the track plane, positive to the right",
-    ),
-    Quantity(
-        "Y_over_Q",
-        "derailment quotient",
-        "Y/Q",
-        "1",
-        _WHEEL,
-        "-",
-        1.0,
-        "positive when the wheel pushes its rail outwards",
-    ),
-    Quantity(
-        "dQ_over_Q0",
-        "wheel load change",
-        r"\Delta Q/Q_0",
-        "1",
-        _WHEEL,
-        "%",
-        100.0,
-        "positive when the wheel is loaded more than at rest on straight level track",
-    ),
-    Quantity(
-        "sum_Y",
-        "track shift force",
-        r"\Sigma Y",
-        "N",
-        _AXLE,
-        "kN",
-        1e-3,
-        "on the track, positive to the right",
-    ),
-    Quantity("sum_abs_Y", "sum of guiding-force magnitudes", r"\Sigma |Y|", "N", _AXLE, "kN", 1e-3),
-    Quantity(
-        "wheelset_lateral",
-        "wheelset lateral displacement",
-        "y",
-        "m",
-        _AXLE,
-        "mm",
-        1e3,
-        "from the middle of the irregular, deflected rails under the wheelset, along the line over "
-        "their tops, positive to the right",
-    ),
-    Quantity(
-        "wheelset_roll",
-        "wheelset roll angle",
-        r"\varphi",
-        "rad",
-        _AXLE,
-        "mrad",
-        1e3,
-        "relative to the line over the tops of the irregular, deflected rails, positive with the "
-        "right wheel down",
-    ),
-    Quantity(
-        "wheelset_yaw",
-        "wheelset yaw angle",
-        r"\psi",
-        "rad",
-        _AXLE,
-        "mrad",
-        1e3,
-        "relative to the radial position, positive with the nose to the right",
-    ),
-    Quantity(
-        "wheelset_distance",
-        "distance of the wheelset",
-        "s",
-        "m",
-        _AXLE,
-        "m",
-        1.0,
-        "along the track; 0 at the start of the track",
-    ),
-    Quantity(
-        "xi_x",
-        "longitudinal creepage",
-        r"\xi_x",
-        "1",
-        _WHEEL,
-        "1e-3",
-        1e3,
-        "of the most loaded patch: wheel minus rail, over the speed, positive forward",
-    ),
-    Quantity(
-        "xi_y",
-        "lateral creepage",
-        r"\xi_y",
-        "1",
-        _WHEEL,
-        "1e-3",
-        1e3,
-        "of the most loaded patch: wheel minus rail, over the speed, positive to the right",
-    ),
-    Quantity(
-        "phi",
-        "spin creepage",
-        r"\phi",
-        "1/m",
-        _WHEEL,
-        "1/m",
-        1.0,
-        "of the most loaded patch: about the normal into the rail",
-    ),
-    Quantity(
-        "T_gamma",
-        "wear number",
-        r"T\gamma",
-        "N",
-        _WHEEL,
-        "N",
-        1.0,
-        "T_x xi_x + T_y xi_y, summed over the patches, without the spin's part",
-    ),
-    Quantity(
-        "T_gamma_spin",
-        "wear number of spin",
-        r"T\gamma_\phi",
-        "N",
-        _WHEEL,
-        "N",
-        1.0,
-        "M_z phi, summed over the patches",
-    ),
-    Quantity(
-        "Q0",
-        "static wheel load",
-        "Q_0",
-        "N",
-        ("wheelset", "side"),
-        "kN",
-        1e-3,
-        "at rest on straight level track",
-    ),
-    Quantity(
-        "body_position",
-        "position of the body",
-        "q",
-        "m, rad",
-        _BODY,
-        "mm, mrad",
-        1e3,
-        "relative to the track frame of the body; zero in the nominal position",
-    ),
-    Quantity(
-        "body_velocity",
-        "velocity of the body",
-        r"\dot q",
-        "m/s, rad/s",
-        _BODY,
-        "m/s, rad/s",
-        1.0,
-        "relative to the track frame of the body",
-    ),
-    Quantity(
-        "body_acceleration",
-        "acceleration of the body",
-        "a",
-        "m/s2, rad/s2",
-        _BODY,
-        "m/s2, rad/s2",
-        1.0,
-        "absolute, in body axes",
-    ),
-)
-
-
 _ELEMENT = ("time", "element", "component")
 _PATCH = ("time", "wheelset", "side", "patch")
+_SENSOR = ("time", "sensor", "axis")
 PATCHES = ("tread", "flange root", "flange")
 
-# Quantities that a run outputs only where its settings ask for them.
-REQUESTED: dict[str, Quantity] = _table(
-    Quantity(
-        "element_deflection",
-        "deflection of the element",
-        "d",
-        "m, rad",
-        _ELEMENT,
-        "mm, mrad",
-        1e3,
-        "body 2 against body 1, axes of body 1; a link's elongation stands under x",
-    ),
-    Quantity(
-        "element_force",
-        "force of the element",
-        "F",
-        "N, N m",
-        _ELEMENT,
-        "kN, kN m",
-        1e-3,
-        "on body 1, its axes; a link's tension stands under x",
-    ),
-    Quantity(
-        "element_power",
-        "power of the element",
-        "P",
-        "W",
-        ("time", "element"),
-        "kW",
-        1e-3,
-        "taken from the bodies",
-    ),
-    Quantity(
-        "frictional_power",
-        "frictional power of the wheel",
-        "P_f",
-        "W",
-        _WHEEL,
-        "kW",
-        1e-3,
-        "turned into heat in the contact, spin included, summed over the patches",
-    ),
-    Quantity(
-        "axle_torque",
-        "torque of drives and brakes on the wheelset",
-        "M_d",
-        "N m",
-        ("time", "wheelset"),
-        "kN m",
-        1e-3,
-        "forwards positive",
-    ),
-    Quantity("patch_N", "normal force of the patch", "N", "N", _PATCH, "kN", 1e-3),
-    Quantity(
-        "patch_pressure",
-        "largest pressure of the patch",
-        "p_{max}",
-        "Pa",
-        _PATCH,
-        "MPa",
-        1e-6,
-        "Hertz: 3 N / (2 pi a b)",
-    ),
-    Quantity("patch_a", "semi-axis of the patch along the rail", "a", "m", _PATCH, "mm", 1e3),
-    Quantity("patch_b", "semi-axis of the patch across the rail", "b", "m", _PATCH, "mm", 1e3),
-    Quantity(
-        "patch_angle",
-        "contact angle",
-        r"\gamma",
-        "rad",
-        _PATCH,
-        "mrad",
-        1e3,
-        "positive where the normal into the rail leans to the right",
-    ),
-    Quantity(
-        "patch_x",
-        "position of the patch along the track",
-        "x_c",
-        "m",
-        _PATCH,
-        "mm",
-        1e3,
-        "from the wheelset's centre, forwards",
-    ),
-    Quantity(
-        "patch_y",
-        "position of the patch across the track",
-        "y_c",
-        "m",
-        _PATCH,
-        "mm",
-        1e3,
-        "from the wheelset's centre, to the right",
-    ),
-    Quantity(
-        "patch_z",
-        "depth of the patch",
-        "z_c",
-        "m",
-        _PATCH,
-        "mm",
-        1e3,
-        "from the wheelset's centre, down",
-    ),
-    Quantity(
-        "patch_T_x",
-        "longitudinal creep force",
-        "T_x",
-        "N",
-        _PATCH,
-        "kN",
-        1e-3,
-        "on the rail, forwards",
-    ),
-    Quantity(
-        "patch_T_y",
-        "lateral creep force",
-        "T_y",
-        "N",
-        _PATCH,
-        "kN",
-        1e-3,
-        "on the rail, in the contact plane to the right",
-    ),
-    Quantity(
-        "patch_T_gamma",
-        "wear number of the patch",
-        r"T\gamma_c",
-        "N",
-        _PATCH,
-        "N",
-        1.0,
-        "T_x xi_x + T_y xi_y, without the spin's part",
-    ),
-    Quantity(
-        "patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH, "1", 1.0
-    ),
-    Quantity(
-        "sensor_acceleration",
-        "reading of the accelerometer",
-        "a",
-        "m/s2",
-        ("time", "sensor", "axis"),
-        "m/s2",
-        1.0,
-        "absolute acceleration minus gravity, in body axes; zero at rest on level track",
-    ),
-    Quantity(
-        "sensor_roll_rate",
-        "roll velocity of the body",
-        r"\dot\varphi",
-        "rad/s",
-        ("time", "sensor"),
-        "rad/s",
-        1.0,
-        "absolute, positive with the right side going down",
-    ),
-    Quantity(
-        "sensor_absolute_acceleration",
-        "acceleration of the point",
-        "a_{abs}",
-        "m/s2",
-        ("time", "sensor", "axis"),
-        "m/s2",
-        1.0,
-        "absolute, in body axes, gravity not taken off",
-    ),
-    Quantity(
-        "sensor_velocity",
-        "velocity of the point",
-        "v",
-        "m/s",
-        ("time", "sensor", "axis"),
-        "m/s",
-        1.0,
-        "relative to the moving track frame of its body, in its axes",
-    ),
-    Quantity(
-        "sensor_displacement",
-        "displacement of the point",
-        "u",
-        "m",
-        ("time", "sensor", "axis"),
-        "mm",
-        1e3,
-        "from its position in the nominal vehicle, in the track frame of its body",
-    ),
-    Quantity(
-        "wheelset_lateral_on_track",
-        "wheelset lateral displacement from the design track",
-        "y_0",
-        "m",
-        _AXLE,
-        "mm",
-        1e3,
-        "of the wheelset's centre in the track frame, positive to the right",
-    ),
-    Quantity(
-        "wheelset_roll_on_track",
-        "wheelset roll angle against the design track",
-        r"\varphi_0",
-        "rad",
-        _AXLE,
-        "mrad",
-        1e3,
-        "relative to the canted track plane, positive with the right wheel down",
-    ),
-    Quantity(
-        "track_curvature",
-        "curvature at the wheelset",
-        r"\kappa",
-        "1/m",
-        _AXLE,
-        "1/km",
-        1e3,
-        "positive to the right",
-    ),
-    Quantity(
-        "track_cant",
-        "cant at the wheelset",
-        "h",
-        "m",
-        _AXLE,
-        "mm",
-        1e3,
-        "positive with the left rail higher",
-    ),
-    Quantity(
-        "track_gradient",
-        "gradient at the wheelset",
-        "i",
-        "1",
-        _AXLE,
-        "per mille",
-        1e3,
-        "positive uphill",
-    ),
-    Quantity(
-        "rail_lateral",
-        "lateral displacement of the rail",
-        "y_r",
-        "m",
-        _WHEEL,
-        "mm",
-        1e3,
-        "irregularity at the wheelset's position, to the right",
-    ),
-    Quantity(
-        "rail_vertical",
-        "vertical displacement of the rail",
-        "z_r",
-        "m",
-        _WHEEL,
-        "mm",
-        1e3,
-        "irregularity at the wheelset's position, down",
-    ),
-    Quantity(
-        "rail_deflection_lateral",
-        "lateral deflection of the rail",
-        "u_y",
-        "m",
-        _WHEEL,
-        "mm",
-        1e3,
-        "of the elastic rail under the wheel, to the right",
-    ),
-    Quantity(
-        "rail_deflection_vertical",
-        "vertical deflection of the rail",
-        "u_z",
-        "m",
-        _WHEEL,
-        "mm",
-        1e3,
-        "of the elastic rail under the wheel, down",
-    ),
-)
+
+def _row(
+    name: str,
+    words: str,
+    symbol: str,
+    shown: str,
+    dims: tuple[str, ...],
+    sign: str = "",
+    formula: Formula | None = None,
+) -> Quantity:
+    known = [SHOWN_UNITS.get(unit, (unit, 1.0)) for unit in shown.split(", ")]
+    unit = ", ".join(stored for stored, _ in known)
+    return Quantity(name, words, symbol, unit, dims, shown, known[0][1], sign, "", formula)
+
+
+def frictional_power(values: Mapping[str, Any]) -> Any:
+    """Power that the contact of each wheel turns into heat, P = V (T_gamma + T_gamma_spin) [W].
+
+    Both wear numbers are work per metre of the vehicle's way; V is its speed.
+    """
+    return values["speed"][:, None, None] * (values["T_gamma"] + values["T_gamma_spin"])
+
+
+def _requested(key: str, *rows: Quantity) -> tuple[Quantity, ...]:
+    return tuple(replace(row, request=key) for row in rows)
+
+
+QUANTITIES = {
+    row.name: row
+    for row in (
+        _row("time", "time", "t", "s", _RUN),
+        _row(
+            "distance",
+            "distance of the reference body",
+            "s",
+            "m",
+            _RUN,
+            "along the track; 0 at the start of the track",
+        ),
+        _row(
+            "mileage",
+            "mileage of the reference body",
+            "s_m",
+            "m",
+            _RUN,
+            "as the track's file gives it; the distance where it does not",
+        ),
+        _row(
+            "curvature",
+            "curvature at the reference body",
+            r"\kappa",
+            "1/km",
+            _RUN,
+            "positive to the right",
+        ),
+        _row(
+            "cant",
+            "cant at the reference body",
+            "h",
+            "mm",
+            _RUN,
+            "positive with the left rail higher",
+        ),
+        _row(
+            "Q",
+            "vertical wheel force",
+            "Q",
+            "kN",
+            _WHEEL,
+            "on the rail, perpendicular to the track plane, positive pressing on the rail",
+        ),
+        _row(
+            "Y",
+            "guiding force",
+            "Y",
+            "kN",
+            _WHEEL,
+            "on the rail, in the track plane, positive to the right",
+        ),
+        _row(
+            "Y_over_Q",
+            "derailment quotient",
+            "Y/Q",
+            "-",
+            _WHEEL,
+            "positive when the wheel pushes its rail outwards",
+        ),
+        _row(
+            "dQ_over_Q0",
+            "wheel load change",
+            r"\Delta Q/Q_0",
+            "%",
+            _WHEEL,
+            "positive when the wheel is loaded more than at rest on straight level track",
+        ),
+        _row(
+            "sum_Y",
+            "track shift force",
+            r"\Sigma Y",
+            "kN",
+            _AXLE,
+            "on the track, positive to the right",
+        ),
+        _row("sum_abs_Y", "sum of guiding-force magnitudes", r"\Sigma |Y|", "kN", _AXLE),
+        _row(
+            "wheelset_lateral",
+            "wheelset lateral displacement",
+            "y",
+            "mm",
+            _AXLE,
+            (
+                "from the middle of the irregular, deflected rails under the wheelset, along the "
+                "line over their tops, positive to the right"
+            ),
+        ),
+        _row(
+            "wheelset_roll",
+            "wheelset roll angle",
+            r"\varphi",
+            "mrad",
+            _AXLE,
+            (
+                "relative to the line over the tops of the irregular, deflected rails, positive "
+                "with the right wheel down"
+            ),
+        ),
+        _row(
+            "wheelset_yaw",
+            "wheelset yaw angle",
+            r"\psi",
+            "mrad",
+            _AXLE,
+            "relative to the radial position, positive with the nose to the right",
+        ),
+        _row(
+            "wheelset_distance",
+            "distance of the wheelset",
+            "s",
+            "m",
+            _AXLE,
+            "along the track; 0 at the start of the track",
+        ),
+        _row(
+            "xi_x",
+            "longitudinal creepage",
+            r"\xi_x",
+            "1e-3",
+            _WHEEL,
+            "of the most loaded patch: wheel minus rail, over the speed, positive forward",
+        ),
+        _row(
+            "xi_y",
+            "lateral creepage",
+            r"\xi_y",
+            "1e-3",
+            _WHEEL,
+            "of the most loaded patch: wheel minus rail, over the speed, positive to the right",
+        ),
+        _row(
+            "phi",
+            "spin creepage",
+            r"\phi",
+            "1/m",
+            _WHEEL,
+            "of the most loaded patch: about the normal into the rail",
+        ),
+        _row(
+            "T_gamma",
+            "wear number",
+            r"T\gamma",
+            "N",
+            _WHEEL,
+            "T_x xi_x + T_y xi_y, summed over the patches, without the spin's part",
+        ),
+        _row(
+            "T_gamma_spin",
+            "wear number of spin",
+            r"T\gamma_\phi",
+            "N",
+            _WHEEL,
+            "M_z phi, summed over the patches",
+        ),
+        _row(
+            "Q0",
+            "static wheel load",
+            "Q_0",
+            "kN",
+            ("wheelset", "side"),
+            "at rest on straight level track",
+        ),
+        _row(
+            "body_position",
+            "position of the body",
+            "q",
+            "mm, mrad",
+            _BODY,
+            "relative to the track frame of the body; zero in the nominal position",
+        ),
+        _row(
+            "body_velocity",
+            "velocity of the body",
+            r"\dot q",
+            "m/s, rad/s",
+            _BODY,
+            "relative to the track frame of the body",
+        ),
+        _row(
+            "body_acceleration",
+            "acceleration of the body",
+            "a",
+            "m/s2, rad/s2",
+            _BODY,
+            "absolute, in body axes",
+        ),
+    )
+}
+"""The usual quantities of a run, by name."""
+
+REQUESTED = {
+    row.name: row
+    for row in (
+        *_requested(
+            "elements",
+            _row(
+                "element_deflection",
+                "deflection of the element",
+                "d",
+                "mm, mrad",
+                _ELEMENT,
+                "body 2 against body 1, axes of body 1; a link's elongation stands under x",
+            ),
+            _row(
+                "element_force",
+                "force of the element",
+                "F",
+                "kN, kN m",
+                _ELEMENT,
+                "on body 1, its axes; a link's tension stands under x",
+            ),
+            _row(
+                "element_power",
+                "power of the element",
+                "P",
+                "kW",
+                ("time", "element"),
+                "taken from the bodies",
+            ),
+        ),
+        *_requested(
+            "frictional_power",
+            _row(
+                "frictional_power",
+                "frictional power of the wheel",
+                "P_f",
+                "kW",
+                _WHEEL,
+                "turned into heat in the contact, spin included, summed over the patches",
+                frictional_power,
+            ),
+        ),
+        *_requested(
+            "drives",
+            _row(
+                "axle_torque",
+                "torque of drives and brakes on the wheelset",
+                "M_d",
+                "kN m",
+                _AXLE,
+                "forwards positive",
+            ),
+        ),
+        *_requested(
+            "contact_patches",
+            _row("patch_N", "normal force of the patch", "N", "kN", _PATCH),
+            _row(
+                "patch_pressure",
+                "largest pressure of the patch",
+                "p_{max}",
+                "MPa",
+                _PATCH,
+                "Hertz: 3 N / (2 pi a b)",
+            ),
+            _row("patch_a", "semi-axis of the patch along the rail", "a", "mm", _PATCH),
+            _row("patch_b", "semi-axis of the patch across the rail", "b", "mm", _PATCH),
+            _row(
+                "patch_angle",
+                "contact angle",
+                r"\gamma",
+                "mrad",
+                _PATCH,
+                "positive where the normal into the rail leans to the right",
+            ),
+            _row(
+                "patch_x",
+                "position of the patch along the track",
+                "x_c",
+                "mm",
+                _PATCH,
+                "from the wheelset's centre, forwards",
+            ),
+            _row(
+                "patch_y",
+                "position of the patch across the track",
+                "y_c",
+                "mm",
+                _PATCH,
+                "from the wheelset's centre, to the right",
+            ),
+            _row(
+                "patch_z",
+                "depth of the patch",
+                "z_c",
+                "mm",
+                _PATCH,
+                "from the wheelset's centre, down",
+            ),
+            _row(
+                "patch_T_x",
+                "longitudinal creep force",
+                "T_x",
+                "kN",
+                _PATCH,
+                "on the rail, forwards",
+            ),
+            _row(
+                "patch_T_y",
+                "lateral creep force",
+                "T_y",
+                "kN",
+                _PATCH,
+                "on the rail, in the contact plane to the right",
+            ),
+            _row(
+                "patch_T_gamma",
+                "wear number of the patch",
+                r"T\gamma_c",
+                "N",
+                _PATCH,
+                "T_x xi_x + T_y xi_y, without the spin's part",
+            ),
+            _row("patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH),
+        ),
+        *_requested(
+            "sensors",
+            _row(
+                "sensor_acceleration",
+                "reading of the accelerometer",
+                "a",
+                "m/s2",
+                _SENSOR,
+                "absolute acceleration minus gravity, in body axes; zero at rest on level track",
+            ),
+            _row(
+                "sensor_roll_rate",
+                "roll velocity of the body",
+                r"\dot\varphi",
+                "rad/s",
+                ("time", "sensor"),
+                "absolute, positive with the right side going down",
+            ),
+            _row(
+                "sensor_absolute_acceleration",
+                "acceleration of the point",
+                "a_{abs}",
+                "m/s2",
+                _SENSOR,
+                "absolute, in body axes, gravity not taken off",
+            ),
+            _row(
+                "sensor_velocity",
+                "velocity of the point",
+                "v",
+                "m/s",
+                _SENSOR,
+                "relative to the moving track frame of its body, in its axes",
+            ),
+            _row(
+                "sensor_displacement",
+                "displacement of the point",
+                "u",
+                "mm",
+                _SENSOR,
+                "from its position in the nominal vehicle, in the track frame of its body",
+            ),
+        ),
+        *_requested(
+            "track",
+            _row(
+                "wheelset_lateral_on_track",
+                "wheelset lateral displacement from the design track",
+                "y_0",
+                "mm",
+                _AXLE,
+                "of the wheelset's centre in the track frame, positive to the right",
+            ),
+            _row(
+                "wheelset_roll_on_track",
+                "wheelset roll angle against the design track",
+                r"\varphi_0",
+                "mrad",
+                _AXLE,
+                "relative to the canted track plane, positive with the right wheel down",
+            ),
+            _row(
+                "track_curvature",
+                "curvature at the wheelset",
+                r"\kappa",
+                "1/km",
+                _AXLE,
+                "positive to the right",
+            ),
+            _row(
+                "track_cant",
+                "cant at the wheelset",
+                "h",
+                "mm",
+                _AXLE,
+                "positive with the left rail higher",
+            ),
+            _row(
+                "track_gradient",
+                "gradient at the wheelset",
+                "i",
+                "per mille",
+                _AXLE,
+                "positive uphill",
+            ),
+            _row(
+                "rail_lateral",
+                "lateral displacement of the rail",
+                "y_r",
+                "mm",
+                _WHEEL,
+                "irregularity at the wheelset's position, to the right",
+            ),
+            _row(
+                "rail_vertical",
+                "vertical displacement of the rail",
+                "z_r",
+                "mm",
+                _WHEEL,
+                "irregularity at the wheelset's position, down",
+            ),
+            _row(
+                "rail_deflection_lateral",
+                "lateral deflection of the rail",
+                "u_y",
+                "mm",
+                _WHEEL,
+                "of the elastic rail under the wheel, to the right",
+            ),
+            _row(
+                "rail_deflection_vertical",
+                "vertical deflection of the rail",
+                "u_z",
+                "mm",
+                _WHEEL,
+                "of the elastic rail under the wheel, down",
+            ),
+        ),
+    )
+}
+"""Quantities that a run outputs only where its settings ask for them."""

@@ -126,19 +126,6 @@ def _of_both(values: Floats) -> Floats:
     return total
 
 
-def frictional_power(values: Mapping[str, Floats], speed: Floats) -> Floats:
-    """Power that the contact of each wheel turns into heat, P = V (T_gamma + T_gamma_spin).
-
-    Both wear numbers are work per metre of the vehicle's way; V is its speed.
-
-    Returns
-    -------
-    float64[time, wheelset, side]
-        [W]
-    """
-    return speed[:, None, None] * (values["T_gamma"] + values["T_gamma_spin"])
-
-
 def axle_torques(model: Model, state: Floats) -> Floats:
     """Torque of drives and brakes on each wheelset, forwards positive, from recorded states.
 
@@ -302,15 +289,11 @@ class OutputPlan:
         )
 
     def _known(self) -> tuple[Quantity, ...]:
-        prefixes = ["element_"] * bool(self.elements)
-        prefixes += ["patch_"] * self._asked.contact_patches
-        prefixes += ["frictional_power"] * self._asked.frictional_power
-        prefixes += ["axle_torque"] * self._asked.drives
-        prefixes += ["track_", "rail_", "wheelset_"] * self._asked.track
-        if self._sensors:
-            prefixes += list(READINGS) if self._readings_only else ["sensor_"]
-        more = [q for name, q in REQUESTED.items() if name.startswith(tuple(prefixes))]
-        return (*QUANTITIES.values(), *(more if prefixes else ()))
+        asked = {**dict(self._asked), "elements": self.elements, "sensors": self._sensors}
+        more = [q for q in REQUESTED.values() if asked[q.request]]
+        if self._readings_only:
+            more = [q for q in more if q.request != "sensors" or q.name in READINGS]
+        return (*QUANTITIES.values(), *more)
 
     @property
     def coordinates(self) -> dict[str, Sequence[str]]:
@@ -350,8 +333,6 @@ class OutputPlan:
                 values |= motions(self._sensors, values, self._model.index.bodies)
         if self._asked.contact_patches:
             values |= _patches(recorder.patch[:rows], recorder.state[:rows, -1])
-        if self._asked.frictional_power:
-            values["frictional_power"] = frictional_power(values, recorder.state[:rows, -1])
         if self._asked.drives:
             values["axle_torque"] = axle_torques(self._model, recorder.state[:rows])
         if self._asked.track:
@@ -364,6 +345,8 @@ class OutputPlan:
                 "wheelset_lateral_on_track": values["body_position"][:, axles, LATERAL],
                 "wheelset_roll_on_track": values["body_position"][:, axles, ROLL],
             }
+        known = {**values, "speed": recorder.state[:rows, -1]}
+        values |= {q.name: q.formula(known) for q in self.quantities if q.formula is not None}
         distance = values["distance"]
         later = {
             "mileage": lambda: self._track_file.mileage_at(distance),
