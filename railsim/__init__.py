@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
+    from railsim.description import Description, describe
     from railsim.errors import InputError, ModelError
     from railsim.linear.modes import modes, root_locus
     from railsim.model.statics import StaticLoads, static_loads
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Assessment": "railsim.assessment",
+    "Description": "railsim.description",
     "InputError": "railsim.errors",
     "Mechanism": "railsim.definitions.mechanism",
     "ModelError": "railsim.errors",
@@ -58,6 +60,7 @@ _HOMES = {
     "assess": "railsim.assessment",
     "critical_speed": "railsim.stability.critical_speed",
     "curving": "railsim.stability.curving",
+    "describe": "railsim.description",
     "load_comfort_limits": "railsim.definitions.loading",
     "load_mechanism": "railsim.definitions.loading",
     "load_profile": "railsim.profiles",
@@ -81,6 +84,7 @@ _HOMES = {
 
 __all__ = [
     "Assessment",
+    "Description",
     "InputError",
     "Mechanism",
     "ModelError",
@@ -95,6 +99,7 @@ __all__ = [
     "assess",
     "critical_speed",
     "curving",
+    "describe",
     "load_comfort_limits",
     "load_mechanism",
     "load_profile",

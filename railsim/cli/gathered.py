@@ -1,15 +1,18 @@
 """Runs from result files and from folders of studies, for commands that take either."""
 
 import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from railsim.description import Description
     from railsim.result import Result
 
 Record = dict[str, Any]
+STUDY_FILES = ("study.json", "summary.csv")
 
 
 @dataclass
@@ -40,7 +43,7 @@ class Gathered:
 def gather(files: Sequence[str]) -> Gathered:
     """Return the runs of result files and of folders.
 
-    A folder is that of a study, or all results in it.
+    A folder is that of a study, or all results in it; so is a file with the table of a study.
 
     Raises
     ------
@@ -51,7 +54,7 @@ def gather(files: Sequence[str]) -> Gathered:
     found = Gathered()
     faults: list[Fault] = []
     for file in files:
-        path = Path(file)
+        path = folder_of(file)
         try:
             records = _of_folder(path) if os.path.isdir(path) else [_of_file(path)]
         except InputError as error:
@@ -67,6 +70,33 @@ def gather(files: Sequence[str]) -> Gathered:
     if faults:
         raise InputError(faults)
     return found
+
+
+def folder_of(file: str) -> Path:
+    """Return the folder of a study, given as such or by a file with its table; or the file."""
+    path = Path(file)
+    return path.parent if path.name in STUDY_FILES and path.is_file() else path
+
+
+def described_runs(file: str) -> "Description":
+    """Return the runs of a study or of a folder: how they ended, and what tells them apart."""
+    from railsim.description import Description
+    from railsim.table import Table
+
+    found = gather([file])
+    statuses = Counter(str(record["status"]) for record in found.records)
+    ended = ", ".join(f"{number} {status}" for status, number in statuses.items())
+    keys = dict.fromkeys(key for record in found.records for key in record["labels"])
+    rows = [
+        {"run": record["name"], **record["labels"], "status": record["status"]}
+        for record in found.records
+    ]
+    table = Table(
+        ["run", *keys, "status"], ({k: str(v) for k, v in row.items()} for row in rows)
+    )
+    title = f"{folder_of(file)}: {len(rows)} runs, {ended}"
+    data = {"kind": "runs", "folder": str(folder_of(file)), "status": statuses, "runs": rows}
+    return Description(data, [title, "", table, *found.remarks])
 
 
 def _add(found: Gathered, records: Sequence[Record], folder: Path, *, prefix: bool) -> None:

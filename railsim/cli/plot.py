@@ -71,7 +71,7 @@ def command(
     wheel of the leading wheelset, body_acceleration:carbody:y the lateral acceleration of the
     carbody.
 
-    Of a STUDY, its folder: values of its summary such as Y_over_Q_abs or sum_abs_Y_mid1 over the
+    Of a STUDY, its folder or summary.csv: values of its summary such as Y_over_Q_abs or sum_abs_Y_mid1 over the
     parameter of most values, a curve for each value of the next, or as --against, --family and
     --kind say.
 
@@ -83,14 +83,17 @@ def command(
       railsim plot run.h5 Y Q:1 --over time --by wheelset --out forces.pdf
       railsim plot curve_r250 --out curve.png
     """  # noqa: D301 - click reads the escape
-    path = Path(out or file)
-    of_study = os.path.isdir(file)
+    from railsim.cli.gathered import folder_of
+
+    folder = folder_of(file)
+    of_study = os.path.isdir(folder)
+    path = Path(out or folder)
     if not out and path.name:
         path = path / "study.png" if of_study else path.with_suffix(".png")
     check_file(path, overwrite=overwrite, endings=PICTURES)
     chosen = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
-        figure = _study_figure(file, selections, chosen)
+        figure = _study_figure(str(folder), selections, chosen)
     elif wrong := [option for option, value in chosen.items() if value]:
         fault = Fault(wrong[0], "", f"'{file}' is no study's folder", "a folder of results")
         raise InputError([fault])
