@@ -102,7 +102,8 @@ class Column:
             return value
         if isnan(value):
             return "-"
-        return format(value * SHOWN_UNITS.get(self.unit, ("", 1))[1], self.format)
+        without_minus_zero = self.format.replace(".", "z.", 1 if self.format.endswith("f") else 0)
+        return format(value * SHOWN_UNITS.get(self.unit, ("", 1))[1], without_minus_zero)
 
 
 class Amount(NamedTuple):

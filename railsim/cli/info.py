@@ -21,7 +21,6 @@ from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
     from railsim.definitions.base import FileDefinition
-    from railsim.description import Description
 
 
 @click.command()
@@ -76,16 +75,21 @@ def command(
         found = describe(open_result(file))
     else:
         from railsim.definitions.loading import load_any
+        from railsim.definitions.vehicle import Vehicle
         from railsim.description import describe
 
         definition, known = load_any(file, with_load(assignments, load))
         if draw is not None:
             _draw(definition, Path(draw), overwrite)
         found = describe(definition, speeds)
-        if static and known.kind == "vehicle":
-            from railsim.model.statics import static_loads
+        if static and isinstance(definition, Vehicle):
+            from railsim.description import Description
+            from railsim.description.rest import describe_statics
 
-            data = static_loads(definition).record()
+            rest = describe_statics(definition, [definition.load] if load else [])
+            chosen = rest.data[definition.load or "design"]
+            data = {**found.data, "static": chosen, "load_cases": rest.data}
+            found = Description(data, [*found.parts, *rest.parts])
         remarks = [] if as_json else [f"remark: {one}" for one in remarks_on(definition, known)]
     if as_json:
         print_json(found.data)

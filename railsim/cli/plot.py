@@ -71,9 +71,9 @@ def command(
     wheel of the leading wheelset, body_acceleration:carbody:y the lateral acceleration of the
     carbody.
 
-    Of a STUDY, its folder or summary.csv: values of its summary such as Y_over_Q_abs or sum_abs_Y_mid1 over the
-    parameter of most values, a curve for each value of the next, or as --against, --family and
-    --kind say.
+    Of a STUDY, its folder or summary.csv: values of its summary such as Y_over_Q_abs or
+    sum_abs_Y_mid1 over the parameter of most values, a curve for each value of the next, or as
+    --against, --family and --kind say.
 
     \b
     Example:

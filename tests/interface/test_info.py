@@ -48,7 +48,7 @@ def test_track_shows_curves_with_their_speeds(capsys):
     lines = lines_of(capsys, "curve_r250", "--speed", "20")
     circle = next(line for line in lines if line.startswith("CIR"))
     # balanced: sqrt(0.15 * 9.81 / 1.5 * 250) = 15.66 m/s; at 20 m/s 244.6 - 150 mm are missing
-    assert circle.split() == ["CIR", "360", "420", "250", "150", "15.7", "m/s", "22.1", "m/s", "95"]
+    assert circle.split() == ["CIR", "360", "420", "250", "150", "56.4", "79.7", "95"]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
@@ -144,6 +144,53 @@ def test_static_loads_add_up_to_the_weight(capsys):
     assert static["preload"]["front.secondary_spring.left"][2] == pytest.approx(
         43628.0 * 9.81 / 4.0
     )
+
+
+def test_every_load_case_has_its_own_tables(capsys):
+    data = data_of(capsys, "metro_b_motor", "--static")
+    assert list(data["load_cases"]) == ["design", "full"]
+    for case in data["load_cases"].values():
+        # both stages carry the same load case: the primary springs the weight of all but wheelsets
+        masses = {row["body"]: row["mass"] for row in case["masses"]}
+        sprung = masses["carbody"] + masses["front.frame"] + masses["rear.frame"]
+        forces = {row["element"]: row["force"] for row in case["springs"]}
+        primary = sum(force for name, force in forces.items() if "primary" in name)
+        secondary = sum(force for name, force in forces.items() if "secondary." in name)
+        assert primary == pytest.approx(sprung * 9.81, rel=1e-4)
+        assert secondary == pytest.approx(masses["carbody"] * 9.81, rel=1e-4)
+        assert all(0.5 < row["bounce"] < 20.0 for row in case["frequencies"])
+    full = data["load_cases"]["full"]
+    # the air springs level the car over frames whose springs of 1.7 kN/mm carry 25.4 kN more
+    (car, frame, _) = full["heights"]
+    assert frame["raised"] == pytest.approx(-0.0162, abs=2e-4)
+    assert car["raised"] == pytest.approx(frame["raised"], abs=1e-4)
+    text = "\n".join(lines_of(capsys, "metro_b_motor", "--static", "--load", "full"))
+    assert "carbody stands 16 mm below its nominal height" in text
+    assert "load 'design'" not in text
+
+
+def test_springs_and_stops_of_a_loaded_wagon(capsys):
+    data = data_of(capsys, "wagon_y25", "--static", "--load", "laden")["static"]
+    springs = {row["element"]: row for row in data["springs"]}
+    outer, inner = (springs[f"front.outer.{name}_springs.left"] for name in ("outer", "inner"))
+    assert outer["shortened"] == pytest.approx(inner["shortened"], abs=1e-6)
+    assert outer["length"] + outer["shortened"] == pytest.approx(0.23993, abs=1e-4)
+    stops = {row["element"]: row for row in data["stops"]}
+    # the inner spring begins to carry 5.9 mm below the nominal position
+    assert stops["front.outer.inner_springs.left"]["backward"] == pytest.approx(
+        0.0059 - inner["shortened"], abs=1e-4
+    )
+    assert stops["front.outer.guide_lateral.left"]["forward"] == pytest.approx(0.01, abs=1e-6)
+
+
+def test_runs_of_a_folder_are_listed_whichever_way_it_is_given(capsys, tmp_path):
+    for name, gain in (("one", 1.0), ("two", 0.9)):
+        example_result(gain=gain).to_hdf5(tmp_path / f"{name}.h5")
+    lines = lines_of(capsys, str(tmp_path))
+    assert lines[0].endswith("2 runs, 2 complete")
+    assert [line.split()[0] for line in lines[3:5]] == ["one", "two"]
+    data = data_of(capsys, str(tmp_path))
+    assert [run["status"] for run in data["runs"]] == ["complete", "complete"]
 
 
 def test_wrong_file_is_status_2(capsys, tmp_path):

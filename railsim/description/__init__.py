@@ -1,0 +1,94 @@
+"""What an input file or a result holds: tables for people, plain values for programs.
+
+`vehicles`, `tracks`, `design_files` one subject each; `rest` a vehicle at rest.
+
+>>> import railsim
+>>> railsim.describe(railsim.load_track("curve_r250")).data["length"]
+980.0
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from railsim.definitions.base import FileDefinition
+from railsim.definitions.loading import FORMATS
+from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.spring import TrailingArmSuspension
+from railsim.definitions.study import Study
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.description.design_files import mechanism_parts, spring_parts
+from railsim.description.tracks import describe_track
+from railsim.description.values import Description
+from railsim.description.vehicles import describe_vehicle
+from railsim.result.data import Result
+from railsim.table import Table
+
+__all__ = ["Description", "describe"]
+
+
+def describe(item: FileDefinition | Result, speeds: Sequence[float] = ()) -> Description:
+    """Return what a vehicle, track, spring, mechanism, study, settings or result holds.
+
+    Parameters
+    ----------
+    item
+        Definition or result.
+    speeds : sequence of float
+        Of a track: speeds for which the cant deficiency in its curves is given [m/s].
+    """
+    if isinstance(item, Result):
+        return _result(item)
+    if isinstance(item, Track):
+        return describe_track(item, speeds)
+    if isinstance(item, Vehicle):
+        return describe_vehicle(item)
+    content = item.model_dump()
+    data = {"kind": FORMATS[content["format"]].kind, **content}
+    if isinstance(item, TrailingArmSuspension):
+        return Description(data, spring_parts(item))
+    if isinstance(item, Mechanism):
+        return Description(data, mechanism_parts(item))
+    if isinstance(item, Study):
+        data = {"kind": "study", "runs": item.runs, **item.model_dump(exclude_none=True)}
+        return Description(data, [f"{item.name}: {item.runs} runs", "", item.to_toml().rstrip()])
+    return Description(data, [item.to_toml().rstrip()])
+
+
+def _result(result: Result) -> Description:
+    """Return what a result holds, without its arrays."""
+    inputs = ("vehicle_toml", "track_toml", "settings_json")
+    attributes = {k: v for k, v in result.attributes.items() if k not in (*inputs, "remarks")}
+    coordinates = {name: list(labels) for name, labels in result.coordinates.items()}
+    # by the dimensions: the arrays of a long run are not read for their shapes
+    lengths = {"time": len(result["time"])} | {dim: len(n) for dim, n in coordinates.items()}
+    quantities: dict[str, dict[str, Any]] = {
+        name: {
+            "dims": quantity.dims,
+            "shape": tuple(lengths[dim] for dim in quantity.dims),
+            "unit": quantity.unit,
+        }
+        for name, quantity in result.quantities.items()
+    }
+    data = {
+        "kind": "result",
+        "attributes": attributes,
+        "remarks": list(result.remarks),
+        "coordinates": coordinates,
+        "quantities": quantities,
+    }
+    rows = [
+        [name, ", ".join(q["dims"]), " x ".join(map(str, q["shape"])), q["unit"]]
+        for name, q in quantities.items()
+    ]
+    return Description(
+        data,
+        [
+            *(f"{name:18} {value}" for name, value in attributes.items()),
+            *(f"{'remark':18} {remark}" for remark in result.remarks),
+            "",
+            *(f"{name:18} {', '.join(labels)}" for name, labels in coordinates.items()),
+            "",
+            Table(["quantity", "dimensions", "shape", "unit"], rows),
+        ],
+    )

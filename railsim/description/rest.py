@@ -1,0 +1,54 @@
+"""How a vehicle stands at rest, and at which frequencies its bodies oscillate."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle import Vehicle
+from railsim.description.values import Description, Parts
+from railsim.linear.modes import modes
+from railsim.model.statics import SLOW, static_loads
+from railsim.table import Column, Table
+
+
+def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Description:
+    """Return how a vehicle stands at rest, and how its bodies oscillate, in several load cases.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    loads : sequence of str or None
+        Load cases, None for the design load; by default all.
+    """
+    cases = loads or (None, *vehicle.loads)
+    data: dict[str, Any] = {}
+    parts: Parts = []
+    for case in cases:
+        loaded = vehicle.replace(load=case)
+        found, frequencies = static_loads(loaded), rest_frequencies(loaded)
+        data[found.load] = {**found.record(), "frequencies": frequencies.records()}
+        parts += ["", f"At rest, load '{found.load}'", *(f"  {words}" for words in found.displaced)]
+        for table in (*found.tables, frequencies):
+            parts += ["", table]
+    return Description(data, parts)
+
+
+def rest_frequencies(vehicle: Vehicle) -> Table:
+    """Return natural frequencies of bounce, pitch and roll of the sprung bodies.
+
+    Each is that of the mode in which the motion has the largest share of the kinetic energy, of
+    the vehicle linearised at rest: friction sticks.
+    """
+    found = modes(vehicle, speed=SLOW).oscillations
+    motions = {"bounce": "z", "pitch": "pitch", "roll": "roll"}
+    rows = []
+    for body in flatten(vehicle).of_kind("body"):
+        row: dict[str, Any] = {"body": body.name}
+        for name, component in motions.items():
+            motion = f"{body.name}.{component}"
+            mode = max(found, key=lambda one: one.participation.get(motion, 0.0), default=None)
+            if mode is not None and motion in mode.participation:
+                row[name] = mode.natural_frequency
+        rows.append(row)
+    columns = [Column(name, unit="Hz", format=".2f") for name in motions]
+    return Table([Column("body"), *columns], rows, "Natural frequencies")

@@ -1,0 +1,145 @@
+"""What a track holds."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from railsim.definitions.alignment_rules import cant_at
+from railsim.definitions.irregularity import READING, Irregularity, Measured
+from railsim.definitions.layout import Section, cant_sections, curvature_sections, gradient_sections
+from railsim.definitions.track import Track
+from railsim.description.values import Description, Parts, either, short
+from railsim.table import Column, Table
+from railsim.track.curves import Curve, curves
+
+_COPIED = (
+    "name", "source", "length", "gauge", "rail", "inclination", "friction", "friction_table",
+    "gauge_widening", "cant_rotation", "third_body", "rounding", "speed",
+)  # fmt: skip
+
+
+def describe_track(track: Track, speeds: Sequence[float]) -> Description:
+    """Return plan with cant, speeds of the curves, vertical profile, irregularities."""
+    plan, cant = curvature_sections(track), cant_sections(track)
+    bends = {curve.section: curve for curve in curves(track)}
+    data = {
+        "kind": "track",
+        **{name: getattr(track, name) for name in _COPIED},
+        "friction_falling": track.friction_falling and track.friction_falling.model_dump(),
+        "plan": [_plan_row(section, cant, bends.get(section), speeds) for section in plan],
+        "cant": [_row(section) for section in cant],
+        "vertical": [_row(section) for section in gradient_sections(track)],
+        "mileage": (track.mileage_at(0.0), track.mileage_at(track.length)),
+        "irregularities": [_irregularity(part) for part in track.irregularities],
+    }
+    parts: Parts = [*_track_lines(track, data["mileage"]), "", _plan_table(data["plan"], speeds)]
+    if speeds and any("cant_deficiency" in row for row in data["plan"]):
+        parts.append("columns of speeds: cant deficiency in mm")
+    ends = [Column("begin", "from", "m", "g"), Column("end", "to", "m", "g")]
+    vertical = [
+        [row["type"], row["begin"], row["end"], _range(row["values"], 1e3)]
+        for row in data["vertical"]
+    ]
+    gradient = Column("gradient", "gradient per mille", format=">")
+    if vertical:
+        parts += ["", Table([Column("vertical"), *ends, gradient], vertical)]
+    irregular = [
+        [str(part["type"]), ", ".join(f"{k} {short(v)}" for k, v in part.items() if k != "type")]
+        for part in data["irregularities"]
+    ]
+    if irregular:
+        parts += ["", Table(["irregularity", "values"], irregular)]
+    return Description(data, parts)
+
+
+def _track_lines(track: Track, mileage: tuple[float, float]) -> list[str]:
+    slope = 1.0 / track.inclination if track.inclination else math.inf
+    friction = "by table" if track.friction_table else either(track.friction)
+    lines = [
+        track.name,
+        f"  {track.length:g} m, gauge {1e3 * track.gauge:g} mm, rail {either(track.rail)} "
+        f"1:{slope:g}, friction {friction}, rounded over {track.rounding:g} m",
+    ]
+    if track.speed is not None:
+        lines.append(f"  permitted speed {track.speed:g} m/s ({3.6 * track.speed:.0f} km/h)")
+    if track.mileage or track.falling_mileage:
+        lines.append("  mileage from km {:.3f} to km {:.3f}".format(*(m / 1e3 for m in mileage)))
+    if track.cant_rotation == "inner_rail":
+        lines.append("  cant turns the track about the inner rail")
+    if track.gauge_widening:
+        widest = max(left + right for _, left, right in track.gauge_widening)
+        lines.append(f"  gauge widened by up to {1e3 * widest:g} mm")
+    if track.friction_falling:
+        falling = track.friction_falling
+        lines.append(f"  friction with slip down to {falling.rest:g} of it, {falling.decay:g} s/m")
+    if track.third_body != (1.0, 1.0):
+        lines.append(f"  third body: Kalker's coefficients times {either(track.third_body)}")
+    return [*lines, f"  source: {track.source}"] if track.source else lines
+
+
+def _irregularity(part: Irregularity) -> dict[str, Any]:
+    """Return an irregularity; of a measured one what its rows hold instead of the rows."""
+    data = part.model_dump(exclude_none=True, exclude={"rows"})
+    if isinstance(part, Measured) and part.rows is not None:
+        from railsim.track.irregularity import largest_between_rows
+
+        found = largest_between_rows(part)
+        data = {key: value for key, value in data.items() if key not in READING}
+        data |= {
+            "number": len(part.rows),
+            "first": part.rows[0][0] + part.shift,
+            "last": part.rows[-1][0] + part.shift,
+            "column": found.column,
+            "largest_at_rows": found.at_rows,
+            "largest_between_rows": found.between,
+        }
+    return data
+
+
+def _row(section: Section) -> dict[str, Any]:
+    return {
+        "type": section.type,
+        "begin": section.begin,
+        "end": section.end,
+        "values": (section.start_value, section.end_value),
+    }
+
+
+def _plan_row(
+    section: Section, cant: Sequence[Section], curve: Curve | None, speeds: Sequence[float]
+) -> dict[str, Any]:
+    row = _row(section)
+    row["radii"] = tuple(1.0 / k if k else math.inf for k in row.pop("values"))
+    row["cant"] = tuple(cant_at(cant, s) for s in (section.begin, section.end))
+    if curve is not None:
+        row["balanced_speed"] = curve.balanced_speed
+        row["usual_speed"] = curve.usual_speed
+        row["cant_deficiency"] = {speed: curve.cant_deficiency(speed) for speed in speeds}
+    return row
+
+
+def _plan_table(plan: Sequence[dict[str, Any]], speeds: Sequence[float]) -> Table:
+    columns = [
+        Column("type", "plan"),
+        Column("begin", "from", "m", "g"),
+        Column("end", "to", "m", "g"),
+        Column("radii", "radius m", format=">"),
+        Column("cant", "cant mm", format=">"),
+        Column("balanced_speed", "equilibrium speed", "km/h", ".1f"),
+        Column("usual_speed", "speed at 150 mm deficiency", "km/h", ".1f"),
+        *(Column(f"{speed:g}", f"{speed:g} m/s", "", ".0f") for speed in speeds),
+    ]
+    rows = [
+        {
+            **row,
+            "radii": _range(row["radii"], 1.0),
+            "cant": _range(row["cant"], 1e3),
+            **{f"{v:g}": 1e3 * lack for v, lack in row.get("cant_deficiency", {}).items()},
+        }
+        for row in plan
+    ]
+    return Table(columns, rows)
+
+
+def _range(values: Sequence[float], scale: float) -> str:
+    return " to ".join(dict.fromkeys(f"{scale * value:g}" for value in values))
