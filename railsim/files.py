@@ -326,7 +326,7 @@ def _sweep(folder: Path, prefix: str = "", own: Path | None = None) -> int:
         return 0
     for path in paths:
         with suppress(OSError):  # a link, gone by now, or on a file system without locks
-            if path == own:
+            if own is not None and path.name == own.name:  # absolute, where the folder is not
                 continue
             handle = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | _NO_WAITING)
             try:

@@ -1,13 +1,14 @@
 """Files and folders that commands write: refused before anything is, and never half full."""
 
 import os
+from pathlib import Path
 
 import pytest
 from example_result import example_result
 
 from railsim.cli import main
 from railsim.errors import InputError
-from railsim.files import check_folder
+from railsim.files import PartialFile, check_folder
 
 FIRST = {"contact": "functions.csv", "compare": "compare.csv", "spring verify": "report.html"}
 
@@ -136,3 +137,10 @@ def test_picture_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch, c
     monkeypatch.setattr(Figure, "savefig", full_disk)
     assert main([*commands["plot"], str(tmp_path / "x.png")]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_a_file_in_the_current_folder_is_not_in_its_own_way(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with PartialFile(Path("run.h5"), alone=True) as partial:
+        partial.path.write_text("whole")
+        assert partial.finish() == Path("run.h5")
