@@ -4,9 +4,7 @@ The first result is what the others are compared with.  Differences are those of
 (|b| - |a|) / |a|, so that a mirrored run differs by nothing.
 """
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
@@ -18,7 +16,7 @@ from railsim.errors import Fault, InputError
 from railsim.notation import Quantity
 from railsim.result import Peak, Result, mid_curves, peaks
 from railsim.result.data import Array
-from railsim.text import spreadsheet_cell
+from railsim.table import Amount, Column, Table
 
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 
@@ -194,16 +192,79 @@ def _shared(one: Result, other: Result) -> Any:
     return (positions >= others[0]) & (positions <= others[-1])
 
 
-def comparison_csv(rows: Sequence[Comparison]) -> str:
-    """Return comparisons as comma-separated values, one line for each value, SI."""
-    columns = ["quantity", "unit", "where", "result", "value", "wheelset", "side"]
-    columns += ["time", "distance", "difference"]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n", extrasaction="ignore")
-    writer.writeheader()
+def comparison_table(rows: Sequence[Comparison]) -> Table:
+    """Return comparisons with one line for each value, SI."""
+    names = ("quantity", "unit", "where", "result", "value", "wheelset", "side", "time",
+             "distance", "difference")  # fmt: skip
+    lines = (
+        {**value, "where": row.where, "result": label}
+        for row in rows
+        for label, value in row.record()["values"].items()
+    )
+    return Table(map(Column, names), lines)
+
+
+def comparison_tables(rows: Sequence[Comparison], results: Mapping[str, Result]) -> list[Table]:
+    """Return comparisons as people read them: the peaks, then each full curve."""
+    by_place: dict[str, list[Comparison]] = {}
     for row in rows:
-        for label, value in row.record()["values"].items():
-            facts = {"quantity": row.quantity.name, "where": row.where, "result": label}
-            row_cells = {**value, **facts}
-            writer.writerow({name: spreadsheet_cell(cell) for name, cell in row_cells.items()})
-    return text.getvalue()
+        place = "peaks" if row.where in WORDS.values() else row.where
+        by_place.setdefault(place, []).append(row)
+    return [
+        Table([Column("quantity", place), *_COLUMNS], _compared(found, results))
+        for place, found in by_place.items()
+    ]
+
+
+_COLUMNS = (
+    Column("words", " "),
+    Column("result"),
+    Column("wheelset"),
+    Column("side"),
+    Column("value", format=">"),
+    Column("time", "t", "s", ".2f"),
+    Column("distance", "s", "m", ".1f"),
+    Column("difference", "difference", "%", "+.2f"),
+)
+
+
+def _compared(rows: Sequence[Comparison], results: Mapping[str, Result]) -> Iterator[list[Any]]:
+    for row in rows:
+        by_sign = row.where in (WORDS["max"], WORDS["min"])
+        words = f"{row.quantity.words}, {row.where}" if by_sign else row.quantity.words
+        differences = row.differences
+        for index, (label, peak) in enumerate(row.peaks.items()):
+            name = peak.labels.get("wheelset", "")
+            undefined = index == 0 or isnan(differences[label])
+            yield [
+                *(("", "") if index else (row.quantity.name, words)),
+                label,
+                f"{results[label].wheelsets.index(name) + 1}" if name else "",
+                peak.labels.get("side", ""),
+                Amount(peak.value, Column.of(row.quantity)),
+                peak.time,
+                peak.distance,
+                None if undefined else differences[label],
+            ]
+
+
+def difference_table(found: Sequence[Difference]) -> Table:
+    """Return the largest differences along the track."""
+    columns = [
+        Column("quantity", "along the track, leading wheelset"),
+        Column("result"),
+        Column("side"),
+        Column("largest_difference", "largest difference", format=">"),
+        Column("distance", "s", "m", ".1f"),
+    ]
+    rows = [
+        [
+            one.quantity.words,
+            one.result,
+            one.labels.get("side", ""),
+            Amount(one.largest[0], Column.of(one.quantity)),
+            one.largest[1],
+        ]
+        for one in found
+    ]
+    return Table(columns, rows)

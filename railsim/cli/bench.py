@@ -2,7 +2,7 @@
 
 import click
 
-from railsim.cli.common import echo, json_option, print_json, table
+from railsim.cli.common import echo, json_option, print_json, show
 from railsim.cli.progress import progress_bar
 
 
@@ -26,6 +26,7 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
       railsim bench --quick --json > bench.json
     """  # noqa: D301 - click reads the escape
     from railsim.bench.report import FULL, QUICK, benchmark, tables
+    from railsim.table import Column, Table
 
     with progress_bar("bench", quiet=quiet) as progress:
         found = benchmark(QUICK if quick else FULL, progress)
@@ -38,6 +39,5 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
         f"FASTSIM's vectors: {facts['vectors']}"
     )
     echo(", ".join(f"{name} {number}" for name, number in found["versions"].items()))
-    for header, rows in tables(found):
-        echo("")
-        echo("\n".join(table(header, rows)))
+    for (first, *others), rows in tables(found):
+        show("", Table([Column(first), *(Column(name, format=">") for name in others)], rows))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, table
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, show
 from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def command(
       railsim compare curves
       railsim compare before after --out changes
     """  # noqa: D301 - click reads the escape
-    from railsim.compare import compare
+    from railsim.compare import compare, comparison_tables, difference_table
 
     groups = _groups(files)
     folder = Path(out) if out else None
@@ -76,7 +76,14 @@ def command(
             continue
         if title:
             echo(f"\n{title}" if number else title)
-        echo("\n".join([*_lines(rows, results), *_along(differing), *why]))
+        for table in comparison_tables(rows, results):
+            show(table, "")
+        remarks = [
+            f"{label}: remark: {remark}"
+            for label, result in results.items()
+            for remark in result.remarks
+        ]
+        show(*remarks, *([difference_table(differing)] if differing else []), *why)
         for path in written:
             echo(str(path))
     if as_json:
@@ -177,26 +184,6 @@ def _differing(results: "dict[str, Result]") -> "tuple[list[Difference], list[st
         return [], [f"no differences along the track: {fault}" for fault in error.faults]
 
 
-def _along(found: "Sequence[Difference]") -> list[str]:
-    """Return the table of the largest differences along the track."""
-    if not found:
-        return []
-    rows = [
-        [
-            one.quantity.long_name,
-            one.result,
-            one.labels.get("side", ""),
-            one.quantity.text(one.largest[0]),
-            one.quantity.shown_unit.replace("-", ""),
-            f"{one.largest[1]:.1f}",
-        ]
-        for one in found
-    ]
-    header = ["along the track, leading wheelset", "result", "side", "largest difference", "",
-              "s (m)"]  # fmt: skip
-    return ["", *table(header, rows, numbers=3)]
-
-
 def _opened(files: tuple[str, ...]) -> "dict[str, Result]":
     """Open all results under the shortest names that tell them apart."""
     from railsim.errors import Fault, InputError
@@ -253,7 +240,7 @@ def _write(
 ) -> list[Path]:
     import json
 
-    from railsim.compare import comparison_csv
+    from railsim.compare import comparison_table
     from railsim.plot.overlay import difference_figure, overlay
     from railsim.plot.style import save
 
@@ -262,7 +249,7 @@ def _write(
         folder / _named(name, title) for name in (TABLE, RECORD, PICTURE, DIFFERENCES)
     )
     with whole_file(table_file) as partial:
-        partial.write_text(comparison_csv(rows), encoding="utf-8")
+        partial.write_text(comparison_table(rows).csv(), encoding="utf-8")
     with whole_file(record_file) as partial:
         partial.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     written = [table_file, record_file, save(overlay(results, over=over), picture, overwrite=True)]
@@ -270,43 +257,3 @@ def _write(
         figure = difference_figure(differing, next(iter(results)))
         written.append(save(figure, differences, overwrite=True))
     return written
-
-
-def _lines(rows: "Sequence[Comparison]", results: "dict[str, Result]") -> list[str]:
-    from railsim.compare import WORDS
-
-    blocks: dict[str, list[list[str]]] = {}
-    for row in rows:
-        by_sign = row.where in (WORDS["max"], WORDS["min"])
-        block = blocks.setdefault("peaks" if row.where in WORDS.values() else row.where, [])
-        words = f"{row.quantity.words}, {row.where}" if by_sign else row.quantity.words
-        differences = row.differences
-        for index, (label, peak) in enumerate(row.peaks.items()):
-            wheelset = peak.labels.get("wheelset", "")
-            block.append(
-                [
-                    "" if index else row.quantity.name,
-                    "" if index else words,
-                    label,
-                    f"{results[label].wheelsets.index(wheelset) + 1}" if wheelset else "",
-                    peak.labels.get("side", ""),
-                    row.quantity.text(peak.value),
-                    f"{peak.time:.2f}",
-                    f"{peak.distance:.1f}",
-                    _percent(differences[label]) if index else "",
-                ]
-            )
-    lines: list[str] = []
-    for where, block in blocks.items():
-        header = [where, "", "result", "wheelset", "side", "value", "t (s)", "s (m)", "difference"]
-        lines += ["", *table(header, block, numbers=5)]
-    remarks = [
-        f"{label}: remark: {remark}"
-        for label, result in results.items()
-        for remark in result.remarks
-    ]
-    return [*lines[1:], *([""] if remarks else []), *remarks]
-
-
-def _percent(share: float) -> str:
-    return "" if share != share else f"{100.0 * share:+.2f} %"

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, table
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, show
 
 PROFILES = "profiles"
 # Letters of source quality beside a number, as the shipped files explain them: read, re-entered,
@@ -45,6 +45,7 @@ def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: 
       railsim list vehicles
     """  # noqa: D301 - click reads the escape
     from railsim.errors import Fault, InputError, nearest
+    from railsim.table import Column, Table
 
     known = [*_kinds(), PROFILES]
     wrong = [kind for kind in kinds if kind not in known]
@@ -57,12 +58,9 @@ def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: 
         print_json(entries)
         return
     for kind in kinds or known:
-        rows = [
-            [entry["name"], entry["trust"], entry["title"]]
-            for entry in entries
-            if entry["kind"] == kind
-        ]
-        echo("\n".join([f"{kind}", *table(["name", "source quality", ""], rows, numbers=3), ""]))
+        rows = (entry for entry in entries if entry["kind"] == kind)
+        columns = [Column("name"), Column("trust", "source quality"), Column("title", " ")]
+        show(kind, Table(columns, rows), "")
     if any(entry["trust"] for entry in entries):
         meanings = ", ".join(f"{letter} {meaning}" for letter, meaning in MEANING.items())
         echo(f"source quality, the most frequent first: {meanings}")

@@ -2,7 +2,7 @@
 
 import logging
 from contextlib import contextmanager
-from math import isnan
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from railsim.cli.common import (
     print_json,
     quiet_option,
     set_option,
-    table,
+    show,
     with_load,
 )
 from railsim.cli.progress import progress_bar
@@ -29,10 +29,9 @@ if TYPE_CHECKING:
     from railsim.compare import Comparison
     from railsim.definitions.settings import Settings
     from railsim.definitions.track import Track
-    from railsim.notation import Quantity
-    from railsim.result import MidCurve, Peak, Result
-    from railsim.result.data import Array
+    from railsim.result import Result
     from railsim.studies.case import Case
+    from railsim.table import Table
 
 
 MOST_CURVES = 3  # with a table each; more are listed, one line each
@@ -93,6 +92,7 @@ def command(
     """  # noqa: D301 - click reads the escape
     from railsim.cli import DONE, ENDED_EARLY
     from railsim.definitions.layout import track_remarks
+    from railsim.result.facts import run_facts
     from railsim.studies.run import run_case
 
     assignments = with_load(assignments, load, "vehicle.")
@@ -110,13 +110,13 @@ def command(
         echo("\n".join(_assumption_lines(case)))
     with progress_bar(case.name, quiet=quiet) as progress, _start_remarks(case, quiet=quiet):
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
-    record = {"file": str(path), **result_record(result)}
-    lines = _report_lines(result, path)
+    record = {"file": str(path), **run_facts(result)}
+    parts = _report(result, path)
     if plots and len(result["time"]):
         from railsim.plot.histories import histories
         from railsim.plot.style import save
 
-        lines.append(str(save(histories(result), path.with_suffix(".png"), overwrite=overwrite)))
+        parts.append(str(save(histories(result), path.with_suffix(".png"), overwrite=overwrite)))
     if check_step and len(result["time"]):
         from railsim.simulation.check_step import difference_record, half_step, step_differences
 
@@ -124,11 +124,11 @@ def command(
             half = half_step(result, progress=progress)
         differences = step_differences(result, half)
         record["half_step"] = [difference_record(row) for row in differences]
-        lines += ["", *_step_lines(result, differences)]
+        parts += ["", _step_table(result, differences)]
     if as_json:
         print_json(record)
     else:
-        echo("\n".join(lines))
+        show(*parts)
     return DONE if result.status == "complete" else ENDED_EARLY
 
 
@@ -213,19 +213,6 @@ def _checked(
     return case, Path(name)
 
 
-def result_record(result: "Result") -> dict[str, Any]:
-    """Return what is printed of a result as plain numbers and strings, SI."""
-    from railsim.result import mid_curves, peaks
-    from railsim.result.facts import FACTS
-
-    return {
-        **{name: result.attributes[name] for name in FACTS if name in result.attributes},
-        "remarks": list(result.remarks),
-        "peaks": [peak.record() for peak in peaks(result)],
-        "mid_curves": [curve.record() for curve in mid_curves(result)],
-    }
-
-
 def _assumption_lines(case: "Case") -> list[str]:
     """Return what the run rests on, in customary units."""
     from railsim.definitions.flatten import flatten
@@ -293,8 +280,10 @@ def _listed(names: "Any") -> str:
     return " / ".join(dict.fromkeys(str(name) for name in names))
 
 
-def _report_lines(result: "Result", path: Path) -> list[str]:
-    from railsim.result import mid_curves, peaks
+def _report(result: "Result", path: Path) -> "list[str | Table]":
+    """Return how the run ended, its peaks and its values in curves."""
+    from railsim.result import mid_curves
+    from railsim.result.tables import full_curve_table, full_curves_table, peak_table
 
     facts = result.attributes
     end = f"{result.status}: {facts['status_reason']}"
@@ -302,106 +291,42 @@ def _report_lines(result: "Result", path: Path) -> list[str]:
         end += f"; t = {result['time'][-1]:.2f} s, s = {result['distance'][-1]:.1f} m"
     else:
         end += "; at its start, before the first instant was recorded"
-    lines = [
+    parts: list[str | Table] = [
         f"  {end}",
         f"  step {1e3 * float(facts['step']):.4g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
         *(f"  remark: {remark}" for remark in result.remarks),
         "",
-        *(peak_lines(result, peaks(result)) if len(result["time"]) else ()),
     ]
+    if len(result["time"]):
+        parts.append(peak_table(result))
     curves = mid_curves(result)
     if len(curves) > MOST_CURVES:
-        lines += ["", *_curve_list(result, curves)]
+        parts += ["", full_curves_table(result, curves)]
     else:
         for curve in curves:
-            lines += ["", *_mid_curve_lines(result, curve)]
-    return [*lines, "", str(path)]
+            parts += ["", full_curve_table(result, curve)]
+    return [*parts, "", str(path)]
 
 
-def peak_lines(result: "Result", found: "Sequence[Peak]") -> list[str]:
-    """Return a table of peaks; the distance is that of the reference body."""
-    kinds = {"abs": "largest magnitude", "max": "largest", "min": "smallest"}
-    rows = []
-    for peak in found:
-        wheelset = peak.labels.get("wheelset", "")
-        number = f"{result.wheelsets.index(wheelset) + 1} {wheelset}" if wheelset else ""
-        words = peak.quantity.words
-        rows.append(
-            [
-                peak.quantity.name,
-                words if peak.kind == "abs" else f"{words}, {kinds[peak.kind]}",
-                number,
-                peak.labels.get("side", ""),
-                peak.quantity.text(peak.value),
-                "" if isnan(peak.smooth) else peak.quantity.text(peak.smooth),
-                f"{peak.time:.2f}",
-                f"{peak.distance:.1f}",
-            ]
-        )
-    header = ["Peaks", "largest magnitude", "wheelset", "side", "value", "20 Hz", "t (s)", "s (m)"]
-    return table(header, rows, numbers=4)
-
-
-def _step_lines(result: "Result", differences: "Sequence[Comparison]") -> list[str]:
-    """Return a table of what half the step changes."""
+def _step_table(result: "Result", differences: "Sequence[Comparison]") -> "Table":
+    """Return what half the step changes."""
     from railsim.simulation.check_step import FULL, HALF
+    from railsim.table import Amount, Column, Table
 
     step = float(result.attributes["step"])
     rows = []
     for row in differences:
-        full, half = row.peaks[FULL], row.peaks[HALF]
-        relative = row.differences[FULL]
-        rows.append(
-            [
-                row.quantity.words,
-                row.where,
-                row.quantity.text(full.value),
-                f"{(full.value - half.value) * row.quantity.scale:+.2g}",
-                "" if isnan(relative) else f"{100.0 * relative:+.2g}",
-            ]
-        )
-    header = [f"Check of the step, {1e3 * step:.4g} ms", "", "value", "less that at half", "%"]
-    return table(header, rows, numbers=2)
-
-
-def _with_scatter(quantity: "Quantity", values: "Array", scatter: "Array") -> list[str]:
-    """Return values with their scatter, where there is any to the digits that are shown."""
-    cells = []
-    for value, spread in zip(values, scatter, strict=True):
-        around = quantity.text(spread)
-        zero = float(around) == 0.0 if around != "nan" else True
-        cells.append(quantity.text(value) + ("" if zero else f" ± {around}"))
-    return cells
-
-
-def _curve_list(result: "Result", curves: "Sequence[MidCurve]") -> list[str]:
-    """Return one line for each curve: the largest median of each quantity over all wheels."""
-    names = list(curves[0].medians)
-    rows = []
-    for curve in curves:
-        largest = {peak.quantity.name: peak for peak in curve.median_peaks}
-        begin, end = curve.full_curve
-        cells = [largest[n].quantity.text(largest[n].value) if n in largest else "" for n in names]
-        rows.append([f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}", *cells])
-    header = ["Full curves, largest medians", "s (m)"]
-    header += [f"{n} ({result.quantities[n].shown_unit})" for n in names]
-    return table(header, rows, numbers=1)
-
-
-def _mid_curve_lines(result: "Result", curve: "MidCurve") -> list[str]:
-    rows = []
-    for name, values in curve.medians.items():
-        quantity, spread = result.quantities[name], curve.scatter[name]
-        if quantity.dims[1:] == ("wheelset", "side"):
-            for side, label in enumerate(result.coordinates["side"]):
-                cells = _with_scatter(quantity, values[:, side], spread[:, side])
-                rows.append([name, quantity.words, label, *cells])
-        elif quantity.dims[1:] == ("wheelset",):
-            rows.append([name, quantity.words, "", *_with_scatter(quantity, values, spread)])
-    numbers = [str(index + 1) for index in range(len(result.wheelsets))]
-    begin, end = curve.full_curve
-    around = "median, ± still settling" if curve.settling else "median and scatter"
-    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: {around}"
-    header = ["", "wheelset", "side", *numbers]
-    return [title, *table(header, rows, numbers=3)]
+        full, half = row.peaks[FULL].value, row.peaks[HALF].value
+        column = Column.of(row.quantity)
+        changed = Amount(full - half, replace(column, format="+.2g"))
+        relative = Amount(row.differences[FULL], Column("", unit="%", format="+.2g"))
+        rows.append([row.quantity.words, row.where, Amount(full, column), changed, relative])
+    columns = [
+        Column("quantity", f"Check of the step, {1e3 * step:.4g} ms"),
+        Column("where", " "),
+        Column("value", format=">"),
+        Column("change", "less that at half", format=">"),
+        Column("share", "%", format=">"),
+    ]
+    return Table(columns, rows)

@@ -1,0 +1,89 @@
+"""Tables of a result: its peaks, and its values in full curves."""
+
+from collections.abc import Sequence
+from math import isnan
+
+from railsim.notation import Quantity
+from railsim.result.data import Result
+from railsim.result.extremes import MidCurve, Peak, mid_curves, peaks
+from railsim.table import Amount, Column, Table
+
+KINDS = {"abs": "", "max": ", largest", "min": ", smallest"}
+PLACE = [Column("time", "t", "s", ".2f"), Column("distance", "s", "m", ".1f")]
+"""When, and where the reference body was."""
+
+
+def wheelset_number(result: Result, name: str) -> str:
+    """Return number (from 1) and name of a wheelset; nothing where there is none."""
+    return f"{result.wheelsets.index(name) + 1} {name}" if name else ""
+
+
+def peak_table(result: Result, found: Sequence[Peak] | None = None) -> Table:
+    """Return the peaks of a result, by default all: value, and after a low pass of 20 Hz."""
+    rows = []
+    for peak in peaks(result) if found is None else found:
+        column = Column.of(peak.quantity)
+        rows.append(
+            [
+                peak.quantity.name,
+                f"{peak.quantity.words}{KINDS[peak.kind]}",
+                wheelset_number(result, peak.labels.get("wheelset", "")),
+                peak.labels.get("side", ""),
+                Amount(peak.value, column),
+                None if isnan(peak.smooth) else Amount(peak.smooth, column),
+                peak.time,
+                peak.distance,
+            ]
+        )
+    columns = [
+        Column("quantity", "Peaks"),
+        Column("words", "largest magnitude"),
+        Column("wheelset"),
+        Column("side"),
+        Column("value", format=">"),
+        Column("low_pass_20_hz", "20 Hz", format=">"),
+    ]
+    return Table([*columns, *PLACE], rows)
+
+
+def full_curve_table(result: Result, curve: MidCurve) -> Table:
+    """Return medians and scatter of every wheel over a full curve."""
+    rows = []
+    for name, values in curve.medians.items():
+        quantity, spread = result.quantities[name], curve.scatter[name]
+        sides = result.coordinates["side"] if values.ndim == 2 else ("",)
+        by_side = zip(sides, values.T.reshape(len(sides), -1), strict=True)
+        for (side, medians), around in zip(by_side, spread.T.reshape(len(sides), -1), strict=True):
+            cells = map(_with_scatter, [quantity] * len(medians), medians, around)
+            rows.append([name, quantity.words, side, *cells])
+    begin, end = curve.full_curve
+    around_words = "median, ± still settling" if curve.settling else "median and scatter"
+    title = f"Full curve R {curve.radius:.6g} m, s = {begin:.1f} to {end:.1f} m: {around_words}"
+    numbers = [Column(str(index + 1), format=">") for index in range(len(result.wheelsets))]
+    columns = [Column("quantity", " "), Column("words", "wheelset"), Column("side")]
+    return Table([*columns, *numbers], rows, title)
+
+
+def _with_scatter(quantity: Quantity, value: float, scatter: float) -> str:
+    """Return a value with its scatter, where there is any to the digits that are shown."""
+    around = quantity.text(scatter)
+    zero = around == "nan" or float(around) == 0.0
+    return quantity.text(value) + ("" if zero else f" ± {around}")
+
+
+def full_curves_table(result: Result, curves: Sequence[MidCurve] | None = None) -> Table:
+    """Return one line for each curve: the largest median of each quantity over all wheels."""
+    found = mid_curves(result) if curves is None else curves
+    names = list(found[0].medians) if found else []
+    rows = []
+    for curve in found:
+        largest = {peak.quantity.name: peak.value for peak in curve.median_peaks}
+        begin, end = curve.full_curve
+        where = f"{curve.radius:.6g} m", f"{begin:.1f} to {end:.1f}"
+        rows.append([*where, *map(largest.get, names)])
+    columns = [
+        Column("radius", "Full curves, largest medians"),
+        Column("distance", "s (m)", format=">"),
+        *(Column.of(result.quantities[name], name) for name in names),
+    ]
+    return Table(columns, rows)
