@@ -9,6 +9,7 @@ from hypothesis import settings
 
 import railsim.contact.stored_table  # uses the class that the fixture replaces
 import railsim.contact.table
+import railsim.model.solutions
 from railsim.contact.table import TableGrid
 
 ROOT = Path(__file__).parent.parent
@@ -21,6 +22,12 @@ def reference_dir():
     if not folder.is_dir():
         pytest.skip(f"no reference data at {folder}")
     return folder
+
+
+@pytest.fixture(autouse=True)
+def no_stored_solutions(monkeypatch):
+    """Equilibria and steps are found anew: a test may replace what finds them."""
+    monkeypatch.setattr(railsim.model.solutions, "own_folder", lambda *_: None)
 
 
 @pytest.fixture

@@ -14,7 +14,9 @@ it cannot stand by itself it is held in its nominal position.
 What cannot be balanced is named: body, component, force or moment.
 """
 
+import hashlib
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +33,8 @@ from railsim.kernels.system import AXLEBOX, FIXED, N_SCALARS, RIGID, WHEELSET, S
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.model.assembly import Model
-from railsim.model.preloads import least_squares, with_preloads
+from railsim.model.preloads import least_squares, with_preloads, with_these_preloads
+from railsim.model.solutions import solution
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import components_of, level_track, work_arrays
 from railsim.notation import COMPONENTS, SIDES
@@ -85,6 +88,40 @@ def equilibrium(model: Model, speed: float) -> Equilibrium:
     rolling = _Balance(model, rough, speed=speed, rolling=True)
     state = rolling.solve(state)
     return Equilibrium(model, state, Q0, rolling.residual, remarks)
+
+
+def stored_equilibrium(model: Model, speed: float, inputs: str) -> Equilibrium:
+    """As `equilibrium`, from the disk where it was found before.
+
+    Parameters
+    ----------
+    inputs : str
+        Hash of all that the model was made of, but for the friction of its track.
+    """
+    friction = model.system.track.rail[:, MU_LEFT : MU_LEFT + 2, 0]
+    digest = hashlib.sha256(f"{inputs} {speed!r} {model.system.contact.values.shape}".encode())
+    digest.update(np.ascontiguousarray(friction).data)
+
+    def solve() -> dict[str, Any]:
+        found = equilibrium(model, speed)
+        system = found.model.system
+        return {
+            "tension": system.links.spring[:, 2].tolist(),
+            "preload": system.mounts.preload.tolist(),
+            "state": found.state.tolist(),
+            "Q0": found.Q0.tolist(),
+            "residual": found.residual,
+            "remarks": list(found.remarks),
+        }
+
+    found = solution("equilibrium", digest.hexdigest(), solve)
+    return Equilibrium(
+        with_these_preloads(model, found["tension"], found["preload"]),
+        np.array(found["state"]),
+        np.array(found["Q0"]),
+        found["residual"],
+        tuple(found["remarks"]),
+    )
 
 
 def _let_down(model: Model) -> tuple[Model, Floats, tuple[str, ...]]:

@@ -47,7 +47,7 @@ def with_preloads(model: Model) -> Model:
         if len(_KEPT) >= MOST_KEPT:
             _KEPT.clear()
         _KEPT[key] = system.links.spring[:, 2].copy(), system.mounts.preload.copy()
-    return _filled(model, *_KEPT[key])
+    return with_these_preloads(model, *_KEPT[key])
 
 
 def _key(model: Model) -> bytes:
@@ -80,7 +80,9 @@ def _solved(model: Model) -> Model:
     """Solve every `auto` preload, see `with_preloads`."""
     if model.design is not None:
         design = with_preloads(model.design).system
-        return _levelled(_filled(model, design.links.spring[:, 2], design.mounts.preload))
+        return _levelled(
+            with_these_preloads(model, design.links.spring[:, 2], design.mounts.preload)
+        )
     conditions = _conditions(model.system)
     # springs carry the weight of a fixed body where they can
     weights = [(int(body), 2) for body in model.system.bodies.fixed]
@@ -262,7 +264,7 @@ def _solved_for(
     return filled, matrix @ values - right_side
 
 
-def _filled(model: Model, tension: Floats, preload: Floats) -> Model:
+def with_these_preloads(model: Model, tension: Floats, preload: Floats) -> Model:
     """Return the model with these preloads of its links and mounts."""
     links = model.system.links._replace(row=aligned(model.system.links.row))
     mounts = model.system.mounts._replace(row=aligned(model.system.mounts.row))

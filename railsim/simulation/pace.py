@@ -21,6 +21,7 @@ from railsim.kernels.rhs import STANDSTILL_SPEED
 from railsim.kernels.track_frame import MU_LEFT, MU_RIGHT
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import equilibrium
+from railsim.model.solutions import solution
 from railsim.model.time_step import MARGIN, Stability
 from railsim.model.work import level_track_with_friction
 from railsim.simulation.flange import in_flange_contact
@@ -87,9 +88,9 @@ class Pace:
     def _choose(self, speed: float, interval: float) -> float:
         given = self._settings.step
         if given is None:
-            stability = self._stability(self._model, speed, self._states.get(speed))
-            longest = interval / max(1, math.ceil(interval / stability.longest * (1.0 - 1e-9)))
-            return longest if self._in_class(speed, longest) else stability.choose(interval)
+            inputs = f"{self._digest()} {speed!r} {interval!r}"
+            step = solution("step", inputs, lambda: {"step": self._stable(speed, interval)})
+            return float(step["step"])
         if not self.varies:
             count = max(1, round(interval / given))
             if abs(count * given - interval) > WRITTEN * interval:
@@ -121,6 +122,19 @@ class Pace:
                 )
             ]
         )
+
+    def _stable(self, speed: float, interval: float) -> float:
+        """Longest stable step at a speed that divides the output interval."""
+        stability = self._stability(self._model, speed, self._states.get(speed))
+        longest = interval / max(1, math.ceil(interval / stability.longest * (1.0 - 1e-9)))
+        return longest if self._in_class(speed, longest) else stability.choose(interval)
+
+    def _digest(self) -> str:
+        """Hash of all that the model was made of."""
+        system = self._model.system
+        digest = hashlib.sha256(f"{self._inputs} {system.contact.values.shape}".encode())
+        digest.update(system.track.rail[:, MU_LEFT : MU_RIGHT + 1, 0].tobytes())
+        return digest.hexdigest()
 
     def _in_class(self, speed: float, step: float) -> bool:
         """Whether a step, with the margin, is stable for the class of a speed and the friction."""

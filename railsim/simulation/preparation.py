@@ -14,7 +14,7 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.model.assembly import Model, SharedTables, assemble
-from railsim.model.equilibrium import equilibrium
+from railsim.model.equilibrium import stored_equilibrium
 from railsim.model.experience import vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
@@ -53,9 +53,10 @@ def prepare(
     on_run_in: SettlingProgress | None = None,
 ) -> Preparation:
     """Assemble, balance, choose the step and set the initial state: `before`, where it is given."""
-    balance = equilibrium(assemble(vehicle, track, settings, profiles, shared), speed)
-    model = balance.model
+    model = assemble(vehicle, track, settings, profiles, shared)
     inputs = inputs_hash(vehicle, track, settings, model)
+    balance = stored_equilibrium(model, speed, inputs)
+    model = balance.model
     pace = Pace(model, sampled(settings), track, {speed: balance.state}, inputs, on_judgement)
     step, _ = pace.at(speed)
     unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]

@@ -1,0 +1,79 @@
+"""Equilibria and stable time steps on disk, found once for all runs with the same inputs.
+
+Both depend on the inputs and on the program alone, and are read back to the last bit: a first run
+and all later ones are the same.  The key of a solution holds all that enters: inputs, sources,
+versions of the libraries that compute, and the processor.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numpy as np
+
+from railsim import kernels
+from railsim.kernels.cache import own_folder, store, stored
+
+MOST_STORED = 1000
+"""Solutions on disk; the older half of more goes."""
+MOST_NEW = 50
+"""Solutions that a process stores: each run of a large study has an equilibrium of its own."""
+_SOURCES = ("contact", "definitions", "model", "profiles", "simulation", "track")
+_new: list[Path] = []
+
+
+def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Return what was found for these inputs before, or what is found now.
+
+    Parameters
+    ----------
+    kind : str
+        What is sought.
+    inputs : str
+        All that it depends on, the program apart.
+    solve : callable
+        Finds it: numbers, texts and lists of them by name.  What it raises is not stored.
+    """
+    folder = own_folder("solutions")
+    if folder is None:
+        return solve()
+    key = hashlib.sha256(f"{program_hash()} {kind} {inputs}".encode()).hexdigest()[:32]
+    path = folder / f"{key}.json"
+    data = stored(path)
+    if data is not None:
+        found: dict[str, Any] = json.loads(data)
+        return found
+    found = solve()
+    if len(_new) < MOST_NEW:
+        _new.append(path)
+        _drop_old(folder)
+        store(path, json.dumps(found).encode())
+    return found
+
+
+@cache
+def program_hash() -> str:
+    """Hash of everything but the inputs that decides the bits of a solution."""
+    package = Path(__file__).parent.parent
+    versions = f"{kernels.source_hash(package / 'kernels')} numpy {np.__version__}"
+    processor = llvmlite.binding.get_host_cpu_name()
+    digest = hashlib.sha256(f"{versions} {processor}".encode())
+    for room in _SOURCES:
+        for path in sorted((package / room).rglob("*.py")):
+            digest.update(path.name.encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _drop_old(folder: Path) -> None:
+    """Remove the older half of the solutions where there are too many."""
+    paths = list(folder.glob("*.json"))
+    if len(paths) < MOST_STORED:
+        return
+    ages = {path: path.stat().st_mtime for path in paths if path.exists()}
+    for path in sorted(ages, key=ages.__getitem__)[: len(ages) // 2]:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,83 @@
+"""Equilibria and stable steps on disk: found once, the same to the last bit, bounded."""
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.kernels import cache
+from railsim.model import equilibrium, solutions
+from railsim.simulation import pace
+
+
+@pytest.fixture
+def folder(monkeypatch, tmp_path):
+    """Folder of the solutions of this test."""
+    monkeypatch.setattr(solutions, "own_folder", lambda name: cache.own_folder(name, base=tmp_path))
+    monkeypatch.setattr(solutions, "_new", [])
+    return tmp_path / "railsim" / "solutions"
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """Names of what was not found on the disk."""
+    calls = []
+    find, judge = equilibrium.equilibrium, pace.Pace._stable
+    monkeypatch.setattr(
+        equilibrium, "equilibrium", lambda *a: calls.append("equilibrium") or find(*a)
+    )
+    monkeypatch.setattr(pace.Pace, "_stable", lambda *a: calls.append("step") or judge(*a))
+    return calls
+
+
+def run(speed=20.0, friction=0.4, vehicle="coach_manchester"):
+    track = railsim.load_track("curve_r250").replace(friction=(friction, friction))
+    return railsim.simulate(railsim.load_vehicle(vehicle), track, speed=speed, until=5.0)
+
+
+def same(one, other):
+    names = [name for name in one.quantities if one[name].dtype.kind == "f"]
+    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in names)
+
+
+def test_later_run_is_the_first_to_the_last_bit(folder, solved):
+    first = run()
+    assert solved == ["equilibrium", "step"]
+    assert len(list(folder.glob("*.json"))) == 2
+    assert same(first, run())
+    assert solved == ["equilibrium", "step"]
+
+
+@pytest.mark.parametrize(
+    "other", [{"speed": 21.0}, {"friction": 0.3}, {"vehicle": "coach_flexicoil"}]
+)
+def test_other_inputs_have_solutions_of_their_own(folder, solved, other):
+    run()
+    run(**other)
+    assert solved == ["equilibrium", "step"] * 2
+
+
+def test_other_program_has_solutions_of_its_own(folder, solved, monkeypatch):
+    run()
+    monkeypatch.setattr(solutions, "program_hash", lambda: "another version")
+    run()
+    assert solved == ["equilibrium", "step"] * 2
+
+
+def test_damaged_solution_is_found_again(folder, solved, monkeypatch):
+    monkeypatch.setattr(cache, "notices", {})
+    first = run()
+    for path in folder.glob("*.json"):
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 1
+        path.write_bytes(data)
+    assert same(first, run())
+    assert solved == ["equilibrium", "step"] * 2
+
+
+def test_number_of_solutions_is_bounded(folder, monkeypatch):
+    monkeypatch.setattr(solutions, "MOST_STORED", 10)
+    monkeypatch.setattr(solutions, "MOST_NEW", 25)  # one process leaves room for others
+    for number in range(30):
+        solutions.solution("test", str(number), lambda: {})
+        assert len(list(folder.glob("*.json"))) <= 10
+    assert len(solutions._new) == 25
