@@ -13,9 +13,12 @@ The public names, loaded when they are first used:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from railsim.plottable import use_plotter
 from railsim.version import __version__
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from railsim.assessment import Assessment, assess
     from railsim.definitions.loading import (
         load_comfort_limits,
@@ -120,6 +123,13 @@ __all__ = [
     "static_loads",
     "study",
 ]
+
+
+@use_plotter
+def _plot(thing: object, **how: Any) -> "Figure":
+    from railsim.plot import plot
+
+    return plot(thing, **how)
 
 
 def __getattr__(name: str) -> Any:

@@ -16,7 +16,7 @@ from railsim.assessment.zones import Population, ZoneReport
 from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
-from railsim.definitions.vehicle import Service
+from railsim.definitions.vehicle_tables import Service
 from railsim.result import Result
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"

@@ -20,7 +20,7 @@ from railsim.assessment.statistics import Regression, multiple_regression
 from railsim.assessment.zones import ZoneReport
 from railsim.constants import CANT_BASE
 from railsim.contact.geometry import ContactGeometry
-from railsim.definitions.vehicle import Service
+from railsim.definitions.vehicle_tables import Service
 
 RADIUS = 300.0  # m, mean one of zone 4
 FLANGE = 0.5  # rad, contact angle from which the flange counts as touching

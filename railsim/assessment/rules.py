@@ -9,7 +9,8 @@ import numpy as np
 from railsim.assessment.statistics import Estimate
 from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import RunningLimits, Sourced
-from railsim.definitions.vehicle import Service, Vehicle
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Service
 from railsim.result.filters import Floats
 
 SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"

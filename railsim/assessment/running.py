@@ -30,7 +30,7 @@ from railsim.assessment.verdict import Verdict, all_verdicts
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
 from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import RunningLimits
-from railsim.definitions.vehicle import Service
+from railsim.definitions.vehicle_tables import Service
 from railsim.errors import Fault, InputError
 from railsim.result import Result
 

@@ -16,7 +16,8 @@ from railsim.assessment.rules import INFORMATION, RULES, SAFETY, Assessed, Limit
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.statistics import Estimate, extreme, one_dimensional, two_dimensional
 from railsim.definitions.limits import RunningLimits
-from railsim.definitions.vehicle import Service, Vehicle
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Service
 from railsim.result.filters import Floats
 
 WELL_SPREAD = 0.1

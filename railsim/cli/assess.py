@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from railsim.assessment import Assessment
     from railsim.assessment.rules import Assessed
-    from railsim.definitions.vehicle import Service
+    from railsim.definitions.vehicle_tables import Service
     from railsim.result import Result
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
@@ -143,7 +143,7 @@ def _service(
         return None
     from pydantic import ValidationError
 
-    from railsim.definitions.vehicle import Service
+    from railsim.definitions.vehicle_tables import Service
     from railsim.errors import Fault, InputError
 
     own = next(iter(results.values())).vehicle().service

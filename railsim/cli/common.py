@@ -14,8 +14,8 @@ import click
 from railsim.text import printable
 
 if TYPE_CHECKING:
-    from railsim.definitions.base import FileDefinition, Remark
-    from railsim.definitions.loading import Format
+    from railsim.definitions.base import Remark
+    from railsim.definitions.file_definition import FileDefinition
     from railsim.table import Table
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -78,12 +78,12 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
     return complete
 
 
-def remarks_on(definition: "FileDefinition", known: "Format") -> list["Remark"]:
+def remarks_on(definition: "FileDefinition") -> list["Remark"]:
     """Return what is allowed but unusual in a definition; a vehicle's statics are looked at too."""
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
-    found = known.remarks(definition)
+    found = definition.unusual()
     if isinstance(definition, Vehicle):
         from railsim.model.experience import vehicle_remarks
 

@@ -20,7 +20,7 @@ from railsim.cli.gathered import STUDY_FILES, described_runs
 from railsim.files import PICTURES, RESULTS, check_file
 
 if TYPE_CHECKING:
-    from railsim.definitions.base import FileDefinition
+    from railsim.definitions.file_definition import FileDefinition
 
 
 @click.command()
@@ -78,7 +78,7 @@ def command(
         from railsim.definitions.vehicle import Vehicle
         from railsim.description import describe
 
-        definition, known = load_any(file, with_load(assignments, load))
+        definition = load_any(file, with_load(assignments, load))
         if draw is not None:
             _draw(definition, Path(draw), overwrite)
         found = describe(definition, speeds)
@@ -90,7 +90,7 @@ def command(
             chosen = rest.data[definition.load or "design"]
             data = {**found.data, "static": chosen, "load_cases": rest.data}
             found = Description(data, [*found.parts, *rest.parts])
-        remarks = [] if as_json else [f"remark: {one}" for one in remarks_on(definition, known)]
+        remarks = [] if as_json else [f"remark: {one}" for one in remarks_on(definition)]
     if as_json:
         print_json(found.data)
     else:

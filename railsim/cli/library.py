@@ -138,7 +138,7 @@ def _draw(entries: list[dict[str, Any]], folder: Path, overwrite: bool) -> None:
     check_folder(folder, pictures, overwrite=overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     for entry, picture in zip(drawn, pictures, strict=True):
-        definition, _ = load_any(entry["file"])
+        definition = load_any(entry["file"])
         if isinstance(definition, Vehicle):
             save(vehicle_figure(definition), folder / picture, overwrite=overwrite)
         elif isinstance(definition, Track):

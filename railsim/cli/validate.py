@@ -101,10 +101,10 @@ def checked(file: str) -> tuple[str, list[dict[str, str]]]:
     from railsim.errors import InputError
     from railsim.profiles.used import profile_faults
 
-    definition, known = load_any(file)
+    definition = load_any(file)
     if faults := profile_faults(definition, file):
         raise InputError(faults)
-    return known.kind, [dict(vars(remark)) for remark in remarks_on(definition, known)]
+    return definition.KIND, [dict(vars(remark)) for remark in remarks_on(definition)]
 
 
 def _is_profile(name: str) -> bool:

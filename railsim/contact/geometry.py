@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from railsim.contact.conicity import equivalent_conicity
 from railsim.contact.curves import misfits, rail_curve, tape_circle_position, wheel_curve
 from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Wheelset
+from railsim.definitions.vehicle_tables import Wheelset
 from railsim.errors import InputError
 from railsim.kernels import contact_geometry as kernel
 from railsim.profiles.profile import Profile

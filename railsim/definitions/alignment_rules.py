@@ -14,13 +14,10 @@ A track without `speed` is not judged.
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from railsim.cant import cant_deficiency
 from railsim.definitions.base import Remark
-
-if TYPE_CHECKING:
-    from railsim.definitions.layout import Section
+from railsim.definitions.section import Section
 
 HIGH_SPEED = 230.0  # km/h: the cant of high-speed lines from here on
 MOST_CANT, MOST_CANT_HIGH_SPEED = 160.0, 180.0  # mm
@@ -32,7 +29,7 @@ ROUND_OFF = 1.0 + 1e-6
 
 
 def alignment_remarks(
-    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
+    plan: Sequence[Section], cant: Sequence[Section], speed: float
 ) -> list[Remark]:
     """Return where a plan with its cant breaks the rules.
 
@@ -51,7 +48,7 @@ def alignment_remarks(
     ]
 
 
-def cant_at(cant: Sequence["Section"], s: float) -> float:
+def cant_at(cant: Sequence[Section], s: float) -> float:
     """Cant at an arc length [m]; the last value continues."""
     for section in cant:
         if s <= section.end:
@@ -59,7 +56,7 @@ def cant_at(cant: Sequence["Section"], s: float) -> float:
     return cant[-1].end_value if cant else 0.0
 
 
-def _cants(plan: Sequence["Section"], cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
+def _cants(plan: Sequence[Section], cant: Sequence[Section], speed: float) -> Iterator[Remark]:
     most = MOST_CANT_HIGH_SPEED if 3.6 * speed >= HIGH_SPEED else MOST_CANT
     for section in plan:
         if section.type != "CIR" or section.start_value == 0.0:  # of infinite radius
@@ -74,7 +71,7 @@ def _cants(plan: Sequence["Section"], cant: Sequence["Section"], speed: float) -
             yield Remark(section.key, text)
 
 
-def _ramps(cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
+def _ramps(cant: Sequence[Section], speed: float) -> Iterator[Remark]:
     for section in cant:
         slope = 1e3 * abs(section.slope)
         V = 3.6 * speed
@@ -85,7 +82,7 @@ def _ramps(cant: Sequence["Section"], speed: float) -> Iterator[Remark]:
 
 
 def _deficiencies(
-    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
+    plan: Sequence[Section], cant: Sequence[Section], speed: float
 ) -> Iterator[Remark]:
     for section in plan:
         if section.type != "CIR":
@@ -103,7 +100,7 @@ def _deficiencies(
 
 
 def _transitions(
-    plan: Sequence["Section"], cant: Sequence["Section"], speed: float
+    plan: Sequence[Section], cant: Sequence[Section], speed: float
 ) -> Iterator[Remark]:
     for section in plan:
         if section.type != "CLO":

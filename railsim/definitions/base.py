@@ -7,13 +7,12 @@ nothing infinite.  What may be given once for both sides is always stored as the
 import ast
 import inspect
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NoReturn, Self
 
-import tomli_w
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -24,11 +23,6 @@ from pydantic import (
     Tag,
     WithJsonSchema,
 )
-
-from railsim.definitions.offered import offered
-from railsim.text import html_table, printable
-
-LONGEST_VALUE = 60  # characters of a value in the table of a notebook
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
@@ -133,65 +127,6 @@ def meanings(model: type[BaseModel]) -> dict[str, str]:
                 ):
                     found[name] = inspect.cleandoc(said)
     return found
-
-
-class FileDefinition(Definition):
-    """Base of what fills a whole file."""
-
-    def to_toml(self) -> str:
-        """Return the whole definition as TOML text, defaults included, `extends` resolved."""
-        return self._toml
-
-    @cached_property
-    def _toml(self) -> str:
-        # a study asks for it once for every run
-        return tomli_w.dumps(self.model_dump(exclude_none=True))
-
-    def replace(self, **changes: Any) -> Self:
-        """Return a copy with top-level keys replaced, validated again."""
-        return type(self).model_validate({**self.model_dump(exclude_none=True), **changes})
-
-    def with_values(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values at some keys, checked as a file would be.
-
-        Parameters
-        ----------
-        values : mapping of str to value
-            Values by the dotted keys of the file, SI; members of lists by their `name` or index.
-
-        Raises
-        ------
-        InputError
-            A key that does not exist, or a value that is not allowed; all of them at once.
-
-        Examples
-        --------
-        >>> import railsim
-        >>> coach = railsim.load_vehicle("coach_manchester")
-        >>> coach.with_values({"bodies.carbody.mass": 40e3}).bodies["carbody"].mass
-        40000.0
-        """
-        changed: Self = offered("changed_definition")(self, values)
-        return changed
-
-    def __repr__(self) -> str:
-        kind = type(self).__name__
-        name = getattr(self, "name", None)
-        return f"<{kind} {printable(name)!r}>" if name else f"<{kind}>"
-
-    def _table(self) -> tuple[list[str], list[list[object]]]:
-        """Return header and rows of the table that a notebook shows: keys and their values."""
-        shown = self.model_dump(exclude_none=True, exclude={"format", "name"})
-        rows: list[list[object]] = []
-        for key, value in shown.items():
-            if isinstance(value, dict | list | tuple) and len(str(value)) > LONGEST_VALUE:
-                value = f"{len(value)} entries"
-            rows.append([key, value])
-        return ["key", "value"], rows
-
-    def _repr_html_(self) -> str:
-        header, rows = self._table()
-        return html_table(str(getattr(self, "name", type(self).__name__)), header, rows)
 
 
 @dataclass(frozen=True)

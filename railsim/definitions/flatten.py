@@ -16,9 +16,7 @@ from railsim.definitions.elements.base import Element
 from railsim.definitions.elements.traction import AxleTorque
 from railsim.definitions.loads import load_faults, loaded
 from railsim.definitions.names import body_names, name_faults, resolve, sided_names
-from railsim.definitions.offered import offers
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Assembly, Placement, Vehicle, Wheelset
+from railsim.definitions.vehicle_tables import Group, Placement, VehicleTables, Wheelset
 from railsim.errors import Fault, InputError
 
 # Allowed difference between an axle's height and the wheel radius, and the like [m].
@@ -164,28 +162,20 @@ class _Frame:
         )
 
 
-def _frames(
-    group: Vehicle | Assembly, frame: _Frame
-) -> Iterator[tuple[Vehicle | Assembly, _Frame]]:
+def _frames(group: Group, frame: _Frame) -> Iterator[tuple[Group, _Frame]]:
     yield group, frame
     for name, assembly in group.assemblies.items():
         for placement in assembly.placements:
             yield from _frames(assembly, frame.inner(name, placement))
 
 
-def check_types(vehicles: Sequence[object], *tracks: object) -> None:
-    """Raise TypeError where a name or a file is given instead of what it stands for."""
-    for kind, wanted, given in [
-        *(("vehicle", Vehicle, vehicle) for vehicle in vehicles),
-        *(("track", Track, track) for track in tracks),
-    ]:
-        if not isinstance(given, wanted):
-            found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
-            raise TypeError(f"the {kind} is {found}; give what railsim.load_{kind} returns")
+def wrong_type(kind: str, given: object) -> str:
+    """Return what is wrong where a name or a file is given instead of what it stands for."""
+    found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
+    return f"the {kind} is {found}; give what railsim.load_{kind} returns"
 
 
-@offers
-def flatten(vehicle: Vehicle) -> FlatVehicle:
+def flatten(vehicle: VehicleTables) -> FlatVehicle:
     """Return the vehicle as plain lists of bodies and elements, worked out once for each vehicle.
 
     Raises
@@ -193,7 +183,8 @@ def flatten(vehicle: Vehicle) -> FlatVehicle:
     InputError : names that mean nothing or are used twice, parts that do not fit together.
     TypeError : something else than a vehicle.
     """
-    check_types([vehicle])
+    if not isinstance(vehicle, VehicleTables):
+        raise TypeError(wrong_type("vehicle", vehicle))
     kept: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
     if KEPT not in kept:
         faults = vehicle_faults(vehicle)
@@ -205,12 +196,12 @@ def flatten(vehicle: Vehicle) -> FlatVehicle:
     return kept[KEPT]
 
 
-def vehicle_faults(vehicle: Vehicle) -> list[Fault]:
+def vehicle_faults(vehicle: VehicleTables) -> list[Fault]:
     """Return what is wrong between the parts of a vehicle; the faults' file is left empty."""
     return name_faults(vehicle.model_dump()) or position_faults(vehicle)
 
 
-def _flat(vehicle: Vehicle) -> FlatVehicle:
+def _flat(vehicle: VehicleTables) -> FlatVehicle:
     vehicle = loaded(vehicle)
     known, _ = body_names(vehicle.model_dump())
     frames = list(_frames(vehicle, _Frame()))
@@ -228,21 +219,19 @@ def _flat(vehicle: Vehicle) -> FlatVehicle:
     return FlatVehicle(vehicle.name, flat, tuple(elements), reference)
 
 
-def _bodies(group: Vehicle | Assembly, frame: _Frame) -> Iterator[FlatBody]:
+def _bodies(group: Group, frame: _Frame) -> Iterator[FlatBody]:
     for name, body in group.bodies.items():
         at = frame.point(body.position)
         yield FlatBody(frame.full(name), "body", body.mass, body.inertia, at, fixed=body.fixed)
 
 
-def _wheelsets(group: Vehicle | Assembly, frame: _Frame) -> Iterator[FlatBody]:
+def _wheelsets(group: Group, frame: _Frame) -> Iterator[FlatBody]:
     for name, wheelset in group.wheelsets.items():
         at = frame.point(wheelset.position)
         yield FlatBody(frame.full(name), "wheelset", wheelset.mass, wheelset.inertia, at, wheelset)
 
 
-def _axleboxes(
-    group: Vehicle | Assembly, frame: _Frame, known: dict[str, str]
-) -> Iterator[FlatBody]:
+def _axleboxes(group: Group, frame: _Frame, known: dict[str, str]) -> Iterator[FlatBody]:
     for name, box in group.axleboxes.items():
         parent = resolve(box.wheelset, frame.scope, None, known)
         for sided, side in sided_names(name, {"sides": box.sides}):
@@ -257,9 +246,7 @@ def _axleboxes(
             )
 
 
-def _elements(
-    group: Vehicle | Assembly, frame: _Frame, positions: dict[str, Vector]
-) -> Iterator[FlatElement]:
+def _elements(group: Group, frame: _Frame, positions: dict[str, Vector]) -> Iterator[FlatElement]:
     for name, element in group.elements.items():
         for sided, side in sided_names(name, {"sides": getattr(element, "sides", None)}):
             ends = [resolve(body, frame.scope, side, positions) or "" for body in element.bodies]
@@ -283,7 +270,7 @@ def _sum(one: Sequence[float], two: Sequence[float]) -> Vector:
     return (one[0] + two[0], one[1] + two[1], one[2] + two[2])
 
 
-def position_faults(vehicle: Vehicle) -> list[Fault]:
+def position_faults(vehicle: VehicleTables) -> list[Fault]:
     """Return which parts of a vehicle stand where they cannot; the faults' file is left empty."""
     if wrong := load_faults(vehicle):
         return wrong
@@ -303,7 +290,7 @@ def position_faults(vehicle: Vehicle) -> list[Fault]:
     return list({fault.key: fault for fault in reversed(faults)}.values())[::-1]
 
 
-def _keys(vehicle: Vehicle) -> dict[str, str]:
+def _keys(vehicle: VehicleTables) -> dict[str, str]:
     keys: dict[str, str] = {}
     for group, frame in _frames(vehicle, _Frame()):
         for table in ("wheelsets", "axleboxes"):
@@ -336,7 +323,7 @@ def _axlebox_faults(flat: FlatVehicle, keys: dict[str, str]) -> list[Fault]:
     return faults
 
 
-def _side_faults(group: Vehicle | Assembly, frame: _Frame) -> list[Fault]:
+def _side_faults(group: Group, frame: _Frame) -> list[Fault]:
     faults = []
     for name, box in group.axleboxes.items():
         if box.sides == "both" and box.position[1] <= 0.0:
@@ -350,7 +337,7 @@ def _side_faults(group: Vehicle | Assembly, frame: _Frame) -> list[Fault]:
     return faults
 
 
-def _torque_faults(group: Vehicle | Assembly, frame: _Frame, kinds: dict[str, str]) -> list[Fault]:
+def _torque_faults(group: Group, frame: _Frame, kinds: dict[str, str]) -> list[Fault]:
     faults = []
     for name, element in group.elements.items():
         if not isinstance(element, AxleTorque):

@@ -11,15 +11,15 @@ from itertools import pairwise
 
 from railsim.definitions.alignment_rules import alignment_remarks
 from railsim.definitions.base import Remark
-from railsim.definitions.offered import offers
-from railsim.definitions.track import (
+from railsim.definitions.section import Section
+from railsim.definitions.track_tables import (
     CantElement,
     Circle,
     Clothoid,
     ConstantCant,
     ConstantGradient,
     PlanElement,
-    Track,
+    TrackTables,
     VerticalElement,
 )
 from railsim.errors import Fault
@@ -34,44 +34,6 @@ SMALL = 1e-6
 
 
 @dataclass(frozen=True)
-class Section:
-    """One element of a list with the values at its ends.
-
-    Attributes
-    ----------
-    key : str
-        Its key in the file, e.g. ``plan.2``.
-    type : str
-        Its type as written.
-    begin, end : float
-        Arc lengths of its ends [m].
-    start_value, end_value : float
-        Curvature [1/m], cant [m] or gradient [1] at its ends.
-    """
-
-    key: str
-    type: str
-    begin: float
-    end: float
-    start_value: float
-    end_value: float
-
-    @property
-    def length(self) -> float:
-        """Length [m]."""
-        return self.end - self.begin
-
-    @property
-    def slope(self) -> float:
-        """Change of the value per metre."""
-        return (self.end_value - self.start_value) / self.length
-
-    def value(self, s: float) -> float:
-        """Value at the arc length `s` within the section."""
-        return self.start_value + self.slope * (s - self.begin)
-
-
-@dataclass(frozen=True)
 class _Draft:
     """A section whose ends may still be open; a ramp's given ends must match its neighbours."""
 
@@ -82,29 +44,28 @@ class _Draft:
     ramp: bool
 
 
-@offers
-def curvature_sections(track: Track) -> list[Section]:
+def curvature_sections(track: TrackTables) -> list[Section]:
     """Return the plan as curvature over arc length [1/m]."""
     return _sections("plan", [_plan_draft(element) for element in track.plan])[0]
 
 
-def cant_sections(track: Track) -> list[Section]:
+def cant_sections(track: TrackTables) -> list[Section]:
     """Return the cant over arc length [m]; empty where there is none."""
     return _sections("cant", [_cant_draft(element) for element in track.cant])[0]
 
 
-def gradient_sections(track: Track) -> list[Section]:
+def gradient_sections(track: TrackTables) -> list[Section]:
     """Return the gradient over arc length [1]; empty for a level track."""
     return _sections("vertical", [_vertical_draft(element) for element in track.vertical])[0]
 
 
-def is_straight_and_level(track: Track) -> bool:
+def is_straight_and_level(track: TrackTables) -> bool:
     """Whether a track has neither curves nor cant nor gradients."""
     sections = (*curvature_sections(track), *cant_sections(track), *gradient_sections(track))
     return not any(section.start_value or section.end_value for section in sections)
 
 
-def track_faults(track: Track) -> list[Fault]:
+def track_faults(track: TrackTables) -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
     _, faults = _sections("plan", [_plan_draft(element) for element in track.plan])
     cant, cant_faults = _sections("cant", [_cant_draft(element) for element in track.cant])
@@ -115,7 +76,7 @@ def track_faults(track: Track) -> list[Fault]:
     return faults
 
 
-def track_remarks(track: Track) -> list[Remark]:
+def track_remarks(track: TrackTables) -> list[Remark]:
     """Return what is allowed in a track but unusual."""
     plan, cant, vertical = curvature_sections(track), cant_sections(track), gradient_sections(track)
     remarks = _curvature_steps(plan) + _gradient_steps(vertical)
@@ -253,7 +214,7 @@ def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -
     return [Remark(name, text)]
 
 
-def _beyond_the_track(track: Track) -> list[Remark]:
+def _beyond_the_track(track: TrackTables) -> list[Remark]:
     """Remark on irregularities of which the track sees nothing."""
     remarks = []
     for index, part in enumerate(track.irregularities):

@@ -7,14 +7,13 @@ A value is `checked` when somebody has compared it with the printed standard; un
 that uses it says so.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
 from railsim.definitions.base import (
     Count,
     Definition,
-    FileDefinition,
     Finite,
     Flag,
     NonNegative,
@@ -22,10 +21,9 @@ from railsim.definitions.base import (
     Text,
     rising,
 )
+from railsim.definitions.file_definition import FileDefinition
 
-LIMITS_FORMAT = "railsim-limits/1"
 COMFORT_LIMITS_FORMAT = "railsim-comfort-limits/1"
-STATIONARY_LIMITS_FORMAT = "railsim-stationary-limits/1"
 
 
 def _rising_rows(rows: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -223,6 +221,8 @@ Criteria = Literal["safety", "loading", "ride"]
 class RunningLimits(FileDefinition):
     """Limits of running tests: EN 14363 or UIC 518."""
 
+    KIND: ClassVar = "limits"
+
     format: Literal["railsim-limits/1"]
     """Kind and version of the file"""
     standard: Literal["en14363", "uic518"]
@@ -285,6 +285,8 @@ class Classes(Sourced):
 class ComfortLimits(FileDefinition):
     """Classes of ride comfort."""
 
+    KIND: ClassVar = "limits"
+
     format: Literal["railsim-comfort-limits/1"]
     """Kind and version of the file"""
     edition: Text
@@ -321,6 +323,8 @@ class Guiding(Sourced):
 
 class StationaryLimits(FileDefinition):
     """Stationary tests: twisted track, cant; and a tight curve at walking pace."""
+
+    KIND: ClassVar = "limits"
 
     format: Literal["railsim-stationary-limits/1"]
     """Kind and version of the file"""

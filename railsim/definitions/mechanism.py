@@ -7,12 +7,13 @@ Axes x, y; angles from x, anticlockwise; gravity along -y unless said otherwise.
 What one key says is checked here, what several say together in `mechanism_faults`.
 """
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from railsim.definitions.base import Count, Definition, FileDefinition, Name, Text
+from railsim.definitions.base import Count, Definition, Name, Remark, Text
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism_parts import (
     AUTO,
     AirSpring,
@@ -44,6 +45,7 @@ from railsim.definitions.mechanism_parts import (
     TorsionSpring,
     by_key,
 )
+from railsim.errors import Fault
 
 MECHANISM_FORMAT = "railsim-mechanism/1"
 
@@ -314,6 +316,8 @@ class Optimise(Definition):
 class Mechanism(FileDefinition):
     """A planar linkage with one degree of freedom: everything that a mechanism file says."""
 
+    KIND: ClassVar = "mechanism"
+
     format: Literal["railsim-mechanism/1"]
     """Kind and version of the file"""
     name: Text = "mechanism"
@@ -374,6 +378,30 @@ class Mechanism(FileDefinition):
     """Tolerances of parameters, plus and minus"""
     cases: dict[Name, dict[Name, QuantityOrAuto]] = Field(default_factory=dict)
     """Other values of parameters by the name of a case"""
+
+    @classmethod
+    def note_assigned(
+        cls, tables: dict[str, Any], keys: Iterable[str], before: FileDefinition | None = None
+    ) -> None:
+        """List parameters that are or were set by their keys in `provenance.set`."""
+        earlier = before.provenance.get("set", ()) if isinstance(before, Mechanism) else ()
+        paths = [key.split(".") for key in keys]
+        changed = [path[1] for path in paths if path[0] == "parameters" and len(path) == 2]
+        known = tables.get("parameters", {})
+        if changed := [name for name in dict.fromkeys([*earlier, *changed]) if name in known]:
+            tables["provenance"] = {**tables.get("provenance", {}), "set": changed}
+
+    def contradictions(self) -> list[Fault]:
+        """Return what is wrong between the parts."""
+        from railsim.definitions.mechanism_faults import mechanism_faults  # of this definition
+
+        return mechanism_faults(self)
+
+    def unusual(self) -> list[Remark]:
+        """Return remarks on the mechanism."""
+        from railsim.definitions.mechanism_faults import mechanism_remarks
+
+        return mechanism_remarks(self)
 
     def in_case(self, case: str | None) -> "Mechanism":
         """Return the mechanism with the parameters of a case; None is the base.

@@ -8,15 +8,16 @@ from typing import TypeVar
 
 from railsim.definitions.base import Vector
 from railsim.definitions.elements.base import Element
-from railsim.definitions.track import (
+from railsim.definitions.track import Track
+from railsim.definitions.track_tables import (
     CantElement,
     Circle,
     Clothoid,
     ConstantCant,
     PlanElement,
-    Track,
 )
-from railsim.definitions.vehicle import Assembly, Axlebox, Body, Placement, Vehicle, Wheelset
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Assembly, Axlebox, Body, Placement, Wheelset
 
 SIGNS = (1.0, -1.0, 1.0)
 

@@ -3,22 +3,14 @@
 A report puts them beside a run of the same vehicle on the same track at the same speed.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from railsim.definitions.base import (
-    Count,
-    Definition,
-    FileDefinition,
-    Finite,
-    NonNegative,
-    Positive,
-    Text,
-)
+from railsim.definitions.base import Count, Definition, Finite, NonNegative, Positive, Text
+from railsim.definitions.file_definition import FileDefinition
 from railsim.notation import QUANTITIES
 
-PUBLISHED_FORMAT = "railsim-published/1"
 Vehicles = Annotated[dict[Text, Finite], Field(min_length=1)]
 
 
@@ -40,6 +32,8 @@ class PublishedValue(Definition):
 
 class Published(FileDefinition):
     """A published study: everything that its file says."""
+
+    KIND: ClassVar = "published"
 
     format: Literal["railsim-published/1"]
     """Kind and version of the file"""

@@ -3,14 +3,13 @@
 Each part is a track and a speed that follows from the vehicle's service table.
 """
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from railsim.definitions.base import Definition, FileDefinition, Finite, Flag, Name, Positive, Text
+from railsim.definitions.base import Definition, Finite, Flag, Name, Positive, Text
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.loads import LoadName
-
-SCENARIO_FORMAT = "railsim-scenario/1"
 
 
 class Speed(Definition):
@@ -72,6 +71,8 @@ class TestCondition(Definition):
 
 class Scenario(FileDefinition):
     """A campaign: everything that its file says."""
+
+    KIND: ClassVar = "scenario"
 
     format: Literal["railsim-scenario/1"]
     """Kind and version of the file"""

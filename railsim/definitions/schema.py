@@ -26,7 +26,7 @@ def json_schema(format_name: str) -> dict[str, Any]:
     A file that `extends` another is only a part of a definition: of such a file the schema checks
     `format`, `extends` and `remove`; the whole is checked when it is loaded.
     """
-    model = FORMATS[format_name].model
+    model = FORMATS[format_name]
     full = model.model_json_schema()
     _describe(full, model)
     known = _parts(model)

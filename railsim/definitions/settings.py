@@ -1,22 +1,12 @@
 """Settings files, `railsim-settings/1`: how a run is computed and what it outputs."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from railsim.definitions.base import (
-    Definition,
-    FileDefinition,
-    Finite,
-    Flag,
-    NonNegative,
-    Positive,
-    Text,
-    rising,
-)
+from railsim.definitions.base import Definition, Finite, Flag, NonNegative, Positive, Text, rising
 from railsim.definitions.creep_law import CreepLawName
-
-SETTINGS_FORMAT = "railsim-settings/1"
+from railsim.definitions.file_definition import FileDefinition
 
 
 def _forward(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
@@ -143,6 +133,9 @@ class Outputs(Definition):
 
 class Settings(FileDefinition):
     """How a run is computed: everything that a settings file says."""
+
+    KIND: ClassVar = "settings"
+    OPEN_TABLES: ClassVar = ("initial",)
 
     format: Literal["railsim-settings/1"] = "railsim-settings/1"
     """Kind and version of the file"""

@@ -6,13 +6,12 @@ belong to one command (`[target]` to design, `[fatigue]` to fatigue, `[vehicle]`
 """
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from railsim.definitions.base import (
     Definition,
-    FileDefinition,
     Finite,
     NonNegative,
     NonNegativeVector,
@@ -21,9 +20,8 @@ from railsim.definitions.base import (
     Text,
     rising,
 )
+from railsim.definitions.file_definition import FileDefinition
 from railsim.errors import Fault, nearest
-
-SPRING_FORMAT = "railsim-spring/1"
 
 Row = tuple[NonNegative, Positive]
 Range = tuple[Positive, Positive]
@@ -276,6 +274,9 @@ class VehicleTable(Definition):
 class TrailingArmSuspension(FileDefinition):
     """A trailing-arm primary suspension: everything that a spring file says."""
 
+    KIND: ClassVar = "spring"
+    OPEN_TABLES: ClassVar = ("loads",)
+
     format: Literal["railsim-spring/1"]
     """Kind and version of the file"""
     name: Text = "trailing-arm primary suspension"
@@ -322,6 +323,14 @@ class TrailingArmSuspension(FileDefinition):
             lower_top = self.inner.seat_height + self.inner.free_height
             return self.arm.seat_height + self.outer.free_height - lower_top
         return self.inner.engagement or 0.0
+
+    def contradictions(self) -> list[Fault]:
+        """Return what is wrong between the parts."""
+        return spring_faults(self)
+
+    def unusual(self) -> list[Remark]:
+        """Return what is allowed but unusual."""
+        return spring_remarks(self)
 
     @property
     def seat_heights(self) -> tuple[float, ...]:

@@ -1,25 +1,15 @@
 """Study files, `railsim-study/1`: what is combined, linked and sampled, under version control."""
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from railsim.definitions.analyses import Analysis, needs_speed
-from railsim.definitions.base import (
-    Count,
-    Definition,
-    FileDefinition,
-    Finite,
-    Name,
-    NonNegative,
-    Positive,
-    Text,
-)
+from railsim.definitions.base import Count, Definition, Finite, Name, NonNegative, Positive, Text
 from railsim.definitions.design import Optimise
+from railsim.definitions.file_definition import FileDefinition
 from railsim.units import range_values
-
-STUDY_FORMAT = "railsim-study/1"
 
 Value = (
     Annotated[bool, Field(strict=True)]
@@ -114,6 +104,9 @@ class Sample(Definition):
 
 class Study(FileDefinition):
     """A study: everything that its file says."""
+
+    KIND: ClassVar = "study"
+    OPEN_TABLES: ClassVar = ("grid",)
 
     format: Literal["railsim-study/1"]
     """Kind and version of the file"""

@@ -1,184 +1,38 @@
-"""Vehicle files, `railsim-vehicle/1`: bodies, wheelsets, axleboxes, force elements, assemblies.
+"""A vehicle: the tables of its file, and what follows from them."""
 
-Everything is a table with its own name, so that an extending file can replace a part of it.
-Positions are those of the nominal vehicle at rest on straight level track: x forward from the
-vehicle's origin, y to the right, z down from the plane through the rail tops.  An assembly is a
-group that stands at each of its placements; its coordinates count from there.
-"""
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
-from typing import Any, ClassVar, Literal
-
-from pydantic import Field
-
-from railsim.definitions.base import (
-    Definition,
-    FileDefinition,
-    Flag,
-    Name,
-    Positive,
-    PositivePair,
-    PositiveVector,
-    Text,
-    TextPair,
-    Vector,
-)
-from railsim.definitions.elements import AnyElement
-from railsim.definitions.loads import LoadCase, LoadName
-from railsim.definitions.offered import offered
-from railsim.drawn import Drawn
-
-VEHICLE_FORMAT = "railsim-vehicle/1"
+from railsim.definitions.flatten import flatten, position_faults
+from railsim.definitions.names import name_faults
+from railsim.definitions.vehicle_tables import VehicleTables
+from railsim.errors import Fault
+from railsim.plottable import Plottable
 
 
-class Body(Definition):
-    """A rigid body: car body, bogie frame, bolster, traction motor."""
-
-    mass: Positive
-    """Mass [kg]"""
-    inertia: PositiveVector
-    """Moments of inertia Ixx, Iyy, Izz about the centre of gravity [kg m2]"""
-    position: Vector
-    """Centre of gravity [m]"""
-    fixed: Literal["track", "ground"] | None = None
-    """Held where the vehicle at rest has it: in its moving track frame (`track`), which is the
-    same as on the `ground` of a test rig where the track is straight and level"""
-
-
-class Wheelset(Definition):
-    """Two wheels on an axle, turning with it."""
-
-    mass: Positive
-    """Mass [kg]"""
-    inertia: PositiveVector
-    """Moments of inertia Ixx, Iyy (about the axle), Izz [kg m2]"""
-    position: Vector
-    """Middle of the axle [m]; z = -radius"""
-    radius: PositivePair
-    """Nominal rolling radius, one number, or left and right [m]"""
-    profile: TextPair
-    """Wheel profile, a built-in name or a file, or [left, right]"""
-    back_to_back: Positive = 1.360
-    """Distance between the wheels' backs [m]"""
-    tape_circle_distance: Positive = 1.5
-    """Distance between the nominal rolling circles [m]"""
-
-
-class Axlebox(Definition):
-    """An axlebox with its arm: rigid with the wheelset but for its pitch about the axle."""
-
-    wheelset: Text
-    """Name of the wheelset that carries it"""
-    position: Vector
-    """Bearing centre [m]; mass and the other inertias are part of the wheelset"""
-    pitch_inertia: Positive
-    """Moment of inertia about the axle [kg m2]"""
-    sides: Literal["both"] | None = None
-    """`both`: given on the right (y > 0), copied to the left; the names get `.right` and `.left`"""
-
-
-class Placement(Definition):
-    """One position and direction of an assembly."""
-
-    name: Name
-    """Name that goes before the names within the assembly, joined by a dot"""
-    position: Vector = (0.0, 0.0, 0.0)
-    """Origin of the assembly's coordinates [m]"""
-    mirror: Flag = False
-    """Reflected fore and aft (x); left and right stay"""
-
-
-class Assembly(Definition):
-    """A group of parts that occurs once or several times."""
-
-    placements: tuple[Placement, ...] = Field(min_length=1)
-    """Where the assembly stands"""
-    bodies: dict[Name, Body] = Field(default_factory=dict)
-    """Bodies by name"""
-    wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
-    """Wheelsets by name"""
-    axleboxes: dict[Name, Axlebox] = Field(default_factory=dict)
-    """Axleboxes by name"""
-    elements: dict[Name, AnyElement] = Field(default_factory=dict)
-    """Force elements by name"""
-    assemblies: dict[Name, "Assembly"] = Field(default_factory=dict)
-    """Assemblies within this one, by name"""
-
-
-class Point(Definition):
-    """A point that is fixed to a body."""
-
-    body: Text
-    """Full name of the body"""
-    position: Vector
-    """Position in the nominal vehicle [m]"""
-
-
-class Service(Definition):
-    """Approved operating conditions of the vehicle: the base of its assessment."""
-
-    admissible_speed: Positive
-    """Highest speed in service [m/s]"""
-    cant_deficiency: Positive
-    """Admissible cant deficiency [m]"""
-    category: Literal["passenger", "freight", "locomotive", "multiple_unit"] = "passenger"
-    """Category, which decides on limits"""
-    floor_height: Positive = 1.2
-    """Height of the floor above the rails, where accelerations are taken [m]"""
-    points: dict[Name, Point] = Field(default_factory=dict)
-    """Further points at which accelerations are taken, by name"""
-    condition: Text | None = None
-    """Condition in which it is tested, such as `worn laden`: assessed together with the vehicles
-    of this name in other conditions, without pooling their values"""
-    fault: Flag = False
-    """The condition is a fault, assessed for running safety only"""
-
-
-class Vehicle(FileDefinition, Drawn):
+class Vehicle(VehicleTables, Plottable):
     """A vehicle: everything that its file says."""
 
-    format: Literal["railsim-vehicle/1"]
-    """Kind and version of the file"""
-    name: Text
-    """What the vehicle is called in tables and plots"""
-    source: Text | None = None
-    """Where the numbers come from"""
-    load: LoadName | None = None
-    """Load case in force; `design`, the default: the numbers of the bodies themselves"""
-    loads: dict[Name, LoadCase] = Field(default_factory=dict)
-    """Load cases by name"""
-    reference: Text | None = None
-    """Full name of the body whose travelled distance is the vehicle's `distance`; by default the
-    first body, else the first wheelset"""
-    service: Service | None = None
-    """Approved operating conditions of the vehicle; assessments need it"""
-    sensors: dict[Name, Point] = Field(default_factory=dict)
-    """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
-    standard ones"""
-    bodies: dict[Name, Body] = Field(default_factory=dict)
-    """Bodies by name"""
-    wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)
-    """Wheelsets by name"""
-    axleboxes: dict[Name, Axlebox] = Field(default_factory=dict)
-    """Axleboxes by name"""
-    elements: dict[Name, AnyElement] = Field(default_factory=dict)
-    """Force elements by name"""
-    assemblies: dict[Name, Assembly] = Field(default_factory=dict)
-    """Assemblies by name"""
-
-    FIGURE: ClassVar = "railsim.plot.vehicle:vehicle_figure"
+    KIND: ClassVar = "vehicle"
 
     @property
     def mass(self) -> float:
         """Mass of all bodies in the load case [kg]."""
-        return float(self._flat().mass)
+        return flatten(self).mass
 
-    def _flat(self) -> Any:
-        return offered("flatten")(self)
+    @classmethod
+    def table_faults(cls, tables: Mapping[str, Any]) -> list[Fault]:
+        """Return every fault of the names in the tables."""
+        return name_faults(tables)
+
+    def contradictions(self) -> list[Fault]:
+        """Return which parts stand where they cannot."""
+        return position_faults(self)
 
     def _table(self) -> tuple[list[str], list[list[object]]]:
         """Return the table of bodies that a notebook shows."""
         rows: list[list[object]] = []
-        for body in self._flat().bodies:
+        for body in flatten(self).bodies:
             position = " ".join(f"{value:.3f}" for value in body.position)
             inertia = " ".join(f"{value:.0f}" for value in body.inertia)
             rows.append([body.name, body.kind, f"{body.mass:.0f}", inertia, position])

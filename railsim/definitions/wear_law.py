@@ -1,12 +1,11 @@
 """Files of a law of wear, `railsim-wear-law/1`: constants of the user's own, with their source."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import model_validator
 
-from railsim.definitions.base import Definition, FileDefinition, NonNegative, Positive, Text
-
-WEAR_LAW_FORMAT = "railsim-wear-law/1"
+from railsim.definitions.base import Definition, NonNegative, Positive, Text
+from railsim.definitions.file_definition import FileDefinition
 
 
 class ArchardMap(Definition):
@@ -41,6 +40,8 @@ class FrictionWork(Definition):
 
 class WearLawFile(FileDefinition):
     """A law of wear: one of the tables, with constants of the user's own."""
+
+    KIND: ClassVar = "limits"
 
     format: Literal["railsim-wear-law/1"]
     """Kind and version of the file"""

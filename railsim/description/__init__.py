@@ -10,7 +10,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from railsim.definitions.base import FileDefinition
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.loading import FORMATS
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.spring import TrailingArmSuspension

@@ -6,7 +6,8 @@ from typing import Any
 
 from railsim.definitions.alignment_rules import cant_at
 from railsim.definitions.irregularity import READING, Irregularity, Measured
-from railsim.definitions.layout import Section, cant_sections, curvature_sections, gradient_sections
+from railsim.definitions.layout import cant_sections, curvature_sections, gradient_sections
+from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.description.values import Description, Parts, either, short
 from railsim.table import Column, Table

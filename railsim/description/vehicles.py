@@ -6,7 +6,8 @@ from typing import Any
 
 from railsim.definitions.elements.base import Element
 from railsim.definitions.flatten import flatten
-from railsim.definitions.vehicle import Assembly, Vehicle
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Assembly
 from railsim.description.values import Description, Parts, either, short
 from railsim.table import Column, Table
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,11 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.drawn import Drawn
 from railsim.errors import InputError, argument_fault
 from railsim.linear.eigenmodes import SEARCHED, SLOWEST, Eigenmodes, eigenmodes, followed
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
+from railsim.plottable import Plottable
 from railsim.profiles import Profile
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class Modes(Drawn):
+class Modes(Plottable):
     """Modes of a vehicle at one speed.
 
     Attributes
@@ -111,8 +111,6 @@ class Modes(Drawn):
     modes: tuple[Mode, ...]
     remarks: tuple[str, ...] = ()
     parameter: tuple[str, float] | None = None
-
-    FIGURE: ClassVar = "railsim.plot.modes:modes_figure"
 
     def __iter__(self) -> Any:
         return iter(self.modes)
@@ -158,7 +156,7 @@ class Modes(Drawn):
 
 
 @dataclass(frozen=True)
-class RootLocus(Drawn):
+class RootLocus(Plottable):
     """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
 
     Attributes
@@ -174,8 +172,6 @@ class RootLocus(Drawn):
     key: str
     values: tuple[float, ...]
     sets: tuple[Modes, ...]
-
-    FIGURE: ClassVar = "railsim.plot.modes:locus_figure"
 
     @property
     def eigenvalues(self) -> Complex:

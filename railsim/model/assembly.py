@@ -17,8 +17,9 @@ from railsim.contact.creep import creep_law
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
-from railsim.definitions.flatten import FlatBody, FlatVehicle, check_types, flatten
+from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
 from railsim.definitions.layout import is_straight_and_level
+from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Drive as DriveDefinition
 from railsim.definitions.settings import Settings
 from railsim.definitions.support import Support as SupportDefinition

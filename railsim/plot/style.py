@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from railsim.definitions.layout import Section
+from railsim.definitions.section import Section
 from railsim.files import PICTURES, check_file, whole_file
 from railsim.result.data import Array
 

@@ -14,12 +14,12 @@ from matplotlib.lines import Line2D
 from scipy.integrate import cumulative_simpson
 
 from railsim.definitions.layout import (
-    Section,
     cant_sections,
     curvature_sections,
     gradient_sections,
     track_remarks,
 )
+from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.plot.style import DISTINCT, LIMIT, SIDE_LINES, Picture, shade, spans, styled
 from railsim.result.data import Array

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
-from railsim.definitions.base import FileDefinition
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Assembly, Vehicle
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Assembly
 from railsim.errors import Fault, InputError
 from railsim.profiles import load_profile
 from railsim.profiles.profile import Kind

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.layout import Section, curvature_sections
+from railsim.definitions.layout import curvature_sections
+from railsim.definitions.section import Section
 from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result
 from railsim.text import printable

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.drawn import drawn
 from railsim.errors import InputError, nearest
 from railsim.notation import Quantity
+from railsim.plottable import picture_of
 from railsim.profiles.profile import Profile
 from railsim.text import html_table
 
@@ -343,18 +343,8 @@ class Result:
         InputError
             A quantity or label that the result does not have; the file exists.
         """
-        # looked up: results lie below pictures and know none of them
         chosen = {"selections": quantities} if quantities else {}
-        return drawn(
-            "railsim.plot.histories:histories",
-            self,
-            path=path,
-            overwrite=overwrite,
-            over=over,
-            by=by,
-            between=between,
-            **chosen,
-        )
+        return picture_of(self, path, overwrite, over=over, by=by, between=between, **chosen)
 
     # -- elsewhere ----------------------------------------------------------------------------
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from railsim.definitions.layout import Section, curvature_sections
+from railsim.definitions.layout import curvature_sections
+from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.notation import Quantity
 from railsim.result.data import Array, Result

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.drawn import Drawn
 from railsim.errors import InputError, ModelError, argument_fault
 from railsim.linear.eigenmodes import (
     SEARCHED,
@@ -26,6 +25,7 @@ from railsim.linear.eigenmodes import (
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
+from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.stability.conicity import conicity_over_amplitude
 from railsim.stability.continuation import followed_branches
@@ -46,7 +46,7 @@ SHARE = 0.75  # ... this share of them
 
 
 @dataclass
-class CriticalSpeed(Drawn):
+class CriticalSpeed(Plottable):
     """Critical speeds of a vehicle.
 
     Attributes
@@ -97,8 +97,6 @@ class CriticalSpeed(Drawn):
     instability_limit: dict[str, Any] | None = None
     conicity_over_amplitude: dict[str, Any] | None = None
     remarks: list[str] = field(default_factory=list)
-
-    FIGURE: ClassVar = "railsim.plot.stability:bifurcation_figure"
 
     @property
     def lowest(self) -> Sustained | None:

@@ -20,7 +20,6 @@ from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.drawn import Drawn
 from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
@@ -36,6 +35,7 @@ from railsim.model.assembly import Model, assemble, check_fixed
 from railsim.model.equilibrium import equilibrium
 from railsim.model.time_step import Stability, empty_recorder
 from railsim.model.work import work_arrays
+from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.simulation.outputs import against_rails
 from railsim.track.tables import track_tables
@@ -51,7 +51,7 @@ STILL = 1e-4  # share of the wheel loads by which forces still change after a se
 
 
 @dataclass(frozen=True)
-class Curving(Drawn):
+class Curving(Plottable):
     """Steady curving on a grid.
 
     Attributes
@@ -105,8 +105,6 @@ class Curving(Drawn):
     bogies: tuple[str, ...]
     wheelset_position: tuple[float, ...]
     remarks: tuple[str, ...] = ()
-
-    FIGURE: ClassVar = "railsim.plot.curving:curving_figure"
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
     VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
         "Q": ("wheelset", "side"),

@@ -14,7 +14,7 @@ from railsim.assessment import Assessment, assess
 from railsim.cant import curve_speed
 from railsim.definitions.loading import load_running_limits, load_scenario, load_vehicle
 from railsim.definitions.scenario import Scenario, Speed, TestCondition
-from railsim.definitions.vehicle import Service
+from railsim.definitions.vehicle_tables import Service
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import check_folder
 from railsim.result import Result, open_result

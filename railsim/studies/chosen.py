@@ -53,13 +53,11 @@ def vehicle_text(vehicle: str | Path, overrides: Sequence[str], folder: Path) ->
     folder : Path
         Folder of the new file; the path to the original is relative to it.
     """
-    from railsim.definitions.loading import FORMATS
     from railsim.definitions.vehicle import Vehicle
 
     base = sources.read_source(sources.find_file(vehicle, "vehicle"), "vehicle")
     defaults = Vehicle.model_construct().model_dump(mode="json")
-    free = FORMATS[base.data["format"]].free
-    changed = apply_overrides(base, overrides, free, defaults).data
+    changed = apply_overrides(base, overrides, Vehicle.OPEN_TABLES, defaults).data
     named = os.path.relpath(vehicle, folder) if is_file(vehicle) else str(vehicle)
     head = {
         "format": base.data["format"],

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from railsim.definitions.analyses import Analysis, needs_run, needs_speed
-from railsim.definitions.base import FileDefinition
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
 from railsim.definitions.overrides import OVERRIDE, split_overrides
 from railsim.definitions.study import Sample, value_texts

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.base import FileDefinition
+from railsim.definitions.file_definition import FileDefinition
 from railsim.files import make_folder, whole_file
 
 INPUTS = "inputs"

@@ -17,8 +17,10 @@ from railsim.definitions.flatten import flatten
 from railsim.definitions.irregularity import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.scenario import Speed, TestCondition
-from railsim.definitions.track import Circle, Track
-from railsim.definitions.vehicle import Service, Vehicle
+from railsim.definitions.track import Track
+from railsim.definitions.track_tables import Circle
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Service
 from railsim.errors import Fault, InputError
 from railsim.result.sensors import sensors
 from railsim.studies.case import Case

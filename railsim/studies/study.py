@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from railsim.definitions.analyses import Analyses, Analysis, needs_run
-from railsim.definitions.base import Definition, FileDefinition
+from railsim.definitions.base import Definition
+from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.settings import Settings
 from railsim.definitions.study import Sample, value_texts
 from railsim.definitions.track import Track

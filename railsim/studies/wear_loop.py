@@ -22,7 +22,8 @@ from railsim.assessment.wear_depth import parts_of_step, worn_depth, worn_profil
 from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
 from railsim.definitions.settings import InitialState, Settings
-from railsim.definitions.track import Straight, Track
+from railsim.definitions.track import Track
+from railsim.definitions.track_tables import Straight
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, ModelError, RailsimError
 from railsim.profiles import Profile, load_profile

@@ -18,12 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from railsim.constants import CANT_BASE
 from railsim.definitions.layout import (
-    Section,
     cant_sections,
     curvature_sections,
     gradient_sections,
     track_faults,
 )
+from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from railsim.cant import cant_deficiency, curve_speed
 from railsim.definitions.alignment_rules import cant_at
-from railsim.definitions.layout import Section, cant_sections, curvature_sections
+from railsim.definitions.layout import cant_sections, curvature_sections
+from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 
 # Cant deficiency up to which EN 14363 tests vehicles for conventional operation [m].

@@ -31,7 +31,7 @@ from railsim.definitions.irregularity import (
     Sweep,
     Twist,
 )
-from railsim.definitions.layout import Section
+from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.track.alignment import RoundedProfile
 from railsim.track.spectra import SPECTRA, Spectrum, erri_b176

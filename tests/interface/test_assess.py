@@ -12,7 +12,7 @@ import railsim
 from railsim.assessment import assess
 from railsim.cli import main
 from railsim.cli.assess import FILES
-from railsim.definitions.vehicle import Service
+from railsim.definitions.vehicle_tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
 from railsim.result import Result

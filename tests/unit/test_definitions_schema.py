@@ -38,7 +38,7 @@ def test_key_tables_of_the_manual_are_up_to_date(page):
 
 @pytest.mark.parametrize("format_name", ["railsim-vehicle/1", "railsim-track/1"])
 def test_manual_shows_every_definition_of_a_format(format_name):
-    kind = FORMATS[format_name].kind
+    kind = FORMATS[format_name].KIND
     text = (DOCS / "user" / f"{kind}_file.md").read_text()
     for name in json_schema(format_name)["$defs"]:
         assert f"<!-- keys: {format_name} {name} -->" in text

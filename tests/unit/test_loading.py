@@ -402,6 +402,6 @@ def test_text_of_a_track_reads_back():
 
 
 def test_any_file_is_recognised_by_its_format():
-    definition, known = load_any(Path(sources.shipped_folder("track")) / "straight.toml")
-    assert known.kind == "track"
+    definition = load_any(Path(sources.shipped_folder("track")) / "straight.toml")
+    assert definition.KIND == "track"
     assert definition.name.startswith("Straight")

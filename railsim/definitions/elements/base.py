@@ -70,6 +70,9 @@ class Element(Definition):
     MUST_PRESS: ClassVar[bool] = False
     """Whether it stands the wrong way round where it would have to pull at rest."""
 
+    if TYPE_CHECKING:  # the field of every kind
+        kind: str
+
     bodies: tuple[Text, ...]
     """Names of the bodies, found from the innermost assembly outwards"""
 

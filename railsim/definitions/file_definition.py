@@ -1,0 +1,179 @@
+"""Definitions that fill a whole file: checked with all faults at once, changed, written."""
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeVar, get_args
+
+import tomli_w
+from pydantic import ValidationError
+
+from railsim.definitions.base import Definition, Remark
+from railsim.definitions.faults import validation_faults
+from railsim.definitions.overrides import apply_overrides, with_values
+from railsim.definitions.sources import Source, text_source
+from railsim.errors import Fault, InputError
+from railsim.files import check_file, whole_file
+from railsim.text import html_table, printable, shortened
+
+LONGEST_VALUE = 60  # characters of a value in the table of a notebook
+D = TypeVar("D", bound="FileDefinition")
+
+
+class FileDefinition(Definition):
+    """Base of what fills a whole file; its `format` names it."""
+
+    KIND: ClassVar[str]
+    """Word for it: vehicle, track, settings."""
+    OPEN_TABLES: ClassVar[tuple[str, ...]] = ()
+    """Tables that an assignment makes where they are missing; their members are dotted names."""
+
+    @classmethod
+    def format_name(cls) -> str:
+        """Return the value of the key `format`."""
+        return str(get_args(cls.model_fields["format"].annotation)[0])
+
+    @classmethod
+    def complete(cls, tables: dict[str, Any]) -> list[Fault]:
+        """Complete the plain tables from further files, in place; return the faults of these."""
+        return []
+
+    @classmethod
+    def table_faults(cls, tables: Mapping[str, Any]) -> list[Fault]:
+        """Return what is wrong in the plain tables, valid or not; the faults' file is empty."""
+        return []
+
+    def contradictions(self) -> list[Fault]:
+        """Return what is wrong between the parts of a valid definition; the file is empty."""
+        return []
+
+    def unusual(self) -> list[Remark]:
+        """Return what is allowed but unusual."""
+        return []
+
+    @classmethod
+    def note_assigned(
+        cls, tables: dict[str, Any], keys: Iterable[str], before: "FileDefinition | None" = None
+    ) -> None:
+        """Note in the plain tables which keys are assigned, where a definition keeps that."""
+
+    def to_toml(self) -> str:
+        """Return the whole definition as TOML text, defaults included, `extends` resolved."""
+        return self._toml
+
+    @cached_property
+    def _toml(self) -> str:
+        # a study asks for it once for every run
+        return tomli_w.dumps(self.model_dump(exclude_none=True))
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the definition as a file, which appears when it is whole.
+
+        Raises
+        ------
+        InputError
+            The file exists or cannot be written.
+        """
+        path = Path(path)
+        check_file(path, overwrite=overwrite, endings=[".toml"])
+        with whole_file(path) as partial:
+            partial.write_text(self.to_toml(), encoding="utf-8")
+        return path
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with top-level keys replaced, validated again."""
+        return type(self).model_validate({**self.model_dump(exclude_none=True), **changes})
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """Return a copy with other values at some keys, checked as a file would be.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Values by the dotted keys of the file, SI; members of lists by their `name` or index.
+
+        Raises
+        ------
+        InputError
+            A key that does not exist, or a value that is not allowed; all of them at once.
+
+        Examples
+        --------
+        >>> import railsim
+        >>> coach = railsim.load_vehicle("coach_manchester")
+        >>> coach.with_values({"bodies.carbody.mass": 40e3}).bodies["carbody"].mass
+        40000.0
+        """
+        kind = type(self)
+        source = text_source(self.to_toml(), getattr(self, "name", kind.KIND), kind.KIND)
+        kind.note_assigned(source.data, values, self)
+        return validated(kind, with_values(source, values, kind.OPEN_TABLES, _defaults(kind)))
+
+    def __repr__(self) -> str:
+        kind, name = type(self).__name__, getattr(self, "name", None)
+        return f"<{kind} {printable(name)!r}>" if name else f"<{kind}>"
+
+    def _table(self) -> tuple[list[str], list[list[object]]]:
+        """Return header and rows of the table that a notebook shows: keys and their values."""
+        shown = self.model_dump(exclude_none=True, exclude={"format", "name"})
+        rows: list[list[object]] = []
+        for key, value in shown.items():
+            if isinstance(value, dict | list | tuple) and len(str(value)) > LONGEST_VALUE:
+                value = f"{len(value)} entries"
+            rows.append([key, value])
+        return ["key", "value"], rows
+
+    def _repr_html_(self) -> str:
+        header, rows = self._table()
+        return html_table(str(getattr(self, "name", type(self).__name__)), header, rows)
+
+
+def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:
+    """Return the definition of a source with assignments.
+
+    Raises
+    ------
+    InputError
+        Another format, and everything that is wrong.
+    """
+    if source.data.get("format") != model.format_name():
+        file = source.file_of(("format",))
+        raise InputError([format_fault(file, source.data.get("format"), [model.format_name()])])
+    overrides = [overrides] if isinstance(overrides, str) else list(overrides)
+    model.note_assigned(source.data, [text.partition("=")[0].strip() for text in overrides])
+    changed = apply_overrides(source, overrides, model.OPEN_TABLES, _defaults(model))
+    return validated(model, changed)
+
+
+def _defaults(model: type[FileDefinition]) -> dict[str, Any]:
+    return {**model.model_construct().model_dump(mode="json"), "format": model.format_name()}
+
+
+def validated(model: type[D], source: Source) -> D:
+    """Return the definition of a source.
+
+    Raises
+    ------
+    InputError
+        Everything that is wrong.
+    """
+
+    def located(faults: Iterable[Fault]) -> list[Fault]:
+        return [f if f.file else source.fault(f.key, f.found, f.allowed) for f in faults]
+
+    faults = located([*model.complete(source.data), *model.table_faults(source.data)])
+    try:
+        definition = model.model_validate(source.data)
+    except ValidationError as error:
+        faults = validation_faults(error, source, model) + faults
+    else:
+        faults = faults or located(definition.contradictions())
+    if faults:
+        raise InputError(dict.fromkeys(faults))
+    return definition
+
+
+def format_fault(file: str, found: object, allowed: Iterable[str]) -> Fault:
+    """Return the fault of a file whose `format` is another."""
+    named = "missing" if found is None else shortened(repr(found))
+    return Fault(file, "format", named, "allowed: " + ", ".join(allowed))

@@ -1,0 +1,252 @@
+"""Track files, `railsim-track/1`: plan, cant, vertical profile, rails, friction, irregularities.
+
+Plan, cant and vertical profile are lists of elements, one behind the other, each with its length.
+A transition (CLO, LIR) takes its ends from its neighbours where it does not name them.  Curvature,
+cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
+"""
+
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+
+from railsim.definitions.base import (
+    Definition,
+    Finite,
+    Flag,
+    NonNegative,
+    NonNegativePair,
+    Positive,
+    Text,
+    TextPair,
+    one_or_two,
+    pair,
+    rising,
+)
+from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.irregularity import Irregularity
+from railsim.definitions.support import Support
+
+ArcLength = TypeVar("ArcLength", float, Any)
+MOST_ELEMENTS, MOST_IRREGULARITIES = 5000, 1000
+
+
+def _curved(radius: float) -> float:
+    if not abs(radius) >= 5.0:
+        raise ValueError("a radius is 5 m at least, negative in a left-hand curve, inf if straight")
+    return radius
+
+
+def _forward(rows: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not rising(rows):
+        raise ValueError("the arc length must increase from row to row")
+    return rows
+
+
+def _softer_in_slip(factors: tuple[float, float]) -> tuple[float, float]:
+    if factors[1] > factors[0]:
+        raise ValueError("the factor of the slip area is at most that of the adhesion area")
+    return factors
+
+
+def _same_on_both_sides(value: Any) -> Any:
+    return _completed(value, 1.0)
+
+
+def _shared_by_both_sides(value: Any) -> Any:
+    return _completed(value, 0.5)
+
+
+def _completed(value: Any, share: float) -> Any:
+    """Return rows [s, value] as [s, left, right]."""
+    if not isinstance(value, list | tuple):
+        return value
+    return [
+        (row[0], share * row[1], share * row[1])
+        if isinstance(row, list | tuple) and len(row) == 2 and isinstance(row[1], int | float)
+        else row
+        for row in value
+    ]
+
+
+_ROWS = WithJsonSchema(
+    {
+        "type": "array",
+        "minItems": 1,
+        "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
+    }
+)
+Widening = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.05, le=0.1)]
+FrictionRows = Annotated[
+    Annotated[tuple[tuple[Finite, NonNegative, NonNegative], ...], Field(min_length=1)],
+    AfterValidator(_forward),
+    BeforeValidator(_same_on_both_sides),
+    _ROWS,
+]
+Share = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
+ThirdBody = Annotated[
+    tuple[Share, Share],
+    AfterValidator(_softer_in_slip),
+    BeforeValidator(pair),
+    one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
+]
+WideningRows = Annotated[
+    Annotated[tuple[tuple[Finite, Widening, Widening], ...], Field(min_length=1)],
+    AfterValidator(_forward),
+    BeforeValidator(_shared_by_both_sides),
+    _ROWS,
+]
+Radius = Annotated[float, Field(strict=True), AfterValidator(_curved)]
+Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e7)]
+Cant = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
+Gradient = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.3, le=0.3)]
+
+
+class Straight(Definition):
+    """A straight."""
+
+    type: Literal["STR"]
+    length: Length
+    """Length [m]"""
+
+
+class Circle(Definition):
+    """A circular curve."""
+
+    type: Literal["CIR"]
+    length: Length
+    """Length along the centre line [m]"""
+    radius: Radius
+    """Radius, positive to the right [m]"""
+
+
+class Clothoid(Definition):
+    """A transition with curvature linear in the arc length."""
+
+    type: Literal["CLO"]
+    length: Length
+    """Length [m]"""
+    radius_start: Radius | None = None
+    """Radius at its beginning, `inf` if straight [m]; by default that of the element before"""
+    radius_end: Radius | None = None
+    """Radius at its end [m]; by default that of the following element"""
+
+
+class ConstantCant(Definition):
+    """Constant cant."""
+
+    type: Literal["CST"]
+    length: Length
+    """Length [m]"""
+    cant: Cant
+    """Height of the left rail over the right one, on the cant base of 1.5 m [m]"""
+
+
+class CantRamp(Definition):
+    """A ramp with cant linear in the arc length."""
+
+    type: Literal["LIR"]
+    length: Length
+    """Length [m]"""
+    cant_start: Cant | None = None
+    """Cant at its beginning [m]; by default that of the element before"""
+    cant_end: Cant | None = None
+    """Cant at its end [m]; by default that of the following element"""
+
+
+class ConstantGradient(Definition):
+    """Constant gradient."""
+
+    type: Literal["CST"]
+    length: Length
+    """Length [m]"""
+    gradient: Gradient
+    """Rise over horizontal distance, positive uphill [1]"""
+
+
+class GradientRamp(Definition):
+    """A vertical curve: gradient linear in the arc length, radius = length / change of gradient."""
+
+    type: Literal["LIR"]
+    length: Length
+    """Length [m]"""
+    gradient_start: Gradient | None = None
+    """Gradient at its beginning [1]; by default that of the element before"""
+    gradient_end: Gradient | None = None
+    """Gradient at its end [1]; by default that of the following element"""
+
+
+PlanElement = Annotated[Straight | Clothoid | Circle, Field(discriminator="type")]
+CantElement = Annotated[ConstantCant | CantRamp, Field(discriminator="type")]
+VerticalElement = Annotated[ConstantGradient | GradientRamp, Field(discriminator="type")]
+
+
+class FallingFriction(Definition):
+    """Friction that falls with the slip velocity w of a contact patch (Polach 2005).
+
+    mu(w) = mu ((1 - rest) exp(-decay w) + rest)
+    """
+
+    rest: Share
+    """Friction at very large slip over that without slip [1]"""
+    decay: NonNegative
+    """How fast it falls with the slip velocity [s/m]"""
+
+
+class TrackTables(FileDefinition):
+    """Everything that the file of a track says."""
+
+    format: Literal["railsim-track/1"]
+    """Kind and version of the file"""
+    name: Text
+    """What the track is called in tables and plots"""
+    source: Text | None = None
+    """Where the numbers come from"""
+    speed: Positive | None = None
+    """Highest speed permitted on the track [m/s]: remarks on the alignment refer to it, and the
+    speed `permitted` of a study"""
+    mileage: Finite = 0.0
+    """Mileage of s = 0 [m]; results hold the mileage of the reference body"""
+    falling_mileage: Flag = False
+    """The mileage falls in the direction of travel"""
+    gauge: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.3, le=2.5)] = 1.435
+    """Distance between the gauge faces, 14 mm below the rail tops [m]"""
+    rail: TextPair = ("60E1", "60E1")
+    """Rail profile, a built-in name or a file, or [left, right]"""
+    inclination: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.2)] = 0.025
+    """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
+    friction: NonNegativePair = (0.4, 0.4)
+    """Coefficient of friction, one number, or left and right [1]"""
+    friction_table: FrictionRows | None = None
+    """Rows [s, mu] or [s, left, right] instead of `friction`, linear in between [m, 1]"""
+    friction_falling: FallingFriction | None = None
+    """How friction falls with the slip velocity; by default it does not"""
+    third_body: ThirdBody = (1.0, 1.0)
+    """Factor of Kalker's coefficients by a layer of dirt or water, one number or [adhesion, slip]:
+    the second, for the slip area, is for the creep law `polach` only [1]"""
+    gauge_widening: WideningRows | None = None
+    """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
+    much each rail stands further out than the gauge says, one number being shared by both rails"""
+    rounding: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=200)] = 10.0
+    """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
+    cant_rotation: Literal["centre", "inner_rail"] = "centre"
+    """Cant turns the track about its centre line, or about the inner (lower) rail"""
+    plan: tuple[PlanElement, ...] = Field(min_length=1, max_length=MOST_ELEMENTS)
+    """Elements of the plan, from s = 0 on; the first and the last continue beyond the ends"""
+    cant: tuple[CantElement, ...] = Field(default=(), max_length=MOST_ELEMENTS)
+    """Elements of the cant; where shorter than the plan, the last value continues"""
+    vertical: tuple[VerticalElement, ...] = Field(default=(), max_length=MOST_ELEMENTS)
+    """Elements of the vertical profile; where shorter than the plan, the last gradient continues"""
+
+    irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
+    """Displacements of the rails from their ideal positions; they add up"""
+    support: Support = Support()
+    """What carries the rails: rigid, or elastic as a moving track model"""
+
+    @property
+    def length(self) -> float:
+        """Length of the plan [m]."""
+        return sum(element.length for element in self.plan)
+
+    def mileage_at(self, s: "ArcLength") -> "ArcLength":
+        """Mileage at an arc length, or at an array of them [m]."""
+        return self.mileage - s if self.falling_mileage else self.mileage + s
