@@ -44,7 +44,7 @@ def describe(item: FileDefinition | Result, speeds: Sequence[float] = ()) -> Des
     if isinstance(item, Vehicle):
         return describe_vehicle(item)
     content = item.model_dump()
-    data = {"kind": FORMATS[content["format"]].kind, **content}
+    data = {"kind": FORMATS[content["format"]].KIND, **content}
     if isinstance(item, TrailingArmSuspension):
         return Description(data, spring_parts(item))
     if isinstance(item, Mechanism):
