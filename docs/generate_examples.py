@@ -1,12 +1,15 @@
 """Make the gallery of examples: ``python docs/generate_examples.py``.
 
-Each script of ``examples/`` gets a page with its question, its text, its picture and its code.  The
-pages are made from the scripts' docstrings (``--pages`` makes nothing else), the pictures by the
-scripts themselves.
+Each script of ``examples/`` gets a page with its question, text, picture, code and output.
+Question, text and code are the script's (``--pages`` makes nothing else), picture and output come
+from a run of it.  The manual offers each as a notebook, too (``docs/manual.py``).
 """
 
 import ast
-import os
+import contextlib
+import io
+import json
+import re
 import runpy
 import shutil
 import sys
@@ -18,20 +21,53 @@ SCRIPTS = tuple(sorted((ROOT / "examples").glob("[0-9]*.py")))
 PAGES, IMAGES = ROOT / "docs" / "examples", ROOT / "docs" / "img" / "examples"
 
 
-def told(script: Path) -> tuple[str, str]:
-    """Question and text of a script."""
-    text = ast.get_docstring(ast.parse(script.read_text("utf-8"))) or ""
-    question, _, rest = text.partition("\n")
-    return question, rest.strip()
+def parts(script: Path) -> tuple[str, str, str]:
+    """Question, text and code of a script."""
+    source = script.read_text("utf-8")
+    question, _, text = (ast.get_docstring(ast.parse(source)) or "").partition("\n")
+    return question, text.strip(), source.split('"""', 2)[2].strip()
 
 
-def page(script: Path) -> str:
-    """Page of a script."""
-    question, text = told(script)
+def output(page: Path) -> str:
+    """What the script printed when its page was made."""
+    text = page.read_text("utf-8") if page.exists() else ""
+    return text.rpartition("```text\n")[2].removesuffix("```\n")
+
+
+def notebook(script: Path) -> str:
+    """The script as a notebook, a cell for each of its paragraphs."""
+    question, text, code = parts(script)
+    cells = [*re.split(r"\n\n+(?=\S)", code), "figure"]
+    head = {
+        "cell_type": "markdown",
+        "id": "text",
+        "metadata": {},
+        "source": f"# {question}\n\n{text}",
+    }
+    body = [
+        {"cell_type": "code", "id": f"cell-{i}", "metadata": {}, "source": cell,
+         "execution_count": None, "outputs": []}
+        for i, cell in enumerate(cells)
+    ]  # fmt: skip
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    return json.dumps(
+        {
+            "cells": [head, *body],
+            "metadata": {"kernelspec": kernel},
+            "nbformat": 4,
+            "nbformat_minor": 5,
+        }
+    )
+
+
+def page(script: Path, printed: str) -> str:
+    """Page of a script, with its output."""
+    question, text, code = parts(script)
     name = script.stem
     return (
         f"# {question}\n\n{text}\n\n![{question}](../img/examples/{name}.png)\n\n"
-        f'```py\n--8<-- "examples/{script.name}"\n```\n'
+        f"The script is `examples/{script.name}`:\n\n```py\n{code}\n```\n\n"
+        f"It prints:\n\n```text\n{printed}```\n"
     )
 
 
@@ -39,7 +75,7 @@ def gallery() -> str:
     """Page that leads to all others, in reading order."""
     items = []
     for script in SCRIPTS:
-        name, (question, _) = script.stem, told(script)
+        name, (question, *_) = script.stem, parts(script)
         picture = f"![{question}](../img/examples/{name}.png)"
         items.append(f"## [{question}]({name}.md)\n\n[{picture}]({name}.md)\n")
     return (
@@ -50,21 +86,26 @@ def gallery() -> str:
 
 
 def pages() -> dict[Path, str]:
-    """All pages by their files."""
-    return {PAGES / "index.md": gallery()} | {
-        PAGES / f"{script.stem}.md": page(script) for script in SCRIPTS
-    }
+    """All pages by their files; the outputs are those that stand there."""
+    made = {PAGES / "index.md": gallery()}
+    for script in SCRIPTS:
+        path = PAGES / f"{script.stem}.md"
+        made[path] = page(script, output(path))
+    return made
+
+
+def run() -> None:
+    """Run all scripts: new pictures and outputs."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for script in SCRIPTS:
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                runpy.run_path(str(script))
+            shutil.copy(f"{script.stem}.png", IMAGES)
+            (PAGES / f"{script.stem}.md").write_text(page(script, printed.getvalue()), "utf-8")
 
 
 if __name__ == "__main__":
-    PAGES.mkdir(exist_ok=True)
+    if "--pages" not in sys.argv:
+        run()
     for path, text in pages().items():
         path.write_text(text, "utf-8")
-    if "--pages" not in sys.argv:
-        IMAGES.mkdir(exist_ok=True)
-        with tempfile.TemporaryDirectory() as folder:
-            os.chdir(folder)
-            for script in SCRIPTS:
-                runpy.run_path(str(script))
-                shutil.copy(f"{script.stem}.png", IMAGES)
-            os.chdir(ROOT)
