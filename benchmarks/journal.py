@@ -10,8 +10,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from railsim.studies.combine import Plan
 from railsim.studies.journal import Journal
+from railsim.studies.plan import Plan
+from railsim.studies.spec import StudySpec
 from railsim.studies.study import study
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "interface"))
@@ -37,7 +38,7 @@ def main() -> None:
     }  # fmt: skip
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        points = timed("points with their keys", lambda: Plan(*how.values()).points)
+        points = timed("points with their keys", lambda: Plan(StudySpec(**how)).points)
         with Journal(folder) as journal:
             journal._line = unsynced(journal)
             for point in points:

@@ -189,12 +189,13 @@ def _checked(
     """Load the case and settle its file; everything that is wrong with either at once."""
     from railsim.errors import Fault, InputError
     from railsim.files import PICTURES, RESULTS, check_file
-    from railsim.studies.combine import load_case
+    from railsim.studies.case import load_case
+    from railsim.studies.spec import RunSpec
 
     faults: list[Fault] = []
     case = None
     try:
-        case = load_case(*what, **how)
+        case = load_case(RunSpec(*what, **how))
     except InputError as error:
         faults.extend(error.faults)
     name = out or (case.file_name if case else None)

@@ -1,6 +1,7 @@
 """``railsim study``: every combination of vehicles, tracks and speeds."""
 
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +23,10 @@ from railsim.processes import begin_server
 
 if TYPE_CHECKING:
     from railsim.studies import Outcome
-    from railsim.studies.journal import Record
+    from railsim.studies.records import Record
+    from railsim.studies.spec import StudySpec
 
+OF_STUDY = ("settings", "start", "duration", "until", "quantities", "keep", "compress", "single")
 MANY = ("--vehicles", "--tracks", "--speeds", "--grid")
 
 
@@ -192,58 +195,46 @@ def command(
     done = not how["overwrite"] and Path(out, "study.json").exists()
     if not done and how["workers"] != 1 and how["scheduler"] is None:
         begin_server()  # which imports on another core while this process does
-    from railsim.studies import study
+    from railsim.studies.spec import Execution
+    from railsim.studies.study import run_study
 
-    inputs: dict[str, Any] = {
+    of_study = {name: how.pop(name) for name in OF_STUDY}
+    given: dict[str, Any] = {
         "vehicles": list(vehicles),
         "tracks": list(tracks),
         "speeds": list(speeds),
         "grid": _grid(grids),
         "assignments": list(with_load(assignments, load, "vehicle.")),
-        **{
-            name: how.pop(name) for name in ("settings", "start", "duration", "until", "quantities")
-        },
+        **{name: of_study[name] for name in ("settings", "start", "duration", "until")},
     }
-    if file is not None:
-        inputs = _of_file(file, inputs)
-    base = Path.cwd()
-    if resume and not any(value for name, value in inputs.items() if name != "quantities"):
-        from railsim.studies.own import repeated
-        from railsim.studies.study import stored_inputs
-
-        stored, base = stored_inputs(Path(out))
-        out = out if base == Path.cwd() else str(Path(out).absolute())
-        if stored.scenario is not None:
+    folder, base = Path(out), Path.cwd()
+    if resume and file is None and not any(given.values()):
+        spec, base = _stored(folder, of_study["quantities"])
+        folder = folder if base == Path.cwd() else folder.absolute()
+        if spec.scenario is not None:
             with chdir(base):
                 return _campaign(
-                    stored.scenario,
-                    tuple(stored.vehicles),
+                    spec.scenario,
+                    tuple(spec.vehicles),
                     ((),),
-                    out,
-                    tuple(stored.assignments),
-                    {**inputs, **how, "report": report, "file": None},
+                    str(folder),
+                    tuple(spec.assignments),
+                    {**given, **of_study, **how, "report": report, "file": None},
                     resume=True,
                     as_json=as_json,
                     quiet=quiet,
                 )
-        function = repeated(stored.quantities, inputs["quantities"])
-        inputs = stored.model_dump(exclude={"railsim_version", "folder", "scenario"})
-        inputs["quantities"] = function
-        for name in ("keep", "compress", "single"):
-            how.pop(name)
-    elif file is None:
-        _require(vehicles, tracks, speeds)
+    else:
+        spec = _asked(file, {**of_study, **given})
+    execution = Execution(
+        **how,
+        resume=resume,
+        on_record=None if quiet or as_json else _print_record,
+        on_remark=_print_remark,
+    )
     # names of files in a study that goes on count from where it was started
     with chdir(base), progress_bar("study", quiet=quiet) as progress:
-        outcome = study(
-            out=out,
-            resume=resume,
-            progress=progress,
-            on_record=None if quiet or as_json else _print_record,
-            on_remark=_print_remark,
-            **inputs,
-            **how,
-        )
+        outcome = run_study(spec, folder, replace(execution, progress=progress))
         page = _report(outcome) if report else None
     if as_json:
         print_json({"folder": str(outcome.folder), "runs": list(outcome.records)})
@@ -254,11 +245,26 @@ def command(
     return _status(outcome)
 
 
-def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the inputs of a study file, with the assignments of the command line after its own."""
+def _stored(folder: Path, quantities: str | None) -> "tuple[StudySpec, Path]":
+    """Return the study in a folder, and the folder of its relative file names."""
+    from railsim.studies.study import stored_spec
+    from railsim.studies.user_function import given_again
+
+    spec, base = stored_spec(folder)
+    return spec.changed(quantities=given_again(spec.quantities, quantities)), base
+
+
+def _asked(file: str | None, given: dict[str, Any]) -> "StudySpec":
+    """Return the study of the options, or of a file with the assignments of the options."""
     from railsim.definitions.loading import load_study
     from railsim.errors import Fault, InputError
+    from railsim.studies.spec import StudySpec, checked
+    from railsim.studies.user_function import full_name
 
+    if file is None:
+        _require(*(given[name] for name in ("vehicles", "tracks", "speeds")))
+        given["quantities"] = full_name(given["quantities"])
+        return checked(StudySpec, given, "study")
     both = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
     faults = [
         Fault(f"--{name}", "", "given together with a study file", "the file holds it")
@@ -267,10 +273,13 @@ def _of_file(file: str, given: dict[str, Any]) -> dict[str, Any]:
     ]
     if faults:
         raise InputError(faults)
-    plan = load_study(file)
-    inputs = plan.arguments()
-    inputs["assignments"] += given["assignments"]
-    return {**inputs, "quantities": given["quantities"]}
+    study = load_study(file)
+    return StudySpec.of_file(
+        study,
+        assignments=[*study.assignments, *given["assignments"]],
+        quantities=full_name(given["quantities"]),
+        **{name: given[name] for name in ("keep", "compress", "single")},
+    )
 
 
 def _report(outcome: "Outcome") -> Path:
@@ -318,7 +327,7 @@ def _campaign(
 
 def _grid(texts: tuple[str, ...]) -> dict[str, list[str]]:
     from railsim.errors import Fault, InputError
-    from railsim.studies.combine import parse_grid
+    from railsim.studies.plan import parse_grid
 
     grid: dict[str, list[str]] = {}
     faults: list[Fault] = []

@@ -1,7 +1,7 @@
 """Study files, `railsim-study/1`: what is combined, linked and sampled, under version control."""
 
 import math
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -149,23 +149,6 @@ class Study(FileDefinition):
         lists += [len(value_texts(self.speeds))] if self.speeds is not None else []
         lists += [self.sample.number] if self.sample else []
         return math.prod([len(self.vehicles), len(self.tracks), *lists])
-
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments of `railsim.study` that the file stands for."""
-        return {
-            "vehicles": list(self.vehicles),
-            "tracks": list(self.tracks),
-            "speeds": None if self.speeds is None else value_texts(self.speeds),
-            "grid": {key: value_texts(values) for key, values in self.grid.items()},
-            "linked": [{k: value_texts(v) for k, v in table.items()} for table in self.linked],
-            "sample": self.sample,
-            "analyses": self.analyses,
-            "settings": self.settings,
-            "start": self.start,
-            "duration": self.duration,
-            "until": self.until,
-            "assignments": list(self.assignments),
-        }
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -18,16 +18,14 @@ from railsim.definitions.vehicle_tables import Service
 from railsim.errors import Fault, InputError, RailsimError
 from railsim.files import check_folder
 from railsim.result import Result, open_result
-from railsim.result.hdf5 import Storage
 from railsim.studies.carry_out import carry_out, cores
-from railsim.studies.case import Case, short_name
-from railsim.studies.combine import load_case, name_faults
+from railsim.studies.case import Case, load_case, short_name
 from railsim.studies.in_conditions import in_condition, repeated, scaled_radii
-from railsim.studies.journal import Record
-from railsim.studies.keep import Keep
+from railsim.studies.plan import name_faults
 from railsim.studies.points import ROUGH_DURATION, Point, check_number
+from railsim.studies.records import Record
 from railsim.studies.rows import in_a_name
-from railsim.version import __version__
+from railsim.studies.spec import Execution, RunSpec, StudySpec
 
 
 @dataclass(frozen=True)
@@ -102,20 +100,26 @@ def campaign(
     check_folder(folder)
     plan = load_scenario(scenario)
     cases = scenario_cases(plan, names, assignments)
-    inputs = {
-        "railsim_version": __version__,
-        "folder": os.path.relpath(Path.cwd(), folder),  # folder that relative file names refer to
-        "scenario": str(scenario),
-        "vehicles": [str(vehicle) for vehicle in names],
-        "tracks": [],
-        "speeds": [],
-        "assignments": list(assignments),
-    }
-    outcome = carry_out(
-        _Cases(cases), inputs, folder, workers=workers, scheduler=scheduler, resume=resume,
-        overwrite=overwrite, longest_first=True, progress=progress, on_record=on_record,
-        keep=Keep(storage=Storage(single=plan.single)), on_remark=on_remark,
-    )  # fmt: skip
+    spec = StudySpec(
+        folder=os.path.relpath(Path.cwd(), folder),
+        scenario=str(scenario),
+        vehicles=[str(name) for name in names],
+        tracks=[],
+        speeds=[],
+        single=plan.single,
+        assignments=list(assignments),
+    )
+    execution = Execution(
+        workers=workers,
+        scheduler=scheduler,
+        resume=resume,
+        overwrite=overwrite,
+        longest_first=True,
+        progress=progress,
+        on_record=on_record,
+        on_remark=on_remark,
+    )
+    outcome = carry_out(_Cases(cases), spec, folder, execution)
     if outcome.failed:
         words = "; ".join(f"{r['name']}: {r['status_reason']}" for r in outcome.failed)
         raise RailsimError(f"{len(outcome.failed)} of {len(cases)} runs failed: {words}")
@@ -130,10 +134,14 @@ class _Cases:
     def __init__(self, cases: Sequence[Case]) -> None:
         self._cases = {case.name: case for case in cases}
         self.points = [
-            Point(case.name, case.vehicle.name, case.track.name, case.speed, {}, case.labels,
-                  case.key)
+            Point(
+                case.name,
+                RunSpec(case.vehicle.name, case.track.name, case.speed),
+                case.labels,
+                case.key,
+            )
             for case in cases
-        ]  # fmt: skip
+        ]
         if faults := name_faults(self.points):
             raise InputError(faults)
 
@@ -178,10 +186,11 @@ def scenario_cases(
                 if condition:
                     texts += condition.assignments
                     texts += [f"vehicle.load={condition.load}"] if condition.load else []
-                case = load_case(
+                run = RunSpec(
                     vehicle, part.track, speed, until=part.until,
-                    assignments=[*texts, *assignments],
+                    assignments=(*texts, *assignments),
                 )  # fmt: skip
+                case = load_case(run)
                 made = in_condition(case.vehicle, state, condition) if condition else case.vehicle
             except InputError as error:
                 faults += error.faults

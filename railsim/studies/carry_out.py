@@ -3,14 +3,13 @@
 import errno
 import logging
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 from railsim.errors import Fault, InputError
 from railsim.files import is_file, make_folder, sweep
-from railsim.studies.case import Case
 from railsim.studies.execute import (
     Batch,
     Job,
@@ -20,9 +19,11 @@ from railsim.studies.execute import (
     in_this_process,
     on_cluster,
 )
-from railsim.studies.journal import JOURNAL, Journal, Record
-from railsim.studies.keep import EVERYTHING, Keep
+from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
+from railsim.studies.records import Record
+from railsim.studies.retention import retention
+from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.state import Runs, State
 from railsim.studies.summary import read_index, write_index
 
@@ -32,80 +33,39 @@ MANY = 10_000  # number of runs from which an index that is up to date is not wr
 NOTHING_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENOENT, errno.EFBIG)
 
 
-def carry_out(
-    plan: Runs,
-    inputs: Mapping[str, Any],
-    folder: Path,
-    *,
-    workers: int | None = None,
-    together: int = 1,
-    scheduler: str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    plots: bool = False,
-    longest_first: bool = False,
-    own: str | None = None,
-    keep: Keep = EVERYTHING,
-    progress: Callable[[float], None] | None = None,
-    on_record: Callable[[Record], None] | None = None,
-    on_remark: Callable[[str], None] | None = None,
-) -> Outcome:
-    """Compute the missing runs of a study or a campaign, with the journal of its folder.
-
-    Parameters
-    ----------
-    plan : Runs
-        Runs of the study.
-    inputs : mapping
-        Inputs as stored in the journal and the index, see `Inputs`.
-    longest_first : bool
-        Begin with the longest runs, to balance the load of the cores.
-    own : str, optional
-        Function for user-defined quantities, see `railsim.studies.own`.
-    keep : Keep
-        Parts of each result that are kept.
-
-    Others as in `study`.
-    """
+def carry_out(plan: Runs, spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
+    """Compute the missing runs of a study or a campaign, with the journal of its folder."""
+    inputs = spec.stored()
     with ExitStack() as stack:
         known = None
         if is_file(folder / JOURNAL):
             known = stack.enter_context(Journal(folder))
-        if not (resume or overwrite):
+        if not (execution.resume or execution.overwrite):
             _refuse_another_study(folder, known, inputs)
-        if known is None and not overwrite:
+        if known is None and not execution.overwrite:
             _refuse_files_of_others(folder)
-        state = State(folder, plan, known, own, keep, resume=resume, overwrite=overwrite)
-        client = None if scheduler is None else cluster(scheduler)
+        state = State(folder, plan, spec, known, execution)
+        client = None if execution.scheduler is None else cluster(execution.scheduler)
         make_folder(folder)
         sweep(folder)
         journal = known or stack.enter_context(Journal(folder))
-        if overwrite:
+        if execution.overwrite:
             journal.clear()
         elif known is None and journal.entries:
             raise InputError([Fault("--out", "", f"another study has begun in {folder}", "")])
         journal.begin(inputs)
-        remark = on_remark or _LOG.warning
         for text in state.settle(journal):
-            remark(text)
-        jobs = [
-            _job(case, folder, plots, own, keep, there=case.name in state.there)
-            for case in state.cases
-        ]
-        if longest_first:
-            jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
-        keys = {point.name: point.key for point in plan.points}
+            (execution.on_remark or _LOG.warning)(text)
+        jobs = _jobs(state, spec, folder, execution)
         status = "interrupted"
         try:
             if jobs:
                 with suppress(FileNotFoundError):  # it would be out of date
                     (folder / "study.json").unlink()
-            for record in _executed(jobs, together, workers, client, progress or (lambda _: None)):
-                there = record["status"] != "failed" and record["file"]
-                file = folder / record["file"] if there else None
-                journal.add(record, keys[record["name"]], None if file is None else file.stat())
-                if on_record is not None:
-                    on_record(record)
+            for record in _computed(jobs, client, execution):
+                _add(journal, state.keys[record["name"]], record)
+                if execution.on_record is not None:
+                    execution.on_record(record)
                 if record.get("errno") in NOTHING_MORE:
                     raise OSError(record["errno"], os.strerror(record["errno"]), str(folder))
             status = "complete"
@@ -119,24 +79,31 @@ def carry_out(
         return Outcome(folder, state.records(journal), len(jobs))
 
 
-def _job(case: Case, folder: Path, plots: bool, own: str | None, keep: Keep, *, there: bool) -> Job:
-    path = (folder / f"{case.name}.h5").resolve()
-    picture = path.with_suffix(".png") if plots and case.file_name else None
-    return Job(case, path, picture, own, keep, there)
+def _jobs(state: State, spec: StudySpec, folder: Path, execution: Execution) -> list[Job]:
+    jobs = []
+    for case in state.cases:
+        path = (folder / f"{case.name}.h5").resolve()
+        picture = path.with_suffix(".png") if execution.plots and case.file_name else None
+        exists = case.name in state.to_be_analysed
+        jobs.append(Job(case, path, picture, spec.quantities, retention(spec), exists))
+    if execution.longest_first:
+        jobs.sort(key=lambda job: -job.case.track.length / job.case.speed)
+    return jobs
 
 
-def _executed(
-    jobs: Sequence[Job],
-    together: int,
-    workers: int | None,
-    client: Any,
-    progress: Callable[[float], None],
-) -> Iterable[Record]:
+def _add(journal: Journal, key: str, record: Record) -> None:
+    has_file = record["status"] != "failed" and record["file"]
+    file = (journal.path.parent / record["file"]).stat() if has_file else None
+    journal.add(record, key, file)
+
+
+def _computed(jobs: Sequence[Job], client: Any, execution: Execution) -> Iterable[Record]:
+    progress = execution.progress or (lambda _: None)
     if client is not None:
         threads = sum(client.nthreads().values())
-        return on_cluster(batches(jobs, together, max(1, threads)), client, progress)
-    count = workers or cores()
-    work: Sequence[Batch] = batches(jobs, together, count)
+        return on_cluster(batches(jobs, execution.together, max(1, threads)), client, progress)
+    count = execution.workers or cores()
+    work: Sequence[Batch] = batches(jobs, execution.together, count)
     count = min(count, len(work))
     return in_processes(work, count, progress) if count > 1 else in_this_process(work, progress)
 
@@ -154,7 +121,7 @@ def _refuse_another_study(
     there = known.inputs if known else None
     if there is None:
         try:
-            there = read_index(folder / "study.json").inputs.model_dump()
+            there = read_index(folder / "study.json").inputs.stored()
         except InputError:
             return
     asked = {name: value for name, value in inputs.items() if name != "folder"}

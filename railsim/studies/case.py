@@ -1,18 +1,25 @@
-"""A case: all inputs of one run."""
+"""A case: all inputs of one run, loaded and checked."""
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
-from railsim.definitions.analyses import Analysis, needs_run
+from railsim.definitions.analyses import Analysis, needs_run, needs_speed
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.overrides import OVERRIDE, split_overrides
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError
 from railsim.profiles import load_profile
-from railsim.profiles.used import used_profiles
+from railsim.profiles.used import profile_faults, used_profiles
+from railsim.simulation.conditions import check_range, initial_speed
+from railsim.studies.spec import RunSpec
 from railsim.version import __version__
 
 
@@ -82,6 +89,127 @@ class Case:
     def _profile_names(self) -> set[str]:
         used = (*used_profiles(self.vehicle), *used_profiles(self.track))
         return {name for _, name, _ in used}
+
+
+Overrides = tuple[str, ...]
+LOADERS: dict[str, Callable[..., Any]] = {
+    "vehicle": load_vehicle,
+    "track": load_track,
+    "settings": load_settings,
+}
+
+
+class Loader:
+    """Loads the definitions of runs, each once, and gathers everything that is wrong with them.
+
+    Parameters
+    ----------
+    grid : collection of str
+        Keys whose assignments a user knows by ``--grid``.
+    analyses : mapping of str to Analysis
+        Analyses of all cases.
+    """
+
+    def __init__(
+        self, grid: Collection[str] = (), analyses: Mapping[str, Analysis] | None = None
+    ) -> None:
+        self._grid = grid
+        self._analyses = dict(analyses or {})
+        self._faults: dict[Fault, None] = {}
+        self._loaded = cache(self._load)
+        self.overrides = cache(self._overrides)
+
+    def report(self, faults: Iterable[Fault]) -> None:
+        """Add faults."""
+        self._faults |= dict.fromkeys(faults)
+
+    def raise_faults(self) -> None:
+        """Raise an `InputError` if anything was wrong so far."""
+        if self._faults:
+            raise InputError(self._faults)
+
+    def definition(self, kind: str, run: RunSpec) -> Any:
+        """Return the ``vehicle``, ``track`` or ``settings`` of a run; None if it is wrong."""
+        return self._loaded(kind, getattr(run, kind), self.overrides(run.assignments)[kind])
+
+    def _load(self, kind: str, path: str | Path | None, overrides: Overrides) -> Any:
+        try:
+            definition = LOADERS[kind](path, overrides)
+            self.report(profile_faults(definition, str(path)))
+            return definition
+        except InputError as error:
+            self.report(self._as_written(fault, kind) for fault in error.faults)
+            return None
+
+    def _as_written(self, fault: Fault, kind: str) -> Fault:
+        """Return the fault of an assignment with its key and option as given."""
+        if fault.file != OVERRIDE:
+            return fault
+        key = f"{kind}.{fault.key}"
+        of_grid = any(key == name or key.startswith(f"{name}.") for name in self._grid)
+        return replace(fault, file="--grid" if of_grid else OVERRIDE, key=key)
+
+    def _overrides(self, assignments: tuple[str, ...]) -> dict[str, Overrides]:
+        """Return the assignments to vehicle, track and settings, each with the file's own keys."""
+        found: dict[str, Overrides] = dict.fromkeys(LOADERS, ())
+        for text in assignments:
+            try:
+                for kind, some in split_overrides([text]).items():
+                    found[kind] += tuple(some)
+            except InputError as error:
+                self.report(error.faults)
+        return found
+
+    def first_speed(self, run: RunSpec) -> float | None:
+        """Return the speed at the start of a run [m/s]; None if there is none."""
+        settings = self.definition("settings", run)
+        if settings is None or (run.speed is None and not needs_speed(self._analyses)):
+            return run.speed
+        try:
+            return initial_speed(settings, run.speed, run.start)
+        except InputError as error:
+            self.report(error.faults)
+            return None
+
+    def case(self, name: str, run: RunSpec, labels: Mapping[str, str | float]) -> Case | None:
+        """Return the case of a run whose speed is that at its start; None if it is wrong."""
+        vehicle, track, settings = (self.definition(kind, run) for kind in LOADERS)
+        speed = run.speed
+        if speed is None and not needs_speed(self._analyses):
+            speed = math.nan
+        elif track and speed is not None and needs_run(self._analyses):
+            try:
+                check_range(track, speed, run.start, run.duration, run.until)
+            except InputError as error:
+                self.report(error.faults)
+        if not (vehicle and track and settings) or speed is None:
+            return None
+        end = run.duration, run.until
+        inputs = vehicle, track, settings, speed, run.start, *end
+        return Case(name, *inputs, labels, self._analyses)
+
+
+def load_case(run: RunSpec) -> Case:
+    """Load the inputs of one run.
+
+    Raises
+    ------
+    InputError : everything that is wrong in any of them.
+    """
+    loader = Loader()
+    loader.overrides(run.assignments)  # its faults come first
+    speed = loader.first_speed(run)
+    name = run_name(run.vehicle, run.track, 0.0 if speed is None else speed)
+    labels = run_labels(run.vehicle, run.track, math.nan if speed is None else speed)
+    case = loader.case(name, replace(run, speed=speed), labels)
+    loader.raise_faults()
+    assert case is not None  # without a fault
+    return case
+
+
+def run_labels(vehicle: str | Path, track: str | Path, speed: float) -> dict[str, str | float]:
+    """Return the labels that every run has."""
+    return {"vehicle": short_name(vehicle), "track": short_name(track), "speed": speed}
 
 
 @lru_cache(1000)  # few files in up to 100 000 runs

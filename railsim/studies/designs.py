@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from railsim.definitions.design import Constraint, Objective, Optimise, Value, Variable
 from railsim.definitions.study import Study
 from railsim.errors import Fault, InputError, nearest
-from railsim.studies.journal import Record
 from railsim.studies.outcome import Outcome
+from railsim.studies.records import Record
 from railsim.studies.search import Floats, Values
-from railsim.studies.study import study
+from railsim.studies.spec import Execution, StudySpec
+from railsim.studies.study import run_study
 from railsim.studies.summary import summary_row, unit_of
 
 DIGITS = 6  # of the values of variables
@@ -65,14 +66,7 @@ class Evaluation:
     """
 
     def __init__(
-        self,
-        definition: Study,
-        wanted: Optimise,
-        folder: Path,
-        how: Mapping[str, Any],
-        *,
-        overwrite: bool,
-        progress: Progress,
+        self, definition: Study, wanted: Optimise, folder: Path, execution: Execution
     ) -> None:
         self.definition, self.wanted, self.folder = definition, wanted, folder
         self.rows: list[tuple[str, ...]] = []
@@ -80,8 +74,9 @@ class Evaluation:
         self.computed = 0
         self.designs: tuple[Design, ...] = ()
         self._margins = np.zeros((0, len(wanted.constraints)))
-        self._how, self._overwrite, self._progress = how, overwrite, progress
-        self._inputs = definition.arguments()
+        self._spec = StudySpec.of_file(definition, keep="summary")
+        self._progress = execution.progress or (lambda _: None)
+        self._execution = replace(execution, resume=not execution.overwrite)
 
     @cached_property
     def variables(self) -> list[tuple[str, Variable]]:
@@ -115,17 +110,9 @@ class Evaluation:
         for column, (path, variable) in enumerate(self.variables):
             for key in (path, *variable.also):
                 linked[key] = [row[column] for row in self.rows]
-        outcome = study(
-            out=self.folder,
-            linked=[*self._inputs["linked"], linked],
-            keep="summary",
-            resume=not self._overwrite,
-            overwrite=self._overwrite,
-            progress=progress,
-            **{name: value for name, value in self._inputs.items() if name != "linked"},
-            **self._how,
-        )
-        self._overwrite = False
+        spec = self._spec.changed(linked=[*self._spec.linked, linked])
+        outcome = run_study(spec, self.folder, replace(self._execution, progress=progress))
+        self._execution = replace(self._execution, resume=True, overwrite=False)
         self.computed += outcome.computed
         self._take(outcome)
 

@@ -14,7 +14,6 @@ import signal
 import tempfile
 import threading
 import time
-import traceback
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -26,7 +25,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, ModelError, RailsimError, words_of
+from railsim.errors import Fault, InputError, ModelError, RailsimError
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
@@ -34,10 +33,10 @@ from railsim.result import Result, open_result
 from railsim.result.facts import OF_FACTS
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
-from railsim.studies.journal import Record
-from railsim.studies.keep import EVERYTHING, Keep
+from railsim.studies.records import Record
+from railsim.studies.retention import EVERYTHING, Retention
 from railsim.studies.run import can_share_a_call, run_case, run_cases
-from railsim.studies.summary import analysed_record, failed_record, finished_record, stopped_record
+from railsim.studies.summary import failed_record, finished_record, waiting_record
 
 GRACE = 3.0  # seconds that running jobs have to stop
 POLL = 0.2  # seconds between updates of the progress
@@ -57,20 +56,20 @@ class Job:
         Result file; an existing one is replaced.
     picture : Path or None
         Figure of the result.
-    own : str or None
-        Function for user-defined quantities, see `railsim.studies.own`.
-    keep : Keep
+    function : str or None
+        Function for user-defined quantities, see `railsim.studies.user_function`.
+    retention : Retention
         Parts of the result that are kept.
-    there : bool
+    exists : bool
         Whether the run exists, and only its analyses are to be computed.
     """
 
     case: Case
     path: Path
     picture: Path | None = None
-    own: str | None = None
-    keep: Keep = EVERYTHING
-    there: bool = False
+    function: str | None = None
+    retention: Retention = EVERYTHING
+    exists: bool = False
 
 
 Batch = tuple[Job, ...]
@@ -94,7 +93,7 @@ def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
     alone: list[Job] = []
     kinds: list[list[Job]] = []
     for job in jobs:
-        if size <= 1 or job.there or not job.case.file_name:
+        if size <= 1 or job.exists or not job.case.file_name:
             alone.append(job)
             continue
         for kind in kinds:
@@ -116,7 +115,7 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     found: list[Result | Exception]
     if not batch[0].case.file_name:
         return [_analysed(job) for job in batch]
-    if batch[0].there and (record := _there(batch[0])) is not None:
+    if batch[0].exists and (record := _existing(batch[0])) is not None:
         return [record]
     try:
         if len(batch) == 1:
@@ -140,19 +139,19 @@ def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
 
 def _file(job: Job) -> Path | None:
     """Return the result file of a job; None if only its summary is kept."""
-    return None if job.keep.summary else job.path
+    return None if job.retention.summary else job.path
 
 
 def _quantities(job: Job) -> Collection[str] | None:
     """Return the quantities that the record of a job needs; None for all."""
-    wants_all = job.own is not None or job.case.analyses or job.picture is not None
-    return None if wants_all or not job.keep.summary else OF_FACTS
+    wants_all = job.function is not None or job.case.analyses or job.picture is not None
+    return None if wants_all or not job.retention.summary else OF_FACTS
 
 
-def _there(job: Job) -> Record | None:
+def _existing(job: Job) -> Record | None:
     """Return the record of an existing run; None if its file lacks required quantities."""
     try:
-        return finished_record(job.case, open_result(job.path), job.own)
+        return finished_record(job.case, open_result(job.path), job.function)
     except RailsimError:
         return None
 
@@ -163,13 +162,13 @@ def _analysed(job: Job) -> Record:
     try:
         quantities = analysed(job.case, None)
     except ModelError as error:  # no solution: a result too, not computed again
-        return stopped_record(job.case, str(error))
-    except RailsimError as error:
-        return failed_record(job.case, str(error))
+        facts: Record = {"status": "stopped", "status_reason": str(error)}
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        return failed_record(job.case, reason, traceback.format_exc())
-    return analysed_record(job.case, quantities, time.process_time() - begin)
+        return failed_record(job.case, error)
+    else:
+        cpu_time = time.process_time() - begin
+        facts = {"status": "complete", "cpu_time": cpu_time, "quantities": quantities}
+    return waiting_record(job.case) | facts
 
 
 def _record(job: Job, outcome: Result | Exception) -> Record:
@@ -182,17 +181,10 @@ def _record(job: Job, outcome: Result | Exception) -> Record:
             from railsim.plot.style import save
 
             save(histories(outcome), job.picture, overwrite=True)
-        record = finished_record(job.case, outcome, job.own)
-        return {**record, "file": job.keep.applied(job.path, outcome)}
-    except RailsimError as error:
-        return failed_record(job.case, str(error))
-    except OSError as error:
-        return failed_record(job.case, words_of(error), errno=error.errno or 0)
-    except MemoryError as error:
-        return failed_record(job.case, words_of(error))
+        record = finished_record(job.case, outcome, job.function)
+        return {**record, "file": job.retention.applied(job.path, outcome)}
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        return failed_record(job.case, reason, traceback.format_exc())
+        return failed_record(job.case, error)
 
 
 def in_this_process(batches: Sequence[Batch], progress: Progress) -> Iterator[Record]:
@@ -419,22 +411,19 @@ def _taken(future: Any, batch: Batch) -> list[Record]:
         for name, data in files.items():
             with whole_file(folder / name) as partial:
                 partial.write_bytes(data)
-    except OSError as error:
-        return [failed_record(job.case, words_of(error), errno=error.errno or 0) for job in batch]
     except Exception as error:
-        return [failed_record(job.case, f"{type(error).__name__}: {error}") for job in batch]
+        return [failed_record(job.case, error) for job in batch]
     found: list[Record] = records
     return found
 
 
-def _outcome(future: Any, batch: Batch) -> list[Record]:
+def _outcome(future: Future[list[Record]], batch: Batch) -> list[Record]:
     try:
-        records: list[Record] = future.result()
+        return future.result()
     except BrokenProcessPool:
         raise
     except Exception as error:
-        return [failed_record(job.case, f"{type(error).__name__}: {error}") for job in batch]
-    return records
+        return [failed_record(job.case, error) for job in batch]
 
 
 # shared with worker processes: progress and process of all jobs, and whether to stop

@@ -10,24 +10,24 @@ holds a lock on the file.
 Opening 100 000 runs reads the heads only; a record is read on access.
 """
 
-import fcntl
 import json
 import os
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self, overload
 
 from railsim.errors import Fault, InputError
+from railsim.files import locked
+from railsim.studies.records import Record, json_bytes
 
 JOURNAL = "study.journal"
 FORMAT = "railsim-study-journal/1"
 LONGEST_LINE = 100_000_000  # bytes; the inputs of 200 000 runs take some 5 MB for each key
 
 RECORD = {"name", "file", "labels", "status"}  # keys of every record
-
-Record = dict[str, Any]
+NOT_DONE = ("failed", "waiting")  # status of runs that are computed again
 
 
 class Entry(NamedTuple):
@@ -52,6 +52,11 @@ class Entry(NamedTuple):
     changed: int
     offset: int
     length: int
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the run has a result, even if it ended early."""
+        return self.status not in NOT_DONE
 
     def is_of(self, file: os.stat_result | None) -> bool:
         """Whether a file is unchanged since the run ended."""
@@ -84,17 +89,14 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / JOURNAL
-        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)
         self._handle = os.open(self.path, flags, 0o666)
-        try:
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self.close()
-            found = f"another study is writing into {folder}"
-            fault = Fault("--out", "", found, "wait for it, or choose another folder")
-            raise InputError([fault]) from None
-        except OSError:  # a file system without locks
-            pass
+        with suppress(OSError):  # a file system without locks
+            if not locked(self._handle):
+                self.close()
+                found = f"another study is writing into {folder}"
+                fault = Fault("--out", "", found, "wait for it, or choose another folder")
+                raise InputError([fault])
         self.entries: dict[str, Entry] = {}
         self.inputs: Mapping[str, Any] | None = None
         self.damaged = 0
@@ -138,7 +140,7 @@ class Journal:
     def begin(self, inputs: Mapping[str, Any]) -> None:
         """Write the inputs of the study if they differ from those of its last start."""
         if self.inputs != inputs:
-            self._line({"format": FORMAT}, _json(inputs))
+            self._line({"format": FORMAT}, json_bytes(inputs))
             self.inputs = inputs
 
     def add(self, record: Record, key: str, file: os.stat_result | None) -> Entry:
@@ -150,14 +152,14 @@ class Journal:
             "size": 0 if file is None else file.st_size,
             "changed": 0 if file is None else file.st_mtime_ns,
         }
-        body = _json(record)
+        body = json_bytes(record)
         offset = self._line(facts, body)
         entry = Entry(**facts, offset=offset, length=len(body))
         self.entries[entry.name] = entry
         return entry
 
     def _line(self, head: Mapping[str, Any], body: bytes) -> int:
-        text = _json(head) + b"\t" + body
+        text = json_bytes(head) + b"\t" + body
         offset = self._end + 9 + len(text) - len(body)
         self._append(b"%08x\t%s\n" % (zlib.crc32(text), text))
         os.fsync(self._handle)
@@ -174,10 +176,6 @@ class Journal:
             raise
         self._end += len(data)
 
-    def body(self, entry: Entry) -> bytes:
-        """Return the record of an entry as JSON."""
-        return os.pread(self._handle, entry.length, entry.offset)
-
     def close(self) -> None:
         """Close the file and release the lock; may be called repeatedly."""
         if self._handle >= 0:
@@ -187,12 +185,7 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -228,57 +221,43 @@ class Records(Sequence[Record]):
 
     def with_status(self, *statuses: str, but: Sequence[str] = ()) -> tuple[Record, ...]:
         """Return the records of runs that ended in one of `statuses`, or in none of `but`."""
-        chosen = []
+        found = []
         for entry in self._entries:
             status = entry.status if isinstance(entry, Entry) else entry["status"]
             if status in statuses or (but and status not in but):
-                chosen.append(entry)
-        return tuple(self._read(chosen))
+                found.append(entry)
+        return tuple(self._read(found))
 
-    def texts(self) -> Iterator[bytes]:
-        """Yield every record as JSON."""
+    def with_texts(self) -> Iterator[tuple[Record, bytes]]:
+        """Yield every record and its JSON."""
+        for entry, text in zip(self._entries, self._texts(self._entries), strict=True):
+            yield self._record(entry, text), text
+
+    def _read(self, entries: Sequence[Entry | Record]) -> Iterator[Record]:
+        for entry, text in zip(entries, self._texts(entries), strict=True):
+            yield self._record(entry, text)
+
+    def _texts(self, entries: Sequence[Entry | Record]) -> Iterator[bytes]:
+        if not any(isinstance(entry, Entry) for entry in entries):
+            yield from map(json_bytes, entries)
+            return
         with open(self._path, "rb") as file:
-            for entry in self._entries:
+            for entry in entries:
                 if isinstance(entry, Entry):
                     file.seek(entry.offset)
                     yield file.read(entry.length)
                 else:
-                    yield _json(entry)
+                    yield json_bytes(entry)
 
-    def _read(self, entries: Sequence[Entry | Record]) -> Iterator[Record]:
-        if all(isinstance(entry, dict) for entry in entries):
-            yield from (dict(entry) for entry in entries if isinstance(entry, dict))
-            return
-        for entry, text in zip(entries, Records(self._path, entries).texts(), strict=True):
-            try:
-                record = json.loads(text)
-                if not record.keys() >= RECORD or not isinstance(record["labels"], dict):
-                    raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
-            except (ValueError, RecursionError, AttributeError) as error:
-                name = entry.name if isinstance(entry, Entry) else ""
-                fault = Fault(
-                    str(self._path),
-                    name,
-                    f"a record that cannot be used ({error})",
-                    "remove the journal: existing results are kept",
-                )
-                raise InputError([fault]) from None
-            yield record
-
-
-def _json(data: Any) -> bytes:
-    """Return data as one line of JSON; infinite and undefined numbers become null."""
-    try:
-        return json.dumps(data, allow_nan=False).encode()
-    except ValueError:
-        return json.dumps(_finite(data)).encode()
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    if isinstance(data, float) and (data != data or data in (float("inf"), float("-inf"))):
-        return None
-    return data
+    def _record(self, entry: Entry | Record, text: bytes) -> Record:
+        if isinstance(entry, dict):
+            return dict(entry)
+        try:
+            record: Record = json.loads(text)
+            if not record.keys() >= RECORD or not isinstance(record["labels"], dict):
+                raise ValueError("it lacks " + ", ".join(sorted(RECORD - record.keys())))
+        except (ValueError, RecursionError, AttributeError) as error:
+            found = f"a record that cannot be used ({error})"
+            allowed = "remove the journal: existing results are kept"
+            raise InputError([Fault(str(self._path), entry.name, found, allowed)]) from None
+        return record

@@ -22,7 +22,6 @@ from railsim.definitions.study import Study
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, is_file, make_folder, read_text, whole_file
 from railsim.studies.carry_out import cores
-from railsim.studies.chosen import chosen_vehicles
 from railsim.studies.designs import (
     INPUTS,
     Design,
@@ -34,10 +33,13 @@ from railsim.studies.designs import (
     values_by_name,
     with_unit,
 )
+from railsim.studies.exported_design import export_vehicles
 from railsim.studies.front import hypervolume, knee, non_dominated
 from railsim.studies.points import ROUGH_DURATION, check_number
+from railsim.studies.records import finite
 from railsim.studies.search import Task, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
+from railsim.studies.spec import Execution, checked
 from railsim.studies.summary import unit_of
 
 NEAR_BOUND = 0.01  # tolerance, as a share of a range or a limit, within which it counts as reached
@@ -174,9 +176,13 @@ def optimise(
         definition,
         wanted,
         folder,
-        {"workers": workers, "scheduler": scheduler, "on_remark": on_remark},
-        overwrite=overwrite,
-        progress=progress or (lambda _: None),
+        Execution(
+            workers=workers,
+            scheduler=scheduler,
+            overwrite=overwrite,
+            progress=progress,
+            on_remark=on_remark,
+        ),
     )
     search(
         wanted.method,
@@ -194,8 +200,6 @@ def optimise(
 
 
 def _changed(wanted: Optimise, changes: Mapping[str, Any]) -> Optimise:
-    from railsim.studies.summary import checked
-
     return checked(Optimise, {**wanted.model_dump(), **changes}, "optimise")
 
 
@@ -244,7 +248,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         chosen,
         _active(wanted, chosen) if chosen else (),
         tuple(_sensitivities(evaluation, chosen, names)) if chosen else (),
-        tuple(chosen_vehicles(evaluation, chosen)) if chosen else (),
+        tuple(export_vehicles(evaluation, chosen)) if chosen else (),
         evaluation.computed,
     )
     _write(found)
@@ -286,7 +290,7 @@ def _write(found: Optimisation) -> None:
     from railsim.plot.style import save
 
     with whole_file(found.folder / "optimise.json") as partial:
-        text = json.dumps(_finite(found.record()), indent=1, allow_nan=False)
+        text = json.dumps(finite(found.record()), indent=1, allow_nan=False)
         partial.write_text(text + "\n", encoding="utf-8")
     _write_designs(found)
     labels = [with_unit(one) for one in found.definition.objectives]
@@ -322,11 +326,3 @@ def _write_designs(found: Optimisation) -> None:
             cells = ["" if math.isnan(number) else number for number in numbers]
             on = design.number in on_front
             writer.writerow([design.number, *cells, int(design.feasible), int(on), design.reason])
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from railsim.result import Result, open_result
-from railsim.studies.journal import Record, Records
+from railsim.studies.journal import NOT_DONE, Records
+from railsim.studies.records import Record
 from railsim.studies.summary import summary_row, unit_of
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class Outcome:
         return {
             record["name"]: open_result(self.folder / record["file"])
             for record in self.records
-            if record["status"] not in ("failed", "waiting") and record["file"]
+            if record["status"] not in NOT_DONE and record["file"]
         }
 
     def to_dataframe(self) -> "pandas.DataFrame":

@@ -3,7 +3,7 @@
 When a study of a hundred thousand runs is continued, its finished runs must be found at once.  The
 key of a point is a hash of the texts that define the run: contents of the vehicle, track and
 settings files and of all files that they name, assignments, speed, start and end.  Definitions are
-loaded and checked by `railsim.studies.combine`, for the runs that are to be computed.
+loaded and checked by `railsim.studies.plan`, for the runs that are to be computed.
 """
 
 import hashlib
@@ -19,11 +19,10 @@ from typing import Any
 from railsim.definitions import sources
 from railsim.errors import Fault, InputError
 from railsim.files import TABLE_BYTES, is_file, read_bytes
+from railsim.studies.case import Overrides
+from railsim.studies.spec import RunSpec
 from railsim.units import duration_in_words
 from railsim.version import __version__
-
-Grid = Mapping[str, Sequence[str]]
-Overrides = tuple[str, ...]
 
 MOST_RUNS = 200_000
 ROUGH_DURATION = 60.0  # s; simulated time of a run that has not been looked at
@@ -39,12 +38,8 @@ class Point:
     ----------
     name : str
         Name of the run.
-    vehicle, track : str or Path
-        File or name.
-    speed : float or None
-        Speed at the start [m/s].
-    overrides : mapping of str to tuple of str
-        Assignments to the ``vehicle``, ``track`` and ``settings``.
+    run : RunSpec
+        The run, with its speed at the start.
     labels : mapping
         Labels of the run.
     key : str
@@ -54,10 +49,7 @@ class Point:
     """
 
     name: str
-    vehicle: str | Path
-    track: str | Path
-    speed: float | None
-    overrides: Mapping[str, Overrides]
+    run: RunSpec
     labels: Mapping[str, str | float] = field(default_factory=dict)
     key: str = ""
     has_run: bool = True

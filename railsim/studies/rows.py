@@ -8,9 +8,9 @@ from itertools import product
 
 from railsim.definitions.study import Sample, Spread
 from railsim.errors import Fault, InputError
-from railsim.studies.points import Grid
 from railsim.units import number_with_unit
 
+Grid = Mapping[str, Sequence[str]]
 SPEED = "speed"  # not a key of a file: the speed of the run
 PERMITTED = "permitted"  # as a speed: the lower of the speeds of vehicle and track
 

@@ -21,7 +21,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, RailsimError
 from railsim.processes import workers_begin
 from railsim.stability.critical_speed import critical_speed
-from railsim.studies.kept import Record, keep, read_kept
+from railsim.studies.records import Record, read_record, write_record
 from railsim.version import __version__
 
 Progress = Callable[[float], None]
@@ -84,7 +84,7 @@ def stability_map(
     for number, path in enumerate(kept):
         if path is not None and path.exists() and not overwrite:
             try:
-                found[number] = read_kept(path)
+                found[number] = read_record(path)
             except InputError as error:
                 (on_remark or _LOG.warning)(f"{error.faults[0]}: it is computed again")
     tell = progress or (lambda _: None)
@@ -95,7 +95,7 @@ def stability_map(
         found[number] = record
         path = kept[number]
         if path is not None:
-            keep(path, record)
+            write_record(path, record)
         tell(len(found) / len(jobs))
     return [found[number] for number in range(len(jobs))]
 

@@ -10,9 +10,11 @@ from typing import Protocol
 from railsim.errors import Fault, InputError
 from railsim.result import open_result
 from railsim.studies.case import Case
-from railsim.studies.journal import JOURNAL, Journal, Record, Records
-from railsim.studies.keep import Keep
+from railsim.studies.journal import JOURNAL, Journal, Records
 from railsim.studies.points import Point
+from railsim.studies.records import Record
+from railsim.studies.retention import SUMMARY
+from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.summary import finished_record, waiting_record
 
 DAMAGED = "--resume computes it again and keeps this file beside it; or another --out"
@@ -41,9 +43,11 @@ class State:
     ----------
     cases : list of Case
         Cases to compute.
+    keys : dict of str to str
+        Keys of all points by their names.
     found : list of (Point, Record)
         Existing results that are not in the journal.
-    there : set of str
+    to_be_analysed : set of str
         Names of the cases whose run exists, but not their analyses.
 
     Raises
@@ -54,50 +58,44 @@ class State:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        plan: Runs,
-        known: Journal | None,
-        own: str | None,
-        keep: Keep,
-        *,
-        resume: bool,
-        overwrite: bool,
+        self, folder: Path, plan: Runs, spec: StudySpec, known: Journal | None, execution: Execution
     ) -> None:
-        self._folder, self._plan, self._own, self._keep = folder, plan, own, keep
-        self._entries = dict(known.entries) if known and not overwrite else {}
-        self._there = {} if overwrite else _files(folder)
+        self._folder, self._points = folder, plan.points
+        self._function, self._without_files = spec.quantities, spec.keep == SUMMARY
+        anew = execution.overwrite
+        self._entries = dict(known.entries) if known and not anew else {}
+        self._files = {} if anew else _files(folder)
         self._damaged: dict[Path, str] = {}
         self._changed: list[str] = []
-        self._lines = known.damaged if known else 0
+        self._damaged_lines = known.damaged if known else 0
+        self.keys = {point.name: point.key for point in plan.points}
         self.found: list[tuple[Point, Record]] = []
-        self.there: set[str] = set()
+        self.to_be_analysed: set[str] = set()
         points = [point for point in plan.points if not self._is_done(point)]
         self._waiting = dict(zip(points, plan.cases(points), strict=True))
         faults = [
             fault for point, case in self._waiting.items() for fault in self._faults_of(point, case)
         ]
-        if faults and not resume:
+        if faults and not execution.resume:
             raise InputError(faults)
-        known_ones = {point for point, _ in self.found}
-        self.cases = [case for point, case in self._waiting.items() if point not in known_ones]
+        found = {point for point, _ in self.found}
+        self.cases = [case for point, case in self._waiting.items() if point not in found]
 
     def _is_done(self, point: Point) -> bool:
         """Whether the journal has the result of these inputs, and its file has not changed."""
         entry = self._entries.get(point.name)
-        if entry is None or entry.status in ("failed", "waiting") or not point.key:
+        if entry is None or not entry.is_done or not point.key:
             return False
-        if not entry.size and not self._keep.summary and point.has_run:
+        if not entry.size and not self._without_files and point.has_run:
             return False  # only the summary was kept, the file is required
-        return entry.key == point.key and entry.is_of(self._there.get(f"{point.name}.h5"))
+        return entry.key == point.key and entry.is_of(self._files.get(f"{point.name}.h5"))
 
     def _faults_of(self, point: Point, case: Case) -> list[Fault]:
         """Examine the existing data of a case: a file, or a summary without a file."""
-        if case.file_name in self._there:
+        if case.file_name in self._files:
             return self._look_at(point, case)
         entry = self._entries.get(case.name)
-        done = entry is not None and entry.status not in ("failed", "waiting") and not entry.size
-        if entry is None or not done or entry.key == point.key:
+        if entry is None or not entry.is_done or entry.size or entry.key == point.key:
             return []
         self._changed.append(case.name)
         return [Fault("--out", case.name, "a summary of other inputs", CHANGED)]
@@ -109,9 +107,9 @@ class State:
             result = open_result(path)
             if result.attributes.get("inputs_hash") == case.key:
                 if case.analyses:  # takes time: done as a job like others
-                    self.there.add(case.name)
+                    self.to_be_analysed.add(case.name)
                 else:
-                    self.found.append((point, finished_record(case, result, self._own)))
+                    self.found.append((point, finished_record(case, result, self._function)))
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
@@ -122,18 +120,18 @@ class State:
     def settle(self, journal: Journal) -> list[str]:
         """Record existing results, rename damaged files; return remarks for the user."""
         remarks = []
-        if self._lines:
-            remarks.append(f"{self._lines} damaged lines of {JOURNAL} are ignored")
+        if self._damaged_lines:
+            remarks.append(f"{self._damaged_lines} damaged lines of {JOURNAL} are ignored")
         for point, record in self.found:
-            journal.add(record, point.key, self._there[record["file"]])
+            journal.add(record, point.key, self._files[record["file"]])
         for path, words in self._damaged.items():
-            kept = _moved_aside(path)
-            remarks.append(f"{words}: it is computed again; the old file is kept as {kept.name}")
+            old = _moved_aside(path)
+            remarks.append(f"{words}: it is computed again; the old file is kept as {old.name}")
         lost = [
             case.name
             for case in self.cases
             if self._entries.get(case.name)
-            and case.file_name not in self._there
+            and case.file_name not in self._files
             and self._entries[case.name].size
         ]
         for names, words in ((self._changed, "of other inputs"), (lost, "no longer there")):
@@ -149,7 +147,7 @@ class State:
             journal.path,
             [
                 journal.entries.get(point.name) or waiting_record(waiting[point.name])
-                for point in self._plan.points
+                for point in self._points
             ],
         )
 
@@ -157,12 +155,9 @@ class State:
 def _moved_aside(path: Path) -> Path:
     """Give a damaged file another name that is free, and return it."""
     endings = chain([""], (f"-{number}" for number in count(2)))
-    for ending in endings:
-        kept = path.with_name(f"{path.name}.damaged{ending}")
-        if not os.path.lexists(kept):
-            break
-    os.rename(path, kept)
-    return kept
+    names = (path.with_name(f"{path.name}.damaged{ending}") for ending in endings)
+    free = next(name for name in names if not os.path.lexists(name))
+    return path.rename(free)
 
 
 def _files(folder: Path) -> dict[str, os.stat_result]:

@@ -1,33 +1,27 @@
-"""`study`: vehicles x tracks x speeds x further values, one result file per run.
-
-A run whose file exists with the same inputs is not computed again, so that an interrupted study is
-continued when it is started again.  Finished runs are recorded in the journal.
-"""
+"""`study`: from inputs to a plan, which is carried out."""
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from railsim.definitions.analyses import Analyses, Analysis, needs_run
-from railsim.definitions.base import Definition
-from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.analyses import Analysis, needs_run
 from railsim.definitions.settings import Settings
-from railsim.definitions.study import Sample, value_texts
+from railsim.definitions.study import Sample
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, is_file
 from railsim.studies.carry_out import carry_out, cores
-from railsim.studies.combine import Plan
-from railsim.studies.given import as_files
-from railsim.studies.journal import JOURNAL, Journal, Record
-from railsim.studies.keep import ALL, parse_keep
+from railsim.studies.journal import JOURNAL, Journal
 from railsim.studies.outcome import Outcome
-from railsim.studies.own import Function, fingerprint, named
-from railsim.studies.rows import PERMITTED, speed_of
-from railsim.studies.summary import Inputs, checked, read_index, refuse_too_many
-from railsim.units import ALLOWED
+from railsim.studies.plan import Plan
+from railsim.studies.records import Record
+from railsim.studies.retention import ALL, retention
+from railsim.studies.spec import Execution, StudySpec, checked
+from railsim.studies.summary import read_index, refuse_too_many
+from railsim.studies.user_function import Function, full_name
+from railsim.studies.written_inputs import as_files
 from railsim.version import __version__
 
 
@@ -138,71 +132,59 @@ def study(
     """
     folder = Path(out)
     check_folder(folder)
-    kept = parse_keep(keep, compress=compress, single=single)
-    vehicles = as_files(_several(vehicles), folder)
-    tracks = as_files(_several(tracks), folder)
-    (settings,) = as_files([settings], folder)
-    asked = _speeds(speeds)
-    written = _written("grid", grid or {})
-    tables = [_written("linked", table) for table in linked]
-    drawn = None if sample is None else _sample(sample)
-    own = named(quantities)
-    work = _analyses(analyses or {})
-    if own and not needs_run(work):
-        fault = Fault("--quantities", "", "no analysis computes a run", 'add one of kind = "run"')
-        raise InputError([fault])
-    plan = Plan(
-        vehicles,
-        tracks,
-        asked,
-        written,
-        linked=tables,
-        sample=drawn,
-        told=fingerprint(own),
-        analyses=work,
-        settings=settings,
-        start=start,
-        duration=duration,
-        until=until,
-        assignments=assignments,
-        workers=workers or cores(),
-    )
     inputs = {
-        "railsim_version": __version__,
-        "folder": os.path.relpath(Path.cwd(), folder),  # folder that relative file names refer to
-        "vehicles": [str(vehicle) for vehicle in vehicles],
-        "tracks": [str(track) for track in tracks],
-        "speeds": asked,
-        "grid": written,
-        "linked": tables,
-        "sample": None if drawn is None else drawn.model_dump(exclude_none=True),
-        "quantities": own,
-        "analyses": {
-            name: one.model_dump(mode="json", exclude_none=True) for name, one in work.items()
-        },
-        "keep": keep,
-        "compress": compress,
-        "single": single,
-        "settings": None if settings is None else str(settings),
+        "vehicles": as_files(vehicles, folder),
+        "tracks": as_files(tracks, folder),
+        "speeds": speeds,
+        "grid": grid or {},
+        "linked": list(linked),
+        "sample": sample,
+        "quantities": full_name(quantities),
+        "analyses": analyses or {},
+        "settings": None if settings is None else as_files(settings, folder)[0],
         "start": start,
         "duration": duration,
         "until": until,
         "assignments": list(assignments),
+        "keep": keep,
+        "compress": compress,
+        "single": single,
     }
+    execution = Execution(
+        workers=workers,
+        together=together,
+        scheduler=scheduler,
+        resume=resume,
+        overwrite=overwrite,
+        plots=plots,
+        progress=progress,
+        on_record=on_record,
+        on_remark=on_remark,
+    )
+    return run_study(checked(StudySpec, inputs, "study"), folder, execution)
+
+
+def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
+    """Carry out a study in its folder; see `study`."""
+    check_folder(folder)
+    retention(spec)  # refuses unknown quantities
+    if spec.quantities and not needs_run(spec.analyses):
+        fault = Fault("--quantities", "", "no analysis computes a run", 'add one of kind = "run"')
+        raise InputError([fault])
+    plan = Plan(spec, execution.workers or cores())
+    base = os.path.relpath(Path.cwd(), folder)
     outcome = carry_out(
-        plan, inputs, folder, own=own, keep=kept, workers=workers, together=together,
-        scheduler=scheduler, resume=resume, overwrite=overwrite, plots=plots, progress=progress,
-        on_record=on_record, on_remark=on_remark,
-    )  # fmt: skip
-    if plots:
+        plan, spec.changed(railsim_version=__version__, folder=base), folder, execution
+    )
+    if execution.plots:
         from railsim.studies.pictures import draw
 
         draw(outcome)
     return outcome
 
 
-def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
-    """Return the inputs of the study in a folder, and the folder of its relative file names.
+def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
+    """Return the study in a folder, and the folder of its relative file names.
 
     Raises
     ------
@@ -222,54 +204,6 @@ def stored_inputs(folder: Path) -> tuple[Inputs, Path]:
         inputs = read_index(index).inputs
     else:
         refuse_too_many(data, str(folder / JOURNAL))
-        inputs = checked(Inputs, data, str(folder / JOURNAL))
+        inputs = checked(StudySpec, data, str(folder / JOURNAL))
     base = (folder / inputs.folder).resolve()
     return inputs, base if os.path.isdir(base) else Path.cwd()
-
-
-def _several(values: Any) -> list[Any]:
-    """Return one or several values as a list."""
-    single = isinstance(values, str | Path | float | int | FileDefinition)
-    return [values] if single else list(values)
-
-
-def _speeds(speeds: Any) -> list[float | str | None]:
-    """Return speeds, ranges and speeds with units as numbers [m/s]; `PERMITTED` unchanged."""
-    if speeds is None:
-        return [None]
-    found: list[float | str | None] = []
-    for speed in _several(speeds):
-        if isinstance(speed, str) and speed != PERMITTED:
-            found += [speed_of(text) for text in _texts("speeds", speed)]
-        else:
-            found.append(speed)
-    return found
-
-
-def _written(what: str, values: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Return values of keys as they are written in assignments."""
-    found = {}
-    for key, given in values.items():
-        found[key] = [text for value in _several(given) for text in _texts(f"{what} {key}", value)]
-    return found
-
-
-def _texts(what: str, value: Any) -> list[str]:
-    try:
-        return value_texts(value if isinstance(value, str) else (_plain(value),))
-    except ValueError as error:
-        raise InputError([Fault(what, "", str(error), f"allowed: {ALLOWED}")]) from None
-
-
-def _plain(value: Any) -> Any:
-    """Return numpy numbers as Python numbers."""
-    return value.item() if hasattr(value, "item") and not isinstance(value, str) else value
-
-
-def _analyses(given: Mapping[str, Analysis | Mapping[str, Any]]) -> dict[str, Analysis]:
-    whole = {name: one if isinstance(one, Definition) else dict(one) for name, one in given.items()}
-    return checked(Analyses, {"analyses": whole}, "analyses").analyses
-
-
-def _sample(given: Sample | Mapping[str, Any]) -> Sample:
-    return given if isinstance(given, Sample) else checked(Sample, dict(given), "sample")

@@ -6,32 +6,36 @@ written from the journal (`railsim.studies.journal`) when the study ends or is i
 """
 
 import csv
+import io
 import json
 import re
-from collections.abc import Mapping, Sequence
+import tempfile
+import traceback
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TextIO, TypeVar
+from typing import Any, BinaryIO
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from railsim.definitions.analyses import unit_of_number
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, RailsimError, words_of
 from railsim.files import is_file, read_text, whole_file
 from railsim.notation import QUANTITIES
 from railsim.result import Result
 from railsim.result.facts import FACTS, run_facts
 from railsim.studies.analyses import analysed
 from railsim.studies.case import Case
-from railsim.studies.journal import JOURNAL, Record, Records
-from railsim.studies.own import own_quantities
+from railsim.studies.journal import JOURNAL, NOT_DONE, Records
 from railsim.studies.points import MOST_RUNS
+from railsim.studies.records import Record
+from railsim.studies.spec import StudySpec, checked
+from railsim.studies.user_function import user_quantities
 from railsim.text import spreadsheet_cell
 
-M = TypeVar("M", bound=BaseModel)
+Row = dict[str, Any]  # cells by the names of their columns, without units
 INDEX_BYTES = 500_000_000
 MOST_VALUES = 30_000_000  # of an index: 150 for each run of the largest study
 MOST_INPUTS = 10 * MOST_RUNS
-MOST_FAULTS = 20
 UNITS = {"speed": "m/s", "step": "s", "wall_time": "s", "cpu_time": "s"}
 _COLUMN = re.compile(r"(\w+?)_(?:peak|max|min|mid\d*|median\d*)(?:_(time|distance|20hz))?")
 FORMAT = "railsim-study-result/1"
@@ -49,79 +53,49 @@ def waiting_record(case: Case) -> Record:
     }
 
 
-def finished_record(case: Case, result: Result, own: str | None = None) -> Record:
+def finished_record(case: Case, result: Result, function: str | None = None) -> Record:
     """Return the record of a run with a result, with user-defined quantities and analyses.
 
     Raises
     ------
     RailsimError : one of these fails.
     """
-    found = own_quantities(own, result) | analysed(case, result)
+    found = user_quantities(function, result) | analysed(case, result)
     facts = {**waiting_record(case), **run_facts(result, case.track)}
-    return {**facts, "quantities": found} if own or case.analyses else facts
+    return {**facts, "quantities": found} if function or case.analyses else facts
 
 
-def analysed_record(case: Case, quantities: Mapping[str, float], cpu_time: float) -> Record:
-    """Return the record of a point without a run in the time domain."""
-    facts = {"status": "complete", "cpu_time": cpu_time, "quantities": dict(quantities)}
-    return {**waiting_record(case), **facts}
-
-
-def stopped_record(case: Case, reason: str) -> Record:
-    """Return the record of a point without a solution; it is not computed again."""
-    return {**waiting_record(case), "status": "stopped", "status_reason": reason}
-
-
-def failed_record(case: Case, reason: str, traceback: str = "", *, errno: int = 0) -> Record:
-    """Return the record of a run without a result; `errno` is that of the system, if any."""
-    return {
-        **waiting_record(case),
-        "status": "failed",
-        "status_reason": reason,
-        "traceback": traceback,
-        **({"errno": errno} if errno else {}),
-    }
+def failed_record(case: Case, error: Exception | str) -> Record:
+    """Return the record of a run without a result, with what the system refused, if anything."""
+    facts: Record = {"status": "failed", "status_reason": str(error), "traceback": ""}
+    if isinstance(error, OSError | MemoryError):
+        facts["status_reason"] = words_of(error)
+        if errno := getattr(error, "errno", None):
+            facts["errno"] = errno
+    elif isinstance(error, Exception) and not isinstance(error, RailsimError):
+        facts["status_reason"] = f"{type(error).__name__}: {error}"
+        facts["traceback"] = "".join(traceback.format_exception(error))
+    return waiting_record(case) | facts
 
 
 def write_index(folder: Path, inputs: Mapping[str, Any], status: str, records: Records) -> None:
     """Write ``study.json`` and ``summary.csv``, each under its name when it is complete."""
     head = json.dumps({"format": FORMAT, "status": status, "inputs": dict(inputs)}, indent=1)
-    with whole_file(folder / "study.json") as partial, open(partial, "wb") as file:
-        file.write(head[:-2].encode() + b',\n "runs": [\n')
-        for number, text in enumerate(records.texts()):
-            file.write((b",\n" if number else b"") + text)
-        file.write(b"\n]}\n")
     with (
-        whole_file(folder / "summary.csv") as partial,
-        open(partial, "w", encoding="utf-8", newline="") as stream,
+        whole_file(folder / "summary.csv") as partial_summary,
+        whole_file(folder / "study.json") as partial_index,
+        open(partial_index, "wb") as index,
+        open(partial_summary, "wb") as summary,
     ):
-        write_summary(records, stream)
 
+        def rows() -> Iterator[Row]:  # each record is read once
+            for number, (record, text) in enumerate(records.with_texts()):
+                index.write((b",\n" if number else b"") + text)
+                yield _checked_row(record)
 
-class Inputs(BaseModel):
-    """Inputs of a study, as stored in its journal and its index."""
-
-    model_config = ConfigDict(extra="ignore")
-
-    railsim_version: str = ""
-    folder: str = "."
-    scenario: str | None = None
-    vehicles: list[str]
-    tracks: list[str]
-    speeds: list[float | str | None]
-    grid: dict[str, list[str]] = {}
-    linked: list[dict[str, list[str]]] = []
-    sample: dict[str, Any] | None = None
-    quantities: str | None = None
-    analyses: dict[str, dict[str, Any]] = {}
-    keep: str = "all"
-    compress: bool = False
-    single: bool = False
-    settings: str | None = None
-    start: float = 0.0
-    duration: float | None = None
-    until: float | None = None
-    assignments: list[str] = []
+        index.write(head[:-2].encode() + b',\n "runs": [\n')
+        _write_rows(rows(), summary)
+        index.write(b"\n]}\n")
 
 
 class Run(BaseModel):
@@ -140,7 +114,7 @@ class Index(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     status: str
-    inputs: Inputs
+    inputs: StudySpec
     runs: list[Run]
 
 
@@ -189,28 +163,6 @@ def refuse_too_many(inputs: Any, file: str) -> None:
         raise InputError([Fault(file, "inputs", "too many values", f"{MOST_INPUTS} at most")])
 
 
-def checked(model: type[M], data: Any, file: str) -> M:
-    """Return data as a model.
-
-    Raises
-    ------
-    InputError : all faults of the data.
-    """
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        details = error.errors(include_url=False)[:MOST_FAULTS]
-        raise InputError(
-            Fault(
-                file,
-                ".".join(map(str, detail["loc"])),
-                repr(detail["input"])[:60],
-                detail["msg"].lower(),
-            )
-            for detail in details
-        ) from None
-
-
 def check_index(path: Path) -> Index:
     """Return the content of a ``study.json``; every finished run must have its result.
 
@@ -222,7 +174,7 @@ def check_index(path: Path) -> Index:
     allowed = "the same study with --resume computes it again"
     faults = []
     for run in index.runs:
-        if run.status in ("waiting", "failed") or not run.file:
+        if run.status in NOT_DONE or not run.file:
             continue
         if Path(run.file).name != run.file:
             faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
@@ -233,7 +185,7 @@ def check_index(path: Path) -> Index:
     return index
 
 
-def write_summary(records: Sequence[Record], stream: TextIO) -> None:
+def _write_rows(rows: Iterable[Row], stream: BinaryIO) -> None:
     """Write one line per run: labels, status, peaks and mid-curve values.
 
     The header includes units: ``Q_peak (N)``.  The columns of a quantity are
@@ -241,14 +193,27 @@ def write_summary(records: Sequence[Record], stream: TextIO) -> None:
     ``_time`` and ``_distance``, and ``Q_mid``, the largest magnitude at the middle of the first
     curve (``Q_mid2`` of the second).  The column ``remarks`` holds all remarks on the run.
     """
-    # reads the records twice, to save memory
-    columns = list(dict.fromkeys(name for record in records for name in _checked_row(record)))
-    writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
-    units = {name: unit_of(name) for name in columns}
-    writer.writerow({name: f"{name} ({unit})" if unit else name for name, unit in units.items()})
-    for record in records:
-        cells = _checked_row(record)
-        writer.writerow({name: spreadsheet_cell(cell) for name, cell in cells.items()})
+    columns: dict[str, None] = {}
+    sizes: list[tuple[int, int]] = []  # bytes and cells of each line
+    with tempfile.TemporaryFile() as lines:  # all columns are known at the end only
+        for row in rows:
+            columns.update(dict.fromkeys(row))
+            line = _csv_line(spreadsheet_cell(row.get(name, "")) for name in columns)
+            lines.write(line)
+            sizes.append((len(line), len(columns)))
+        units = {name: unit_of(name) for name in columns}
+        header = (f"{name} ({unit})" if unit else name for name, unit in units.items())
+        stream.write(_csv_line(header))
+        lines.seek(0)
+        for length, cells in sizes:
+            stream.write(lines.read(length).removesuffix(b"\n"))
+            stream.write(b"," * (len(columns) - cells) + b"\n")
+
+
+def _csv_line(cells: Iterable[Any]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue().encode()
 
 
 def _checked_row(record: Record) -> dict[str, Any]:

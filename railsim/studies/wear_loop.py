@@ -31,7 +31,7 @@ from railsim.result import Result
 from railsim.result.filters import Floats
 from railsim.result.hunting import HUNTS
 from railsim.simulation import simulate
-from railsim.studies.kept import keep, read_kept
+from railsim.studies.records import read_record, write_record
 from railsim.version import __version__
 
 AMPLITUDE = 3e-3  # m, at which EN 15302 compares equivalent conicities
@@ -155,7 +155,8 @@ def wear_loop(
                     vehicle, ways, given, chosen, {name: worn}, at, part
                 )
                 if path is not None and not path.exists():
-                    keep(path, {"distance": at, **wear._asdict(), "depth": wear.depth.tolist()})
+                    facts = {"distance": at, **wear._asdict(), "depth": wear.depth.tolist()}
+                    write_record(path, facts)
                 for route, words in wear.hunts.items():
                     if route not in hunting:
                         remark(f"after {1e-3 * at:.4g} km on {route}: {words}")
@@ -272,7 +273,7 @@ def _kept(path: Path | None, remark: Callable[[str], None]) -> _Wear | None:
     if path is None or not path.exists():
         return None
     try:
-        record = read_kept(path)
+        record = read_record(path)
     except InputError as error:
         remark(f"{error.faults[0]}: it is computed again")
         path.unlink()

@@ -1,7 +1,6 @@
 """Remarks on a run stand wherever its numbers are shown."""
 
 import csv
-import io
 import json
 
 import pytest
@@ -12,7 +11,9 @@ import railsim
 from railsim.cli import main
 from railsim.result import Hdf5Sink, MemorySink, open_result
 from railsim.studies import summary
-from railsim.studies.combine import load_case
+from railsim.studies.case import load_case
+from railsim.studies.journal import Records
+from railsim.studies.spec import RunSpec
 
 REMARKS = ("The first remark of two.", "The second one, on another matter.")
 
@@ -45,17 +46,16 @@ def test_result_without_the_attribute_opens():
     assert MemorySink().close({}, {}).remarks == ()
 
 
-def test_index_and_table_of_a_study_repeat_them():
-    case = load_case("coach_manchester", "curve_r250", 20.0)
+def test_index_and_table_of_a_study_repeat_them(tmp_path):
+    case = load_case(RunSpec("coach_manchester", "curve_r250", 20.0))
     records = [
         summary.finished_record(case, fed(MemorySink())),
         summary.finished_record(case, fed(MemorySink(), ())),
         summary.failed_record(case, "a reason"),
     ]
     assert [record.get("remarks") for record in records] == [list(REMARKS), [], None]
-    stream = io.StringIO()
-    summary.write_summary(records, stream)
-    rows = list(csv.DictReader(stream.getvalue().splitlines()))
+    summary.write_index(tmp_path, {}, "complete", Records(tmp_path / "none", records))
+    rows = list(csv.DictReader((tmp_path / "summary.csv").read_text().splitlines()))
     assert [row["remarks"] for row in rows] == [" ".join(REMARKS), "", ""]
 
 

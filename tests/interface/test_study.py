@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 import pytest
 from example_result import ROOT, feed
+from planned import combinations
 from selection import points
 from started import started
 
@@ -26,8 +27,8 @@ import railsim.studies.run
 from railsim.cli import main
 from railsim.errors import InputError, ModelError
 from railsim.studies import execute
-from railsim.studies.combine import combinations, parse_grid
 from railsim.studies.journal import Journal
+from railsim.studies.plan import parse_grid
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"
 LEFT = {"study.journal", "study.json", "summary.csv"}  # beside the results

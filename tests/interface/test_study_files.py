@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from planned import combinations
 from test_study import CURVE, arguments, index, rows
 from test_study import simulated as simulated
 
@@ -14,8 +15,7 @@ from railsim.cli import main
 from railsim.definitions.loading import load_study, load_track, load_vehicle
 from railsim.definitions.study import Sample, Spread
 from railsim.errors import InputError
-from railsim.studies import own
-from railsim.studies.combine import combinations
+from railsim.studies import user_function
 from railsim.studies.rows import made_rows, quantile, sampled
 
 COACH = "coach_manchester"
@@ -170,7 +170,7 @@ def test_own_quantities_stand_in_record_and_summary_and_follow_their_file(tmp_pa
     result = railsim.open_result(out / f"{COACH}_{CURVE}_10.h5")
     assert float(rows(out)[0]["twice"]) == 2.0 * result.Q.max()
     file.write_text("def mine(result):\n    return {'thrice': 3.0 * result.Q.max()}\n")
-    own._loaded.cache_clear()  # another process would load it anew
+    user_function._loaded.cache_clear()  # another process would load it anew
     assert main(arguments(out, 10, more=more)) == 0
     assert float(rows(out)[0]["thrice"]) == 3.0 * result.Q.max()
     assert simulated == [10.0]  # the run itself is kept
@@ -190,7 +190,7 @@ def test_function_that_a_received_study_names_is_not_loaded(
     shutil.copy(tmp_path / "q.py", received)
     if not computed:
         (received / f"{COACH}_{CURVE}_10.h5").unlink()
-    own._loaded.cache_clear()
+    user_function._loaded.cache_clear()
     monkeypatch.chdir(mine)
     before = sorted(path.stat().st_mtime_ns for path in received.iterdir())
     resume = ["study", "--resume", "--out", str(received), "--workers", "1"]

@@ -7,11 +7,11 @@ import json
 
 import numpy as np
 import pytest
+from planned import combinations
 
 import railsim
 import railsim.studies.run
 from railsim.cli import main
-from railsim.studies.combine import combinations
 from railsim.studies.execute import Job, batches
 
 COACH, CURVE, STRAIGHT = "coach_manchester", "curve_r250", "straight"

@@ -8,8 +8,9 @@ import pytest
 
 import railsim
 from railsim.result import open_run
-from railsim.studies.combine import load_case
+from railsim.studies.case import load_case
 from railsim.studies.execute import Job, perform_there
+from railsim.studies.spec import RunSpec
 
 distributed = pytest.importorskip("distributed")
 
@@ -26,7 +27,7 @@ def arrays(folder):
 
 
 def test_job_whose_folder_is_not_seen_sends_its_files_back(tmp_path):
-    case = load_case("coach_manchester", "straight", 20.0, until=10.0)
+    case = load_case(RunSpec("coach_manchester", "straight", 20.0, until=10.0))
     job = Job(case, tmp_path / "elsewhere" / case.file_name)
     (record,), files = perform_there((job,), "nobody made this mark")
     assert record["status"] == "complete"

@@ -20,7 +20,8 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.sources import library_files, shipped_folder
 from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
-from railsim.studies.combine import combinations
+from railsim.studies.plan import Plan
+from railsim.studies.spec import StudySpec
 from railsim.track.alignment import Alignment
 
 GRAVITY = 9.81
@@ -205,7 +206,8 @@ def test_deflated_coach_stands_and_sways_on_its_emergency_springs():
     always=(0, 3),
 )
 def test_vehicle_runs_its_track_at_the_permitted_speed(vehicle, track, until):
-    (case,) = combinations([vehicle], [track], ["permitted"], until=until)
+    spec = StudySpec(vehicles=vehicle, tracks=track, speeds="permitted", until=until)
+    (case,) = Plan(spec).cases()
     result = railsim.simulate(case.vehicle, case.track, speed=case.speed, until=until)
     assert result.status == "complete"
     assert not any("beyond all experience" in remark for remark in result.remarks)

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from railsim.errors import InputError
-from railsim.studies.kept import keep, read_kept
+from railsim.studies.records import read_record, write_record
 
 RECORD = {"speed": 61.7, "modes": [1.0, None, "hunting"], "nested": {"b": 2, "a": 1e-300}}
 
@@ -13,12 +13,12 @@ RECORD = {"speed": 61.7, "modes": [1.0, None, "hunting"], "nested": {"b": 2, "a"
 @pytest.fixture
 def kept(tmp_path):
     path = tmp_path / "points" / "one.json"
-    keep(path, RECORD)
+    write_record(path, RECORD)
     return path
 
 
 def test_record_comes_back_as_it_was(kept):
-    assert read_kept(kept) == RECORD
+    assert read_record(kept) == RECORD
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_record_comes_back_as_it_was(kept):
 def test_anything_else_is_refused(kept, damage):
     kept.write_bytes(damage(kept.read_bytes()))
     with pytest.raises(InputError, match=r"one\.json: "):
-        read_kept(kept)
+        read_record(kept)
 
 
 def test_any_changed_byte_is_noticed_or_means_the_same(kept):
@@ -47,6 +47,6 @@ def test_any_changed_byte_is_noticed_or_means_the_same(kept):
     for i in range(len(whole)):
         kept.write_bytes(whole[:i] + bytes([whole[i] ^ 1]) + whole[i + 1 :])
         try:
-            assert read_kept(kept) == RECORD
+            assert read_record(kept) == RECORD
         except InputError:
             continue

@@ -14,7 +14,7 @@ from railsim.studies.designs import Design, Evaluation, name_of
 from railsim.studies.summary import unit_of
 
 
-def chosen_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
+def export_vehicles(evaluation: Evaluation, chosen: Design) -> list[Path]:
     """Write a file for each vehicle that extends it with the chosen values."""
     row = evaluation.rows[chosen.number - 1]
     texts = list(evaluation.definition.assignments)

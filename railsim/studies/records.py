@@ -1,6 +1,7 @@
-"""Records of finished work as JSON with a CRC-32, so that damaged records are recognised."""
+"""Records of finished work as JSON; in files of their own with a CRC-32, so that damage is seen."""
 
 import json
+import math
 import zlib
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from railsim.files import TABLE_BYTES, make_folder, read_text, whole_file
 Record = dict[str, Any]
 
 
-def keep(path: Path, record: Record) -> None:
+def write_record(path: Path, record: Record) -> None:
     """Write a record; its folder is created if it does not exist."""
     make_folder(path.parent)
     with whole_file(path) as partial:
@@ -19,7 +20,7 @@ def keep(path: Path, record: Record) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
-def read_kept(path: Path) -> Record:
+def read_record(path: Path) -> Record:
     """Return a stored record.
 
     Raises
@@ -28,16 +29,33 @@ def read_kept(path: Path) -> Record:
     """
     text = read_text(path, TABLE_BYTES)
     try:
-        kept = json.loads(text)
-        whole = kept["crc32"] == _crc(kept["record"])
+        stored = json.loads(text)
+        whole = stored["crc32"] == _crc(stored["record"])
     except (ValueError, TypeError, KeyError, RecursionError):
         whole = False
     if not whole:
         raise InputError([Fault(str(path), "", "the record is damaged", "")])
-    record: Record = kept["record"]
+    record: Record = stored["record"]
     return record
 
 
 def _crc(record: Any) -> str:
     # writing reproduces what was read: order and all digits of numbers are kept
     return f"{zlib.crc32(json.dumps(record).encode()):08x}"
+
+
+def finite(data: Any) -> Any:
+    """Return plain data with None instead of infinite and undefined numbers."""
+    if isinstance(data, dict):
+        return {key: finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def json_bytes(data: Any) -> bytes:
+    """Return data as one line of JSON; infinite and undefined numbers become null."""
+    try:
+        return json.dumps(data, allow_nan=False).encode()
+    except ValueError:
+        return json.dumps(finite(data)).encode()

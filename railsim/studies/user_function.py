@@ -23,7 +23,7 @@ ALLOWED = "FILE.py:FUNCTION, such as quantities.py:summary"
 Function = Callable[[Result], Mapping[str, float]]
 
 
-def named(function: "str | Function | None") -> str | None:
+def full_name(function: "str | Function | None") -> str | None:
     """Return the name ``FILE.py:FUNCTION`` of a function with the full path of the file.
 
     Raises
@@ -50,21 +50,21 @@ def named(function: "str | Function | None") -> str | None:
     return whole
 
 
-def repeated(stored: str | None, given: str | None) -> str | None:
-    """Return the function of a study that is continued, as `named`.
+def given_again(stored: str | None, option: str | None) -> str | None:
+    """Return the function of a study that is continued, as `full_name`.
 
     The folder of a study may come from somebody else, and a function is code: the one that the
     folder names is never loaded because of that.
 
     Raises
     ------
-    InputError : the study has a function, and none is given; as `named`.
+    InputError : the study has a function, and none is given; as `full_name`.
     """
-    if stored and not given:
+    if stored and not option:
         found = f"the study in this folder calls the function {stored}"
         allowed = f"read it, then give {OPTION} FILE.py:FUNCTION too: it runs with your rights"
         raise InputError([Fault("--resume", "", found, allowed)])
-    return named(given)
+    return full_name(option)
 
 
 def fingerprint(name: str | None) -> str:
@@ -74,7 +74,7 @@ def fingerprint(name: str | None) -> str:
     return hashlib.sha256(read_bytes(name.rpartition(":")[0], TABLE_BYTES)).hexdigest() + name
 
 
-def own_quantities(name: str | None, result: Result) -> dict[str, float]:
+def user_quantities(name: str | None, result: Result) -> dict[str, float]:
     """Return the values of the function for a result; none if there is no function.
 
     Raises
@@ -115,8 +115,7 @@ def _loaded(name: str) -> Function:
     except Exception as error:
         found = f"cannot be loaded ({type(error).__name__}: {error})"
         raise InputError([Fault(OPTION, file, found, ALLOWED)]) from None
-    found_one = getattr(module, function, None)
-    if not callable(found_one):
+    loaded: Function | None = getattr(module, function, None)
+    if not callable(loaded):
         raise InputError([Fault(OPTION, file, f"no function '{function}'", ALLOWED)])
-    made: Function = found_one
-    return made
+    return loaded

@@ -8,13 +8,14 @@ from railsim.errors import Fault, InputError, nearest
 from railsim.notation import QUANTITIES, REQUESTED
 from railsim.result import Result
 from railsim.result.hdf5 import PLAIN, Storage, write
+from railsim.studies.spec import StudySpec
 
 ALL, SUMMARY = "all", "summary"
 ALWAYS = ("time", "distance", "Q0")
 
 
 @dataclass(frozen=True)
-class Keep:
+class Retention:
     """Parts of a result that are kept.
 
     Attributes
@@ -49,30 +50,25 @@ class Keep:
         ]
 
 
-EVERYTHING = Keep()
+EVERYTHING = Retention()
 
 
-def parse_keep(given: str, *, compress: bool = False, single: bool = False) -> Keep:
-    """Parse ``all``, ``summary`` or a list of quantities.
+def retention(spec: StudySpec) -> Retention:
+    """Return what a study keeps: ``all``, ``summary`` or a list of quantities.
 
     Raises
     ------
     InputError : an unknown quantity.
-
-    Examples
-    --------
-    >>> parse_keep("Q,wheelset_*").quantities
-    ('Q', 'wheelset_*')
     """
-    storage = Storage(compress=compress, single=single)
-    if given in (ALL, SUMMARY):
-        return Keep(None, given == SUMMARY, storage)
-    names = tuple(name.strip() for name in given.split(",") if name.strip())
+    storage = Storage(compress=spec.compress, single=spec.single)
+    if spec.keep in (ALL, SUMMARY):
+        return Retention(None, spec.keep == SUMMARY, storage)
+    names = tuple(name.strip() for name in spec.keep.split(",") if name.strip())
     known = [*QUANTITIES, *REQUESTED]
     wrong = [name for name in names if not any(fnmatchcase(one, name) for one in known)]
     if wrong or not names:
         raise InputError(
             Fault("--keep", name, "no such quantity", nearest(name, [ALL, SUMMARY, *known]))
-            for name in wrong or [given]
+            for name in wrong or [spec.keep]
         )
-    return Keep(names, False, storage)
+    return Retention(names, False, storage)

@@ -5,7 +5,7 @@ continued, sent to other machines and read without the script.
 """
 
 import re
-from collections.abc import Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +15,20 @@ from railsim.files import make_folder, whole_file
 INPUTS = "inputs"
 
 
-def as_files(given: Sequence[Any], folder: Path) -> list[str | Path]:
-    """Return files instead of definitions, written if they do not exist."""
-    found: list[str | Path] = []
-    taken: dict[str, str] = {}
-    for one in given:
+def as_files(inputs: Any, folder: Path) -> list[str]:
+    """Return one or several inputs as files; definitions are written if they do not exist."""
+    single = isinstance(inputs, str | Path | FileDefinition)
+    texts: dict[str, str] = {}  # of the definitions, by name
+    found = []
+    for one in [inputs] if single else inputs:
         if not isinstance(one, FileDefinition):
-            found.append(one)
+            found.append(str(one))
             continue
         text = one.to_toml()
-        name = base = _slug(str(getattr(one, "name", "settings")))
-        number = 1
-        while taken.get(name, text) != text:
-            number += 1
-            name = f"{base}-{number}"
-        taken[name] = text
+        base = _slug(str(getattr(one, "name", "settings")))
+        names = chain([base], (f"{base}-{number}" for number in count(2)))
+        name = next(name for name in names if texts.get(name, text) == text)
+        texts[name] = text
         path = (folder / INPUTS / f"{name}.toml").absolute()
         if not _holds(path, text.encode()):
             make_folder(path.parent)

@@ -1,0 +1,209 @@
+"""What a run or a study is asked to compute, and how: the same objects for all who ask.
+
+The command line, Python's keyword arguments and study files make them; the journal and
+``study.json`` hold a `StudySpec`, and a study is continued from it.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, ValidationError
+
+from railsim.definitions.analyses import Analysis
+from railsim.definitions.base import Name
+from railsim.definitions.study import Sample, Study, value_texts
+from railsim.errors import Fault, InputError
+from railsim.studies.rows import PERMITTED, speed_of
+from railsim.units import ALLOWED
+from railsim.version import __version__
+
+M = TypeVar("M", bound=BaseModel)
+MOST_FAULTS = 20
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """One run.
+
+    Attributes
+    ----------
+    vehicle, track : str or Path
+        File, or name of a shipped one.
+    speed : float or None
+        Speed [m/s]; not needed where the settings have a speed table.
+    settings : str or Path, optional
+        Settings file.
+    start : float
+        Distance at which the reference body starts [m].
+    duration, until : float, optional
+        End of the run: time [s] or distance [m].
+    assignments : tuple of str
+        ``key.path=value``, the paths beginning with ``vehicle.``, ``track.`` or ``settings.``.
+    """
+
+    vehicle: str | Path
+    track: str | Path
+    speed: float | None
+    settings: str | Path | None = None
+    start: float = 0.0
+    duration: float | None = None
+    until: float | None = None
+    assignments: tuple[str, ...] = ()
+
+
+def _several(values: Any) -> list[Any]:
+    """Return one or several values as a list."""
+    several = isinstance(values, Iterable) and not isinstance(values, str)
+    return list(values) if several else [values]
+
+
+def _file_names(values: Any) -> list[str]:
+    return [str(value) for value in _several(values)]
+
+
+def _texts(key: str, values: Any) -> list[str]:
+    """Return one or several values of a key, or ranges, as they are written in assignments."""
+    found: list[str] = []
+    for value in _several(values):
+        plain = value.item() if hasattr(value, "item") else value  # numpy's numbers
+        try:
+            found += value_texts(plain if isinstance(plain, str) else (plain,))
+        except ValueError as error:
+            raise InputError([Fault(key, "", str(error), f"allowed: {ALLOWED}")]) from None
+    return found
+
+
+def _speeds(speeds: Any) -> list[float | str | None]:
+    """Return speeds, ranges and speeds with units as numbers [m/s]; `PERMITTED` unchanged."""
+    found: list[float | str | None] = []
+    for speed in [None] if speeds is None else _several(speeds):
+        if isinstance(speed, str) and speed != PERMITTED:
+            found += [speed_of(text) for text in _texts("speeds", speed)]
+        else:
+            found.append(speed)
+    return found
+
+
+def _table(table: Any, option: str = "grid") -> Any:
+    """Return the values of keys as texts; what is no table is left to be refused."""
+    if not isinstance(table, Mapping):
+        return table
+    return {key: _texts(f"{option} {key}", values) for key, values in table.items()}
+
+
+def _linked(table: Any) -> Any:
+    return _table(table, "linked")
+
+
+def _as_text(value: Any) -> str | None:
+    return None if value is None else str(value)
+
+
+def _stored(value: Any) -> Any:
+    """Return definitions as plain data without what is not given."""
+    if isinstance(value, Mapping):
+        return {name: _stored(one) for name, one in value.items()}
+    return value if value is None else value.model_dump(mode="json", exclude_none=True)
+
+
+class StudySpec(BaseModel):
+    """A study: everything that its numbers and its files depend on; see `railsim.study`.
+
+    Single values, ranges and numbers are taken too, and held as lists of texts.
+
+    Attributes
+    ----------
+    railsim_version : str
+    folder : str
+        Folder that relative file names refer to, from the folder of the study.
+    scenario : str or None
+        Scenario of a campaign, which has tracks and speeds of its own.
+    quantities : str or None
+        ``FILE.py:FUNCTION``, see `railsim.studies.user_function`.
+    keep, compress, single
+        Parts of each result that are kept, see `railsim.studies.retention`.
+
+    Others as in a study file (`railsim.definitions.study`).
+    """
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    railsim_version: str = __version__
+    folder: str = "."
+    scenario: str | None = None
+    vehicles: Annotated[list[str], BeforeValidator(_file_names)]
+    tracks: Annotated[list[str], BeforeValidator(_file_names)]
+    speeds: Annotated[list[float | str | None], BeforeValidator(_speeds)]
+    grid: Annotated[dict[str, list[str]], BeforeValidator(_table)] = {}
+    linked: list[Annotated[dict[str, list[str]], BeforeValidator(_linked)]] = []
+    sample: Annotated[Sample | None, PlainSerializer(_stored)] = None
+    quantities: str | None = None
+    analyses: Annotated[dict[Name, Analysis], PlainSerializer(_stored)] = {}
+    keep: str = "all"
+    compress: bool = False
+    single: bool = False
+    settings: Annotated[str | None, BeforeValidator(_as_text)] = None
+    start: float = 0.0
+    duration: float | None = None
+    until: float | None = None
+    assignments: list[str] = []
+
+    @classmethod
+    def of_file(cls, study: Study, **changes: Any) -> "StudySpec":
+        """Return the study of a study file, with changes."""
+        names = cls.model_fields.keys() & type(study).model_fields.keys()
+        return checked(cls, {name: getattr(study, name) for name in names} | changes, "study")
+
+    def changed(self, **changes: Any) -> "StudySpec":
+        """Return a study with other inputs."""
+        return self.model_copy(update=changes)
+
+    def stored(self) -> dict[str, Any]:
+        """Return the study as plain data."""
+        return self.model_dump(mode="json")
+
+
+@dataclass(frozen=True)
+class Execution:
+    """How the runs of a study are carried out; the numbers do not depend on it.
+
+    Attributes as the arguments of `railsim.study`, and
+
+    longest_first : bool
+        Begin with the longest runs, to balance the load of the cores.
+    """
+
+    workers: int | None = None
+    together: int = 1
+    scheduler: str | None = None
+    resume: bool = False
+    overwrite: bool = False
+    plots: bool = False
+    longest_first: bool = False
+    progress: Callable[[float], None] | None = None
+    on_record: Callable[[dict[str, Any]], None] | None = None
+    on_remark: Callable[[str], None] | None = None
+
+
+def checked(model: type[M], data: Any, file: str) -> M:
+    """Return data as a model.
+
+    Raises
+    ------
+    InputError : all faults of the data.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        details = error.errors(include_url=False)[:MOST_FAULTS]
+        raise InputError(
+            Fault(
+                file,
+                ".".join(map(str, detail["loc"])),
+                repr(detail["input"])[:60],
+                detail["msg"].lower(),
+            )
+            for detail in details
+        ) from None
