@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
-from railsim.cli.contact_tables import TABLES, contact_data, contact_lines, write_tables
-from railsim.files import check_folder, make_folder
+from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, show
+from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
-    from railsim.contact.summary import ContactSummary
+    from railsim.contact.summary import Array, ContactSummary
+    from railsim.profiles import Profile
 
+TABLES = ("functions.csv", "conicity.csv", "patches.csv")
+MAP, OVERLAY = ("conicity_over_gauge.png", "conicity_over_gauge.csv"), "overlay.png"
 PICTURES = ("profiles.png", "functions.png", "conicity.png", "patches.png")
 NORMAL = ("hertz", "kik-piotrowski")
 
@@ -28,6 +30,7 @@ RANGES = {
 
 
 @click.command()
+@click.argument("profiles", nargs=-1, metavar="[WHEEL] [RAIL]")
 @click.option(
     "--wheel",
     "wheels",
@@ -67,6 +70,12 @@ RANGES = {
 @click.option(
     "--max-shift", default=0.010, show_default=True, help="Largest lateral displacement (m)."
 )
+@click.option("--gauges", metavar="A:B:N", help="Also the conicity over N gauges from A to B (m).")
+@click.option(
+    "--overlay",
+    metavar="P",
+    help="With --out: also a wheel or rail profile drawn over the right one.",
+)
 @click.option(
     "--exact", is_flag=True, help="Check the patches by boundary elements (about ten seconds)."
 )
@@ -104,6 +113,7 @@ RANGES = {
 @json_option
 @quiet_option
 def command(
+    profiles: tuple[str, ...],
     wheels: tuple[str, ...],
     rails: tuple[str, ...],
     gauge: float,
@@ -112,6 +122,8 @@ def command(
     radii: tuple[float, ...],
     load: float,
     max_shift: float,
+    gauges: str | None,
+    overlay: str | None,
     exact: bool,
     normal: str,
     creep: bool,
@@ -126,22 +138,29 @@ def command(
     """Contact geometry of a wheelset on its rails.
 
     Prints rolling radius difference, contact angles and contact positions over the lateral
-    displacement, the equivalent conicity of EN 15302, and the contact patches of the right wheel
-    under a load.
+    displacement, the equivalent conicity of EN 15302, the gauge values of the wheels with their
+    limits, and the contact patches of the right wheel under a load.
 
     \b
     Example:
       railsim contact --wheel S1002 --rail 60E1 --inclination 0.025 --out s1002_60e1
-      railsim contact --wheel measured.whl --rail 54E1 --exact --json
+      railsim contact S1002 60E1 --gauges 1.430:1.450:5
+      railsim contact measured.whl 54E1 --overlay S1002 --out worn
       railsim contact --creep --friction 0.35 --out creep
     """  # noqa: D301 - click reads the escape
+    from railsim.assessment.influences import RADIUS, steering_index
     from railsim.cli import creep as creep_part
+    from railsim.cli.analysis import values_of
+    from railsim.contact import tables
     from railsim.contact.creep_curves import forces_by_law
-    from railsim.contact.summary import contact_summary
+    from railsim.contact.gauges import gauge_table
+    from railsim.contact.summary import conicity_over_gauge, contact_summary
+    from railsim.profiles import load_profile
 
     if build_creep_table:
         creep_part.build_table(out, workers, as_json, quiet)
         return
+    wheels, rails = _named(profiles, wheels, rails)
     _check_counts(wheel=wheels, rail=rails, radius=radii)
     _check_ranges(
         gauge=gauge,
@@ -153,7 +172,14 @@ def command(
     )
     if creep:
         creep_part.check_friction(friction)
-    written = (*PICTURES, *TABLES, *((*creep_part.PICTURES, *creep_part.TABLES) if creep else ()))
+    over = values_of(gauges, "--gauges") if gauges else []
+    if len(over) == 1:
+        raise click.UsageError("--gauges needs two gauges at least")
+    compared = load_profile(overlay) if overlay else None
+    written = [*PICTURES, *TABLES]
+    written += [*creep_part.PICTURES, *creep_part.TABLES] if creep else []
+    written += [*MAP] if over else []
+    written += [OVERLAY] if compared else []
     folder = Path(out) if out else None
     if folder:
         check_folder(folder, written, overwrite=overwrite)
@@ -171,24 +197,56 @@ def command(
     )
     patch = found.main_patch(friction) if creep else None
     creep_rows = forces_by_law(patch) if patch else []
+    by_gauge = conicity_over_gauge(found, over) if over else None
+    gauge_values = gauge_table(
+        (found.pairs[0].wheel, found.pairs[1].wheel),
+        diameter=2.0 * min(radii),
+        back_to_back=back_to_back,
+        gauge=gauge,
+    )
+    steering = steering_index(found.geometry, RADIUS, min(radii))
+    words = f"steering index at R {RADIUS:g} m: {steering:.2f}; above 1 the flange steers too"
+    shown: list[Any] = [
+        tables.printed_functions(found),
+        tables.printed_conicity(found),
+        gauge_values,
+        words,
+        tables.patch_table(found),
+    ]
+    shown += [tables.conicity_map_table(found, over, by_gauge)] if by_gauge is not None else []
+    shown += [tables.creep_table(patch, creep_rows)] if patch else []
     if folder:
         make_folder(folder)
         if patch:
             creep_part.write(folder, patch, creep_rows)
-        write_tables(folder, found)
-        _write_pictures(folder, found)
+        _write(folder, found)
+        if by_gauge is not None:
+            _write_map(folder, found, over, by_gauge)
+        if compared is not None:
+            _write_overlay(folder, found, compared)
     if as_json:
-        print_json(contact_data(found) | ({"creep": creep_rows} if patch else {}))
+        data = _record(found) | {"gauge_values": gauge_values.records()}
+        data["steering_index"] = {"radius": RADIUS, "value": steering}
+        if by_gauge is not None:
+            data |= {"gauges": over, "conicity_over_gauge": by_gauge.tolist()}
+        print_json(data | ({"creep": creep_rows} if patch else {}))
         return
     for note in found.notes:
         echo(note, err=True)
-    for line in contact_lines(found):
-        echo(line)
-    if patch:
-        for line in creep_part.lines_of(patch, creep_rows):
-            echo(line)
+    for number, table in enumerate(shown):
+        show(*([""] if number else []), table)
     if folder and not quiet:
         echo(f"wrote {', '.join(written)} to {folder}", err=True)
+
+
+def _named(
+    profiles: tuple[str, ...], wheels: tuple[str, ...], rails: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return wheels and rails: the first argument is a wheel, the second a rail."""
+    if len(profiles) > 2:
+        raise click.UsageError("give a wheel and a rail; --wheel and --rail twice for both sides")
+    wheels = profiles[:1] or wheels
+    return wheels, profiles[1:] or rails
 
 
 def _check_counts(**given: Sequence[Any]) -> None:
@@ -227,11 +285,28 @@ def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
     return loaded[names[0]], loaded[names[-1]]
 
 
-def _write_pictures(folder: Path, found: "ContactSummary") -> None:
+def _record(found: "ContactSummary") -> dict[str, Any]:
+    """Everything for ``--json``, SI."""
+    data: dict[str, Any] = {name: values.tolist() for name, values in found.functions.items()}
+    data["equivalent_conicity"] = [
+        {"amplitude": float(a), "value": float(v)}
+        for a, v in zip(found.amplitudes, found.conicity, strict=True)
+    ]
+    data["jumps"] = [{"lateral": lateral, "side": side} for lateral, side in found.geometry.jumps()]
+    return data | {"patches": found.patches, "notes": found.notes}
+
+
+def _write(folder: Path, found: "ContactSummary") -> None:
+    """Write the tables and the pictures that there always are."""
+    from railsim.contact import tables
     from railsim.contact.summary import OTHER_NORMAL
     from railsim.plot import contact as plot
     from railsim.plot.style import save
 
+    made = tables.function_table(found), tables.conicity_table(found), tables.patch_table(found)
+    for name, table in zip(TABLES, made, strict=True):
+        with whole_file(folder / name) as partial:
+            partial.write_text(table.csv(), encoding="utf-8")
     names = dict.fromkeys(f"{pair.wheel.name} on {pair.rail.name}" for pair in found.pairs)
     other = found.with_other_normal() if found.exact else None
     labels = (f"table, {found.normal}", f"table, {OTHER_NORMAL[found.normal]}")
@@ -243,3 +318,23 @@ def _write_pictures(folder: Path, found: "ContactSummary") -> None:
     )
     for name, figure in zip(PICTURES, figures, strict=True):
         save(figure, folder / name, overwrite=True)
+
+
+def _write_map(folder: Path, found: "ContactSummary", gauges: list[float], values: "Array") -> None:
+    from railsim.contact.tables import conicity_map_table
+    from railsim.plot.contact import conicity_map_figure
+    from railsim.plot.style import save
+
+    picture, table = MAP
+    save(conicity_map_figure(gauges, found.amplitudes, values), folder / picture, overwrite=True)
+    with whole_file(folder / table) as partial:
+        partial.write_text(conicity_map_table(found, gauges, values).csv(), encoding="utf-8")
+
+
+def _write_overlay(folder: Path, found: "ContactSummary", compared: "Profile") -> None:
+    from railsim.plot.contact import overlay_figure
+    from railsim.plot.style import save
+
+    right = found.pairs[1]
+    own = right.wheel if compared.kind == "wheel" else right.rail
+    save(overlay_figure([compared, own]), folder / OVERLAY, overwrite=True)

@@ -1,11 +1,10 @@
 """The creep part of ``railsim contact``: curves and traction fields, the table's generator."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from railsim.cli.common import echo, print_json, table
+from railsim.cli.common import echo, print_json
 from railsim.cli.progress import progress_bar
 from railsim.files import check_folder, whole_file
 
@@ -34,6 +33,7 @@ def write(folder: Path, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
     from railsim.contact.creep_curves import CASES, exact_force
     from railsim.plot.creep import creep_curves_figure, traction_figure
     from railsim.plot.style import save
+    from railsim.table import Table
 
     fields = {
         case: exact_force(patch, FIELD_SIZE * patch.unit_creepages(direction))
@@ -42,42 +42,8 @@ def write(folder: Path, patch: "Patch", rows: Sequence[dict[str, Any]]) -> None:
     figures = (creep_curves_figure(patch, LAWS), traction_figure(fields, patch.mu * patch.N))
     for name, figure in zip(PICTURES, figures, strict=True):
         save(figure, folder / name, overwrite=True)
-    with (
-        whole_file(folder / TABLES[0]) as partial,
-        partial.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(
-            {key: v if isinstance(v, str) else f"{v:.7g}" for key, v in row.items()} for row in rows
-        )
-
-
-def lines_of(patch: "Patch", rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Printed table: force over mu N of each law, by direction and size of creepage."""
-    from railsim.contact.creep import LAWS
-
-    head = (
-        f"Creep force over mu N, a = {1e3 * patch.a:.2f} mm, b = {1e3 * patch.b:.2f} mm, "
-        f"N = {1e-3 * patch.N:.1f} kN, mu = {patch.mu:g}"
-    )
-    by_creepage: dict[tuple[str, float], dict[str, dict[str, Any]]] = {}
-    for row in rows:
-        by_creepage.setdefault((row["case"], row["size"]), {})[row["law"]] = row
-    body = [
-        [
-            case,
-            f"{size:g}",
-            *(f"{_shown(by_law[law]['T_x'])} {_shown(by_law[law]['T_y'])}" for law in LAWS),
-        ]
-        for (case, size), by_law in by_creepage.items()
-    ]
-    return ["", head, *table(["T_x, T_y by", "creepage", *LAWS], body)]
-
-
-def _shown(value: float) -> str:
-    """Three digits, without a sign where they are zero."""
-    return f"{round(value, 3) + 0.0:.3f}"
+    with whole_file(folder / TABLES[0]) as partial:
+        partial.write_text(Table(list(rows[0]), rows).csv(), encoding="utf-8")
 
 
 def build_table(out: str | None, workers: int, as_json: bool, quiet: bool) -> None:

@@ -14,6 +14,8 @@ module         job
 `creep_table`  its table for the time loop: generator and data
 `creep_curves` creep forces of one patch by every law
 `summary`      functions, conicity and loaded patches of a wheelset in one object
+`tables`       its tables
+`gauges`       gauge values of wheels and wheelsets, with limits
 ============== ==================================================================
 
 Read `table` first: it says what the simulation takes from this package.  The public names are

@@ -13,7 +13,7 @@ from railsim.contact.exact_normal import ExactContact, exact_contact
 from railsim.contact.geometry import ContactGeometry, contact_geometry
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable, TableGrid
-from railsim.errors import ModelError
+from railsim.errors import InputError, ModelError
 from railsim.profiles.profile import Profile
 
 Array = NDArray[np.float64]
@@ -186,6 +186,36 @@ def contact_summary(
         contacts,
         _exact(right, radii[1], geometry, list(contacts), load) if exact else {},
     )  # fmt: skip
+
+
+def conicity_over_gauge(found: ContactSummary, gauges: Sequence[float]) -> Array:
+    """Equivalent conicity, float64[gauge, amplitude], at the amplitudes of a summary [1].
+
+    Parameters
+    ----------
+    found : ContactSummary
+        Profiles and their position.
+    gauges : sequence of float
+        Track gauges [m]; NaN for one at which the wheels do not stand on the rails.
+    """
+    left, right = found.pairs
+    rows = []
+    for gauge in gauges:
+        try:
+            geometry = contact_geometry(
+                (left.wheel, right.wheel),
+                (left.rail, right.rail),
+                found.radii,
+                gauge,
+                left.inclination,
+                left.back_to_back,
+                found.geometry.lateral,
+            )
+        except (InputError, ModelError):
+            rows.append(np.full(len(found.amplitudes), np.nan))
+        else:
+            rows.append(geometry.equivalent_conicity(found.amplitudes))
+    return np.array(rows)
 
 
 def _roll(geometry: ContactGeometry, y: float) -> float:

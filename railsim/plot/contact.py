@@ -220,6 +220,55 @@ def conicity_figure(conicity: Mapping[str, tuple[Array, Array]]) -> Figure:
     return figure
 
 
+def conicity_map_figure(gauges: Sequence[float], amplitudes: Array, values: Array) -> Figure:
+    """Equivalent conicity over gauge and amplitude.
+
+    Parameters
+    ----------
+    gauges, amplitudes : sequence of float
+        [m].
+    values : float64[gauge, amplitude]
+        [1].
+    """
+    with styled():
+        figure = Picture(figsize=(5.6, 3.6))
+        figure.subplots_adjust(left=0.11, right=0.985, bottom=0.13, top=0.975)
+        axes = figure.subplots()
+        # the flange's slopes beyond would hide the tread's
+        levels = np.linspace(0.0, 0.8, 17)
+        x, y = 1e3 * np.asarray(gauges), 1e3 * amplitudes
+        filled = axes.contourf(x, y, values.T, levels, extend="max")
+        figure.colorbar(filled, ax=axes, label="equivalent conicity $\\tan\\gamma_e$")
+        axes.set_xlabel("gauge (mm)")
+        axes.set_ylabel("amplitude $\\hat y$ (mm)")
+    return figure
+
+
+def overlay_figure(profiles: Sequence[Profile]) -> Figure:
+    """Profiles of one kind on each other, and how far the others are off the first."""
+    first, *others = profiles
+    with styled():
+        figure = Picture(figsize=(9.6, 5.0))
+        figure.subplots_adjust(left=0.07, right=0.99, bottom=0.09, top=0.98, hspace=0.12)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
+        order = np.argsort(first.y, kind="stable")
+        for colour, profile in zip(DISTINCT, profiles, strict=False):
+            above.plot(
+                1e3 * profile.y, -1e3 * profile.z, color=colour, label=unformatted(profile.name)
+            )
+        for colour, profile in zip(DISTINCT[1:], others, strict=False):
+            # not where a contour is nearly upright
+            flat = np.abs(np.gradient(profile.z)) < 4.0 * np.abs(np.gradient(profile.y))
+            off = np.interp(profile.y, first.y[order], first.z[order]) - profile.z
+            below.plot(1e3 * profile.y, np.where(flat, 1e3 * off, np.nan), color=colour)
+        above.set_aspect("equal", adjustable="datalim")
+        above.set_ylabel("height (mm)")
+        above.legend(loc="best")
+        below.set_ylabel(f"above {unformatted(first.name)} (mm)")
+        below.set_xlabel("position on the profile $y$ (mm)")
+    return figure
+
+
 def patches_figure(
     contacts: Mapping[float, LoadedContact],
     load: float,

@@ -76,6 +76,39 @@ def test_pictures_and_tables_are_written_and_kept(tmp_path, capsys):
     assert cli.main([*arguments, "--overwrite", "--quiet"]) == 0
 
 
+@pytest.mark.usefixtures("small_contact_tables")
+def test_profiles_may_be_named_alone_and_have_gauge_values(capsys):
+    data = as_json(capsys, "S1002", "60E1", "--gauges", "1.430,1.435,1.440")
+    assert data == {
+        **as_json(capsys, "--wheel", "S1002", "--rail", "60E1"),
+        "gauges": [1.43, 1.435, 1.44],
+        "conicity_over_gauge": data["conicity_over_gauge"],
+    }
+    values = {row["name"]: row for row in data["gauge_values"]}
+    # EN 13715: flange 28 mm high and 32.5 mm thick, qR 10.8 mm; SR = 1360 + 2 32.5
+    found = [1e3 * values[name]["value"] for name in ("Sh", "Sd", "qR", "AR", "SR", "play")]
+    assert found == pytest.approx([28.0, 32.5, 10.79, 1360.0, 1425.0, 10.0], abs=0.02)
+    assert {row["verdict"] for row in data["gauge_values"]} == {"pass", ""}
+    # the same as at that gauge alone
+    alone = [row["value"] for row in data["equivalent_conicity"]]
+    assert data["conicity_over_gauge"][1] == pytest.approx(alone)
+    at_3_mm = [row[5] for row in data["conicity_over_gauge"]]
+    assert at_3_mm[0] > at_3_mm[1] > at_3_mm[2]  # more play, less conicity of this pair
+    assert cli.main(["contact", "S1002", "60E1", "54E1"]) == 2
+
+
+@pytest.mark.usefixtures("small_contact_tables")
+def test_a_worn_wheel_lies_over_a_new_one_and_exceeds_its_limits(tmp_path, capsys):
+    out = tmp_path / "worn"
+    arguments = ["S1002_hollow", "60E1", "--overlay", "S1002", "--gauges", "1.43:1.45:3"]
+    assert cli.main(["contact", *arguments, "--out", str(out)]) == 0
+    assert {"overlay.png", "conicity_over_gauge.png", "conicity_over_gauge.csv"} <= {
+        path.name for path in out.iterdir()
+    }
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Sd")]
+    assert lines[0].split()[-1] == "fail"  # 33.1 mm: the tread is hollow, its flank measured lower
+
+
 def test_exact_patches_stand_beside_those_of_the_table(capsys):
     data = as_json(capsys, "--max-shift", "0.004", "--exact", "--load", "40000")
     by_method = {

@@ -1,0 +1,130 @@
+"""Gauge values of wheels and of a wheelset, with their limits in service.
+
+On a wheel, from its nominal rolling circle and flange back (EN 15313):
+
+- flange height ``Sh``: flange tip over the nominal rolling circle;
+- flange thickness ``Sd``: from the flange back to the flank, 10 mm beyond the rolling circle;
+- ``qR``: along the axle from that point of the flank to the one 2 mm below the tip.
+
+Of a wheelset: distance of the flange backs ``AR``, of the active faces ``SR = AR + 2 Sd``, and the
+play in the gauge, ``gauge - SR``.  Limits are those of the TSI Rolling stock (EU 1302/2014, tables
+of 4.2.3.5.2) for 1435 mm, of ``qR`` that of EN 15313; quoted from memory.
+"""
+
+from dataclasses import dataclass
+from math import inf, nan
+
+import numpy as np
+
+from railsim.profiles.profile import FLANGE_BACK, Profile
+from railsim.table import Column, Table
+
+FLANK, BELOW_TIP = 0.010, 0.002
+"""Where the flank is measured: beyond the nominal rolling circle, below the flange tip [m]."""
+
+# diameters up to: least Sd, least Sh, least SR, least AR [m]
+_LEAST = {
+    0.760: (0.0275, 0.0315, 1.415, 1.359),
+    0.840: (0.0250, 0.0295, 1.412, 1.358),
+    inf: (0.0220, 0.0275, 1.410, 1.357),
+}
+_MOST = (0.033, 0.036, 1.426, 1.363)
+LEAST_QR = 0.0065
+
+
+@dataclass(frozen=True)
+class WheelGauge:
+    """Gauge values of a wheel profile [m]; NaN where its flange does not reach so far.
+
+    Attributes
+    ----------
+    Sh, Sd, qR : float
+        See the module.
+    """
+
+    Sh: float
+    Sd: float
+    qR: float
+
+
+def wheel_gauge(wheel: Profile) -> WheelGauge:
+    """Return the gauge values of a wheel profile.
+
+    Examples
+    --------
+    >>> from railsim.profiles import load_profile
+    >>> found = wheel_gauge(load_profile("S1002"))
+    >>> [round(1e3 * value, 1) for value in (found.Sh, found.Sd, found.qR)]
+    [28.0, 32.5, 10.8]
+    """
+    order = np.argsort(wheel.y, kind="stable")
+    tread = float(np.interp(0.0, wheel.y[order], wheel.z[order]))
+    tip = int(np.argmax(wheel.z))
+    height = float(wheel.z[tip]) - tread
+    flank = _flank(wheel, tip, tread + FLANK)
+    below_tip = _flank(wheel, tip, float(wheel.z[tip]) - BELOW_TIP)
+    return WheelGauge(height, flank - FLANGE_BACK, flank - below_tip)
+
+
+def _flank(wheel: Profile, tip: int, height: float) -> float:
+    """Position on the profile where it first falls to a height on the way from tip to tread."""
+    z = wheel.z[tip:]
+    below = np.flatnonzero(z <= height)
+    if not len(below) or below[0] == 0:
+        return nan
+    k = tip + int(below[0])
+    share = (wheel.z[k - 1] - height) / (wheel.z[k - 1] - wheel.z[k])
+    return float(wheel.y[k - 1] + share * (wheel.y[k] - wheel.y[k - 1]))
+
+
+def gauge_table(
+    wheels: tuple[Profile, Profile],
+    *,
+    diameter: float = 0.92,
+    back_to_back: float = 1.360,
+    gauge: float = 1.435,
+) -> Table:
+    """Return the gauge values of a wheelset against their limits.
+
+    Parameters
+    ----------
+    wheels : tuple of two Profile
+        Left and right.
+    diameter : float
+        Of the wheels, on which limits depend [m].
+    back_to_back, gauge : float
+        Distance of the flange backs, track gauge [m].
+    """
+    left, right = map(wheel_gauge, wheels)
+    thickness, height, faces, backs = next(v for most, v in _LEAST.items() if diameter <= most)
+    most_thickness, most_height, most_faces, most_backs = _MOST
+    active = back_to_back + left.Sd + right.Sd
+    rows: list[tuple[str, str, float, float | None, float | None]] = [
+        ("Sh", "flange height, left", left.Sh, height, most_height),
+        ("Sh", "flange height, right", right.Sh, height, most_height),
+        ("Sd", "flange thickness, left", left.Sd, thickness, most_thickness),
+        ("Sd", "flange thickness, right", right.Sd, thickness, most_thickness),
+        ("qR", "flank, left", left.qR, LEAST_QR, None),
+        ("qR", "flank, right", right.qR, LEAST_QR, None),
+        ("AR", "flange backs", back_to_back, backs, most_backs),
+        ("SR", "active faces", active, faces, most_faces),
+        ("play", "gauge less active faces", gauge - active, None, None),
+    ]
+    lengths = [
+        Column(name, words, "mm", ".1f")
+        for name, words in (("value", "value"), ("least", "at least"), ("most", "at most"))
+    ]
+    columns = [
+        Column("name", "gauge value"),
+        Column("words", " "),
+        *lengths,
+        Column("verdict", " "),
+    ]
+    return Table(columns, [[*row, _verdict(*row[2:])] for row in rows])
+
+
+def _verdict(value: float, least: float | None, most: float | None) -> str:
+    if least is None and most is None:
+        return ""
+    inside = (least is None or value >= least - 1e-9) and (most is None or value <= most + 1e-9)
+    return "pass" if inside else "fail"
