@@ -25,7 +25,7 @@ result = railsim.simulate(coach, zone4, speed=22.0, until=500.0, settings=settin
 print("verdict:", assessment.verdict)
 print(*assessment.reasons, sep="\n")
 for row in assessment.worst:
-    print(f"{row.rule.words:40} {100.0 * row.share:5.1f} % of the limit")
+    print(f"{row.criterion.words:40} {100.0 * row.share:5.1f} % of the limit")
 
 figure = assessment_figure([assessment])
 save(figure, "02_does_it_pass.png", overwrite=True)

@@ -13,12 +13,11 @@ from railsim.assessment.comfort_report import (
 from railsim.assessment.conditions import Condition, SectionRow
 from railsim.assessment.influences import Influence
 from railsim.assessment.record import Record
-from railsim.assessment.rules import Assessed
-from railsim.assessment.running import Options, Running, assessed_runs, group_key
+from railsim.assessment.running import Options, Running, assessed_runs, group_key, limits_checked
 from railsim.assessment.safety_report import SafetyReport, safety_report
 from railsim.assessment.verdict import DERAILED, FAIL, Verdict, overall
 from railsim.assessment.wear_report import WheelWear, wear_report
-from railsim.assessment.zones import ZoneReport
+from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.definitions.limits import ComfortLimits, RunningLimits
 from railsim.definitions.loading import load_comfort_limits, load_running_limits
 from railsim.definitions.vehicle_tables import Service
@@ -109,9 +108,9 @@ class Assessment:
         found: dict[str, tuple[ZoneReport, Assessed]] = {}
         for report in self.zones:
             for row in report.rows if report.zone == zone else ():
-                before = found.get(row.rule.name)
+                before = found.get(row.criterion.name)
                 if before is None or not row.rank <= before[1].rank:
-                    found[row.rule.name] = report, row
+                    found[row.criterion.name] = report, row
         return found
 
     def record(self) -> dict[str, object]:
@@ -204,7 +203,7 @@ def assess(
     found = []
     for runs in groups.values():
         if standard in RUNNING:
-            law = load_running_limits(limits or standard)
+            law = limits_checked(load_running_limits(limits or standard), str(limits or standard))
             if law.standard != standard:
                 fault = Fault(str(limits), "standard", repr(law.standard), f"wanted: '{standard}'")
                 raise InputError([fault])

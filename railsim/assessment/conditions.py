@@ -13,14 +13,11 @@ import numpy as np
 
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.zones import Population, ZoneReport
-from railsim.contact.geometry import ContactGeometry, geometry_of
-from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import ConicityClasses, RunningLimits, Sourced, TrackTarget, Zone
 from railsim.definitions.vehicle_tables import Service
 from railsim.result import Result
 
 MET, NOT_MET, NOT_CHECKED = "met", "not met", "not checked"
-AMPLITUDE = 3e-3  # m, of the equivalent conicity
 SHARE = 90.0  # per cent of the sections, of the track's quality
 
 
@@ -232,21 +229,3 @@ def _loads(reports: Sequence[ZoneReport]) -> Condition:
     state = _stated(len(loads) > 1) if known or len(loads) > 1 else NOT_CHECKED
     words = ", ".join(loads) if known else "the vehicle's file has no load cases"
     return Condition("load states", "", state, words or "none", "empty and laden", "[R]")
-
-
-def leading_geometry(result: Result) -> ContactGeometry | None:
-    """Contact functions of the leading wheelset of a run on rigid rails.
-
-    None where the profiles are not kept or do not fit.
-    """
-    wheelset = flatten(result.vehicle()).of_kind("wheelset")[0].wheelset
-    track, known = result.track(), result.profiles
-    names = [*wheelset.profile, *track.rail] if wheelset else ["?"]
-    if wheelset is None or any(name not in known for name in names):
-        return None
-    return geometry_of(wheelset, track, known)
-
-
-def conicity_of(geometry: ContactGeometry | None) -> float:
-    """Equivalent conicity for 3 mm; nan where it is not known [1]."""
-    return float("nan") if geometry is None else float(geometry.equivalent_conicity([AMPLITUDE])[0])

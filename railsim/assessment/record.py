@@ -10,6 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
+from railsim.contact.geometry import ContactGeometry, geometry_of
+from railsim.definitions.flatten import flatten
 from railsim.errors import Fault, InputError
 from railsim.result import Result
 from railsim.result.filters import Floats
@@ -20,6 +22,7 @@ from railsim.track.alignment import Alignment
 FINE_ENOUGH = 1000.0  # samples per second of instantaneous values
 START = 3.0  # s after the start that are not assessed
 MOTION = ("body_position", "body_velocity", "body_acceleration")
+AMPLITUDE = 3e-3  # m, of the equivalent conicity
 PIECE = 60.0  # s that are read at once by default
 
 
@@ -117,6 +120,24 @@ class Record:
     def alignment(self) -> Alignment:
         """Geometry of the track."""
         return Alignment(self.result.track())
+
+    @cached_property
+    def geometry(self) -> ContactGeometry | None:
+        """Contact functions of the leading wheelset on rigid rails.
+
+        None where the profiles are not kept or do not fit.
+        """
+        wheelset = flatten(self.result.vehicle()).of_kind("wheelset")[0].wheelset
+        track, known = self.result.track(), self.result.profiles
+        if wheelset is None or not {*wheelset.profile, *track.rail} <= known.keys():
+            return None
+        return geometry_of(wheelset, track, known)
+
+    @cached_property
+    def conicity(self) -> float:
+        """Equivalent conicity of the leading wheelset for 3 mm; nan where it is not known [1]."""
+        geometry = self.geometry
+        return math.nan if geometry is None else float(geometry.equivalent_conicity([AMPLITUDE])[0])
 
     @cached_property
     def offsets(self) -> Floats:

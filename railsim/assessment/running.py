@@ -1,20 +1,18 @@
 """Running tests after EN 14363 and UIC 518: all runs of a vehicle to zones and verdicts."""
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from railsim.assessment.conditions import (
     Condition,
     SectionRow,
-    conicity_of,
-    leading_geometry,
     missing_zones,
     vehicle_conditions,
     zone_conditions,
 )
+from railsim.assessment.criteria import CRITERIA, INFORMATION
 from railsim.assessment.en14363 import (
     NEEDED,
     SectionValues,
@@ -22,16 +20,15 @@ from railsim.assessment.en14363 import (
     hunting_spectrum,
     section_values,
 )
-from railsim.assessment.influences import Influence, influences, steering_index
+from railsim.assessment.influences import Influence, influences
 from railsim.assessment.record import Record
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality, quality_class
 from railsim.assessment.verdict import Verdict, all_verdicts
 from railsim.assessment.zones import Population, ZoneReport, zone_reports
-from railsim.definitions.flatten import flatten
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.vehicle_tables import Service
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, nearest
 from railsim.result import Result
 
 
@@ -127,7 +124,6 @@ def assessed_runs(
     f0 = hunting_frequency([hunting_spectrum(run.record, run.counting) for run in done])
     for run in done:
         run.values = section_values(run.record, run.counting, f0=f0, causal=options.causal)
-        _add_steering(run)
     rows = [row for run in done for row in _section_rows(run, service)]
     counted = [row for row in rows if row.counts]
     zones: list[ZoneReport] = []
@@ -155,19 +151,21 @@ def assessed_runs(
     )  # fmt: skip
 
 
-def _add_steering(run: _Run) -> None:
-    """Add the steering index of the leading wheelset to the sections in curves."""
-    result = run.record.result
-    geometry = leading_geometry(result) if any(v.section.turn for v in run.values) else None
-    wheelset = flatten(result.vehicle()).of_kind("wheelset")[0].wheelset
-    if geometry is None or wheelset is None:
-        return
-    rolling = float(np.mean(wheelset.radius))
-    for value in run.values:
-        if value.section.turn:
-            index = steering_index(geometry, abs(value.section.radius), rolling)
-            if index == index:
-                value.values["steering", "wheelset 1"] = [index]
+def limits_checked(limits: RunningLimits, file: str) -> RunningLimits:
+    """Return the limits, each of a known quantity.
+
+    Raises
+    ------
+    InputError : the limit of a quantity that decides is missing; the limit of an unknown one.
+    """
+    needed = [name for name, one in CRITERIA.items() if one.group != INFORMATION]
+    faults = [Fault(file, f"limits.{name}", "unknown quantity", nearest(name, CRITERIA))
+              for name in limits.limits if name not in CRITERIA]  # fmt: skip
+    faults += [Fault(file, f"limits.{name}", "missing", "needed for its verdict")
+               for name in needed if name not in limits.limits]  # fmt: skip
+    if faults:
+        raise InputError(faults)
+    return limits
 
 
 def _service(runs: Mapping[str, Result]) -> Service:
@@ -203,11 +201,11 @@ def _read(
 
 def _section_rows(run: _Run, service: Service) -> list[SectionRow]:
     """Return the sections of a run with what the standard asks about them."""
-    result, track = run.record.result, run.record.result.track()
+    track = run.record.result.track()
     quality = None
     if run.sections and track.irregularities:
         quality = TrackQuality(track, run.sections[0].begin, run.sections[-1].end)
-    conicity = conicity_of(leading_geometry(result) if run.counting else None)
+    conicity = run.record.conicity if run.counting else math.nan
     realisation = repr(track.irregularities)
     rows = []
     for s in run.sections:

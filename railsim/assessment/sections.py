@@ -16,6 +16,7 @@ from railsim.definitions.limits import RunningLimits, Zone
 from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle_tables import Service
+from railsim.notation import SIDES
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,14 @@ class TestSection:
     def turn(self) -> int:
         """1 in a right-hand curve, -1 in a left-hand one, 0 on straight track."""
         return 0 if math.isinf(self.radius) else int(math.copysign(1.0, self.radius))
+
+    def wheel(self, side: int | None) -> str:
+        """Name of the wheels on a side: ``outer`` and ``inner`` in curves; empty for no side."""
+        if side is None:
+            return ""
+        if not self.turn:
+            return SIDES[side]
+        return "outer" if (side == 0) == (self.turn > 0) else "inner"
 
 
 def outer_deficiency(speed: float, radius: float, cant: float) -> float:

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from railsim.assessment.conditions import MET, Condition
-from railsim.assessment.rules import CRITERIA, SAFETY
+from railsim.assessment.criteria import SAFETY, VERDICTS
 from railsim.assessment.zones import ZoneReport
 from railsim.result import Result
 
@@ -71,13 +71,13 @@ def all_verdicts(
     stopped = [f"{_ended(n, r)}: not assessed" for n, r in runs.items() if _stopped(r)]
     missing = [condition.sentence for condition in conditions if condition.state != MET]
     found = {}
-    for name in CRITERIA:
+    for name in VERDICTS:
         exceeded = [why for report in reports for why in _exceeded(report, name)]
         unknown = [
-            f"{report.title}: {row.rule.words}, {row.place}: too few values for an estimate"
+            f"{report.title}: {row.criterion.words}, {row.place}: too few values for an estimate"
             for report in reports
             for row in report.rows
-            if row.rule.group == name and math.isnan(row.share)
+            if row.criterion.group == name and math.isnan(row.share)
         ]
         incomplete = [*stopped, *unknown, *missing]
         if derailed and name == SAFETY:
@@ -104,9 +104,9 @@ def _ended(name: str, result: Result) -> str:
 def _exceeded(report: ZoneReport, criterion: str) -> list[str]:
     """Return limits exceeded and wheels lifted, a sentence each."""
     found = [
-        f"{report.title}: {row.rule.words}, {row.place}: {100.0 * row.share:.0f} % of the limit"
+        f"{report.title}: {about.words}, {row.place}: {100.0 * row.share:.0f} % of the limit"
         for row in report.exceeded
-        if row.rule.group == criterion
+        if (about := row.criterion).group == criterion
     ]
     if criterion == SAFETY:
         found += [f"{report.title}: {wheel} without load over {metres:.1f} m: Y/Q has no value"

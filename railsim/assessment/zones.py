@@ -5,17 +5,18 @@ on track of one kind (spectra of the irregularities, friction, rails), whatever 
 """
 
 import math
+import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from railsim.assessment.criteria import CRITERIA, INFORMATION, SAFETY, Criterion
 from railsim.assessment.en14363 import SectionValues
-from railsim.assessment.rules import INFORMATION, RULES, SAFETY, Assessed, Limit, Rule, limits_of
 from railsim.assessment.sections import TestSection, reasons
 from railsim.assessment.statistics import Estimate, extreme, one_dimensional, two_dimensional
-from railsim.definitions.limits import RunningLimits
+from railsim.definitions.limits import RunningLimits, Situation
 from railsim.definitions.vehicle import Vehicle
 from railsim.definitions.vehicle_tables import Service
 from railsim.result.filters import Floats
@@ -23,6 +24,83 @@ from railsim.result.filters import Floats
 WELL_SPREAD = 0.1
 """Range of the cant deficiency, as a share of the admissible one, from which the two-dimensional
 method is used."""
+
+
+METHODS = {"one": "one-dimensional", "two": "two-dimensional", "largest": "largest value",
+           "smallest": "smallest value"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Assessed:
+    """Estimate of one quantity at one wheelset, wheel or sensor, and its limit.
+
+    Attributes
+    ----------
+    criterion : Criterion
+    place : str
+        Wheelset, wheel or sensor; wheelsets count from 1.
+    estimate : Estimate
+    limit : float
+        nan for quantities without [SI].
+    source : str
+        Source of the limit.
+    checked : bool
+        Whether the limit has been compared with the printed standard.
+    uncorrected : Estimate or None
+        Estimate before the correction for high friction, where that was made.
+    """
+
+    criterion: Criterion
+    place: str
+    estimate: Estimate
+    limit: float = math.nan
+    source: str = ""
+    checked: bool = False
+    uncorrected: Estimate | None = None
+
+    @property
+    def share(self) -> float:
+        """Estimate over limit [1]."""
+        return self.estimate.value / self.limit
+
+    @property
+    def rank(self) -> float:
+        """What the rows of a quantity are ordered by: share of the limit, else the value."""
+        if not math.isnan(self.limit):
+            return self.share
+        return -self.estimate.value if self.criterion.kind == "smallest" else self.estimate.value
+
+    def record(self) -> dict[str, object]:
+        """Return it as plain numbers and strings, SI."""
+        estimate, line = self.estimate, self.estimate.line
+        return {
+            "name": self.criterion.name,
+            "criterion": self.criterion.group,
+            "place": self.place,
+            "N": estimate.N,
+            "mean": estimate.mean,
+            "deviation": estimate.deviation,
+            "estimate": estimate.value,
+            "uncorrected": self.uncorrected.value if self.uncorrected else None,
+            "method": METHODS[estimate.method],
+            "line": float(line.at(line.target)) if line else None,
+            "line_error": line.error if line else None,
+            "target": line.target if line else None,
+            "limit": self.limit,
+            "share": self.share,
+            "source": self.source,
+            "checked": self.checked,
+        }
+
+
+def nearest(rows: Sequence[Assessed]) -> list[Assessed]:
+    """Of each quantity the row that is nearest to its limit, or has the extreme value."""
+    found: dict[str, Assessed] = {}
+    for row in rows:
+        before = found.get(row.criterion.name)
+        if before is None or not row.rank <= before.rank:
+            found[row.criterion.name] = row
+    return list(found.values())
 
 
 @dataclass(frozen=True)
@@ -85,12 +163,7 @@ class ZoneReport:
     @property
     def nearest(self) -> list[Assessed]:
         """Of each quantity the row that is nearest to its limit, or has the extreme value."""
-        found: dict[str, Assessed] = {}
-        for row in (*self.rows, *self.information):
-            before = found.get(row.rule.name)
-            if before is None or not row.rank <= before.rank:
-                found[row.rule.name] = row
-        return list(found.values())
+        return nearest((*self.rows, *self.information))
 
     @property
     def exceeded(self) -> tuple[Assessed, ...]:
@@ -132,16 +205,6 @@ class ZoneReport:
         }
 
 
-@dataclass(frozen=True)
-class _Pooled:
-    """What a zone's estimates need."""
-
-    values: Sequence[SectionValues]
-    limits: RunningLimits
-    service: Service
-    straight: bool
-
-
 def zone_reports(
     population: Population,
     values: Sequence[SectionValues],
@@ -161,22 +224,20 @@ def zone_reports(
         All sections of all its runs.
     method : {'normal', 'simplified'}
     """
+    judged = [c for c in CRITERIA.values() if method in c.methods and
+              (c.group in (SAFETY, INFORMATION) or not population.fault)]  # fmt: skip
     reports = []
     for zone in sorted(limits.zones):
-        own = tuple(v for v in values if v.section.zone == zone)
         all_own = tuple(s for s in sections if s.zone == zone)
         if not all_own:
             continue
-        vehicle, Q0 = population.vehicle, population.Q0
-        limit_of = limits_of(vehicle, service, limits, Q0, zone, _mean_radius(own))
-        pooled = _Pooled(own, limits, service, straight=zone == "1")
-        rules = [r for r in RULES if method in r.methods and
-                 (r.group in (SAFETY, INFORMATION) or not population.fault)]  # fmt: skip
-        rows = [row for rule in rules for row in _rows(rule, pooled, limit_of)]
+        own = tuple(v for v in values if v.section.zone == zone)
+        pooled = _Pooled(population, zone, own, limits, service)
+        rows = [row for criterion in judged for row in pooled.rows(criterion)]
         reports.append(ZoneReport(
             zone, population, own, all_own,
-            tuple(row for row in rows if row.rule.group != INFORMATION),
-            tuple(row for row in rows if row.rule.group == INFORMATION),
+            tuple(row for row in rows if row.criterion.group != INFORMATION),
+            tuple(row for row in rows if row.criterion.group == INFORMATION),
             limits.zones[zone].sections,
         ))  # fmt: skip
     return reports
@@ -187,59 +248,78 @@ def _mean_radius(values: Sequence[SectionValues]) -> float:
     return float(np.mean(radii)) if radii else math.nan
 
 
-def _rows(rule: Rule, pooled: _Pooled, limit_of: Mapping[str, Limit]) -> list[Assessed]:
-    gathered: dict[str, list[tuple[float, list[float]]]] = {}
-    for value in pooled.values:
-        for (name, label), numbers in value.values.items():
-            if name == rule.name:
-                gathered.setdefault(label, []).append((value.section.cant_deficiency, numbers))
-    rows = []
-    for label, pairs in gathered.items():
+@dataclass(frozen=True)
+class _Pooled:
+    """Values of the sections of one zone of a population, and what their estimates need."""
+
+    population: Population
+    zone: str
+    values: Sequence[SectionValues]
+    limits: RunningLimits
+    service: Service
+
+    def rows(self, criterion: Criterion) -> list[Assessed]:
+        """Estimates of a quantity, place by place, with their limits."""
+        pairs: dict[str, list[tuple[float, list[float]]]] = defaultdict(list)
+        for value in self.values:
+            for (name, place), numbers in value.values.items():
+                if name == criterion.name:
+                    pairs[place].append((value.section.cant_deficiency, numbers))
+        return [self._row(criterion, place, own) for place, own in pairs.items()]
+
+    def _row(
+        self, criterion: Criterion, place: str, pairs: Sequence[tuple[float, list[float]]]
+    ) -> Assessed:
         influence = np.array([deficiency for deficiency, _ in pairs])
         # the two signs of a section are not independent: each sign is a sample of its own
         signs = np.array([numbers for _, numbers in pairs]).T
-        estimate = _larger([_estimate(rule, influence, x, pooled) for x in signs])
-        if rule.name not in limit_of:
-            rows.append(Assessed(rule, label, estimate))
-            continue
-        limit, sourced = limit_of[rule.name](label)
-        row = Assessed(rule, label, estimate, limit, sourced.source, sourced.checked)
-        if rule.name == "Y_qst" and row.share > 1.0:
-            corrected = _high_friction(label, signs[0], pooled)
-            if corrected is not None:
-                after = _estimate(rule, influence, corrected, pooled)
-                row = replace(row, estimate=after, uncorrected=estimate)
-        rows.append(row)
-    return rows
+        estimate = _larger([self._estimate(criterion, influence, x) for x in signs])
+        law = self.limits.limits.get(criterion.name)
+        if law is None:
+            return Assessed(criterion, place, estimate)
+        limit = law.at(self._situation(place))
+        row = Assessed(criterion, place, estimate, limit, law.source, law.checked)
+        corrected = None
+        if criterion.name == "Y_qst" and row.share > 1.0:
+            corrected = self._less_high_friction(place, signs[0])
+        if corrected is None:
+            return row
+        after = self._estimate(criterion, influence, corrected)
+        return replace(row, estimate=after, uncorrected=estimate)
+
+    def _situation(self, place: str) -> Situation:
+        """What limits depend on, at a wheelset, wheel or sensor."""
+        number = re.match(r"(?:wheelset |frame_)(\d+)", place)
+        wheelset = int(number[1]) - 1 if number else None
+        static = math.nan if wheelset is None else float(np.mean(self.population.Q0[wheelset]))
+        return Situation(
+            self.population.vehicle, self.service, self.zone, _mean_radius(self.values), wheelset,
+            static, self.limits.limits,
+        )  # fmt: skip
+
+    def _estimate(self, criterion: Criterion, influence: Floats, values: Floats) -> Estimate:
+        kind = criterion.kind
+        if kind in ("largest", "smallest"):
+            return extreme(values, kind)
+        statistics, most = self.limits.statistics, self.service.cant_deficiency
+        wide = float(np.ptp(influence)) >= WELL_SPREAD * most
+        if self.zone != "1" and wide and len(values) > 4:
+            return two_dimensional(influence, values, most, getattr(statistics.probability, kind))
+        return one_dimensional(values, getattr(statistics.k, kind))
+
+    def _less_high_friction(self, place: str, guiding: Floats) -> Floats | None:
+        """Guiding forces corrected where Y/Q of the inner wheel indicates high friction, if any."""
+        law, inner = self.limits.high_friction, place.replace("outer", "inner")
+        quotient = np.array([
+            v.values["Y_over_Q_inner", inner][0] for v in self.values
+            if ("Y_qst", place) in v.values
+        ])  # fmt: skip
+        if law is None or not (quotient > law.threshold).any():
+            return None
+        return np.asarray(guiding - law.slope * np.maximum(quotient - law.threshold, 0.0))
 
 
 def _larger(estimates: Sequence[Estimate]) -> Estimate:
     """The largest estimate, which decides; nan where none has a value."""
     known = [one for one in estimates if not math.isnan(one.value)]
     return max(known, key=lambda one: one.value) if known else estimates[0]
-
-
-def _estimate(rule: Rule, influence: Floats, values: Floats, pooled: _Pooled) -> Estimate:
-    if rule.kind in ("largest", "smallest"):
-        return extreme(values, rule.kind)
-    statistics, service = pooled.limits.statistics, pooled.service
-    wide = float(np.ptp(influence)) >= WELL_SPREAD * service.cant_deficiency
-    if not pooled.straight and wide and len(values) > 4:
-        probability = getattr(statistics.probability, rule.kind)
-        return two_dimensional(influence, values, service.cant_deficiency, probability)
-    return one_dimensional(values, getattr(statistics.k, rule.kind))
-
-
-def _high_friction(label: str, guiding: Floats, pooled: _Pooled) -> Floats | None:
-    """Guiding forces corrected where Y/Q of the inner wheel indicates high friction, if any."""
-    law = pooled.limits.high_friction
-    if law is None:
-        return None
-    inner = label.replace("outer", "inner")
-    quotient = np.array([
-        v.values["Y_over_Q_inner", inner][0] for v in pooled.values if ("Y_qst", label) in v.values
-    ])  # fmt: skip
-    high = quotient > law.threshold
-    if not high.any():
-        return None
-    return np.asarray(guiding - law.slope * np.where(high, quotient - law.threshold, 0.0))

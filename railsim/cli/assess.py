@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from railsim.assessment import Assessment
-    from railsim.assessment.rules import Assessed
+    from railsim.assessment.zones import Assessed
     from railsim.definitions.vehicle_tables import Service
     from railsim.result import Result
 
@@ -241,7 +241,7 @@ def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[s
 
 def _verdict_lines(assessment: "Assessment") -> list[str]:
     """Overall verdict, and each of its parts with its reasons; a reason of several parts once."""
-    from railsim.assessment.rules import WORDS
+    from railsim.assessment.criteria import WORDS
 
     if not assessment.verdict:
         return []
@@ -255,12 +255,12 @@ def _verdict_lines(assessment: "Assessment") -> list[str]:
 
 
 def _row(row: "Assessed") -> list[str]:
-    estimate, shown = row.estimate, row.rule.text
+    estimate, shown = row.estimate, row.criterion.text
     value = shown(estimate.value)
     if row.uncorrected is not None:
         value += f" (uncorrected {shown(row.uncorrected.value)})"
     return [
-        row.rule.words, row.place, row.rule.unit, str(estimate.N), shown(estimate.mean),
+        row.criterion.words, row.place, row.criterion.unit, str(estimate.N), shown(estimate.mean),
         shown(estimate.deviation), SHORT[estimate.method], value,
         "" if row.limit != row.limit else shown(row.limit),
         "" if row.limit != row.limit else f"{100.0 * row.share:.1f}",

@@ -7,6 +7,8 @@ A value is `checked` when somebody has compared it with the printed standard; un
 that uses it says so.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -22,6 +24,9 @@ from railsim.definitions.base import (
     rising,
 )
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle import Vehicle
+from railsim.definitions.vehicle_tables import Service
 
 COMFORT_LIMITS_FORMAT = "railsim-comfort-limits/1"
 
@@ -50,23 +55,71 @@ class Sourced(Definition):
     """Whether somebody has compared it with the printed standard"""
 
 
-class Constant(Sourced):
-    """A limit that is one number."""
+class Value(Sourced):
+    """One number."""
 
     value: Positive
     """Limit [SI]"""
 
 
+@dataclass(frozen=True)
+class Situation:
+    """What a limit may depend on: one wheelset, wheel or sensor in one zone.
+
+    Attributes
+    ----------
+    vehicle : Vehicle
+    service : Service
+    zone : str
+        1 to 4.
+    radius : float
+        Mean radius of the sections [m].
+    wheelset : int or None
+        From 0; None for what belongs to none.
+    Q0 : float
+        Mean static load of its two wheels [N].
+    limits : mapping of str to law
+        All limits of the file.
+    """
+
+    vehicle: Vehicle
+    service: Service
+    zone: str
+    radius: float
+    wheelset: int | None
+    Q0: float
+    limits: "Mapping[str, LimitLaw]"
+
+
+class Constant(Value):
+    """A limit that is one number."""
+
+    law: Literal["constant"]
+    """The same everywhere"""
+
+    def at(self, _: Situation) -> float:
+        """Return the limit [SI]."""
+        return self.value
+
+
 class ByZone(Sourced):
     """A limit for each test zone."""
 
+    law: Literal["by_zone"]
+    """One number for each zone"""
     values: tuple[Positive, Positive, Positive, Positive]
     """Limits in the zones 1 to 4 [SI]"""
 
+    def at(self, place: Situation) -> float:
+        """Return the limit [SI]."""
+        return self.values[int(place.zone) - 1]
+
 
 class ByAxleLoad(Sourced):
-    """Track shift force: k1 (constant + factor Q0)."""
+    """k1 (constant + factor Q0), as of the track shift force."""
 
+    law: Literal["by_axle_load"]
+    """k1 (constant + factor Q0)"""
     constant: NonNegative
     """[N]"""
     factor: Positive
@@ -74,10 +127,16 @@ class ByAxleLoad(Sourced):
     k1: dict[Text, Positive] = Field(min_length=1)
     """Factor by category of the vehicle [1]"""
 
+    def at(self, place: Situation) -> float:
+        """Return the limit [N]."""
+        return self.k1[place.service.category] * (self.constant + self.factor * place.Q0)
 
-class WheelLoad(Sourced):
-    """Wheel load: constant + Q0, at most a value that falls with the speed."""
 
+class ByWheelLoad(Sourced):
+    """Constant + Q0, at most a value that falls with the speed."""
+
+    law: Literal["by_wheel_load"]
+    """Constant + Q0, at most a value by speed"""
     constant: NonNegative
     """[N]"""
     by_speed: Rows
@@ -85,14 +144,76 @@ class WheelLoad(Sourced):
     above: Positive
     """Beyond the last row [N]"""
 
+    def at(self, place: Situation) -> float:
+        """Return the limit [N]."""
+        speed = place.service.admissible_speed
+        most = next((m for v, m in self.by_speed if speed <= v * (1.0 + 1e-4)), self.above)
+        return min(self.constant + place.Q0, most)
+
 
 class ByRadius(Sourced):
-    """Quasi-static guiding force: constant + numerator / mean radius."""
+    """Constant + numerator / mean radius, as of the quasi-static guiding force."""
 
+    law: Literal["by_radius"]
+    """Constant + numerator / mean radius"""
     constant: NonNegative
     """[N]"""
     numerator: NonNegative
     """[N m]"""
+
+    def at(self, place: Situation) -> float:
+        """Return the limit [N]."""
+        return self.constant + self.numerator / place.radius
+
+
+class ByBogieMass(Sourced):
+    """Constant - slope m, as of the acceleration of the bogie frame."""
+
+    law: Literal["by_bogie_mass"]
+    """Constant - slope m"""
+    constant: Positive
+    """[m/s2]"""
+    slope: NonNegative
+    """Per mass of the bogie [m/s2/kg]"""
+
+    def at(self, place: Situation) -> float:
+        """Return the limit [m/s2]."""
+        return self.constant - self.slope * bogie_mass(place.vehicle, place.wheelset or 0)
+
+
+class Share(Sourced):
+    """A share of another limit."""
+
+    law: Literal["share"]
+    """A share of another limit"""
+    value: Positive
+    """[1]"""
+    of: Text
+    """Name of the other limit"""
+
+    def at(self, place: Situation) -> float:
+        """Return the limit [SI]."""
+        return self.value * place.limits[self.of].at(place)
+
+
+LimitLaw = Annotated[
+    Constant | ByZone | ByAxleLoad | ByWheelLoad | ByRadius | ByBogieMass | Share,
+    Field(discriminator="law"),
+]
+
+
+def bogie_mass(vehicle: Vehicle, wheelset: int) -> float:
+    """Mass of the frame above a wheelset and of the wheelsets nearest to it [kg]."""
+    flat = flatten(vehicle)
+    wheelsets = flat.of_kind("wheelset")
+    frames = [b for b in flat.of_kind("body") if b.name != flat.reference]
+
+    def frame_of(x: float) -> str:
+        return min(frames, key=lambda frame: abs(frame.position[0] - x)).name
+
+    own = frame_of(wheelsets[wheelset].position[0])
+    carried = [w.mass for w in wheelsets if frame_of(w.position[0]) == own]
+    return sum(b.mass for b in frames if b.name == own) + sum(carried)
 
 
 class HighFriction(Sourced):
@@ -102,22 +223,6 @@ class HighFriction(Sourced):
     """Y/Q of the inner wheel [1]"""
     slope: Positive
     """[N]"""
-
-
-class ByBogieMass(Sourced):
-    """Acceleration of the bogie frame: constant - slope m."""
-
-    constant: Positive
-    """[m/s2]"""
-    slope: NonNegative
-    """Per mass of the bogie [m/s2/kg]"""
-
-
-class Share(Sourced):
-    """A share of another limit."""
-
-    value: Positive
-    """[1]"""
 
 
 class Zone(Sourced):
@@ -237,40 +342,22 @@ class RunningLimits(FileDefinition):
     """Low and high conicity in zone 1"""
     track_quality: TrackTarget | None = None
     """Quality of the track in each zone"""
-    friction: Constant | None = None
+    friction: Value | None = None
     """Least coefficient of friction of the rails"""
     statistics: Statistics
     """Factors of the statistics"""
-    sum_Y: ByAxleLoad
-    """Track shift force, 2 m mean"""
-    Y_over_Q: Constant
-    """Derailment quotient, 2 m mean"""
-    Q: WheelLoad
-    """Wheel load"""
-    Q_qst: Constant
-    """Quasi-static wheel load"""
-    Y_qst: ByRadius
-    """Quasi-static guiding force"""
     high_friction: HighFriction | None = None
     """Correction of the quasi-static guiding force"""
-    body_y_safety: ByZone
-    """Lateral acceleration of the body, simplified method"""
-    body_z_safety: ByZone
-    """Vertical acceleration of the body, simplified method"""
-    frame_y: ByBogieMass
-    """Lateral acceleration of the bogie frame, simplified method"""
-    body_y: Constant
-    """Lateral acceleration of the body, ride"""
-    body_z: Constant
-    """Vertical acceleration of the body, ride"""
-    body_y_rms: Constant
-    """Lateral acceleration of the body, root mean square"""
-    body_z_rms: Constant
-    """Vertical acceleration of the body, root mean square"""
-    body_y_qst: Constant
-    """Quasi-static lateral acceleration of the body"""
-    instability: Share
-    """Root mean square over the limit of the track shift force or frame acceleration"""
+    limits: dict[Text, LimitLaw] = Field(min_length=1)
+    """Limits by the names of the assessed quantities"""
+
+    @model_validator(mode="after")
+    def _shares_of_others(self) -> "RunningLimits":
+        for name, limit in self.limits.items():
+            other = self.limits.get(limit.of) if isinstance(limit, Share) else None
+            if isinstance(limit, Share) and (other is None or isinstance(other, Share)):
+                raise ValueError(f"limit '{name}' is a share of '{limit.of}', which is none itself")
+        return self
 
 
 class Classes(Sourced):
@@ -312,11 +399,9 @@ class Twist(Sourced):
         return max(0.0, min(self.constant + self.numerator / length, self.greatest))
 
 
-class Guiding(Sourced):
+class Guiding(Value):
     """Guiding force in a tight level curve over the smallest wheel load on twisted track."""
 
-    value: Positive
-    """Y/Q [1]"""
     radius: Positive
     """Radius of the curve [m]"""
 
@@ -330,7 +415,7 @@ class StationaryLimits(FileDefinition):
     """Kind and version of the file"""
     edition: Text
     """Edition of the standards"""
-    unloading: Constant
+    unloading: Value
     """(Q0 - Q)/Q0 of the least loaded wheel on twisted track"""
     bogie_twist: Twist
     """Twist of the track over the wheelbase of a bogie"""
@@ -339,7 +424,7 @@ class StationaryLimits(FileDefinition):
     guiding: Guiding
     """Y/Q of the leading outer wheel: force in the level curve over the least load on the twists,
     and both in the twisted curve"""
-    lean_unloading: Constant
+    lean_unloading: Value
     """(Q0 - Q)/Q0 of the least loaded wheel on a cant equal to the admissible cant deficiency"""
-    lean_angle: Constant
+    lean_angle: Value
     """Angle of the floor from horizontal on it [rad]"""

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from railsim.assessment import Assessment
-from railsim.assessment.rules import WORDS, Assessed
+from railsim.assessment.criteria import WORDS
 from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
-from railsim.assessment.zones import ZoneReport
+from railsim.assessment.zones import Assessed, ZoneReport
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
 
 LONGEST_BAR = 250.0  # per cent; longer ones are cut and say how long they are
@@ -34,7 +34,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     """Bars of each quantity's worst row, zone by zone, in per cent of the limit."""
     reports = [zone for a in assessments for zone in a.zones]
     zones = sorted({zone.zone for zone in reports if zone.rows} or {zone.zone for zone in reports})
-    rules = {row.rule.name: row.rule for a in assessments for row in a.worst}
+    rules = {row.criterion.name: row.criterion for a in assessments for row in a.worst}
     height = 1.6 + (0.17 * len(assessments) + 0.10) * len(rules)
     figure = Picture(figsize=(max(6.8, 2.4 + 2.6 * len(zones)), height), layout="constrained")
     axes = figure.subplots(1, len(zones), sharey=True, squeeze=False)[0]
@@ -83,7 +83,7 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
     if not reports:
         return None
     zones = sorted({zone.zone for zone in reports})
-    names = list(dict.fromkeys(row.rule.name for zone in reports for row in zone.rows))
+    names = list(dict.fromkeys(row.criterion.name for zone in reports for row in zone.rows))
     n = len(DISTINCT)
     looks: dict[str, dict[str, Any]] = {
         name: {"color": DISTINCT[k % n], "marker": "o^"[k // n % 2], "ls": "", "ms": 4}
@@ -108,7 +108,7 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
             axes[0].set_ylabel("section value / limit (%)")
         for ax in grid[-1]:
             ax.set_xlabel("middle of the section (km)")
-        words = {row.rule.name: row.rule.words for zone in reports for row in zone.rows}
+        words = {row.criterion.name: row.criterion.words for zone in reports for row in zone.rows}
         handles = [Line2D([], [], label=words[name], **look) for name, look in looks.items()]
         figure.legend(handles=handles, loc="outside lower left", ncols=2)
     return figure
@@ -117,7 +117,7 @@ def sections_figure(assessments: Sequence[Assessment]) -> Figure | None:
 def _sections(ax: Axes, report: ZoneReport, looks: Mapping[str, Mapping[str, Any]]) -> None:
     """Largest share of its limit of every quantity in every section of a zone."""
     for name, look in looks.items():
-        limits = {row.place: row.limit for row in report.rows if row.rule.name == name}
+        limits = {row.place: row.limit for row in report.rows if row.criterion.name == name}
         points = [
             (
                 5e-4 * (values.section.begin + values.section.end),
@@ -157,10 +157,10 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
                         colour = DISTINCT[names.index(report.population.name) % len(DISTINCT)]
                         _regression(ax, report, own[zone], colour)
                 row = own[zone]
-                ax.axhline(row.rule.scale * row.limit, color=LIMIT, lw=1.0)
+                ax.axhline(row.criterion.scale * row.limit, color=LIMIT, lw=1.0)
                 ax.set_title(f"zone {zone}", loc="right", fontsize=9)
-                unit = row.rule.unit.replace("-", "1")
-                ax.set_ylabel(f"{row.rule.words},\n{row.place} ({unit})", fontsize=8)
+                unit = row.criterion.unit.replace("-", "1")
+                ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
             axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
             handles = [
                 Line2D([], [], marker="o", ls="", color=DISTINCT[k % len(DISTINCT)], label=name)
@@ -178,18 +178,18 @@ def _widest(assessment: Assessment, zone: str) -> Assessed | None:
     deciding = getattr(assessment.limits, "deciding", ())
     rows = [row for report in assessment.zones if report.zone == zone for row in report.rows
             if row.estimate.line is not None and row.estimate.line.quantile > 0.0
-            and row.rule.group in deciding]  # fmt: skip
+            and row.criterion.group in deciding]  # fmt: skip
     return max(rows, key=lambda row: row.share, default=None)
 
 
 def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> None:
     """Draw the values of one quantity at one place in one population."""
-    key, scale = (like.rule.name, like.place), like.rule.scale
+    key, scale = (like.criterion.name, like.place), like.criterion.scale
     points = [(1e3 * v.section.cant_deficiency, scale * max(v.values[key]))
               for v in report.values if key in v.values]  # fmt: skip
     if points:
         ax.plot(*zip(*points, strict=True), "o", color=colour, ms=3.5)
-    row = next((r for r in report.rows if (r.rule.name, r.place) == key), None)
+    row = next((r for r in report.rows if (r.criterion.name, r.place) == key), None)
     line = row.estimate.line if row else None
     if line is None or row is None:
         return

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from railsim.assessment import Assessment, assess
+from railsim.assessment.criteria import CRITERIA, WORDS
 from railsim.assessment.influences import RADIUS
-from railsim.assessment.rules import RULES, WORDS
-from railsim.assessment.rules import Assessed as Row
 from railsim.assessment.running import group_key
 from railsim.assessment.verdict import DERAILED, FAIL, PASS
+from railsim.assessment.zones import Assessed as Row
 from railsim.assessment.zones import ZoneReport
 from railsim.definitions.flatten import flatten
 from railsim.errors import InputError
@@ -19,24 +19,6 @@ from railsim.result import Result
 from railsim.result.sensors import sensors
 from railsim.text import printable
 
-# Meaning of each limit, by the key of the quantity in the limits file.
-MEANING = {
-    "sum_Y": "shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static axle load "
-    "(Prud'homme)",
-    "Y_over_Q": "flange climbing of the outer wheel",
-    "instability": "instability: half of the limit of the track shift force",
-    "Q": "track loading: 90 kN + Q0, at most a value that depends on the speed",
-    "Q_qst": "quasi-static vertical wheel force on the outer rail in curves",
-    "Y_qst": "quasi-static guiding force on the outer rail, by the mean radius of the sections",
-    "body_y_safety": "lateral acceleration of the body, safety",
-    "body_z_safety": "vertical acceleration of the body, safety",
-    "frame_y": "lateral acceleration of the bogie frame, by its mass",
-    "body_y": "lateral acceleration of the body, ride",
-    "body_z": "vertical acceleration of the body, ride",
-    "body_y_rms": "lateral acceleration of the body, ride, rms",
-    "body_z_rms": "vertical acceleration of the body, ride, rms",
-    "body_y_qst": "quasi-static lateral acceleration of the body in curves",
-}
 NADAL = (
     "Nadal's limit (tan gamma - mu)/(1 + mu tan gamma), gamma the flange angle of the profile, mu "
     "the friction of the track; Y/Q unfiltered at the outputs. The climb is the longest stretch "
@@ -182,10 +164,10 @@ def _rows(one: Assessment) -> list[Table]:
     for zone in one.zones:
         rows: list[list[Cell]] = []
         for row in (*zone.rows, *zone.information):
-            e, line, text = row.estimate, row.estimate.line, row.rule.text
+            e, line, text = row.estimate, row.estimate.line, row.criterion.text
             bounded = not math.isnan(row.limit)
             rows.append([
-                (row.rule.words, row.place), row.rule.unit, str(e.N), text(e.mean),
+                (row.criterion.words, row.place), row.criterion.unit, str(e.N), text(e.mean),
                 text(e.deviation), METHOD[e.method], text(float(line.at(line.target))) if line
                 else "", text(line.error) if line else "", text(e.value),
                 text(row.uncorrected.value) if row.uncorrected else "",
@@ -205,7 +187,7 @@ def _influences(one: Assessment) -> Table:
     """Return the regressions over cant deficiency and curvature."""
     rows: list[list[Cell]] = []
     for found in one.influences:
-        rule, solved = found.rule, found.regression
+        rule, solved = found.criterion, found.regression
         constant, deficiency, curvature = (rule.scale * c for c in solved.coefficients)
         rows.append([
             (rule.words, printable(", ".join(filter(None, [found.place, found.population])))),
@@ -251,9 +233,9 @@ def _setup(one: Assessment, runs: Mapping[str, Result]) -> Table:
 def _sources(limits: Any) -> Table:
     """Return where the number of each limit is from."""
     rows = [
-        [rule.words, WORDS[rule.group], MEANING[rule.name], _origin(law.source, law.checked)]
-        for rule in RULES
-        if (law := getattr(limits, rule.name, None)) is not None
+        [one.words, WORDS[one.group], one.meaning, _origin(law.source, law.checked)]
+        for one in CRITERIA.values()
+        if (law := limits.limits.get(one.name)) is not None
     ]
     caption = f"Limits of {limits.edition}"
     return Table(["", "verdict on", "", "limit from"], rows, caption, words=frozenset(range(4)))
@@ -302,7 +284,13 @@ def _zones(assessments: Sequence[Assessment]) -> list[Table]:
             own = [found.get(rule) for found in worst.values()]
             first = next(pair for pair in own if pair)[1]
             limits = dict.fromkeys(_limit(pair[1]) for pair in own if pair)
-            rows.append([(first.rule.words, MEANING[rule]), *map(_cell, own), _joined(limits)])
+            rows.append(
+                [
+                    (first.criterion.words, first.criterion.meaning),
+                    *map(_cell, own),
+                    _joined(limits),
+                ]
+            )
             if any(pair and pair[1].share > 1.0 for pair in own):
                 failed.append(len(rows) - 1)
         own_zones = [z for one in assessments for z in one.zones if z.zone == name]
@@ -334,19 +322,19 @@ def _cell(pair: tuple[ZoneReport, Row] | None) -> Cell:
     zone, row = pair
     words = [f"{100.0 * row.share:.0f} %", row.place, METHOD[row.estimate.method]]
     if row.uncorrected is not None:
-        words.append(f"uncorrected {row.rule.scale * row.uncorrected.value:.3g}")
+        words.append(f"uncorrected {row.criterion.scale * row.uncorrected.value:.3g}")
     if math.isnan(row.share):
         words = [
-            f"{row.estimate.N} value, mean {row.rule.scale * row.estimate.mean:.3g}",
+            f"{row.estimate.N} value, mean {row.criterion.scale * row.estimate.mean:.3g}",
             row.place,
         ]
     small = ", ".join(filter(None, [*words, zone.population.name]))
-    return f"{row.rule.scale * row.estimate.value:.3g}", printable(small)
+    return f"{row.criterion.scale * row.estimate.value:.3g}", printable(small)
 
 
 def _limit(row: Row) -> tuple[str, str]:
-    unit = row.rule.unit.replace("-", "")
-    return f"{row.rule.scale * row.limit:.3g} {unit}", _origin(row.source, row.checked)
+    unit = row.criterion.unit.replace("-", "")
+    return f"{row.criterion.scale * row.limit:.3g} {unit}", _origin(row.source, row.checked)
 
 
 def _safety(found: Sequence[Assessment]) -> tuple[Table, list[str]]:

@@ -60,7 +60,7 @@ def _assessed(case: Case, analysis: AssessAnalysis, result: Result | None) -> Nu
     shares: dict[str, float] = {}
     for row in found.worst:
         if not math.isnan(row.share):
-            name = row.rule.name
+            name = row.criterion.name
             shares[name] = max(row.share, shares.get(name, 0.0))
     numbers = {f"{name}_share": share for name, share in shares.items()}
     if shares:

@@ -28,7 +28,7 @@ def sides(outer, inner):
 def rows_of(assessment, zone, name):
     reports = [z for z in assessment.zones if z.zone == zone]
     return {row.place: row for z in reports for row in (*z.rows, *z.information)
-            if row.rule.name == name}  # fmt: skip
+            if row.criterion.name == name}  # fmt: skip
 
 
 def condition(assessment, name, place=""):
@@ -177,7 +177,7 @@ def test_loads_in_one_condition_are_not_pooled():
 def test_fault_mode_is_assessed_for_running_safety_only():
     run = made(ON_ZONE_4, 23.0, vehicle=vehicle(condition="failed damper", fault=True))
     (found,) = assess(run)
-    assert {row.rule.group for z in found.zones for row in z.rows} == {"safety"}
+    assert {row.criterion.group for z in found.zones for row in z.rows} == {"safety"}
     assert not any(c.name == "number of sections" for c in found.conditions)
 
 
@@ -228,8 +228,10 @@ def test_instability_is_judged_on_straights_with_one_frequency_for_the_vehicle()
     }
     (found,) = assess(runs)
     assert found.hunting_frequency == pytest.approx(5.0, abs=0.02)
-    used = {f for z in found.zones for v in z.values for f in v.frequencies.values()}
-    assert used == {found.hunting_frequency}
+    # 9 Hz are outside the band about 5 Hz, at which the other straight is judged too
+    means = [max(r.estimate.mean for r in z.rows if r.criterion.name == "instability")
+             for z in found.zones if z.zone == "1"]  # fmt: skip
+    assert min(means) < 1e3 < 14e3 < max(means)
     assert not rows_of(found, "4", "instability")
     assert rows_of(found, "1", "instability")
 
@@ -263,7 +265,7 @@ def test_regression_over_cant_deficiency_and_curvature_of_all_curves():
     assert found.influences == ()
     (found,) = assess({"a": run(290.0, 0.12), "b": run(300.0, 0.11), "c": run(290.0, 0.125)})
     row = next(
-        one for one in found.influences if one.rule.name == "Y_qst" and "1 outer" in one.place
+        one for one in found.influences if one.criterion.name == "Y_qst" and "1 outer" in one.place
     )
     assert row.regression.value == pytest.approx(40e3, rel=1e-4)
     assert row.regression.coefficients[2] == pytest.approx(6e6, rel=1e-3)

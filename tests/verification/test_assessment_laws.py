@@ -21,8 +21,8 @@ from railsim.assessment.comfort import (
     p_de,
     transition_comfort,
 )
-from railsim.assessment.en14363 import dominant_frequency
-from railsim.assessment.influences import steering_index
+from railsim.assessment.criteria import steering_index
+from railsim.assessment.en14363 import FREQUENCIES, hunting_frequency, spectrum
 from railsim.assessment.safety import climb_distance, flange_angle, nadal, overturning
 from railsim.assessment.sperling import index_of_rms, sperling_gain, sperling_index
 from railsim.assessment.statistics import multiple_regression, one_dimensional, two_dimensional
@@ -143,7 +143,8 @@ def test_percentile_of_a_stream_is_within_a_cell_of_one_of_the_record(seed, scal
 
 def test_dominant_frequency_of_a_hunting_wheelset_in_noise():
     noise = np.random.default_rng(3).normal(size=12_000)
-    assert dominant_frequency(5.0 * sine(6.3, 12.0) + noise, RATE) == pytest.approx(6.3, abs=0.05)
+    found = spectrum(5.0 * sine(6.3, 12.0) + noise, RATE)
+    assert hunting_frequency([np.interp(FREQUENCIES, *found)]) == pytest.approx(6.3, abs=0.05)
 
 
 # statistics ---------------------------------------------------------------------------------------

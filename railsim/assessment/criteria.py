@@ -1,0 +1,306 @@
+"""The assessed quantities (EN 14363:2016 with A2:2022, UIC 518): one row of `CRITERIA` each.
+
+A row says what is measured in a section (signal, filter, value), how the values of the sections
+become an estimate, and which verdict it belongs to; its limit stands under its name in the limits
+file, with the law by which it depends on vehicle and track (`railsim.definitions.limits`).  Filters
+are of order 4 and zero phase by default.
+
+Signs: in curves an outward force is positive, and so is the lateral acceleration with cant
+deficiency; the outer wheel is assessed; left and right curves are pooled.  On straight track both
+percentiles of a signed quantity are values.  A window of 2 m lies within its section.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.assessment import signals as of
+from railsim.assessment.sections import TestSection
+from railsim.assessment.signals import Band, Signal, Signals, between
+from railsim.constants import CANT_BASE
+from railsim.contact.geometry import ContactGeometry
+from railsim.definitions.flatten import flatten
+from railsim.result.filters import Floats, band_passed, distance_means, window_centres
+
+SAFETY, LOADING, RIDE, INFORMATION = "safety", "loading", "ride", "information"
+VERDICTS = (SAFETY, LOADING, RIDE)
+WORDS = {
+    SAFETY: "running safety", LOADING: "track loading", RIDE: "ride",
+    INFORMATION: "for information",
+}  # fmt: skip
+LOW, HIGH = 0.15, 99.85  # per cent
+FORCES: Band = (None, 20.0)  # Hz
+RIDE_BAND: Band = (0.4, 10.0)
+HALF_BAND, LOWEST = 2.0, 0.4  # Hz, of the instability filter
+HUNTING_ZONES = ("1", "2")
+RMS_LENGTH, RMS_STEP = 100.0, 10.0  # m
+FLANGE = 0.5  # rad, contact angle from which the flange counts as touching
+OUTER, INNER, ALL = ("", "outer", "left", "right"), ("inner",), ("outer", "inner", "left", "right")
+
+Values = dict[str, list[float]]
+"""By place: one value of a section, or both percentiles on straight track [SI]."""
+
+
+def ends(x: Floats, sign: int) -> list[float]:
+    """Percentile of a signed quantity towards `sign`; both, upwards, where that is zero."""
+    if sign:
+        return [float(np.percentile(sign * x, HIGH))]
+    low, high = np.percentile(x, (LOW, HIGH))
+    return [float(-low), float(high)]
+
+
+def outside(x: Floats, turn: int) -> list[float]:
+    """Percentile of an acceleration to the outside of the curve."""
+    return ends(x, turn)
+
+
+def outside_force(x: Floats, turn: int) -> list[float]:
+    """Percentile of a force on the rails to the outside of the curve."""
+    return ends(x, -turn)
+
+
+def both_ends(x: Floats, _: int) -> list[float]:
+    """Both percentiles, also in curves."""
+    return ends(x, 0)
+
+
+def high(x: Floats, _: int) -> list[float]:
+    """99.85 % value."""
+    return [float(np.percentile(x, HIGH))] if len(x) else []
+
+
+def low(x: Floats, _: int) -> list[float]:
+    """0.15 % value."""
+    return [float(np.percentile(x, LOW))]
+
+
+def middle(x: Floats, _: int) -> list[float]:
+    """50 % value."""
+    return [float(np.median(x))]
+
+
+def middle_outside(x: Floats, turn: int) -> list[float]:
+    """50 % value to the outside of the curve."""
+    return [float(np.median(turn * x))]
+
+
+def mean_of_known(x: Floats, _: int) -> list[float]:
+    """Mean where there is a value; nan where there is none."""
+    known = x[~np.isnan(x)]
+    return [float(np.mean(known)) if len(known) else math.nan]
+
+
+def rms(x: Floats, _: int) -> list[float]:
+    """Root mean square."""
+    return [float(np.sqrt(np.mean(x**2)))]
+
+
+def transferred(x: Floats, turn: int) -> list[float]:
+    """99.85 % value of what has moved outwards, on straight track to either side."""
+    return high(turn * x if turn else np.abs(x), turn)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is measured of a signal in a section.
+
+    Attributes
+    ----------
+    signal : callable
+        Forms the signal of the filtered quantities, see `railsim.assessment.signals`.
+    band : (float or None, float) or None
+        Filter [Hz].
+    value : callable
+        Values over time in a section, 1 in a right-hand curve, -1 in a left-hand one and 0 on
+        straight track, to the values of the section.
+    window : float
+        Means over this length are taken before [m]; 0: none.
+    wheels : tuple of str
+        Wheels that are assessed.
+    curves : bool
+        In curves only.
+    """
+
+    signal: Callable[[Signals, Band | None], Signal | None]
+    band: Band | None
+    value: Callable[[Floats, int], list[float]]
+    window: float = 0.0
+    wheels: tuple[str, ...] = OUTER
+    curves: bool = False
+
+    def __call__(self, signals: Signals, section: TestSection) -> Values:
+        """Values of a section by place."""
+        signal = signals.signal(self.signal, self.band)
+        if signal is None or (self.curves and not section.turn):
+            return {}
+        found = {}
+        for k, (label, side) in enumerate(signal.places):
+            wheel = section.wheel(side)
+            if side is not None and wheel not in self.wheels:
+                continue
+            value = self.value(signal.in_section(k, section, self.window), section.turn)
+            if value:
+                found[f"{label} {wheel}".rstrip()] = value
+        return found
+
+
+def instability(signals: Signals, section: TestSection) -> Values:
+    """Largest rms over 100 m of the track shift force within 2 Hz of f0, in zones 1 and 2 [N].
+
+    The window has the length of the section where this is shorter.
+    """
+    if signals.f0 is None or section.zone not in HUNTING_ZONES:
+        return {}
+    begin, end = section.begin, section.end
+    length = min(RMS_LENGTH, end - begin)
+    centres = window_centres(begin, end, length, RMS_STEP)
+    corners = max(signals.f0 - HALF_BAND, LOWEST), signals.f0 + HALF_BAND
+    found = {}
+    for w, s in enumerate(signals.raw("wheelset_distance").T):
+        # two seconds on either side, for a band of 4 Hz
+        near = between(s, begin - 2.0 * section.speed, end + 2.0 * section.speed)
+        force = signals.raw("Y")[near, w].sum(axis=-1)
+        band = band_passed(force, signals.record.rate, *corners, causal=signals.causal)
+        square = distance_means(s[near], np.square(band), centres, length)
+        found[f"wheelset {w + 1}"] = [float(np.sqrt(np.max(np.maximum(square, 0.0))))]
+    return found
+
+
+def steering(signals: Signals, section: TestSection) -> Values:
+    """Steering index of the leading wheelset in a curve, see `steering_index`."""
+    geometry = signals.record.geometry if section.turn else None
+    wheelset = flatten(signals.record.result.vehicle()).of_kind("wheelset")[0].wheelset
+    if geometry is None or wheelset is None:
+        return {}
+    index = steering_index(geometry, abs(section.radius), float(np.mean(wheelset.radius)))
+    return {} if math.isnan(index) else {"wheelset 1": [index]}
+
+
+def steering_index(geometry: ContactGeometry, radius: float, rolling_radius: float) -> float:
+    """Radius difference for rolling without creep, over that before the flange; nan if unknown [1].
+
+    e r0/R with the distance e of the contact points (Redtenbacher 1855), over the largest one that
+    the profiles offer before the flange makes contact: above 1 the wheelset cannot steer without
+    its flange.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+        Contact functions of the leading wheelset.
+    radius, rolling_radius : float
+        Of the curve, unsigned, and of the wheels [m].
+    """
+    y, difference = geometry.lateral, np.asarray(geometry.delta_r)
+    ahead = np.flatnonzero((y >= 0.0) & np.isfinite(difference))
+    touching = ahead[np.abs(geometry.contact_angle[ahead]).max(axis=1) > FLANGE]
+    if not len(touching) or touching[0] == 0 or difference[touching[0] - 1] <= 0.0:
+        return math.nan
+    return float(CANT_BASE * rolling_radius / radius / difference[touching[0] - 1])
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """An assessed quantity.
+
+    Attributes
+    ----------
+    name : str
+        Key of its limit in the limits file.
+    words, unit : str
+        Name and unit in tables.
+    group : str
+        ``safety``, ``loading`` or ``ride``: the verdict to which it belongs; ``information``: none.
+    kind : str
+        Statistics of the limits file; ``largest`` and ``smallest``: no estimate, the extreme value.
+    measure : callable
+        Signals of a part and a section to values by place.
+    methods : tuple of str
+        ``normal``, with wheel forces, and ``simplified``, with accelerations.
+    meaning : str
+        What its limit is about.
+    """
+
+    name: str
+    words: str
+    unit: str
+    group: str
+    kind: str
+    measure: Callable[[Signals, TestSection], Values]
+    methods: tuple[str, ...] = ("normal",)
+    meaning: str = ""
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI to the unit in tables."""
+        return 1e-3 if self.unit == "kN" else 1.0
+
+    def text(self, value: float) -> str:
+        """Value in the unit of tables."""
+        return f"{self.scale * value:.3f}" if self.scale == 1.0 else f"{self.scale * value:.2f}"
+
+
+BOTH = ("normal", "simplified")
+SIMPLIFIED = ("simplified",)
+_ROWS = (
+    Criterion("sum_Y", "track shift force, 2 m", "kN", SAFETY, "safety",
+              Measured(of.track_shifting_force, FORCES, outside_force, window=2.0),
+              meaning="shifting of ballasted track: k1 (10 kN + 2 Q0/3), 2 Q0 the static axle load "
+              "(Prud'homme)"),
+    Criterion("Y_over_Q", "derailment quotient, 2 m", "-", SAFETY, "safety",
+              Measured(of.quotient, FORCES, high, window=2.0, curves=True),
+              meaning="flange climbing of the outer wheel"),
+    Criterion("instability", "rms of track shift force, 100 m", "kN", SAFETY, "largest",
+              instability, meaning="instability: half of the limit of the track shift force"),
+    Criterion("Q", "wheel load", "kN", LOADING, "loading", Measured(of.wheel_load, FORCES, high),
+              meaning="track loading: 90 kN + Q0, at most a value that depends on the speed"),
+    Criterion("Q_qst", "quasi-static wheel load", "kN", LOADING, "quasi_static",
+              Measured(of.wheel_load, FORCES, middle, curves=True),
+              meaning="quasi-static vertical wheel force on the outer rail in curves"),
+    Criterion("Y_qst", "quasi-static guiding force", "kN", LOADING, "quasi_static",
+              Measured(of.guiding_force, FORCES, middle, curves=True),
+              meaning="quasi-static guiding force on the outer rail, by the mean radius of the "
+              "sections"),
+    Criterion("body_y_safety", "body lateral, 6 Hz", "m/s2", SAFETY, "safety",
+              Measured(of.body_lateral, (None, 6.0), outside), SIMPLIFIED,
+              "lateral acceleration of the body, safety"),
+    Criterion("body_z_safety", "body vertical, 0.4 to 4 Hz", "m/s2", SAFETY, "safety",
+              Measured(of.body_vertical, (0.4, 4.0), both_ends), SIMPLIFIED,
+              "vertical acceleration of the body, safety"),
+    Criterion("frame_y", "bogie frame lateral, 10 Hz", "m/s2", SAFETY, "safety",
+              Measured(of.frame_lateral, (None, 10.0), outside), SIMPLIFIED,
+              "lateral acceleration of the bogie frame, by its mass"),
+    Criterion("body_y", "body lateral, ride", "m/s2", RIDE, "ride",
+              Measured(of.body_lateral, RIDE_BAND, both_ends), BOTH,
+              "lateral acceleration of the body, ride"),
+    Criterion("body_z", "body vertical, ride", "m/s2", RIDE, "ride",
+              Measured(of.body_vertical, RIDE_BAND, both_ends), BOTH,
+              "vertical acceleration of the body, ride"),
+    Criterion("body_y_rms", "body lateral, rms", "m/s2", RIDE, "ride",
+              Measured(of.body_lateral, RIDE_BAND, rms), BOTH,
+              "lateral acceleration of the body, ride, rms"),
+    Criterion("body_z_rms", "body vertical, rms", "m/s2", RIDE, "ride",
+              Measured(of.body_vertical, RIDE_BAND, rms), BOTH,
+              "vertical acceleration of the body, ride, rms"),
+    Criterion("body_y_qst", "body lateral, quasi-static", "m/s2", RIDE, "quasi_static",
+              Measured(of.body_lateral, FORCES, middle_outside, curves=True), BOTH,
+              "quasi-static lateral acceleration of the body in curves"),
+    Criterion("Q_low", "smallest wheel load, 0.15 %", "kN", INFORMATION, "smallest",
+              Measured(of.wheel_load, FORCES, low, wheels=ALL)),
+    Criterion("Y_max", "guiding force", "kN", INFORMATION, "loading",
+              Measured(of.guiding_force, FORCES, high)),
+    Criterion("B_max", "rail loading |Y| + 0.83 |Q|", "kN", INFORMATION, "loading",
+              Measured(of.rail_loading, FORCES, high)),
+    Criterion("B_qst", "quasi-static rail loading", "kN", INFORMATION, "quasi_static",
+              Measured(of.rail_loading, FORCES, middle, curves=True)),
+    Criterion("Y_over_Q_inner", "derailment quotient, mean", "-", INFORMATION, "quasi_static",
+              Measured(of.quotient, FORCES, mean_of_known, wheels=INNER, curves=True)),
+    Criterion("T_qst", "quasi-static wear number", "N", INFORMATION, "quasi_static",
+              Measured(of.wear_number, None, middle, curves=True)),
+    Criterion("overturning", "overturning coefficient, 1.5 Hz", "-", INFORMATION, "safety",
+              Measured(of.load_transfer, (None, 1.5), transferred)),
+    Criterion("steering", "steering index", "-", INFORMATION, "quasi_static", steering, BOTH),
+)  # fmt: skip
+CRITERIA = {criterion.name: criterion for criterion in _ROWS}
+"""Assessed quantities by name, in the order of tables."""

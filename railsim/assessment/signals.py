@@ -1,0 +1,218 @@
+"""Filtered signals of a part of a run; each filter is applied once, each signal formed once."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from railsim.assessment.record import Record
+from railsim.assessment.safety import overturning
+from railsim.assessment.sections import TestSection
+from railsim.result.filters import Floats, band_passed, distance_means, low_passed, window_centres
+
+Band = tuple[float | None, float]
+"""Lower and upper corner of a filter [Hz]; without the lower one a low pass."""
+
+MARGINS = ((20.0, 0.5), (5.0, 1.5), (0.0, 16.0))
+"""Rows [lowest corner of the filter from Hz, seconds on either side of a part]."""
+WIDEST = MARGINS[-1][1]
+STEP = 0.5  # m, between the windows of means over distance
+OUTWARDS = np.array([-1.0, 1.0])  # of the forces on the left and the right rail
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal at several places of the vehicle.
+
+    Attributes
+    ----------
+    values : float64[time, place]
+        nan where there is no value.
+    s : float64[time, place]
+        Arc length of the place [m].
+    places : sequence of (str, int or None)
+        Wheelset, bogie or sensor, and the side of a wheel.
+    """
+
+    values: Floats
+    s: Floats
+    places: Sequence[tuple[str, int | None]]
+
+    def rows(self, place: int, section: TestSection) -> slice:
+        """Rows from the last before a section to the first after it."""
+        inside = between(self.s[:, place], section.begin, section.end)
+        return slice(max(0, inside.start - 1), min(len(self.s), inside.stop + 1))
+
+    def in_section(self, place: int, section: TestSection, window: float) -> Floats:
+        """Values of one place in a section, or means over windows of `window` metres in it.
+
+        A window that holds an instant without value has no mean.
+        """
+        if not window:
+            return self.values[between(self.s[:, place], section.begin, section.end), place]
+        rows = self.rows(place, section)
+        s, x = self.s[rows, place], self.values[rows, place]
+        centres = window_centres(section.begin, section.end, window, STEP)
+        unknown = np.isnan(x)
+        means = distance_means(s, np.where(unknown, 0.0, x), centres, window)
+        if not unknown.any():
+            return means
+        return means[distance_means(s, unknown.astype(float), centres, window) <= 0.0]
+
+
+def between(s: Floats, begin: float, end: float) -> slice:
+    """Rows between two arc lengths."""
+    return slice(int(np.searchsorted(s, begin)), int(np.searchsorted(s, end, side="right")))
+
+
+class Signals:
+    """Signals of a part of a run.
+
+    Parameters
+    ----------
+    record : Record
+    begin, end : float
+        Arc lengths of the part [m]; it is read with the margins of the filters.
+    f0 : float, optional
+        Frequency of the instability of the vehicle [Hz].
+    causal : bool
+        Use causal filters, as in a measuring amplifier, instead of zero-phase filters.
+    """
+
+    def __init__(
+        self, record: Record, begin: float, end: float, *, f0: float | None, causal: bool
+    ) -> None:
+        self.record, self.f0, self.causal = record, f0, causal
+        self._begin, self._end = begin, end
+        self._rows = record.rows_between(begin, end, WIDEST)
+        self.raw = cache(self._raw)
+        self.filtered = cache(self._filtered)
+        self.signal = cache(self._signal)
+
+    def _signal(
+        self, form: "Callable[[Signals, Band | None], Signal | None]", band: Band | None
+    ) -> Signal | None:
+        """Return the signal that `form` forms of this part, once."""
+        return form(self, band)
+
+    def _raw(self, name: str) -> Floats:
+        """Quantity over the rows of the widest margin; ``acceleration`` is that of all sensors."""
+        if name == "acceleration":
+            return self.record.readings(self._rows)[0]
+        return self.record.result.part(name, self._rows)
+
+    def _near(self, band: Band | None) -> slice:
+        """Rows of the part with the margin of a filter, among those of the widest one."""
+        corner = np.inf if band is None else band[1] if band[0] is None else band[0]
+        margin = next(seconds for lowest, seconds in MARGINS if corner >= lowest)
+        rows = self.record.rows_between(self._begin, self._end, margin)
+        return slice(rows.start - self._rows.start, rows.stop - self._rows.start)
+
+    def _filtered(self, name: str, band: Band | None) -> Floats:
+        raw = self.raw(name)[self._near(band)]
+        return raw if band is None else self.passed(raw, band)
+
+    def passed(self, x: Floats, band: Band) -> Floats:
+        """Values over time through a filter."""
+        flat, (low, high) = x.reshape(len(x), -1), band
+        if low is None:
+            flat = low_passed(flat, self.record.rate, high, causal=self.causal)
+        else:
+            flat = band_passed(flat, self.record.rate, low, high, causal=self.causal)
+        return flat.reshape(x.shape)
+
+    def s_wheelset(self, band: Band | None) -> Floats:
+        """Arc lengths of the wheelsets over the rows of `filtered` [m]."""
+        return self.raw("wheelset_distance")[self._near(band)]
+
+    def s_sensor(self, name: str, band: Band | None) -> Floats:
+        """Arc length of a sensor over the same rows [m]."""
+        rows = self.record.distance[self._rows][self._near(band)]
+        return np.asarray(rows + self.record.sensor_offset(name))
+
+
+def _labels(signals: Signals) -> list[str]:
+    return [f"wheelset {w + 1}" for w in range(len(signals.record.offsets))]
+
+
+def _of_wheels(signals: Signals, values: Floats, band: Band | None) -> Signal:
+    """Signal of [time, wheelset, side]."""
+    places = [(label, side) for label in _labels(signals) for side in (0, 1)]
+    s = np.repeat(signals.s_wheelset(band), 2, axis=1)
+    return Signal(values.reshape(len(values), -1), s, places)
+
+
+def track_shifting_force(signals: Signals, band: Band | None) -> Signal:
+    """Sum of the lateral forces of a wheelset on both rails [N]."""
+    total = signals.filtered("Y", band).sum(axis=-1)
+    return Signal(total, signals.s_wheelset(band), [(label, None) for label in _labels(signals)])
+
+
+def wheel_load(signals: Signals, band: Band | None) -> Signal:
+    """Q [N]."""
+    return _of_wheels(signals, signals.filtered("Q", band), band)
+
+
+def guiding_force(signals: Signals, band: Band | None) -> Signal:
+    """Y of each wheel, outwards positive [N]."""
+    return _of_wheels(signals, OUTWARDS * signals.filtered("Y", band), band)
+
+
+def quotient(signals: Signals, band: Band | None) -> Signal:
+    """Y/Q, both filtered before; none where the wheel carries no load [1]."""
+    Q = signals.filtered("Q", band)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        values = np.where(Q > 0.0, OUTWARDS * signals.filtered("Y", band) / Q, np.nan)
+    return _of_wheels(signals, values, band)
+
+
+def rail_loading(signals: Signals, band: Band | None) -> Signal:
+    """B = |Y| + 0.83 |Q| [N]."""
+    values = np.abs(signals.filtered("Y", band)) + 0.83 * np.abs(signals.filtered("Q", band))
+    return _of_wheels(signals, values, band)
+
+
+def wear_number(signals: Signals, band: Band | None) -> Signal | None:
+    """T_gamma, where the result has it [N]."""
+    if "T_gamma" not in signals.record.result:
+        return None
+    return _of_wheels(signals, signals.filtered("T_gamma", band), band)
+
+
+def load_transfer(signals: Signals, band: Band | None) -> Signal:
+    """(sum Q_left - sum Q_right)/(sum Q) of each bogie: positive outside right-hand curves [1]."""
+    bogies: dict[str, list[int]] = {}
+    for w, name in enumerate(signals.record.result.wheelsets):
+        bogies.setdefault(name.split(".")[0], []).append(w)
+    Q, s = signals.filtered("Q", band), signals.s_wheelset(band)
+    values = np.stack([overturning(Q[:, own]) for own in bogies.values()], axis=-1)
+    middles = np.stack([s[:, own].mean(axis=1) for own in bogies.values()], axis=-1)
+    return Signal(values, middles, [(name, None) for name in bogies])
+
+
+def _acceleration(signals: Signals, band: Band | None, axis: int, *, frames: bool) -> Signal | None:
+    names = list(signals.record.sensors)
+    own = [k for k, name in enumerate(names) if name.startswith("frame_") == frames]
+    if not own:
+        return None
+    near = signals._near(band)
+    raw = signals.raw("acceleration")[near][:, own, axis]
+    s = np.stack([signals.s_sensor(names[k], band) for k in own], axis=-1)
+    values = raw if band is None else signals.passed(raw, band)
+    return Signal(values, s, [(names[k], None) for k in own])
+
+
+def body_lateral(signals: Signals, band: Band | None) -> Signal | None:
+    """Lateral acceleration on the floor of the body [m/s2]."""
+    return _acceleration(signals, band, 1, frames=False)
+
+
+def body_vertical(signals: Signals, band: Band | None) -> Signal | None:
+    """Vertical acceleration on the floor of the body [m/s2]."""
+    return _acceleration(signals, band, 2, frames=False)
+
+
+def frame_lateral(signals: Signals, band: Band | None) -> Signal | None:
+    """Lateral acceleration of the bogie frames above the wheelsets [m/s2]."""
+    return _acceleration(signals, band, 1, frames=True)
