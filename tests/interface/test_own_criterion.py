@@ -39,9 +39,7 @@ def test_new_quantity_is_assessed_printed_and_reported(limits, monkeypatch, tmp_
 
 
 def test_limit_without_its_quantity_is_refused(limits):
-    with pytest.raises(
-        InputError, match=r"limits\.unloading: unknown quantity"
-    ):
+    with pytest.raises(InputError, match=r"limits\.unloading: unknown quantity"):
         assess(made(track(*curve(300.0, 800.0)), 23.0), limits=limits)
 
 
