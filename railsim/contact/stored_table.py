@@ -49,7 +49,8 @@ def cached_contact_table(
     The name of the stored table is a hash of everything that enters: both profiles, all numbers,
     the grid and the generator's sources.  Tables are written under a temporary name and renamed,
     so that parallel runs never see half a table; they are memory-mapped, so that parallel runs
-    share one copy.  A table that is not, byte for byte, what was stored is built again.
+    share one copy.  A table that is not, byte for byte, what was stored is built again: all of it
+    is read once after each change of its file's number, size or time.
     """
     grid = chosen_grid(grid, normal)
     numbers = (radius, gauge, inclination, back_to_back, tape_circle_distance, G, nu, centre_height)
@@ -90,17 +91,23 @@ def _stored_table(path: Path) -> ContactTable | None:
     return _checked_table(path, text, (found.st_mtime_ns, found.st_size, found.st_ino))
 
 
-@lru_cache(MOST_OPEN)  # the check reads all of a table: once a process, and after each change
-def _checked_table(path: Path, text: str | bytes, stamp: tuple[int, ...]) -> ContactTable | None:
+@lru_cache(MOST_OPEN)
+def _checked_table(path: Path, text: bytes, stamp: tuple[int, ...]) -> ContactTable | None:
+    """Table whose bytes were checked since its file last changed, by this process or another."""
+    checked = path.with_suffix(".checked")
+    known = repr(stamp).encode()
     try:
         facts = json.loads(text)
         crc = facts.pop("crc32")
         facts["w"] = np.array(facts["w"])
         table = ContactTable(values=np.load(path, mmap_mode="r"), **facts)
+        if cache.stored(checked) == known:
+            return table
         whole = zlib.crc32(table.values.data) == crc
     except (OSError, ValueError, TypeError, KeyError, EOFError):
         whole = False
     if whole:
+        cache.store(checked, known)
         return table
     for part in (path, path.with_suffix(".json")):
         cache.discard(part)

@@ -299,3 +299,21 @@ def test_stored_table_is_the_built_one_and_any_input_makes_another(tmp_path, mon
         file.write_bytes(b"not an array")
     mended = cached_contact_table(wheel, rail, grid=grid)
     np.testing.assert_array_equal(mended.values, built.values)
+
+
+def test_flipped_bit_in_a_stored_table_is_found(tmp_path, monkeypatch):
+    monkeypatch.setenv("RAILSIM_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("railsim.kernels.cache.notices", {})
+    wheel, rail = load_profile("S1002"), load_profile("60E1")
+    grid = TableGrid(ds=1e-3, droll=3e-3, n_w=2)
+    built = cached_contact_table(wheel, rail, grid=grid).values.copy()
+    for _ in range(2):  # checked in full, and known to be
+        cached_contact_table(wheel, rail, grid=grid)
+    (file,) = tmp_path.rglob("*.npy")
+    assert file.with_suffix(".checked").exists()
+    with open(file, "r+b") as stored:
+        stored.seek(4711)
+        (byte,) = stored.read(1)
+        stored.seek(4711)
+        stored.write(bytes([byte ^ 4]))
+    np.testing.assert_array_equal(cached_contact_table(wheel, rail, grid=grid).values, built)
