@@ -11,11 +11,11 @@ import numpy as np
 from generate import fill_page, table
 from scipy.signal import welch
 
+from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track import Track
 from railsim.notation import QUANTITIES
 from railsim.plot.style import DISTINCT, save, styled
 from railsim.track.irregularity import displacement
-from railsim.track.spectra import SPECTRA
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "validation" / "vehicles_and_tracks.md"

@@ -3,8 +3,8 @@
 from typing import Any, ClassVar
 
 from railsim.definitions.base import Remark
+from railsim.definitions.excitations.measured_file import embed_measured
 from railsim.definitions.layout import curvature_sections, track_faults, track_remarks
-from railsim.definitions.measured import embed_measured
 from railsim.definitions.track_tables import TrackTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable

@@ -22,8 +22,8 @@ from railsim.definitions.base import (
     pair,
     rising,
 )
+from railsim.definitions.excitations import Irregularity
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.irregularity import Irregularity
 from railsim.definitions.support import Support
 
 ArcLength = TypeVar("ArcLength", float, Any)

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from railsim.definitions.alignment_rules import cant_at
-from railsim.definitions.irregularity import READING, Irregularity, Measured
+from railsim.definitions.excitations import Irregularity
+from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.layout import cant_sections, curvature_sections, gradient_sections
 from railsim.definitions.section import Section
 from railsim.definitions.track import Track
@@ -82,7 +83,7 @@ def _irregularity(part: Irregularity) -> dict[str, Any]:
     """Return an irregularity; of a measured one what its rows hold instead of the rows."""
     data = part.model_dump(exclude_none=True, exclude={"rows"})
     if isinstance(part, Measured) and part.rows is not None:
-        from railsim.track.irregularity import largest_between_rows
+        from railsim.definitions.excitations.measured import largest_between_rows
 
         found = largest_between_rows(part)
         data = {key: value for key, value in data.items() if key not in READING}

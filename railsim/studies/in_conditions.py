@@ -13,8 +13,8 @@ from railsim.assessment.record import START
 from railsim.assessment.sections import TestSection, track_sections
 from railsim.assessment.track_quality import TrackQuality
 from railsim.cant import curve_speed
+from railsim.definitions.excitations.random import Random
 from railsim.definitions.flatten import flatten
-from railsim.definitions.irregularity import Random
 from railsim.definitions.limits import RunningLimits
 from railsim.definitions.scenario import Speed, TestCondition
 from railsim.definitions.track import Track

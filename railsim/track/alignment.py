@@ -23,95 +23,13 @@ from railsim.definitions.layout import (
     gradient_sections,
     track_faults,
 )
+from railsim.definitions.rounded_profile import RoundedProfile
 from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 KEPT = "_alignment"
-
-
-def _array(s: ArrayLike) -> Array:
-    return np.asarray(s, dtype=np.float64)
-
-
-def _running(parts: Array) -> Array:
-    """Sum of all parts before each."""
-    return np.concatenate([[0.0], np.cumsum(parts)[:-1]])
-
-
-class RoundedProfile:
-    """A piecewise linear function, constant beyond its ends, averaged over a window.
-
-    Parameters
-    ----------
-    sections : sequence of Section
-        Values over arc length; none at all means zero everywhere.
-    rounding : float
-        Length of the window [m]; 0 leaves the kinks.
-    origin : float
-        Arc length from which the sections' ends count [m].
-    """
-
-    def __init__(self, sections: Sequence[Section], rounding: float, origin: float = 0.0) -> None:
-        knots = [-1.0, 0.0, *(section.end for section in sections)]
-        slopes = [0.0, *(section.slope for section in sections), 0.0]
-        first = sections[0].start_value if sections else 0.0
-        last = sections[-1].end_value if sections else 0.0
-        values = [first, *(section.start_value for section in sections), last]
-        slope, value, width = np.array(slopes), np.array(values), np.diff([*knots, knots[-1] + 1.0])
-        once = _running(value * width + slope * width**2 / 2.0)
-        twice = _running(once * width + value * width**2 / 2.0 + slope * width**3 / 6.0)
-        self._knots = origin + np.array(knots)
-        # coefficients of each piece, highest power first: of derivative, value and two integrals
-        self._pieces = (
-            (slope,),
-            (slope, value),
-            (slope / 2.0, value, once),
-            (slope / 6.0, value / 2.0, once, twice),
-        )
-        self._half_window = 0.5 * rounding
-
-    def _plain(self, times: int, s: ArrayLike) -> Array:
-        """Derivative (-1), value (0), integral (1) or double integral (2) before rounding."""
-        # scipy's PPoly does this too, but its package takes a quarter of a second to import
-        at = _array(s)
-        piece = np.clip(np.searchsorted(self._knots, at, side="right") - 1, 0, None)
-        u = at - self._knots[piece]
-        highest, *others = self._pieces[times + 1]
-        total: Array = highest[piece]
-        for coefficient in others:
-            total = total * u + coefficient[piece]
-        return total
-
-    def _mean(self, times: int, s: ArrayLike) -> Array:
-        at, h = _array(s), self._half_window
-        mean: Array = (self._plain(times, at + h) - self._plain(times, at - h)) / (2.0 * h)
-        return mean
-
-    def __call__(self, s: ArrayLike) -> Array:
-        """Value at the arc length `s` [m]."""
-        if self._half_window == 0.0:
-            return self._plain(0, s)
-        return self._mean(1, s)
-
-    def rate(self, s: ArrayLike) -> Array:
-        """Derivative along the track at `s`."""
-        if self._half_window == 0.0:
-            return self._plain(-1, s)
-        return self._mean(0, s)
-
-    def second_rate(self, s: ArrayLike) -> Array:
-        """Second derivative along the track."""
-        if self._half_window == 0.0:
-            return np.zeros_like(_array(s))
-        return self._mean(-1, s)
-
-    def integral(self, s: ArrayLike) -> Array:
-        """Integral from 0 to `s`."""
-        if self._half_window == 0.0:
-            return self._plain(1, s) - self._plain(1, 0.0)
-        return self._mean(2, s) - self._mean(2, 0.0)
 
 
 class Alignment:

@@ -11,12 +11,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from railsim.definitions.excitations.base import Displacement
 from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError
 from railsim.kernels.aligned import aligned_zeros
 from railsim.kernels.track_frame import TrackTables
 from railsim.track.alignment import Alignment, Array
-from railsim.track.irregularity import Displacement, displacement, shortest_length
+from railsim.track.irregularity import displacement, shortest_length
 
 # Usual length of a cell, and the largest number of them that is worth its memory.
 CELL_LENGTH = 0.25

@@ -1,23 +1,17 @@
 """Irregularities of the track against their definitions: spectra, shapes, measured data."""
 
-import typing
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.signal import welch
 
-from railsim.definitions.irregularity import Irregularity
+from railsim.definitions.excitations import TYPES
+from railsim.definitions.excitations.measured import largest_between_rows
+from railsim.definitions.excitations.spectra import ERRI_B176, SPECTRA
 from railsim.definitions.loading import load_track
 from railsim.definitions.track import Track
 from railsim.errors import InputError
-from railsim.track.irregularity import (
-    _displacement,
-    displacement,
-    largest_between_rows,
-    measured_remarks,
-)
-from railsim.track.spectra import ERRI_B176, SPECTRA
+from railsim.track.irregularity import displacement, measured_remarks
 from railsim.track.tables import track_tables
 
 Y_LEFT, Z_LEFT, Y_RIGHT, Z_RIGHT, MU_LEFT, MU_RIGHT = range(6)
@@ -239,10 +233,8 @@ def test_cross_level_of_a_sweep_is_the_difference_of_heights():
 
 
 def test_every_kind_of_irregularity_has_a_displacement_and_answers():
-    kinds = typing.get_args(typing.get_args(Irregularity)[0])
-    assert len(kinds) == 6
-    for kind in kinds:
-        assert _displacement.dispatch(kind) is not _displacement.dispatch(object)
+    assert len(TYPES) == 6
+    for kind in TYPES.values():
         assert not kind.__abstractmethods__
 
 
@@ -413,7 +405,7 @@ def test_realisation_of_every_spectrum_has_the_variance_of_its_band(name):
 def test_names_of_the_definition_are_those_of_the_spectra():
     from typing import get_args
 
-    from railsim.definitions.irregularity import SpectrumName
+    from railsim.definitions.excitations.random import SpectrumName
 
     assert set(get_args(SpectrumName)) == {*SPECTRA, "own"}
 

@@ -17,7 +17,7 @@ import pytest
 from test_lateral_ramp import ramp
 
 import railsim
-from railsim.definitions.irregularity import Kink
+from railsim.definitions.excitations.kink import Kink
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
 from railsim.definitions.settings import Settings

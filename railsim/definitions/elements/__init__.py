@@ -8,29 +8,14 @@ Every module of this package belongs to the registry `KINDS`: file format, schem
 arrays and preloads read it.  `base` and `rows` hold what the kinds share.
 """
 
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
 from railsim.definitions.elements.base import Element
+from railsim.definitions.registry import kinds
 
-
-def _kinds(definition: type[Element]) -> dict[str, type[Element]]:
-    """Return the definition and those derived from it that have a value of `kind`."""
-    found: dict[str, type[Element]] = {}
-    if "kind" in definition.model_fields:
-        found[definition.model_fields["kind"].annotation.__args__[0]] = definition  # type: ignore[union-attr]
-    for derived in definition.__subclasses__():
-        found |= _kinds(derived)
-    return found
-
-
-for _module in iter_modules(__path__):
-    import_module(f"{__name__}.{_module.name}")
-
-KINDS = dict(sorted(_kinds(Element).items()))  # type: ignore[type-abstract]
+KINDS = kinds(Element, "kind", __name__)  # type: ignore[type-abstract]
 """Definition of every kind of force element."""
 
 if TYPE_CHECKING:

@@ -16,12 +16,34 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.irregularity import CHANNELS, Coefficients
+from railsim.definitions.base import Definition, NonNegative, Positive
+from railsim.definitions.excitations.base import CHANNELS
 
 Array = NDArray[np.float64]
 Density = Callable[[Array], Array]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+class Coefficients(Definition):
+    """Coefficients of the spectra; form and meaning in the manual."""
+
+    lateral: NonNegative = 0.0
+    """A_a of the alignment [m rad]"""
+    vertical: NonNegative = 0.0
+    """A_v of the longitudinal level [m rad]"""
+    cross_level: NonNegative = 0.0
+    """Coefficient of the cross level instead of A_v [m rad]"""
+    gauge: NonNegative = 0.0
+    """A_g of the gauge [m rad]"""
+    omega_c: Positive = 0.8246
+    """[rad/m]"""
+    omega_r: Positive = 0.0206
+    """[rad/m]"""
+    omega_s: Positive = 0.4380
+    """[rad/m]"""
+    b: Positive = 0.75
+    """Half the distance of the rails that the cross level refers to [m]"""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from railsim.definitions.irregularity import COLUMNS, READING, Measured
-from railsim.definitions.recording import BANDS, band_passed, equal_step, from_chord
+from railsim.definitions.excitations.base import COLUMNS
+from railsim.definitions.excitations.measured import READING, Measured
+from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, InputError, counted, nearest
 from railsim.files import TABLE_BYTES, is_file, read_text
 from railsim.text import LONGEST_FILE, shortened
@@ -82,7 +83,7 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
 
 @dataclass(frozen=True)
 class Reading:
-    """How the file of a measured irregularity is read; see `definitions.irregularity.Measured`."""
+    """How the file of a measured irregularity is read; see `Measured`."""
 
     columns: dict[str, str] | None = None
     units: dict[str, str] | None = None

@@ -1,0 +1,94 @@
+"""What all irregularities have in common: channels, mirror image, displacement of the rails.
+
+A `Displacement` gives, for any arc lengths, the four displacements (y_left, z_left, y_right,
+z_right; y to the right, z down) [m] and their derivatives along the track [1].
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from railsim.definitions.base import Definition, Finite
+
+Array = NDArray[np.float64]
+Displacement = Callable[[Array], tuple[Array, Array]]
+
+# Names of the columns of a measured irregularity, beside the arc length.
+COLUMNS = ("y_left", "z_left", "y_right", "z_right")
+# The four irregularities of a track.
+CHANNELS = ("lateral", "vertical", "cross_level", "gauge")
+# Sign of each in the mirror image of the track.
+MIRROR = {"lateral": -1.0, "vertical": 1.0, "cross_level": -1.0, "gauge": 1.0}
+# Rails moved by one unit of each: y_left, z_left, y_right, z_right; the cross level is an angle
+# here, positive = left rail higher, and its unit moves the rails by b.
+SHARES = {
+    "lateral": (1.0, 0.0, 1.0, 0.0),
+    "vertical": (0.0, 1.0, 0.0, 1.0),
+    "cross_level": (0.0, -1.0, 0.0, 1.0),
+    "gauge": (-0.5, 0.0, 0.5, 0.0),
+}
+Channel = Literal["lateral", "vertical", "cross_level", "gauge"]
+Amplitude = Annotated[Finite, Field(ge=-0.5, le=0.5)]
+
+
+def _band(wavelengths: tuple[float, float]) -> tuple[float, float]:
+    if wavelengths[1] <= wavelengths[0]:
+        raise ValueError("[shortest, longest]: the second must be larger than the first")
+    return wavelengths
+
+
+Wavelengths = Annotated[
+    tuple[Annotated[Finite, Field(ge=0.2)], Annotated[Finite, Field(le=1000.0)]],
+    AfterValidator(_band),
+]
+
+
+class Irregular(Definition):
+    """What every irregularity answers; none can be defined without."""
+
+    type: str
+
+    @abstractmethod
+    def mirrored(self) -> Self:
+        """Return the mirror image: left and right exchanged."""
+
+    @abstractmethod
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends on a track whose plan has some length [m]."""
+
+    @abstractmethod
+    def resolution(self) -> float:
+        """Return the length that tables must resolve, a sixteenth of its shortest wave [m]."""
+
+    @abstractmethod
+    def summary(self) -> str:
+        """Return what it is in a few words."""
+
+    @abstractmethod
+    def displacement(self, length: float) -> Displacement:
+        """Return how it moves the rails of a track whose plan has some length [m]."""
+
+
+def faded(moved: Displacement, begin: float, end: float, fade: float) -> Displacement:
+    """Return a displacement that rises behind `begin` and falls before `end` over `fade` [m]."""
+    length = min(fade, 0.5 * (end - begin))
+
+    def window(s: Array) -> tuple[Array, Array]:
+        inside = ((s >= begin) & (s < end)).astype(float)
+        if length == 0.0:
+            return inside, np.zeros_like(s)
+        depth = np.minimum(s - begin, end - s)
+        angle = np.pi * np.clip(depth / length, 0.0, 1.0)
+        side = np.where(s - begin < end - s, 1.0, -1.0)
+        rate = side * 0.5 * np.pi / length * np.sin(angle)
+        return inside * 0.5 * (1.0 - np.cos(angle)), inside * rate
+
+    def within(s: Array) -> tuple[Array, Array]:
+        (value, rate), (share, slope) = moved(s), window(s)
+        return share * value, share * rate + slope * value
+
+    return within

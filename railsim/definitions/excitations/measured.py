@@ -1,0 +1,198 @@
+"""Irregularities measured or computed elsewhere."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from railsim.definitions.base import Finite, Flag, NonNegative, Positive, Text, rises
+from railsim.definitions.excitations.base import (
+    COLUMNS,
+    Amplitude,
+    Array,
+    Displacement,
+    Irregular,
+    Wavelengths,
+    faded,
+)
+
+# Keys that say how the file of a measured irregularity is read; its rows are what came of it.
+READING = ("columns", "units", "reverse", "falling_mileage", "chord", "band")
+# Share of the range of the rows around by which a spline between measured rows may leave it.
+OVERSHOOT = 0.25
+_INNER = np.arange(1, 8) / 8.0  # positions within an interval, over its length
+Row = tuple[Finite, Amplitude, Amplitude, Amplitude, Amplitude]
+
+
+class Measured(Irregular):
+    """Displacements measured or computed elsewhere.
+
+    Between the rows a cubic spline where they resolve the waves, shape-preserving elsewhere.
+    """
+
+    type: Literal["measured"]
+    file: Text | None = None
+    """CSV with a header: `s` and any of `y_left`, `z_left`, `y_right`, `z_right` in m (`s_m`) or
+    mm (`y_left_mm`), or `y`, `z`, `cross_level`, `gauge`; read when the track is loaded"""
+    columns: dict[Text, Text] | None = None
+    """Names of the file's columns by ours, where they differ: `{ s = "Mileage", z_left = "LL" }`;
+    columns that are not named are not read"""
+    units: dict[Text, Literal["m", "mm", "km"]] | None = None
+    """Units by our names of the columns, `{ s = "km", z_left = "mm" }`; by default as the names
+    say"""
+    reverse: tuple[Text, ...] = ()
+    """Our names of the columns whose sign is the opposite of ours"""
+    falling_mileage: Flag = False
+    """The file's mileage falls in the direction of travel; s then counts from its first row"""
+    chord: tuple[Positive, Positive] | None = None
+    """Displacements are offsets at a chord of these parts behind and ahead [m]: the space curve is
+    recovered from them"""
+    band: Literal["D1", "D2", "D3"] | Wavelengths | None = None
+    """Band of wavelengths that is kept: D1 (3 to 25 m), D2 (25 to 70 m), D3 (70 to 150 m), or
+    shortest and longest [m]"""
+    rows: Annotated[tuple[Row, ...], rises("arc length")] | None = None
+    """What was read: rows of s, y_left, z_left, y_right, z_right [m]"""
+    shift: Finite = 0.0
+    """Added to the arc lengths of the file [m]"""
+    scale: Finite = 1.0
+    """Factor on all displacements"""
+    fade: NonNegative = 10.0
+    """Length over which the data fade in and out at both ends [m]"""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.file is None) == (self.rows is None):
+            raise ValueError("either 'file' or 'rows' is needed")
+        if self.rows is not None and len(self.rows) < 4:
+            raise ValueError("four rows at least are needed")
+        if self.rows is not None:
+            given = [key for key in READING if getattr(self, key) not in (None, (), False)]
+            if given:
+                raise ValueError(f"'{given[0]}' belongs to 'file' and does not go with 'rows'")
+        return self
+
+    def mirrored(self) -> Self:
+        """Return the rows with the rails exchanged, displacements to the right turned round."""
+        rows = tuple((s, -yr, zr, -yl, zl) for s, yl, zl, yr, zr in self.rows or ())
+        return self.model_copy(update={"rows": rows})
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where the rows begin and end [m]."""
+        rows = self.rows or ((0.0,), (length,))
+        return rows[0][0] + self.shift, rows[-1][0] + self.shift
+
+    def resolution(self) -> float:
+        """Return half the least distance of the rows, 0.05 m at least [m]."""
+        s = [row[0] for row in self.rows or ()]
+        return max(0.05, 0.5 * min(b - a for a, b in pairwise(s)))
+
+    def summary(self) -> str:
+        """Return that it is measured, and its number of rows."""
+        return f"measured, {len(self.rows or ())} rows"
+
+    def interpolation(self) -> tuple[Array, Array, Array]:
+        """Positions of the rows [m], and displacements [m] and slopes [1] there by columns."""
+        rows = np.array(self.rows)
+        positions = rows[:, 0] + self.shift
+        values = self.scale * rows[:, 1:].T
+        slopes = np.stack([shape_preserving_slopes(positions, row) for row in values])
+        return positions, values, slopes
+
+    def displacement(self, length: float) -> Displacement:
+        """Return the spline through the rows."""
+        from scipy.interpolate import CubicHermiteSpline  # a quarter of a second; most need none
+
+        positions, values, slopes = self.interpolation()
+        spline = CubicHermiteSpline(positions, values, slopes, axis=1)
+        slope = spline.derivative()
+
+        def moved(s: Array) -> tuple[Array, Array]:
+            at = np.clip(s, positions[0], positions[-1])
+            return spline(at), slope(at)
+
+        return faded(moved, positions[0], positions[-1], self.fade)
+
+
+def _between(positions: Array, values: Array, slopes: Array) -> Array:
+    """Cubic Hermite interpolation at seven positions within every interval between the rows."""
+    h = np.diff(positions)
+    t = _INNER
+    basis = np.stack(
+        ((1.0 + 2.0 * t) * (1.0 - t) ** 2, t * (1.0 - t) ** 2, t**2 * (3.0 - 2.0 * t),
+         t**2 * (t - 1.0))
+    )  # fmt: skip
+    ends = (values[..., :-1], h * slopes[..., :-1], values[..., 1:], h * slopes[..., 1:])
+    return np.asarray(np.stack(ends, axis=-1) @ basis)
+
+
+@dataclass(frozen=True)
+class Between:
+    """Largest displacement of a record at its rows, and of the rails between them [m]."""
+
+    column: str
+    at_rows: float
+    between: float
+    s: float
+
+
+def largest_between_rows(part: Measured) -> Between:
+    """Return the largest displacement between the rows, of the column where it differs most.
+
+    A record that does not resolve the shortest wave that it holds lets the rails go further than
+    any row says.
+    """
+    positions, values, slopes = part.interpolation()
+    found = np.abs(_between(positions, values, slopes)).reshape(4, -1)
+    inner = positions[:-1, None] + np.diff(positions)[:, None] * _INNER
+    at_rows = np.abs(values).max(axis=1)
+    further = np.where(at_rows > 0.0, found.max(axis=1) - at_rows, -np.inf)
+    column = int(np.argmax(further))
+    index = int(np.argmax(found[column]))
+    return Between(
+        COLUMNS[column],
+        float(at_rows[column]),
+        float(found[column, index]),
+        float(inner.ravel()[index]),
+    )
+
+
+def shape_preserving_slopes(positions: Array, values: Array) -> Array:
+    """Slopes at the rows for piecewise cubic interpolation without false waves.
+
+    Those of the cubic spline where the rows resolve the wave; where the spline leaves the range of
+    the four rows around an interval by more than a quarter of that range, the monotone ones of
+    Fritsch and Butland (1984, SIAM J. Sci. Stat. Comput. 5) at both its ends.  A sine of six rows a
+    wave leaves it by 0.15 at most.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n,)
+        Increasing arc lengths [m].
+    values : ndarray, shape (n,)
+        Displacements [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Slopes [1].
+    """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    slopes = CubicSpline(positions, values)(positions, 1)
+    monotone = PchipInterpolator(positions, values)(positions, 1)
+    padded = np.concatenate((values[:1], values, values[-1:]))
+    around = np.stack([padded[i : i + len(values) - 1] for i in range(4)])
+    low, high = around.min(axis=0), around.max(axis=0)
+    allowed = OVERSHOOT * (high - low)
+    while True:
+        inside = _between(positions, values, slopes)
+        lowest, highest = inside.min(axis=1), inside.max(axis=1)
+        wrong = (lowest < low - allowed) | (highest > high + allowed)
+        ends = np.zeros(len(positions), dtype=bool)
+        ends[:-1] |= wrong
+        ends[1:] |= wrong
+        if not np.any(ends & (slopes != monotone)):
+            return np.asarray(slopes)
+        slopes = np.where(ends, monotone, slopes)

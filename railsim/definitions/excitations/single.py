@@ -1,0 +1,61 @@
+"""What single disturbances have in common: place, length and shape."""
+
+from typing import Literal
+
+import numpy as np
+
+from railsim.definitions.base import Finite, Positive
+from railsim.definitions.excitations.base import Array, Displacement, Irregular
+from railsim.definitions.rounded_profile import RoundedProfile
+from railsim.definitions.section import Section
+
+Rails = Literal["left", "right", "both"]
+OTHER_RAIL: dict[str, Rails] = {"left": "right", "right": "left", "both": "both"}
+MOVED = {"left": (1.0, 0.0), "right": (0.0, 1.0), "both": (1.0, 1.0)}
+
+
+class Single(Irregular):
+    """A single disturbance, `length` long about `s`."""
+
+    s: Finite
+    """Arc length of its middle [m]"""
+    length: Positive
+    """Length from begin to end [m]"""
+    shape: Literal["cosine", "triangle"] = "triangle"
+    """`cosine`: one wave of 1 - cos; `triangle`: two straights, kinks rounded over length / 10"""
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.s - 0.5 * self.length, self.s + 0.5 * self.length
+
+    def resolution(self) -> float:
+        """Return a part of its length; a triangle has rounded kinks [m]."""
+        return self.length / (40.0 if self.shape == "triangle" else 16.0)
+
+    def summary(self) -> str:
+        """Return its type and arc length."""
+        return f"{self.type} at {self.s:g} m"
+
+    def moved(self, *middle: float) -> Displacement:
+        """Return the displacement that is `middle` at `s` (y, z left, y, z right) [m]."""
+        shares = np.array(middle)[:, None]
+        shape = self._cosine if self.shape == "cosine" else self._triangle
+
+        def moved(s: Array) -> tuple[Array, Array]:
+            value, rate = shape(s - self.s)
+            return shares * value, shares * rate
+
+        return moved
+
+    def _cosine(self, u: Array) -> tuple[Array, Array]:
+        wave = 2.0 * np.pi / self.length
+        inside = np.abs(u) < 0.5 * self.length
+        value = np.where(inside, 0.5 + 0.5 * np.cos(wave * u), 0.0)
+        return value, np.where(inside, -0.5 * wave * np.sin(wave * u), 0.0)
+
+    def _triangle(self, u: Array) -> tuple[Array, Array]:
+        half = 0.5 * self.length
+        up = Section("", "", 0.0, half, 0.0, 1.0)
+        down = Section("", "", half, self.length, 1.0, 0.0)
+        profile = RoundedProfile([up, down], self.length / 10.0)
+        return profile(u + half), profile.rate(u + half)

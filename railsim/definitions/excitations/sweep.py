@@ -1,0 +1,90 @@
+"""Waves of one amplitude over a range of wavelengths."""
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import Finite, NonNegative
+from railsim.definitions.excitations.base import (
+    MIRROR,
+    SHARES,
+    Amplitude,
+    Array,
+    Channel,
+    Displacement,
+    Irregular,
+    faded,
+)
+
+Wavelength = Annotated[Finite, Field(ge=0.2, le=1000.0)]
+
+
+class Sweep(Irregular):
+    """Waves of one amplitude whose wavelength goes from one value to another.
+
+    Each octave of wavelengths takes the same length of track.
+    """
+
+    type: Literal["sweep"]
+    channel: Channel = "vertical"
+    """Which of the four irregularities: both rails to the right or down, the left rail higher, or
+    the rails apart"""
+    amplitude: Amplitude
+    """Amplitude of the waves; of `cross_level` the difference of heights, of `gauge` that of the
+    gauge [m]"""
+    wavelengths: tuple[Wavelength, Wavelength]
+    """Wavelength at the beginning and at the end, rising or falling [m]"""
+    begin: Finite
+    """Arc length where it begins, at a zero of the wave [m]"""
+    end: Finite
+    """Arc length where it ends [m]"""
+    fade: NonNegative = 10.0
+    """Length over which it fades in and out within its ends [m]"""
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if self.end <= self.begin:
+            raise ValueError("'end' must lie behind 'begin'")
+        return self
+
+    def mirrored(self) -> Self:
+        """Return the mirror image: what goes to the right or rises on the left is turned round."""
+        sign = MIRROR[self.channel]
+        return self.model_copy(update={"amplitude": sign * self.amplitude})
+
+    def extent(self, length: float) -> tuple[float, float]:
+        """Return where it begins and ends [m]."""
+        return self.begin, self.end
+
+    def resolution(self) -> float:
+        """Return a sixteenth of the shorter wavelength [m]."""
+        return min(self.wavelengths) / 16.0
+
+    def summary(self) -> str:
+        """Return channel, amplitude and wavelengths."""
+        first, last = self.wavelengths
+        return f"{self.channel} sweep, {1e3 * self.amplitude:g} mm, {first:g} to {last:g} m"
+
+    def displacement(self, length: float) -> Displacement:
+        """Return A sin(phase), d phase/ds = 2 pi/wavelength, which changes exponentially.
+
+        With u = (s - begin)/length and r = first/last wavelength: wavelength = first r^-u and
+        phase = 2 pi length (r^u - 1)/(first ln r).
+        """
+        from scipy.special import exprel  # (e^x - 1)/x, also at one wavelength
+
+        first, last = self.wavelengths
+        extent, octaves = self.end - self.begin, np.log(first / last)
+        shares = self.amplitude * np.array(SHARES[self.channel])[:, None]
+        if self.channel == "cross_level":
+            shares *= 0.5  # each rail has half of the difference
+
+        def moved(s: Array) -> tuple[Array, Array]:
+            u = np.clip((s - self.begin) / extent, 0.0, 1.0)
+            waves = extent / first * u * exprel(octaves * u)
+            rate = 2.0 * np.pi / first * np.exp(octaves * u)
+            phase = 2.0 * np.pi * waves
+            return shares * np.sin(phase), shares * rate * np.cos(phase)
+
+        return faded(moved, self.begin, self.end, self.fade)
