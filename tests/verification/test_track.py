@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from railsim.definitions.rounded_profile import RoundedProfile
 from scipy.special import fresnel
 
 from railsim.definitions.loading import load_track
+from railsim.definitions.rounded_profile import RoundedProfile
 from railsim.definitions.track import Track
 from railsim.track.alignment import Alignment
 from railsim.track.tables import track_tables, usual_cell_length
