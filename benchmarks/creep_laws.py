@@ -74,7 +74,7 @@ def step_microseconds(rounds):
         settings = load_settings(overrides=[f'creep_law="{law}"'])
         prepared = prepare(load_vehicle(vehicle), load_track(track), settings, speed)
         system, state = prepared.model.system, prepared.state.copy()
-        step, _ = prepared.pace.at(speed)
+        step, _ = prepared.steps.at(speed)
         arrays = (work_arrays(system), state, np.zeros_like(state), np.zeros((3, len(state))),
                   empty_recorder(prepared.model, 1))  # fmt: skip
         time_loop(system, *arrays, FAST, step, Chunk(1, int(distance / speed / step), never))

@@ -57,7 +57,7 @@ def state_at(vehicle: str, track: str, speed: float, distance: float) -> tuple[P
     """Prepare a run and advance it to a position along the track."""
     prepared = prepare(load_vehicle(vehicle), load_track(track), Settings(), speed)
     system, state = prepared.model.system, prepared.state.copy()
-    step, _ = prepared.pace.at(speed)
+    step, _ = prepared.steps.at(speed)
     steps = int(distance / speed / step)
     time_loop(
         system,
@@ -128,7 +128,7 @@ def _step_time(prepared: Preparation, state: Floats, repetitions: int) -> float:
     work, trial = work_arrays(system), state.copy()
     derivative, stages = np.zeros_like(state), np.zeros((3, len(state)))
     recorder = empty_recorder(prepared.model, 1)
-    step, _ = prepared.pace.at(float(state[-1]))
+    step, _ = prepared.steps.at(float(state[-1]))
 
     def some_steps() -> None:
         trial[:] = state

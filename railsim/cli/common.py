@@ -85,7 +85,7 @@ def remarks_on(definition: "FileDefinition") -> list["Remark"]:
 
     found = definition.unusual()
     if isinstance(definition, Vehicle):
-        from railsim.model.experience import vehicle_remarks
+        from railsim.model.plausibility import vehicle_remarks
 
         found = [*found, *vehicle_remarks(definition)]
     if isinstance(definition, Track):

@@ -217,7 +217,7 @@ def _checked(
 def _assumption_lines(case: "Case") -> list[str]:
     """Return what the run rests on, in customary units."""
     from railsim.definitions.flatten import flatten
-    from railsim.simulation.right_samples import output_words
+    from railsim.simulation.sampling import output_words
 
     track, settings = case.track, case.settings
     wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)

@@ -3,14 +3,14 @@
 - `run`: `simulate`, the course of a run on one page
 - `conditions`, `preparation`, `ending`: its inputs checked, its model and state, its result
 - `together`: `simulate_together`, several runs in one call of the time loop
-- `told`: the finished fraction, as it is reported during the run
+- `run_progress`: the finished fraction, as it is reported during the run
 - `advance`: the time loop, chunk by chunk
-- `pace`: step and output interval at any speed; `flange`: the step judged in flange contact
-- `run_in`: the state in which a run starts, also in curves; `settling`: run-ins
+- `step_choice`: step and output interval at any speed; `flange`: the step judged in flange contact
+- `run_in`: the state in which a run starts, also in curves; `auxiliary_track`: run-ins
 - `disturbance`: initial disturbances, wheelsets kept on their rails
 - `ensemble`: several vehicles as one system
 - `outputs`: from raw records to the quantities of a result
-- `right_samples`: low-pass filter before storage
+- `sampling`: low-pass filter before storage
 - `remarks`: remarks for the reader of a result
 - `check_step`: a run compared with itself at half its step
 """

@@ -33,7 +33,7 @@ from railsim.result import MemorySink, Sink
 from railsim.result.hunting import SEEN, thinned
 from railsim.simulation.ensemble import Ensemble, contact_grid
 from railsim.simulation.outputs import OutputPlan
-from railsim.simulation.pace import Pace, duration
+from railsim.simulation.step_choice import StepChoice, duration
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -60,7 +60,7 @@ class Preparation:
         Initial state.
     end_time, end_distance : float
         Where the run ends, whichever comes first [s], [m].
-    pace : Pace
+    steps : StepChoice
         Step and output interval at any speed.
     evaluation : float
         Time from which on peaks are evaluated [s].
@@ -75,7 +75,7 @@ class Preparation:
     state: Floats
     end_time: float
     end_distance: float
-    pace: Pace
+    steps: StepChoice
     evaluation: float = 0.0
     fresh: bool = True
     remarks: tuple[str, ...] = ()
@@ -227,7 +227,7 @@ class _Convoy:
         self._stages = np.zeros((3, len(self._state)))
         self._fresh, self._due = runs[0].fresh, runs[0].due
         self._evaluates = self._state[-3] >= runs[0].prepared.evaluation - ROUND_OFF
-        self._varies = runs[0].prepared.pace.varies
+        self._varies = runs[0].prepared.steps.varies
         # equal steps of distance while the speed changes: every interval is a chunk of its own
         self._spacing = settings.output_spacing if self._varies else None
         wheelsets = [len(model.system.contact.body) for model in models]
@@ -247,10 +247,10 @@ class _Convoy:
                 self._work.vibration.copy(),
                 self._work.parts.copy(),
             )
-            paces = self._paces()
-            if len(set(paces)) > 1 or self._errors():
-                return self._parted(paces, before)
-            status, where, rows = self._chunk(*paces[0]) if paces else self._last_record()
+            choices = self._choices()
+            if len(set(choices)) > 1 or self._errors():
+                return self._parted(choices, before)
+            status, where, rows = self._chunk(*choices[0]) if choices else self._last_record()
             if status != RUNNING and len(self._runs) > 1:
                 return self._parted(self._ensemble.concerned(status, where), before)
             self._write(rows)
@@ -273,27 +273,27 @@ class _Convoy:
     def _errors(self) -> bool:
         return any(run.ended for run in self._runs)
 
-    def _paces(self) -> list[tuple[float, int]]:
+    def _choices(self) -> list[tuple[float, int]]:
         """Step and number of steps to the next output of every run; none at the end."""
         if self._left() <= 1e-9:
             return []
         if self._spacing is not None:
             right_hand_sides(self._system, self._work, self._state[None], self._derivative[None])
         speed, rate = self._state[-1], self._derivative[-1]
-        paces = []
+        choices = []
         for run in self._runs:
             try:
-                paces.append(run.prepared.pace.at(speed, rate))
+                choices.append(run.prepared.steps.at(speed, rate))
             except RailsimError as error:  # no equilibrium at this speed, or no stable step
                 if self._state[-3] > run.prepared.state[-3]:
                     run.stopped = f"the run cannot go on at {speed:.3g} m/s: {error}"
                 else:
                     run.error = error
-                paces.append((math.nan, 0))
+                choices.append((math.nan, 0))
             except Exception as error:
                 run.error = error
-                paces.append((math.nan, 0))
-        return paces
+                choices.append((math.nan, 0))
+        return choices
 
     def _chunk(self, step: float, every: int) -> tuple[int, int, int]:
         """Advance by one chunk: status, where, number of records."""

@@ -18,7 +18,7 @@ from railsim.simulation.advance import Run
 from railsim.simulation.conditions import Inputs
 from railsim.simulation.outputs import run_extremes
 from railsim.simulation.remarks import beyond_experience, run_remarks
-from railsim.simulation.right_samples import low_pass_remark
+from railsim.simulation.sampling import low_pass_remark
 
 Floats = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
             if swings
             else {}
         ),
-        "step": prepared.pace.smallest,
+        "step": prepared.steps.smallest,
         "scheme": settings.scheme,
         "wall_time": run.wall_time + time.perf_counter() - began,
         "cpu_time": run.cpu_time,

@@ -16,7 +16,7 @@ from railsim.kernels.system import System
 from railsim.kernels.time_loop import FAST
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, without_loads
-from railsim.simulation.settling import DOING, Progress, advance, curve_to_settle_in
+from railsim.simulation.auxiliary_track import DOING, Progress, advance, curve_to_settle_in
 from railsim.track.alignment import alignment_of
 from railsim.track.tables import track_tables
 

@@ -15,20 +15,20 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.model.assembly import Model, SharedTables, assemble
 from railsim.model.equilibrium import stored_equilibrium
-from railsim.model.experience import vehicle_remarks
+from railsim.model.plausibility import vehicle_remarks
 from railsim.model.time_step import SCHEMES
 from railsim.profiles import Profile
 from railsim.result import Sink
 from railsim.result.stored import StoredPeaks, lost_peak
 from railsim.simulation.advance import Preparation, Run
+from railsim.simulation.auxiliary_track import Progress as SettlingProgress
 from railsim.simulation.conditions import Inputs
 from railsim.simulation.disturbance import disturb
 from railsim.simulation.outputs import OutputPlan, run_extremes
-from railsim.simulation.pace import Pace, inputs_hash
-from railsim.simulation.right_samples import filtering, low_pass_remark, output_words, sampled
 from railsim.simulation.run_in import start_state
-from railsim.simulation.settling import Progress as SettlingProgress
-from railsim.simulation.told import Told
+from railsim.simulation.run_progress import RunProgress
+from railsim.simulation.sampling import filtering, low_pass_remark, output_words, sampled
+from railsim.simulation.step_choice import StepChoice, inputs_hash
 from railsim.track.irregularity import measured_remarks
 
 Floats = NDArray[np.float64]
@@ -57,8 +57,10 @@ def prepare(
     inputs = inputs_hash(vehicle, track, settings, model)
     balance = stored_equilibrium(model, speed, inputs)
     model = balance.model
-    pace = Pace(model, sampled(settings), track, {speed: balance.state}, inputs, on_judgement)
-    step, _ = pace.at(speed)
+    steps = StepChoice(
+        model, sampled(settings), track, {speed: balance.state}, inputs, on_judgement
+    )
+    step, _ = steps.at(speed)
     unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
     remarks: list[str] = [*balance.remarks, *unusual, *measured_remarks(track)]
     if before is None:
@@ -81,7 +83,7 @@ def prepare(
         state,
         end_time=math.inf if duration is None else float(state[-3]) + duration,
         end_distance=track.length if until is None else until,
-        pace=pace,
+        steps=steps,
         fresh=before is None,
         remarks=tuple(remarks),
     )
@@ -123,7 +125,7 @@ def begin(
     profiles: Mapping[str, Profile] | None,
     before: Floats | None,
     shared: SharedTables,
-    told: Told,
+    fraction: RunProgress,
 ) -> Run:
     """Prepare a run and tell its sink what will come."""
     began = time.perf_counter()
@@ -139,8 +141,8 @@ def begin(
         profiles,
         shared,
         before,
-        on_judgement=told.of_judgement,
-        on_run_in=told.of_run_in,
+        on_judgement=fraction.of_judgement,
+        on_run_in=fraction.of_run_in,
     )
     for remark in prepared.remarks:
         _START.warning(remark)

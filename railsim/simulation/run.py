@@ -20,11 +20,11 @@ from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.simulation.advance import advance
+from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.conditions import Inputs, state_before
 from railsim.simulation.ending import end
 from railsim.simulation.preparation import begin
-from railsim.simulation.settling import DOING
-from railsim.simulation.told import Progress, Told
+from railsim.simulation.run_progress import Progress, RunProgress
 
 Floats = NDArray[np.float64]
 
@@ -102,12 +102,12 @@ def simulate(
                 raise InputError([argument_fault(name, "", found, allowed)])
         speed, start = own["speed"], own["start"]
     inputs = Inputs.checked(track, settings, speed, start, duration, until)
-    told = Told(progress, 1, inputs)
-    told.next_run()
+    fraction = RunProgress(progress, 1, inputs)
+    fraction.next_run()
     sink = MemorySink() if sink is None else sink
-    run = begin(vehicle, inputs, sink, profiles, before, SharedTables(), told)
+    run = begin(vehicle, inputs, sink, profiles, before, SharedTables(), fraction)
     DOING.info("")
-    for _ in advance([run], settings, told.of_runs):
+    for _ in advance([run], settings, fraction.of_runs):
         pass
     if run.error is not None:
         raise run.error

@@ -44,7 +44,13 @@ from railsim.linear.steady import NotConverged, led
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium, initial_state
 from railsim.model.work import CONSTANT_SPEED, without_loads, work_arrays
-from railsim.simulation.settling import DOING, NEGLIGIBLE, Progress, advance, curve_to_settle_in
+from railsim.simulation.auxiliary_track import (
+    DOING,
+    NEGLIGIBLE,
+    Progress,
+    advance,
+    curve_to_settle_in,
+)
 from railsim.track.alignment import Alignment, alignment_of
 from railsim.track.tables import track_tables
 

@@ -17,11 +17,11 @@ from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile
 from railsim.result import MemorySink, Result, Sink
 from railsim.simulation.advance import Run, advance
+from railsim.simulation.auxiliary_track import DOING
 from railsim.simulation.conditions import Inputs
 from railsim.simulation.ending import end
 from railsim.simulation.preparation import begin
-from railsim.simulation.settling import DOING
-from railsim.simulation.told import Progress, Told
+from railsim.simulation.run_progress import Progress, RunProgress
 
 Floats = NDArray[np.float64]
 
@@ -121,17 +121,17 @@ def outcomes(
     found: list[Result | Exception | None] = [None] * len(vehicles)
     runs: dict[Run, int] = {}
     sinks = [MemorySink() for _ in vehicles] if sinks is None else sinks
-    told = Told(progress, len(vehicles), inputs)
+    fraction = RunProgress(progress, len(vehicles), inputs)
     for number, (vehicle, sink) in enumerate(zip(vehicles, sinks, strict=True)):
-        told.next_run()
+        fraction.next_run()
         try:
-            run = begin(vehicle, inputs, sink, profiles, None, shared, told)
+            run = begin(vehicle, inputs, sink, profiles, None, shared, fraction)
         except Exception as error:
             found[number] = error
         else:
             runs[run] = number
     DOING.info("")
-    for run in advance(list(runs), settings, told.of_runs):
+    for run in advance(list(runs), settings, fraction.of_runs):
         number = runs[run]
         try:
             found[number] = run.error or end(run, vehicles[number], inputs, None)

@@ -7,14 +7,14 @@ import sys
 import pytest
 
 import railsim.cli.interrupts
+import railsim.simulation.auxiliary_track
 import railsim.simulation.flange
 import railsim.simulation.preparation
 import railsim.simulation.run_in
-import railsim.simulation.settling
 from railsim.cli import main
 from railsim.cli.interrupts import remembered_interrupts
 from railsim.cli.progress import progress_bar
-from railsim.simulation import pace
+from railsim.simulation import step_choice
 
 RUN = ["run", "coach_manchester", "curve_r250", "--speed", "20", "--until", "10", "--quiet"]
 STUDY = ["study", "--vehicles", "coach_manchester", "--tracks", "curve_r250", "--speeds", "20"]
@@ -96,7 +96,7 @@ def test_run_obeys_a_signal_that_python_loses_before_it(
 
     Either is left after the call in hand.
     """
-    calls, time_loop = [], railsim.simulation.settling.time_loop
+    calls, time_loop = [], railsim.simulation.auxiliary_track.time_loop
 
     def interrupted(*arguments):
         calls.append(1)
@@ -104,11 +104,11 @@ def test_run_obeys_a_signal_that_python_loses_before_it(
         return time_loop(*arguments)
 
     def advance(*arguments):
-        monkeypatch.setattr(railsim.simulation.settling, "time_loop", interrupted)
+        monkeypatch.setattr(railsim.simulation.auxiliary_track, "time_loop", interrupted)
         return settle(*arguments)
 
     settle = module.advance
-    monkeypatch.setattr(pace, "_JUDGED", {})  # by another test, perhaps
+    monkeypatch.setattr(step_choice, "_JUDGED", {})  # by another test, perhaps
     monkeypatch.setattr(module, "advance", advance)
     run = ["run", "coach_manchester", "curve_r250", "--speed", speed, "--start", "390", "--quiet"]
     assert main([*run, "--out", str(tmp_path / "run.h5")]) == 130
@@ -137,9 +137,9 @@ def test_bar_says_what_comes_before_a_run(monkeypatch):
         def close(self):
             pass
 
-    monkeypatch.setattr(pace, "_JUDGED", {})  # by another test, perhaps
+    monkeypatch.setattr(step_choice, "_JUDGED", {})  # by another test, perhaps
     monkeypatch.setattr("tqdm.tqdm", Bar)
-    monkeypatch.setattr(railsim.simulation.settling, "WHEELSET_STEPS", 4000)
+    monkeypatch.setattr(railsim.simulation.auxiliary_track, "WHEELSET_STEPS", 4000)
     coach, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     with progress_bar("a run", quiet=False) as progress:
         railsim.simulate(coach, track, speed=20.0, start=390.0, duration=0.1, progress=progress)

@@ -5,7 +5,7 @@ import pytest
 
 import railsim
 import railsim.simulation.advance
-import railsim.simulation.settling
+import railsim.simulation.auxiliary_track
 
 
 def run():
@@ -44,7 +44,7 @@ def test_run_in_may_be_interrupted_and_is_the_same_in_pieces(monkeypatch):
     vehicle = railsim.load_vehicle("coach_manchester")
     how = {"speed": 20.0, "start": 390.0, "duration": 0.1}
     whole = railsim.simulate(vehicle, track, **how)
-    monkeypatch.setattr(railsim.simulation.settling, "WHEELSET_STEPS", 4 * 137)
+    monkeypatch.setattr(railsim.simulation.auxiliary_track, "WHEELSET_STEPS", 4 * 137)
     pieces = railsim.simulate(vehicle, track, **how)
     for name in whole:
         np.testing.assert_array_equal(pieces[name], whole[name])

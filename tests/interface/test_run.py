@@ -16,7 +16,7 @@ from started import started
 import railsim
 from railsim.cli import main
 from railsim.errors import ModelError
-from railsim.simulation.pace import Pace
+from railsim.simulation.step_choice import StepChoice
 
 COACH = ["run", "coach_manchester", "curve_r250"]
 # Ten metres of straight track: the shortest run that goes through everything.
@@ -299,14 +299,14 @@ def test_braking_to_a_standstill_keeps_the_run(tmp_path, capsys, monkeypatch, st
     Constant force: t = m V / F, with the wheelsets' inertia some 60 t and 1.2 s.
     """
     (tmp_path / "braking.toml").write_text(BRAKING)
-    at = Pace.at
+    at = StepChoice.at
 
     def until_walking_speed(self, speed, rate=0.0):
         if not stable and speed < 2.0:
             raise ModelError("no equilibrium")
         return at(self, speed, rate)
 
-    monkeypatch.setattr(Pace, "at", until_walking_speed)
+    monkeypatch.setattr(StepChoice, "at", until_walking_speed)
     given = ["run", "coach_manchester", "straight", "--speed", "3", "--duration", "9", "--quiet"]
     given += ["--settings", str(tmp_path / "braking.toml"), "--out", str(tmp_path / "run.h5")]
     assert main(given) == 3

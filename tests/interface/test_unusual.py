@@ -8,7 +8,7 @@ import pytest
 import railsim
 from railsim import cli
 from railsim.definitions.vehicle import Vehicle
-from railsim.model.experience import vehicle_remarks
+from railsim.model.plausibility import vehicle_remarks
 from railsim.result import peak
 
 BODY = {"mass": 8e3, "inertia": [5e3, 9e3, 9e3], "position": [0.0, 0.0, -1.2]}

@@ -6,7 +6,7 @@ import pytest
 import railsim
 from railsim.kernels import cache
 from railsim.model import equilibrium, solutions
-from railsim.simulation import pace
+from railsim.simulation import step_choice
 
 
 @pytest.fixture
@@ -21,11 +21,13 @@ def folder(monkeypatch, tmp_path):
 def solved(monkeypatch):
     """Names of what was not found on the disk."""
     calls = []
-    find, judge = equilibrium.equilibrium, pace.Pace._stable
+    find, judge = equilibrium.equilibrium, step_choice.StepChoice._stable
     monkeypatch.setattr(
         equilibrium, "equilibrium", lambda *a: calls.append("equilibrium") or find(*a)
     )
-    monkeypatch.setattr(pace.Pace, "_stable", lambda *a: calls.append("step") or judge(*a))
+    monkeypatch.setattr(
+        step_choice.StepChoice, "_stable", lambda *a: calls.append("step") or judge(*a)
+    )
     return calls
 
 

@@ -151,7 +151,7 @@ def test_mirrored_track_gives_the_mirrored_run(law, coach):
 def chosen_step(vehicle, law, speed):
     prepared = prepare(load_vehicle(vehicle), load_track("straight"), Settings(creep_law=law),
                        speed)  # fmt: skip
-    return prepared.pace.at(speed)[0]
+    return prepared.steps.at(speed)[0]
 
 
 @pytest.mark.parametrize("vehicle", ["coach_manchester", "coach_flexicoil"])

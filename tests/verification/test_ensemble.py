@@ -19,7 +19,7 @@ from railsim.kernels.fastsim_simd import available
 from railsim.model.assembly import SharedTables, assemble
 from railsim.model.time_step import empty_recorder
 from railsim.result import MemorySink
-from railsim.simulation import outcomes, pace
+from railsim.simulation import outcomes, step_choice
 from railsim.simulation.ensemble import Ensemble
 
 COACH = "coach_manchester"
@@ -133,13 +133,13 @@ def test_the_one_that_finds_no_step_on_the_way_fails_by_itself(monkeypatch):
     drive = {"mode": "table", "speed_table": [[0.0, 20.0], [5.0, 20.0], [15.0, 15.0]]}
     vehicles = [coach(), with_mass(35e3)]
 
-    class NoStepForTheSecond(pace.Stability):
+    class NoStepForTheSecond(step_choice.Stability):
         def __init__(self, model, system, state, *how):
             if state[-1] < 17.0 and model.system.bodies.mass[0] == 35e3:
                 raise ModelError("no stable step")
             super().__init__(model, system, state, *how)
 
-    monkeypatch.setattr(pace, "Stability", NoStepForTheSecond)
+    monkeypatch.setattr(step_choice, "Stability", NoStepForTheSecond)
     fine, failure = outcomes(vehicles, load_track("straight"), until=20.0,
                              settings=Settings(drive=drive))  # fmt: skip
     assert fine.status == "complete"

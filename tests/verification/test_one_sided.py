@@ -10,7 +10,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import ModelError
 from railsim.model.assembly import without_rails
-from railsim.model.experience import vehicle_remarks
+from railsim.model.plausibility import vehicle_remarks
 from railsim.model.preloads import static_shares
 
 PAD = {

@@ -8,7 +8,7 @@ from railsim.simulation.conditions import Inputs
 Progress = Callable[[float], None]
 
 
-class Told:
+class RunProgress:
     """The finished fraction of runs and of what comes before them, by simulated time.
 
     Before a run its step is judged in flange contact, and it may have a run-in.

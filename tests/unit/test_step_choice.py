@@ -5,7 +5,7 @@ import pytest
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
-from railsim.simulation import pace
+from railsim.simulation import step_choice
 from railsim.simulation.preparation import prepare
 
 
@@ -17,15 +17,15 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
         judged.append((float(state[-1]), float(model.system.track.rail[0, 4, 0])))
 
     def steps(frictions):
-        monkeypatch.setattr(pace, "_JUDGED", {})
+        monkeypatch.setattr(step_choice, "_JUDGED", {})
         judged.clear()
         runs = {mu: track.replace(friction=(mu, mu)) for mu in frictions}
         return {
-            mu: prepare(vehicle, run, Settings(), 20.0, duration=1.0).pace.at(20.0)
+            mu: prepare(vehicle, run, Settings(), 20.0, duration=1.0).steps.at(20.0)
             for mu, run in runs.items()
         }
 
-    monkeypatch.setattr(pace, "in_flange_contact", settled)
+    monkeypatch.setattr(step_choice, "in_flange_contact", settled)
     forwards = steps([0.21, 0.28, 0.35])
     # one judgement for two runs, at the lowest speed and highest friction of their class
     assert judged == [pytest.approx((1.2**16, 0.3)), pytest.approx((1.2**16, 0.4))]
@@ -36,16 +36,16 @@ def test_runs_of_a_class_share_a_judgement_in_any_order(monkeypatch):
 def test_given_step_is_refused_where_it_is_unstable_and_longer_than_a_stable_one(monkeypatch):
     """Differences across a kink of the forces make a short step look unstable, too."""
 
-    class OnlyOne(pace.Stability):
+    class OnlyOne(step_choice.Stability):
         def holds(self, h, margin=1.0):
             return h == 1.0 / 600.0
 
-    monkeypatch.setattr(pace, "Stability", OnlyOne)
+    monkeypatch.setattr(step_choice, "Stability", OnlyOne)
     vehicle, track = load_vehicle("coach_manchester"), load_track("straight")
 
     def step(given):
         settings = Settings(step=given)
-        return prepare(vehicle, track, settings, 20.0, duration=1.0).pace.at(20.0)[0]
+        return prepare(vehicle, track, settings, 20.0, duration=1.0).steps.at(20.0)[0]
 
     assert step(1e-3) == 1e-3
     assert step(1.66667e-3) == 5e-3 / 3  # as it is printed

@@ -24,8 +24,8 @@ from railsim.model.equilibrium import equilibrium
 from railsim.model.solutions import solution
 from railsim.model.time_step import MARGIN, Stability
 from railsim.model.work import level_track_with_friction
+from railsim.simulation.auxiliary_track import Progress
 from railsim.simulation.flange import in_flange_contact
-from railsim.simulation.settling import Progress
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ MOST_JUDGED = 10_000
 _JUDGED: dict[str, bool] = {}
 
 
-class Pace:
+class StepChoice:
     """Step and output interval of a run, chosen once for each class of speeds where these vary.
 
     Creep forces stiffen as 1/V, and in flange contact friction feeds vibrations: a class is judged
