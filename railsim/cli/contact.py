@@ -11,6 +11,7 @@ from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
     from railsim.contact.summary import Array, ContactSummary
+    from railsim.description import Description
     from railsim.profiles import Profile
 
 TABLES = ("functions.csv", "conicity.csv", "patches.csv")
@@ -148,12 +149,10 @@ def command(
       railsim contact measured.whl 54E1 --overlay S1002 --out worn
       railsim contact --creep --friction 0.35 --out creep
     """  # noqa: D301 - click reads the escape
-    from railsim.assessment.influences import RADIUS, steering_index
     from railsim.cli import creep as creep_part
     from railsim.cli.analysis import values_of
     from railsim.contact import tables
     from railsim.contact.creep_curves import forces_by_law
-    from railsim.contact.gauges import gauge_table
     from railsim.contact.summary import conicity_over_gauge, contact_summary
     from railsim.profiles import load_profile
 
@@ -198,23 +197,13 @@ def command(
     patch = found.main_patch(friction) if creep else None
     creep_rows = forces_by_law(patch) if patch else []
     by_gauge = conicity_over_gauge(found, over) if over else None
-    gauge_values = gauge_table(
-        (found.pairs[0].wheel, found.pairs[1].wheel),
-        diameter=2.0 * min(radii),
-        back_to_back=back_to_back,
-        gauge=gauge,
-    )
-    steering = steering_index(found.geometry, RADIUS, min(radii))
-    words = f"steering index at R {RADIUS:g} m: {steering:.2f}; above 1 the flange steers too"
-    shown: list[Any] = [
-        tables.printed_functions(found),
-        tables.printed_conicity(found),
-        gauge_values,
-        words,
-        tables.patch_table(found),
-    ]
-    shown += [tables.conicity_map_table(found, over, by_gauge)] if by_gauge is not None else []
-    shown += [tables.creep_table(patch, creep_rows)] if patch else []
+    described = _described(found)
+    if by_gauge is not None:
+        described.data.update(gauges=over, conicity_over_gauge=by_gauge.tolist())
+        described.parts.extend(["", tables.conicity_map_table(found, over, by_gauge)])
+    if patch:
+        described.data.update(creep=creep_rows)
+        described.parts.extend(["", tables.creep_table(patch, creep_rows)])
     if folder:
         make_folder(folder)
         if patch:
@@ -225,16 +214,11 @@ def command(
         if compared is not None:
             _write_overlay(folder, found, compared)
     if as_json:
-        data = _record(found) | {"gauge_values": gauge_values.records()}
-        data["steering_index"] = {"radius": RADIUS, "value": steering}
-        if by_gauge is not None:
-            data |= {"gauges": over, "conicity_over_gauge": by_gauge.tolist()}
-        print_json(data | ({"creep": creep_rows} if patch else {}))
+        print_json(described.data)
         return
     for note in found.notes:
         echo(note, err=True)
-    for number, table in enumerate(shown):
-        show(*([""] if number else []), table)
+    show(*described.parts)
     if folder and not quiet:
         echo(f"wrote {', '.join(written)} to {folder}", err=True)
 
@@ -285,15 +269,37 @@ def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
     return loaded[names[0]], loaded[names[-1]]
 
 
-def _record(found: "ContactSummary") -> dict[str, Any]:
-    """Everything for ``--json``, SI."""
+def _described(found: "ContactSummary") -> "Description":
+    """Return what is printed, and everything for ``--json``, SI."""
+    from railsim.assessment.influences import RADIUS, steering_index
+    from railsim.contact import tables
+    from railsim.contact.gauges import gauge_table
+    from railsim.description import Description
+
+    left, right = found.pairs
+    gauge_values = gauge_table(
+        (left.wheel, right.wheel),
+        diameter=2.0 * min(found.radii),
+        back_to_back=left.back_to_back,
+        gauge=left.gauge,
+    )
+    steering = steering_index(found.geometry, RADIUS, min(found.radii))
     data: dict[str, Any] = {name: values.tolist() for name, values in found.functions.items()}
     data["equivalent_conicity"] = [
         {"amplitude": float(a), "value": float(v)}
         for a, v in zip(found.amplitudes, found.conicity, strict=True)
     ]
     data["jumps"] = [{"lateral": lateral, "side": side} for lateral, side in found.geometry.jumps()]
-    return data | {"patches": found.patches, "notes": found.notes}
+    data |= {
+        "patches": found.patches,
+        "notes": found.notes,
+        "gauge_values": gauge_values.records(),
+        "steering_index": {"radius": RADIUS, "value": steering},
+    }
+    words = f"steering index at R {RADIUS:g} m: {steering:.2f}; above 1 the flange steers too"
+    functions, conicity = tables.printed_functions(found), tables.printed_conicity(found)
+    patches = tables.patch_table(found)
+    return Description(data, [functions, "", conicity, "", gauge_values, words, "", patches])
 
 
 def _write(folder: Path, found: "ContactSummary") -> None:

@@ -25,7 +25,7 @@ class Description:
     """
 
     data: dict[str, Any]
-    parts: Sequence[str | Table]
+    parts: list[str | Table]
 
     def __repr__(self) -> str:
         return "\n".join(str(part) for part in self.parts)
