@@ -26,6 +26,7 @@ SHOWN_UNITS = {
     "kN m": ("N m", 1e-3),
     "kN/m": ("N/m", 1e-3),
     "N/mm": ("N/m", 1e-3),
+    "kN m/rad": ("N m/rad", 1e-3),
     "MPa": ("Pa", 1e-6),
     "kW": ("W", 1e-3),
     "mrad": ("rad", 1e3),
