@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from railsim.notation import SHOWN_UNITS
 from railsim.table import Amount, Column, Table
@@ -21,7 +21,7 @@ class Check:
     name: str
     value: float
     limit: float
-    sense: Literal["above", "below", "about"]  # side on which it must be; about: a rule of thumb
+    sense: str  # side on which it must be, "above" or "below"; "about": a rule of thumb
     unit: str
     note: str  # what is compared, where the limit comes from
 

@@ -42,8 +42,8 @@ RIDE_HEIGHT = [
     Column("name", "ride height at"),
     Column("load", "P", "kN", ".3f"),
     Column("random", "statistical (RSS), ±", "mm", ".2f"),
-    Column("lowest", "worst case, low", "mm", "+z.2f"),
-    Column("highest", "worst case, high", "mm", "+z.2f"),
+    Column("lowest", "worst case, low", "mm", "+.2f"),
+    Column("highest", "worst case, high", "mm", "+.2f"),
 ]
 SEARCH = [
     Column("rank", format="d"),
@@ -52,8 +52,8 @@ SEARCH = [
     Column("heights", "H0 outer/inner (mm)", format=">"),
     Column("mass", "mass", "kg", ".2f"),
     Column("fatigue_margin", "fatigue margin", "", ".3f"),
-    Column("mounting_error", "error at mounting", "mm", "+z.2f"),
-    Column("target_error", "error at target", "mm", "+z.2f"),
+    Column("mounting_error", "error at mounting", "mm", "+.2f"),
+    Column("target_error", "error at target", "mm", "+.2f"),
     Column("active", "active limits"),
 ]
 
@@ -122,12 +122,12 @@ def case_table(result: Verification) -> Table:
     columns = [
         Column("name", "load case"),
         Column("load", "P", "kN", ".3f"),
-        Column("rotation", "", "deg", "+z.4f"),
+        Column("rotation", "", "deg", "+.4f"),
         Column("deflection", "dz", "mm", ".3f"),
         Column("K_sys", "", "N/mm", ".3f"),
         Column("rate", "tangent", "N/mm", ".1f"),
         *(Column(f"height_{name}", f"H {name}", "mm", ".2f") for name in result.cases[0].springs),
-        Column("dx", "", "mm", "+z.3f"),
+        Column("dx", "", "mm", "+.3f"),
         Column("K_L", "", "N/mm", ".2f"),
         Column("K_C", "", "kN m/rad", ".3f"),
     ]
