@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from railsim import Result, Settings, load_track, load_vehicle, simulate
+from railsim.definitions.schema import check_markers
 from railsim.notation import QUANTITIES, REQUESTED, Quantity
 from railsim.plot.histories import histories
 
@@ -114,6 +115,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---:"
 
 def filled(text: str, known: dict[str, str]) -> str:
     """Return a page with its tables filled."""
+    check_markers(text)
     return TABLE.sub(lambda match: f"{match[1]}\n{known[match[2]]}\n{match[3]}", text)
 
 

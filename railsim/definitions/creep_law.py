@@ -1,9 +1,7 @@
 """The creep laws: what settings, plots, texts and the time loop know of each."""
 
 from dataclasses import dataclass
-from typing import Literal
-
-CreepLawName = Literal["fastsim", "table", "fastrip", "polach", "linear", "adhesion_curve"]
+from typing import TYPE_CHECKING, Literal
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class CreepLaw:
     measured: bool = False
 
 
-CREEP_LAWS: dict[CreepLawName, CreepLaw] = {
+CREEP_LAWS: dict[str, CreepLaw] = {
     "fastsim": CreepLaw(
         0, "FASTSIM", 0, "Kalker's simplified theory (1982), the usual compromise", grid=True
     ),
@@ -61,3 +59,8 @@ CREEP_LAWS: dict[CreepLawName, CreepLaw] = {
     ),
 }
 """Every creep law by its name in a settings file."""
+
+if TYPE_CHECKING:
+    CreepLawName = str
+else:
+    CreepLawName = Literal[tuple(CREEP_LAWS)]

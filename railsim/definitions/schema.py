@@ -174,8 +174,26 @@ def _limited(schema: dict[str, Any]) -> str:
     return " ".join([names.get(schema["type"], schema["type"]), *limits])
 
 
+_MARKERS = re.compile(r"<!-- (keys: .*?|generated: .*?|end|end of keys) -->")
+
+
+def check_markers(text: str) -> None:
+    """Raise ValueError where a begin and an end of a filled table of a page do not alternate."""
+    opened = ""
+    for match in _MARKERS.finditer(text):
+        ends = match[1].startswith("end")
+        if ends != bool(opened) or (ends and opened.startswith("keys:") != (match[1] != "end")):
+            raise ValueError(
+                f"line {text.count(chr(10), 0, match.start()) + 1}: {match[0]} has no partner"
+            )
+        opened = "" if ends else match[1]
+    if opened:
+        raise ValueError(f"<!-- {opened} --> has no end")
+
+
 def filled(text: str) -> str:
     """Return a page of the manual with its key tables filled."""
+    check_markers(text)
 
     def table(match: re.Match[str]) -> str:
         begin = f"<!-- keys: {match['format']} {match['name']} -->\n"

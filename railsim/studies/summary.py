@@ -198,8 +198,7 @@ def _write_rows(rows: Iterable[Row], stream: BinaryIO) -> None:
     with tempfile.TemporaryFile() as lines:  # all columns are known at the end only
         for row in rows:
             columns.update(dict.fromkeys(row))
-            cells = [row.get(name, "") for name in columns]
-            line = _csv_line([spreadsheet_cell(c) if isinstance(c, str) else c for c in cells])
+            line = _csv_line(spreadsheet_cell(row.get(name, "")) for name in columns)
             lines.write(line)
             sizes.append((len(line), len(columns)))
         units = {name: unit_of(name) for name in columns}

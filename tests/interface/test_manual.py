@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from railsim.cli import railsim as command_line
+from railsim.definitions.schema import check_markers
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -31,6 +32,16 @@ def generated(name):
     """Tables of this name, in all pages."""
     block = re.compile(rf"<!-- generated: {name} -->\n\n(.*?)\n<!-- end -->", re.DOTALL)
     return [table for page in PAGES for table in block.findall(page.read_text("utf-8"))]
+
+
+def test_markers_of_filled_tables_alternate():
+    """A second end marker once swallowed a section."""
+    for page in PAGES:
+        check_markers(page.read_text("utf-8"))
+    table = "<!-- generated: a -->\n<!-- end -->\n"
+    for wrong in ("<!-- end -->", "<!-- generated: b -->", "<!-- keys: f N --><!-- end -->"):
+        with pytest.raises(ValueError, match=r"partner|no end"):
+            check_markers(table + wrong)
 
 
 def test_table_of_quantities_is_up_to_date(generate):
