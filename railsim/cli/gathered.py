@@ -27,11 +27,14 @@ class Gathered:
         Result files by the names of the runs that have one.
     remarks : list of str
         What was not found as the records say.
+    inputs : dict
+        Inputs of the study, if they are the runs of one.
     """
 
     records: list[Record] = field(default_factory=list)
     paths: dict[str, Path] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    inputs: dict[str, Any] = field(default_factory=dict)
 
     def results(self, names: Sequence[str]) -> "dict[str, Result]":
         """Open the results of some runs; runs without a file are left out."""
@@ -56,13 +59,14 @@ def gather(files: Sequence[str]) -> Gathered:
     for file in files:
         path = folder_of(file)
         try:
-            records = _of_folder(path) if os.path.isdir(path) else [_of_file(path)]
+            records, inputs = _of_folder(path) if os.path.isdir(path) else ([_of_file(path)], {})
         except InputError as error:
             faults.extend(error.faults)
             continue
         if not records:
             allowed = "the folder of a study, or one with .h5 files"
             faults.append(Fault(file, "", "no results in this folder", allowed))
+        found.inputs = inputs if len(files) == 1 else {}
         _add(found, records, path if os.path.isdir(path) else path.parent, prefix=len(files) > 1)
     names = [record["name"] for record in found.records]
     twice = {name for name in names if names.count(name) > 1} if len(files) > 1 else set()
@@ -114,22 +118,23 @@ def _add(found: Gathered, records: Sequence[Record], folder: Path, *, prefix: bo
             missing += 1
     if missing:
         found.remarks.append(
-            f"{missing} of {len(records)} runs in {folder} have no result file any more, only "
-            "their summary: their curves cannot be shown."
+            f"{missing} of {len(records)} runs in {folder} have no result file "
+            "(`--keep summary`, or removed): only their summary can be shown."
         )
 
 
-def _of_folder(folder: Path) -> list[Record]:
+def _of_folder(folder: Path) -> tuple[list[Record], dict[str, Any]]:
+    """Records of the runs of a folder, and the inputs of their study."""
     from railsim.studies.journal import JOURNAL, Journal, Records
     from railsim.studies.summary import read_index
 
     if (folder / "study.json").is_file():
-        runs = [run.model_dump() for run in read_index(folder / "study.json").runs]
-        return [{"labels": {}, **run} for run in runs]
+        index = read_index(folder / "study.json")
+        return [{"labels": {}, **run.model_dump()} for run in index.runs], index.inputs.model_dump()
     if (folder / JOURNAL).is_file():
         with Journal(folder) as journal:
-            return list(Records(journal.path, list(journal.entries.values())))
-    return [_of_file(path) for path in sorted(folder.glob("*.h5"))]
+            return list(Records(journal.path, list(journal.entries.values()))), {}
+    return [_of_file(path) for path in sorted(folder.glob("*.h5"))], {}
 
 
 def _of_file(path: Path) -> Record:

@@ -66,9 +66,14 @@ def write_report(
     found = gather(files)
     with_files = [record for record in found.records if record["name"] in found.paths]
     results = found.results(worst_runs(with_files, curves))
-    names = ", ".join(dict.fromkeys(Path(file).resolve().stem for file in files[:4]))
+    study = found.inputs.get("name")
+    names = (
+        str(study)
+        if study
+        else ", ".join(dict.fromkeys(Path(file).resolve().stem for file in files[:4]))
+    )
     more = f" and {len(files) - 4} more" if len(files) > 4 else ""
     every = found.results([record["name"] for record in with_files])
-    text = page(title or names + more, found.records, results, found.remarks, every)
+    text = page(title or names + more, found.records, results, found.remarks, every, found.inputs)
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")

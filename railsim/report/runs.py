@@ -19,7 +19,7 @@ from railsim.report.curves import cells_of, curve_data, groups
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published
-from railsim.report.spread import LEAST, WORDS, columns, parameters, spread_rows
+from railsim.report.spread import LEAST, WORDS, columns, command, parameters, spread_rows
 from railsim.report.tables import Cell, Table
 from railsim.result import Result
 from railsim.text import printable
@@ -27,6 +27,7 @@ from railsim.version import __version__
 
 Record = Mapping[str, Any]
 MOST_ROWS = 300  # of a table on the page
+MOST_SHOWN = 12  # values of an input of a study
 MOST_DIFFERENCES = 40  # keys in which the vehicles differ
 
 
@@ -71,6 +72,7 @@ def page(
     results: Mapping[str, Result],
     remarks: Sequence[str] = (),
     assessable: Mapping[str, Result] | None = None,
+    inputs: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the page as HTML.
 
@@ -87,6 +89,8 @@ def page(
         Further notes for the reader.
     assessable : mapping of str to Result, optional
         All results, which are assessed together; by default `results`.
+    inputs : mapping, optional
+        Inputs of the study whose runs these are, as in its ``study.json``.
     """
     found = groups(results)
     cells = cells_of(found)
@@ -100,18 +104,18 @@ def page(
         title_of = "Comparison with limits"
         tables, details = limits.tables, limits.details
         sections.append(Section("limits", title_of, tables=tables, details=details))
-    if spread := _spread(records, data):
+    if spread := _spread(records, data, inputs or {}):
         sections.append(spread)
     if published := _published(results):
         sections.append(published)
-    sections.append(_what_was_run(records, results))
+    sections.append(_what_was_run(results, inputs or {}))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report",
         "templates/runs.html",
         title=title,
         styles=["vendor/uPlot.min.css", "templates/runs.css"],
-        scripts=["vendor/uPlot.iife.min.js", "templates/runs.js"],
+        scripts=["vendor/uPlot.iife.min.js", "templates/study.js", "templates/runs.js"],
         data=data,
         schemes="light dark",
         lead=_lead(records, results),
@@ -179,9 +183,11 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
     )
     texts = ["Largest magnitudes over all steps after the start of the run, with their "
              "signs; wheelsets are numbered from the leading end."]  # fmt: skip
-    if len(shown) < len(_done(records)):
+    if not shown:
+        texts = ["The study kept no results of its runs (`--keep summary`); their values follow."]
+    elif len(shown) < len(_done(records)):
         texts.append(f"{len(shown)} of {len(_done(records))} runs, those with the largest values; "
-                     "all others are in the spread and in the study's summary.csv.")  # fmt: skip
+                     "all others follow in the table of runs.")  # fmt: skip
     return Section("peaks", "Peaks", texts, tables=[table] if shown else [])
 
 
@@ -195,22 +201,39 @@ def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result
     return Section("curves", "Along the track", texts, plots=[str(k) for k in range(number)])
 
 
-def _spread(records: Sequence[Record], data: dict[str, Any]) -> Section | None:
+def _spread(
+    records: Sequence[Record], data: dict[str, Any], inputs: Mapping[str, Any]
+) -> Section | None:
+    """Table of all runs, and what their values depend on."""
     done = _done(records)
-    varied = parameters(done)
-    if len(done) < LEAST or not varied:
+    if len(records) < LEAST:
         return None
-    data["spread"] = {"parameters": varied, "columns": columns(done)}
-    rows = spread_rows(done)
+    varied = parameters(records)
+    data["spread"] = {
+        "parameters": varied,
+        "columns": columns(records),
+        "runs": [
+            {
+                "name": printable(str(record["name"])),
+                "status": str(record["status"]),
+                "reason": printable(str(record.get("status_reason", ""))),
+                "command": printable(command(record, inputs)),
+            }
+            for record in records
+        ],
+    }
     table = Table(
         ["value", "smallest", "in run", "median", "largest", "in run"],
-        rows,
+        spread_rows(done),
         f"Spread over {len(done)} runs",
         words=frozenset({0, 2, 5}),
         note="Peaks and medians over full curves by magnitude, over all wheels.",
     )
-    texts = [f"Varied: {', '.join(map(printable, varied))}."]
-    return Section("spread", "Over the study", texts, plots=["spread"], details=[table])
+    section = Section("spread", "Over the study", plots=["runs"], details=[table])
+    if len(done) >= LEAST and varied:
+        section.texts = [f"Varied: {', '.join(map(printable, varied))}."]
+        section.plots.insert(0, "spread")
+    return section
 
 
 def _published(results: Mapping[str, Result]) -> Section | None:
@@ -244,18 +267,16 @@ def _published(results: Mapping[str, Result]) -> Section | None:
     return Section("published", "Comparison with published values", tables=tables)
 
 
-def _what_was_run(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
+def _what_was_run(results: Mapping[str, Result], inputs: Mapping[str, Any]) -> Section:
     section = Section("inputs", "Inputs")
-    label = {record["name"]: record["labels"] for record in records}
     vehicles: dict[str, Any] = {}
     tracks: dict[str, list[Track]] = {}
-    for name, result in results.items():
-        own = label.get(name, {})
+    for result in results.values():
         vehicle, track = result.vehicle(), result.track()
-        vehicles.setdefault(str(own.get("vehicle", vehicle.name)), vehicle)
-        tracks.setdefault(str(own.get("track", track.name)), []).append(track)
+        vehicles.setdefault(vehicle.name, vehicle)
+        tracks.setdefault(track.name, []).append(track)
     for name, vehicle in vehicles.items():
-        words = f"{vehicle.name}. {vehicle.source or ''}"
+        words = vehicle.source or ""
         section.drawings.append(
             Drawing(
                 printable(name),
@@ -268,14 +289,32 @@ def _what_was_run(records: Sequence[Record], results: Mapping[str, Result]) -> S
         rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
         values = sorted({mu for track in variants for mu in track.friction})
         friction = ", ".join(f"{mu:g}" for mu in values)
-        words = f"{variants[0].name}. Friction {friction}; rails {rails}."
+        words = f"Friction {friction}; rails {rails}."
         drawing = _svg(track_svg(variants[0]))
         section.drawings.append(Drawing(printable(name), printable(words), drawing))
     if len(vehicles) > 1:
         section.tables.append(_differences(vehicles))
-    section.tables.append(_settings(results))
-    section.details.append(_runs(records))
+    if results:
+        section.tables.append(_settings(results))
+    if inputs:
+        section.tables.append(_inputs(inputs))
     return section
+
+
+def _inputs(inputs: Mapping[str, Any]) -> Table:
+    """Inputs of a study, without those that are not given."""
+    rows = []
+    for key, value in inputs.items():
+        if value in (None, [], {}, False, "", ()) or key == "folder":
+            continue
+        parts = value.items() if isinstance(value, dict) else [("", value)]
+        for name, part in parts:
+            values = part if isinstance(part, list) else [part]
+            words = ", ".join(_number(v) for v in values[:MOST_SHOWN])
+            more = len(values) - MOST_SHOWN
+            words += f" and {more} more" if more > 0 else ""
+            rows.append([printable(f"{key} {name}".strip()), printable(words)])
+    return Table(["input", "value"], rows, "Inputs of the study", words=frozenset({0, 1}))
 
 
 def _rails(track: Track) -> str:
@@ -333,33 +372,6 @@ def _settings(results: Mapping[str, Result]) -> Table:
             rows.append([key, ", ".join(values), "changed" if changed else ""])
     words = frozenset({0, 1, 2})
     return Table(["setting", "value", ""], rows, "Method of computation", words=words)
-
-
-def _runs(records: Sequence[Record]) -> Table:
-    labels = list(dict.fromkeys(name for record in records for name in record["labels"]))
-    rows: list[list[Cell]] = []
-    for record in records[:MOST_ROWS]:
-        time = record.get("wall_time")
-        rows.append(
-            [
-                printable(str(record["name"])),
-                *(printable(_number(record["labels"].get(name, ""))) for name in labels),
-                str(record["status"]),
-                "" if time is None else f"{time:.2f}",
-            ]
-        )
-    more = len(records) - MOST_ROWS
-    return Table(
-        ["run", *("speed (m/s)" if name == "speed" else name for name in labels), "status",
-         "wall time (s)"],
-        rows,
-        f"All {len(records)} runs",
-        words=frozenset({0, 1, 2}),
-        failed=frozenset(
-            i for i, record in enumerate(records[:MOST_ROWS]) if record["status"] != "complete"
-        ),
-        note=f"{more} more are in summary.csv." if more > 0 else "",
-    )  # fmt: skip
 
 
 def _number(value: Any) -> str:

@@ -1,6 +1,8 @@
 """Spread of the values of a study over the varied parameters: columns of the page and its table."""
 
+import shlex
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -13,21 +15,27 @@ WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 LEAST = 3  # runs, for a spread
 
 
-def parameters(records: Sequence[Record]) -> dict[str, list[Any]]:
-    """Return the parameters that differ between runs, by name, numbers as numbers.
+def parameters(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
+    """Return the parameters that differ between runs, by name: ``words``, ``unit``, ``values``.
+
+    Numbers are numbers; the words are the end of the name that tells it from all others.
 
     Examples
     --------
     >>> runs = [{"labels": {"vehicle": "a", "speed": 20.0, "track.friction": f}} for f in "12"]
     >>> parameters(runs)
-    {'track.friction': [1.0, 2.0]}
+    {'track.friction': {'words': 'friction', 'unit': '', 'values': [1.0, 2.0]}}
     """
     names = list(dict.fromkeys(name for record in records for name in record["labels"]))
     found = {}
     for name in names:
         values = [record["labels"].get(name, "") for record in records]
         if len(set(map(str, values))) > 1:
-            found[name] = _numbers(values)
+            found[name] = {
+                "words": _short(name, names),
+                "unit": "m/s" if name == "speed" else "",
+                "values": _numbers(values),
+            }
     return found
 
 
@@ -36,6 +44,42 @@ def _numbers(values: Sequence[Any]) -> list[Any]:
         return [float(value) for value in values]
     except (TypeError, ValueError):
         return [printable(str(value)) for value in values]
+
+
+def _short(name: str, names: Sequence[str]) -> str:
+    parts = name.split(".")
+    for number in range(1, len(parts)):
+        end = ".".join(parts[-number:])
+        if sum(f".{other}".endswith(f".{end}") for other in names) == 1:
+            return end
+    return name
+
+
+def command(record: Record, inputs: Mapping[str, Any]) -> str:
+    """Return the command that computes a run of a study again.
+
+    Examples
+    --------
+    >>> run = {"labels": {"vehicle": "coach_25t", "track": "straight", "speed": 40.0}}
+    >>> command(run, {"duration": 5.0})
+    'railsim run coach_25t straight --speed 40 --duration 5'
+    """
+    labels = dict(record["labels"])
+    words = ["railsim", "run"]
+    for kind in ("vehicle", "track"):
+        label = str(labels.pop(kind, ""))
+        files = [str(file) for file in inputs.get(f"{kind}s", ())]
+        words.append(next((file for file in files if Path(file).stem == label), label))
+    if "speed" in labels:
+        words += ["--speed", f"{labels.pop('speed'):g}"]
+    for option in ("settings", "start", "duration", "until"):
+        value = inputs.get(option)
+        if value:
+            words += [f"--{option}", f"{value:g}" if isinstance(value, float) else str(value)]
+    pairs = [f"{key}={value}" for key, value in labels.items() if "." in key]
+    for pair in (*inputs.get("assignments", ()), *pairs):
+        words += ["--set", str(pair)]
+    return shlex.join(words)
 
 
 def columns(records: Sequence[Record]) -> dict[str, dict[str, Any]]:

@@ -22,7 +22,7 @@ from railsim.cli import main
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
-from railsim.report.spread import columns, parameters, worst_runs
+from railsim.report.spread import columns, command, parameters, worst_runs
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.facts import run_facts
 
@@ -72,8 +72,38 @@ function probe(frame) {
 }
 """
 
+# A study: every view, then the table sorted by wheel load change and filtered.
+STUDY_PROBE = """
+async function probe(frame) {
+  const w = frame.contentWindow, d = w.document, box = d.querySelector('[data-plots="spread"]');
+  const found = {errors: w.railsimErrors, views: []}, view = box.querySelector("select");
+  const settle = () => new Promise(done => w.setTimeout(done, 30));
+  for (const kind of [0, 1, 2]) {
+    view.value = kind;
+    view.dispatchEvent(new w.Event("change"));
+    await settle();
+    const count = name => box.querySelectorAll(name).length;
+    found.views.push([count("canvas"), count("svg rect"), count("svg polyline")]);
+  }
+  const table = d.querySelector('[data-plots="runs"]'), rows = () => Array.from(
+    table.querySelectorAll("tbody tr"), row => Array.from(row.cells, cell => cell.textContent));
+  const heads = Array.from(table.querySelectorAll("th button"), b => b.textContent);
+  table.querySelectorAll("th button")[heads.indexOf("wheel load change, largest (%)")].click();
+  found.heads = heads;
+  found.rows = rows();
+  const filter = table.querySelector("input");
+  filter.value = "failed";
+  filter.dispatchEvent(new w.Event("input"));
+  found.failed = rows();
+  table.querySelector("tbody tr").click();
+  found.told = table.querySelector(".command").textContent;
+  found.overflow = d.documentElement.scrollWidth - d.documentElement.clientWidth;
+  return found;
+}
+"""
 
-def probed(folder, html):
+
+def probed(folder, html, probe=PROBE):
     """Open a page at desktop and phone width in one browser; return what was found in each."""
     catch = (
         "window.railsimErrors = [];"
@@ -87,7 +117,7 @@ def probed(folder, html):
         f'<iframe src="page.html" style="width:{w}px;height:900px"></iframe>' for w in (1200, 390)
     )
     (folder / "probe.html").write_text(
-        f"<body>{frames}<pre id=found></pre><script>{PROBE}"
+        f"<body>{frames}<pre id=found></pre><script>{probe}"
         "addEventListener('load', async () => { const found = [];"
         "for (const f of document.querySelectorAll('iframe')) { found.push(await probe(f)); }"
         "document.getElementById('found').textContent = JSON.stringify(found); });</script>"
@@ -168,6 +198,28 @@ def test_page_works_in_a_browser_at_desktop_and_phone_width(html, tmp_path):
         assert 0.01 < found["ink"] < 0.9
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="no chromium")
+def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp_path):
+    runs = []
+    for i, record in enumerate(records(3) * 70):
+        labels = {**record["labels"], "speed": 10.0 + i % 7, "vehicle": f"coach{i % 2}"}
+        runs.append({**record, "name": f"run{i}", "labels": labels})
+    runs[5] = {**runs[5], "status": "failed", "status_reason": "no equilibrium", "peaks": []}
+    for found in probed(tmp_path, page("A study", runs, {}), STUDY_PROBE):
+        assert found["errors"] == []
+        assert found["overflow"] <= 0
+        assert found["views"][0] == [1, 0, 0]
+        assert found["views"][1] == [0, 14, 0]  # seven speeds, two vehicles
+        assert found["views"][2] == [0, 0, 209]  # the failed run has no values
+        assert found["heads"][:4] == ["run", "vehicle", "speed (m/s)", "friction"]
+        column = found["heads"].index("wheel load change, largest (%)")
+        values = [float(row[column]) for row in found["rows"][:209]]
+        assert values == sorted(values, reverse=True)
+        assert [row[0] for row in found["failed"]] == ["run5"]
+        assert found["told"].startswith("no equilibrium — railsim run coach1 curve --speed 15")
+
+
 def test_thinned_curves_keep_every_peak_and_their_order():
     axis = np.linspace(0.0, 100.0, 5001)
     values = np.stack([np.sin(axis) + 0.3 * np.sin(37.0 * axis), axis], axis=1)
@@ -227,7 +279,11 @@ def records(number):
 
 def test_spread_has_the_values_of_every_run():
     runs = records(4)
-    assert parameters(runs) == {"track.friction": pytest.approx([0.1, 0.2, 0.3, 0.4])}
+    assert list(parameters(runs)) == ["track.friction"]
+    assert parameters(runs)["track.friction"]["values"] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert command(runs[1], {"vehicles": ["../coach.toml"], "until": 400.0}) == (
+        "railsim run ../coach.toml curve --speed 20 --until 400 --set track.friction=0.2"
+    )
     column = columns(runs)["Y_abs"]
     assert column["unit"] == "kN"
     assert column["values"] == pytest.approx([32.0, 40.0, 48.0, 56.0], rel=1e-5)

@@ -34,7 +34,7 @@
     drawn.push({ plot: plot, fit: fit });
     if (window.ResizeObserver) { new ResizeObserver(fit).observe(box); }
   }
-  function redraw() { drawn.forEach(function (d) { d.fit(); d.plot.redraw(false, true); }); }
+  function redraw() { drawn = drawn.filter(function (d) { return d.plot.root.isConnected; }); drawn.forEach(function (d) { d.fit(); d.plot.redraw(false, true); }); }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   addEventListener("beforeprint", function () { root.classList.add("printing"); redraw(); });
   addEventListener("afterprint", function () { root.classList.remove("printing"); redraw(); });
@@ -101,6 +101,9 @@
     var side = choose(controls, "Wheel", ["left", "right"], fill);
     var reset = made("button", controls, "Whole length");
     reset.type = "button";
+    var keep = made("button", controls, "Save picture");
+    keep.type = "button";
+    keep.addEventListener("click", function () { save(grid, data.track); });
     made("span", controls, "Drag over a plot to zoom all of them, double-click for the whole length.", "notes");
     var readings = made("div", box, undefined, "readings scroll"), table = made("table", readings);
     var head = made("tr", made("thead", table)), body = made("tbody", table), at = made("th", head), cells = [];
@@ -168,71 +171,46 @@
     box.railsimPlots = plots;
   }
 
-  /* values of a study over what was varied ---------------------------------------------------- */
-  function spread(box, data) {
-    var names = Object.keys(data.parameters), keys = Object.keys(data.columns), u = null;
-    var controls = made("div", box, undefined, "controls");
-    function words(k) { var c = data.columns[k]; return c.words + (c.unit ? " (" + c.unit + ")" : ""); }
-    var quantity = choose(controls, "Value", keys.map(words), draw);
-    var over = choose(controls, "over", names, draw);
-    var family = choose(controls, "a line for each", ["(all together)"].concat(names), draw);
-    var numeric = names.findIndex(function (n) { return typeof data.parameters[n][0] === "number"; });
-    over.value = Math.max(0, numeric);
-    family.value = names.length > 1 ? (Number(over.value) === 0 ? 2 : 1) : 0;
-    var target = made("div", box), note = made("p", box, "", "notes"), slot = null;
-    function sorted(list) {
-      return Array.from(new Set(list)).sort(function (a, b) { return typeof a === "number" ? a - b : String(a).localeCompare(String(b)); });
-    }
-    function draw() {
-      var key = keys[quantity.value], ys = data.columns[key].values, xs = data.parameters[names[over.value]];
-      var fs = Number(family.value) ? data.parameters[names[family.value - 1]] : null;
-      var ticks = sorted(xs), isNumber = typeof ticks[0] === "number", fams = fs ? sorted(fs) : [""];
-      var data2 = [isNumber ? ticks : ticks.map(function (_, i) { return i; })], series = [{}], bands = [], many = false;
-      series[0] = { label: names[over.value], value: function (_, v) { return v === null ? "" : isNumber ? shown(v) : String(ticks[v]); } };
-      fams.forEach(function (f, i) {
-        var groups = ticks.map(function () { return []; });
-        ys.forEach(function (y, r) {
-          if (y !== null && (!fs || fs[r] === f)) { groups[ticks.indexOf(xs[r])].push(y); }
-        });
-        groups.forEach(function (g) { g.sort(function (a, b) { return a - b; }); many = many || g.length > 1; });
-        function pick(how) { return groups.map(function (g) { return g.length ? how(g) : null; }); }
-        var paint = function () {
-          return fams.length <= 8 ? runColour(i) : "hsl(" + (250 - 230 * i / (fams.length - 1)) + " 65% " + (matchMedia("(prefers-color-scheme: dark)").matches && !root.classList.contains("printing") ? 65 : 40) + "%)";
-        };
-        var label = fs ? String(f) : "all runs", first = series.length;
-        data2.push(pick(function (g) { var m = g.length >> 1; return g.length % 2 ? g[m] : 0.5 * (g[m - 1] + g[m]); }));
-        data2.push(pick(function (g) { return g[0]; }), pick(function (g) { return g[g.length - 1]; }));
-        var read = function (_, v) { return v === null || v === undefined ? "" : shown(v); };
-        series.push({ label: label, stroke: paint, width: 1.6, points: { show: true, size: 6, fill: paint }, spanGaps: true, value: read, show: true });
-        series.push({ class: "quiet", label: label + ", smallest", stroke: "transparent", width: 0, points: { show: false }, spanGaps: true, value: read });
-        series.push({ class: "quiet", label: label + ", largest", stroke: "transparent", width: 0, points: { show: false }, spanGaps: true, value: read });
-        bands.push({ series: [first + 2, first + 1], fill: function () { return faint(paint()); } });
-      });
-      if (!many) { /* one run at each point: no band to draw */
-        data2 = data2.filter(function (_, i) { return i === 0 || i % 3 === 1; });
-        series = series.filter(function (_, i) { return i === 0 || i % 3 === 1; });
-        bands = [];
-      }
-      if (u) { u.destroy(); drawn.splice(drawn.indexOf(slot), 1); }
-      var xAxis = axis(names[over.value] + (names[over.value] === "speed" ? " (m/s)" : ""), 24);
-      if (!isNumber) {
-        xAxis.splits = function () { return data2[0]; };
-        xAxis.values = function (_, s) { return s.map(function (v) { return String(ticks[v] === undefined ? "" : ticks[v]); }); };
-      }
-      u = new uPlot({
-        width: Math.max(200, target.clientWidth), height: 300, bands: bands,
-        scales: { x: { time: false, range: function (_, a, b) { var m = 0.04 * (b - a || 1); return [a - m, b + m]; } } },
-        axes: [xAxis, axis("", 52)], series: series, legend: { live: true }
-      }, data2, target);
-      place(u, target, 300);
-      slot = drawn[drawn.length - 1];
-      note.textContent = words(key) + (many ? ": line: median; band: smallest to largest of all other values." : ".");
-    }
-    draw();
+  /* pictures to keep ---------------------------------------------------------------------------- */
+  function kept(url, name) {
+    var link = made("a");
+    link.href = url;
+    link.download = name;
+    link.click();
   }
+  function save(box, name) {
+    var file = name.replace(/[^A-Za-z0-9]+/g, "_"), picture = box.querySelector("svg");
+    if (picture) {
+      var copy = picture.cloneNode(true), style = getComputedStyle(root), marks = ["--ink", "--soft", "--rule", "--bad", "--k4"];
+      copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+      marks.forEach(function (n) { copy.style.setProperty(n, style.getPropertyValue(n)); });
+      copy.insertBefore(made("style", null, "text{font:12px sans-serif;fill:var(--soft)}polyline{fill:none;stroke-width:1.2px}.axis{stroke:var(--soft)}"), copy.firstChild);
+      kept("data:image/svg+xml," + encodeURIComponent(new XMLSerializer().serializeToString(copy)), file + ".svg");
+    } else {
+      var canvases = Array.from(box.querySelectorAll("canvas")), sheet = made("canvas"), y = 0;
+      sheet.width = Math.max.apply(null, canvases.map(function (c) { return c.width; }));
+      sheet.height = canvases.reduce(function (h, c) { return h + c.height + 24; }, 0);
+      var g = sheet.getContext("2d");
+      g.fillStyle = colour("--paper"); g.fillRect(0, 0, sheet.width, sheet.height);
+      canvases.forEach(function (c) {
+        var panel = c.closest(".panel"), title = panel ? panel.querySelector("h4").textContent : name;
+        g.fillStyle = colour("--ink"); g.font = "14px system-ui, sans-serif"; g.fillText(title, 8, y + 17);
+        g.drawImage(c, 0, y + 24);
+        y += c.height + 24;
+      });
+      kept(sheet.toDataURL("image/png"), file + ".png");
+    }
+  }
+  function plot(options, values, target) {
+    options.width = Math.max(200, target.clientWidth);
+    place(new uPlot(options, values, target), target, options.height);
+  }
+  var study = all.spread && railsimStudy(all.spread, {
+    made: made, shown: shown, choose: choose, colour: colour, runColour: runColour, faint: faint, axis: axis, plot: plot, save: save
+  });
 
   document.querySelectorAll("[data-plots]").forEach(function (box) {
     var name = box.dataset.plots;
-    if (name === "spread") { spread(box, all.spread); } else { curves(box, all.curves[Number(name)], "curves" + name); }
+    if (study && study[name]) { study[name](box); } else { curves(box, all.curves[Number(name)], "curves" + name); }
   });
 })();
