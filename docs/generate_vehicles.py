@@ -311,7 +311,7 @@ def hunting(vehicle: Vehicle) -> str:
     if found.linear is None:
         words += "no loss of stability at rest"
     else:
-        words += f"rest loses its stability at {3.6 * found.linear['speed']:.0f} km/h"
+        words += f"rest loses its stability at {3.6 * found.linear.speed:.0f} km/h"
     lowest = found.lowest
     if lowest is None:
         return f"{words}; from no disturbance tried does it hunt."

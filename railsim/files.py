@@ -15,7 +15,7 @@ import re
 import stat
 import tempfile
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
@@ -96,6 +96,23 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
     elif not overwrite and (there := [name for name in names if (folder / name).exists()]):
         found, allowed = f"{folder} holds {', '.join(there)}", "give --overwrite or another folder"
     _refuse(found, allowed)
+
+
+def write_folder(
+    folder: Path, content: Mapping[str, bytes], *, overwrite: bool = False
+) -> list[Path]:
+    """Write files by their names into a folder, created if it does not exist; their paths.
+
+    Raises
+    ------
+    InputError : one of them exists and may not be overwritten; nothing is written then.
+    """
+    check_folder(folder, content, overwrite=overwrite)
+    make_folder(folder)
+    for name, data in content.items():
+        with whole_file(folder / name) as partial:
+            partial.write_bytes(data)
+    return [folder / name for name in content]
 
 
 def make_folder(folder: Path) -> None:

@@ -81,6 +81,11 @@ class Column:
         return SHOWN_UNITS.get(self.unit, (self.unit, 1.0))[0]
 
     @property
+    def scale(self) -> float:
+        """Shown value over value."""
+        return SHOWN_UNITS.get(self.unit, ("", 1))[1]
+
+    @property
     def heading(self) -> str:
         """Words with the shown unit."""
         words = self.words or self.name
@@ -103,7 +108,7 @@ class Column:
         if isnan(value):
             return "-"
         without_minus_zero = self.format.replace(".", "z.", 1 if self.format.endswith("f") else 0)
-        return format(value * SHOWN_UNITS.get(self.unit, ("", 1))[1], without_minus_zero)
+        return format(value * self.scale, without_minus_zero)
 
 
 class Amount(NamedTuple):

@@ -2,10 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from railsim.cli.common import echo
+import click
+
+from railsim.cli.common import (
+    echo,
+    json_option,
+    load_option,
+    overwrite_option,
+    print_json,
+    quiet_option,
+    set_option,
+    show,
+)
 from railsim.errors import Fault, InputError
 from railsim.files import check_folder, make_folder, whole_file
 
@@ -15,6 +27,7 @@ if TYPE_CHECKING:
     from railsim.definitions.settings import Settings
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
+    from railsim.table import Table
 
 MOST_VALUES = 2000
 
@@ -72,6 +85,76 @@ def load_inputs(
     return Inputs(found["vehicle"], found["track"], found["settings"], short_name(vehicle))
 
 
+@dataclass(frozen=True)
+class InputFiles:
+    """The files and changes that a command line names, see `load_inputs`."""
+
+    vehicle: str
+    track: str | None
+    settings: str | None
+    load_case: str | None
+    assignments: tuple[str, ...]
+
+    def load(self, changes: Sequence[str] = ()) -> Inputs:
+        """Load them, with further assignments."""
+        assignments = [*self.assignments, *changes]
+        return load_inputs(self.vehicle, self.track, self.settings, assignments, self.load_case)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where the results of an analysis go."""
+
+    out: str | None
+    overwrite: bool
+    as_json: bool
+    quiet: bool
+
+
+def analysis_options(
+    files: str, settings: str = "creep law and contact"
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add the options of an analysis; the command takes `InputFiles` and `Output` first.
+
+    Parameters
+    ----------
+    files : str
+        What ``--out`` holds.
+    settings : str
+        What counts of ``--settings``.
+    """
+
+    def add(function: Callable[..., None]) -> Callable[..., None]:
+        @wraps(function)
+        def command(
+            vehicle: str,
+            out: str | None,
+            settings: str | None,
+            load: str | None,
+            assignments: tuple[str, ...],
+            **others: Any,
+        ) -> None:
+            names = ("overwrite", "as_json", "quiet")
+            output = Output(out, *(others.pop(name) for name in names))
+            track = others.pop("track", None)
+            function(InputFiles(vehicle, track, settings, load, assignments), output, **others)
+
+        found: Callable[..., None] = command
+        for option in (
+            quiet_option,
+            json_option,
+            overwrite_option,
+            set_option,
+            load_option,
+            click.option("--settings", metavar="F", help=f"Settings file: {settings}."),
+            click.option("--out", metavar="DIR", help=f"Folder for {files}."),
+        ):
+            found = option(found)
+        return found
+
+    return add
+
+
 def values_of(text: str, option: str) -> list[float]:
     """Return the values of ``A:B:N`` (N values from A to B) or ``A,B,C``.
 
@@ -114,6 +197,7 @@ class Folder:
 
     def __init__(self, out: str | None, names: Sequence[str], overwrite: bool) -> None:
         self.path = Path(out) if out else None
+        self.names = tuple(names)
         if self.path is not None:
             check_folder(self.path, names, overwrite=overwrite)
         self.written: list[Path] = []
@@ -140,6 +224,25 @@ class Folder:
 
         make_folder(self.path)
         self.written.append(save(figure, self.path / name, overwrite=True))
+
+    def finish(
+        self,
+        record: Any,
+        figure: "Callable[[], Figure]",
+        parts: "Callable[[], Sequence[str | Table]]",
+        *,
+        as_json: bool,
+    ) -> None:
+        """Write record and figure to the first two files; print the record, or texts and tables."""
+        data, picture, *_ = self.names
+        self.write_json(data, record)
+        if self.path is not None:
+            self.write_picture(picture, figure())
+        if as_json:
+            print_json(record)
+            return
+        show(*parts())
+        self.tell()
 
     def tell(self) -> None:
         """Print what was written."""

@@ -1,28 +1,16 @@
 """``railsim critical-speed``: linear and non-linear critical speed of a vehicle."""
 
-from collections.abc import Callable
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    json_option,
-    linearisation_options,
-    load_option,
-    names_of,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    set_option,
-    table,
-)
+from railsim.cli.analysis import Folder, InputFiles, Inputs, Output, analysis_options, values_of
+from railsim.cli.common import echo, linearisation_options, names_of
 from railsim.cli.progress import progress_bar
+from railsim.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from railsim.cli.analysis import Inputs
-    from railsim.stability.critical_speed import CriticalSpeed
     from railsim.studies.stability_map import MapPoint
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation", "all")
@@ -86,36 +74,17 @@ FILES = ("critical_speed.json", "critical_speed.png")
     metavar="N",
     help="Processes for a map; default: all cores.",
 )
-@click.option(
-    "--out",
-    metavar="DIR",
-    help="Folder for critical_speed.json and .png; an interrupted map is continued.",
+@analysis_options(
+    "critical_speed.json and .png; an interrupted map is continued", "scheme, creep law, contact"
 )
-@click.option("--settings", metavar="F", help="Settings file: scheme, creep law, contact.")
-@load_option
-@set_option
-@overwrite_option
-@json_option
-@quiet_option
 def command(
-    vehicle: str,
-    track: str | None,
+    files: InputFiles,
+    output: Output,
     method: str,
-    low: float,
-    high: float,
-    points: int,
     excitation: str | None,
     conicity: str | None,
     friction: str | None,
     over: tuple[str, ...],
-    workers: int | None,
-    out: str | None,
-    settings: str | None,
-    load: str | None,
-    assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
     **how: Any,
 ) -> None:
     """Find the critical speed of a vehicle on ideal straight track.
@@ -132,70 +101,84 @@ def command(
       railsim critical-speed coach_manchester --method linear --conicity 0.05:0.4:8 --out map
       railsim critical-speed coach_manchester --over vehicle.bodies.carbody.mass=20e3:50e3:7
     """  # noqa: D301 - click reads the escape
-    from railsim.cli.analysis import Folder, load_inputs, values_of
-
-    inputs = load_inputs(vehicle, track, settings, assignments, load)
+    inputs, workers = files.load(), how.pop("workers")
     ranges = _ranges(conicity, friction, over)
-    methods = METHODS[:-1] if method == "all" else ("linear", method)
-    options = {
-        "methods": tuple(dict.fromkeys(methods)),
-        "low": low,
-        "high": high,
-        "points": points,
-        **({"excitations": values_of(excitation, "--excitation")} if excitation else {}),
-        **how,
-    }
-
-    def with_values(changes: list[str]) -> "Inputs":
-        return load_inputs(vehicle, track, settings, [*assignments, *changes], load)
-
-    grid = [
-        _point(inputs, with_values, dict(zip(ranges, values, strict=True)))
+    how["methods"] = METHODS[:-1] if method == "all" else tuple(dict.fromkeys(("linear", method)))
+    if excitation:
+        how["excitations"] = values_of(excitation, "--excitation")
+    points = [
+        _point(inputs, files, dict(zip(ranges, values, strict=True)))
         for values in product(*ranges.values())
     ]
-    folder = Folder(out, FILES, overwrite)
-    with progress_bar("critical speed", quiet=quiet) as progress:
-        if len(grid) > 1:
-            from railsim.studies.stability_map import stability_map
+    folder = Folder(output.out, FILES, output.overwrite)
+    if len(points) > 1:
+        _map(points, ranges, how, workers, folder, output)
+    else:
+        _one(points[0], how, folder, output)
 
-            points_found = stability_map(
-                grid,
-                {**options, "over_amplitude": False},
-                folder=folder.path,
-                workers=workers,
-                overwrite=overwrite,
-                progress=progress,
-                on_remark=lambda text: echo(f"remark: {text}", err=True),
-            )
-        else:
-            one = _one(grid[0], options, progress)
-    if len(grid) > 1:
-        several = {name: values for name, values in ranges.items() if len(values) > 1}
-        _tell_map(folder, inputs, several, points_found, as_json)
-        return
-    from railsim.plot.stability import bifurcation_figure
 
-    folder.write_json(FILES[0], one.record())
-    if folder.path is not None:
-        folder.write_picture(FILES[1], bifurcation_figure(one, inputs.vehicle.name))
-    if as_json:
-        print_json(one.record())
-        return
-    echo("\n".join(_lines(one)))
-    folder.tell()
+def _one(point: "MapPoint", how: dict[str, Any], folder: Folder, output: Output) -> None:
+    from railsim.stability.critical_speed import critical_speed
+
+    with progress_bar("critical speed", quiet=output.quiet) as progress:
+        found = critical_speed(
+            point.vehicle,
+            point.track,
+            settings=point.settings,
+            conicity=point.at.get("conicity"),
+            progress=progress,
+            **how,
+        )
+
+    def parts() -> list[Any]:
+        verdict = [found.verdict()] if found.verdict() else []
+        return [found.table(), *verdict, *(f"remark: {remark}" for remark in found.remarks)]
+
+    folder.finish(found.record(), found.plot, parts, as_json=output.as_json)
+
+
+def _map(
+    points: "list[MapPoint]",
+    ranges: dict[str, list[float]],
+    how: dict[str, Any],
+    workers: int | None,
+    folder: Folder,
+    output: Output,
+) -> None:
+    from railsim.plot.stability import map_figure
+    from railsim.studies.stability_map import map_speeds, map_table, stability_map
+
+    with progress_bar("critical speed", quiet=output.quiet) as progress:
+        found = stability_map(
+            points,
+            {**how, "over_amplitude": False},
+            folder=folder.path,
+            workers=workers,
+            overwrite=output.overwrite,
+            progress=progress,
+            on_remark=lambda text: echo(f"remark: {text}", err=True),
+        )
+    axes = {name: values for name, values in ranges.items() if len(values) > 1}
+
+    def parts() -> list[Any]:
+        remarks = dict.fromkeys(remark for record in found for remark in record["remarks"])
+        return [map_table(found, list(axes)), *(f"remark: {remark}" for remark in remarks)]
+
+    name = points[0].vehicle.name
+    folder.finish(
+        found,
+        lambda: map_figure(axes, map_speeds(found), f"{name}: critical speed"),
+        parts,
+        as_json=output.as_json,
+    )
 
 
 def _ranges(
     conicity: str | None, friction: str | None, over: tuple[str, ...]
 ) -> dict[str, list[float]]:
     """Values by parameter; of a map two parameters at most."""
-    from railsim.cli.analysis import values_of
-    from railsim.errors import Fault, InputError
-
-    found = {}
-    for name, text in (("conicity", conicity), ("friction", friction)):
-        if text:
-            found[name] = values_of(text, f"--{name}")
+    texts = {"conicity": conicity, "friction": friction}
+    found = {name: values_of(text, f"--{name}") for name, text in texts.items() if text}
     for text in over:
         key, equals, values = text.partition("=")
         if not equals:
@@ -205,146 +188,17 @@ def _ranges(
         found[key] = values_of(values, "--over")
     several = [name for name, values in found.items() if len(values) > 1]
     if len(several) > 2:
-        raise InputError(
-            [
-                Fault(
-                    "--over",
-                    "",
-                    f"found {len(several)} parameters with several values ({', '.join(several)})",
-                    "two at most",
-                )
-            ]
-        )
+        words = f"found {len(several)} parameters with several values ({', '.join(several)})"
+        raise InputError([Fault("--over", "", words, "two at most")])
     return found
 
 
-def _point(
-    inputs: "Inputs", with_values: Callable[[list[str]], "Inputs"], at: dict[str, float]
-) -> "MapPoint":
+def _point(inputs: Inputs, files: InputFiles, at: dict[str, float]) -> "MapPoint":
     from railsim.studies.stability_map import MapPoint
 
     changes = [f"{key}={value!r}" for key, value in at.items() if key not in BY_OPTION]
-    here = with_values(changes) if changes else inputs
+    here = files.load(changes) if changes else inputs
     track = here.track
     if "friction" in at:
         track = track.replace(friction=at["friction"], friction_table=None)
     return MapPoint(at, here.vehicle, track, here.settings)
-
-
-def _one(point: "MapPoint", options: dict[str, Any], progress: Any) -> "CriticalSpeed":
-    from railsim.stability.critical_speed import critical_speed
-
-    return critical_speed(
-        point.vehicle,
-        point.track,
-        settings=point.settings,
-        conicity=point.at.get("conicity"),
-        progress=progress,
-        **options,
-    )
-
-
-def _tell_map(
-    folder: Any,
-    inputs: "Inputs",
-    values: dict[str, list[float]],
-    found: list[dict[str, Any]],
-    as_json: bool,
-) -> None:
-    """Print, write and draw a map."""
-    import numpy as np
-
-    from railsim.plot.stability import map_figure
-
-    shape = [len(several) for several in values.values()]
-    speeds = {}
-    for kind, words in (("linear", "linear"), ("nonlinear", "non-linear")):
-        column = [_speed(record, kind) for record in found]
-        if kind == "linear" or np.isfinite(column).any():
-            speeds[words] = np.array(column).reshape(shape)
-    folder.write_json(FILES[0], found)
-    if folder.path is not None:
-        folder.write_picture(FILES[1], map_figure(values, speeds, inputs.vehicle.name))
-    if as_json:
-        print_json(found)
-        return
-    kinds = {"linear": f"linear, {_linearisation(found[0])} (m/s)"}
-    methods = dict.fromkeys(m for one in found for m in one.get("nonlinear_by_method") or ())
-    if methods:
-        kinds["nonlinear"] = f"non-linear, {', '.join(methods)} (m/s)"
-    rows = []
-    for record in found:
-        point = [f"{record['at'][name]:g}" for name in values]
-        speeds_here = [_speed(record, kind) for kind in kinds]
-        cells = ["none" if np.isnan(speed) else f"{speed:.2f}" for speed in speeds_here]
-        rows.append([*point, *cells])
-    header = [*values, *kinds.values()]
-    echo("\n".join(table(header, rows, numbers=0)))
-    for remark in dict.fromkeys(remark for record in found for remark in record["remarks"]):
-        echo(f"remark: {remark}")
-    folder.tell()
-
-
-def _speed(record: dict[str, Any], kind: str) -> float:
-    """Critical speed of a record; NaN where there is none."""
-    speed = (record[kind] or {}).get("speed")
-    return float("nan") if speed is None else float(speed)
-
-
-def _linearisation(record: dict[str, Any]) -> str:
-    """How the contact was linearised, in words."""
-    if record.get("linearisation") == "harmonic":
-        return f"harmonic {1e3 * record['amplitude']:g} mm"
-    return "tangent"
-
-
-def _row(
-    words: str, speed: float | None, frequency: float | None, amplitude: float | None, more: str
-) -> list[str]:
-    """A row of the table; cells without a number are empty."""
-    if speed is None:
-        return [words, "none", "", "", more]
-    return [
-        words,
-        f"{speed:.2f}",
-        "" if frequency is None else f"{frequency:.2f}",
-        "" if amplitude is None else f"{1e3 * amplitude:.2f}",
-        more,
-    ]
-
-
-def _lines(found: "CriticalSpeed") -> list[str]:
-    linear = found.linear or {}
-    how = f"linear, {_linearisation(found.record())}"
-    rows = [_row(how, linear.get("speed"), linear.get("frequency"), None, linear.get("mode", ""))]
-    if linear.get("speed_of_runs") is not None:
-        rows.append(_row("linear, cells of the runs", linear["speed_of_runs"], None, None, ""))
-    smallest = (found.linear_over_amplitude or {}).get("smallest")
-    if smallest:
-        words = "linear, harmonic, smallest over amplitude"
-        rows.append(_row(words, smallest["speed"], None, smallest["amplitude"], ""))
-    for method, low in found.nonlinear.items():
-        rows.append(_row(f"non-linear, {method}", low.speed, low.frequency, low.amplitude, ""))
-    for jump in found.jumps:
-        words = "jump, speed rising" if jump["direction"] == "up" else "jump, speed falling"
-        more = f"to {1e3 * jump['to']:.2f} mm"
-        rows.append(_row(words, jump["speed"], None, jump["amplitude"], more))
-    for words, limit in (
-        ("amplitude above {:g} mm", found.amplitude_limit),
-        ("rms of sum_Y above {:.3g} kN", found.instability_limit),
-    ):
-        if limit is not None:
-            size = limit["limit"] * (1e3 if "mm" in words else 1e-3)
-            more = "" if limit["reached"] else f"not reached up to {found.high:g} m/s"
-            rows.append(_row(words.format(size), limit["speed"], None, None, more))
-    header = ["critical speed", "m/s", "Hz", "mm", "mode"]
-    kind = [f"the bifurcation is {found.type}"] if found.type not in ("", "none") else []
-    if kind and found.onset and found.onset != found.type:
-        kind = [f"{kind[0]}; small motions begin as in a {found.onset} one"]
-    where = found.conditions
-    note = (
-        f"rails {where['rails']}, friction {where['friction']}, creep law {where['law']}"
-        f" (linear: {where['linear_law']}), searched from {found.low:g} to {found.high:g} m/s"
-    )
-    remarks = (f"remark: {remark}" for remark in found.remarks)
-    return [*table(header, rows), note, *kind, *remarks]

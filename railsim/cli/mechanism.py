@@ -15,9 +15,9 @@ from railsim.cli.common import (
     print_json,
     quiet_option,
     set_option,
-    table,
+    show,
 )
-from railsim.files import check_folder, make_folder, whole_file
+from railsim.files import check_folder, write_folder
 
 if TYPE_CHECKING:
     from railsim.definitions.mechanism import Mechanism
@@ -82,36 +82,33 @@ def command(
       railsim mechanism atr95_lift_5 atr95_lift_4 --at height=0.8955
       railsim mechanism tilting_one_spring --case bordolese_5000 --json
     """  # noqa: D301 - click reads the escape
-    _check_options(files, searched, starts, seed)
-    mechanisms = [_loaded(file, assignments) for file in files]
+    if searched and len(files) > 1:
+        raise click.UsageError("--optimise takes one FILE")
+    if not searched and (starts is not None or seed is not None):
+        raise click.UsageError("--starts and --seed go with --optimise")
+    from railsim.definitions.loading import load_mechanism
+
+    mechanisms = [load_mechanism(file, assignments) for file in files]
     if out is not None:
         check_folder(Path(out))
-    optimum = None
-    if searched:
-        with faults_in(files[0], "mechanism", mechanisms[0].name):
-            optimum = _optimised(mechanisms[0], case, starts, seed)
-        results = [optimum.after]
-    else:
-        results = []
-        for file, mechanism in zip(files, mechanisms, strict=True):
-            with faults_in(file, "mechanism", mechanism.name):
-                results.append(_analysed(mechanism, case))
-    found = []
-    for file, mechanism, result in zip(files, mechanisms, results, strict=True):
+    optimum, results, at_values = None, [], []
+    for file, mechanism in zip(files, mechanisms, strict=True):
         with faults_in(file, "mechanism", mechanism.name):
-            found.append(_values_at(result, at))
+            if searched:
+                optimum = _optimised(mechanism, case, starts, seed)
+            results.append(optimum.after if optimum else _analysed(mechanism, case))
+            at_values.append(_values_at(results[-1], at))
     cases = {} if searched else _cases(files[0], mechanisms[0], results[0])
     written: list[Path] = []
     if out is not None:
         content = _content(results, cases, optimum)
         if optimum is not None:
             content[OPTIMISED] = _optimised_text(files[0], case, out, optimum, assignments)
-        written = _write(Path(out), content, overwrite)
+        written = write_folder(Path(out), content, overwrite=overwrite)
     if as_json:
-        print_json(_data(results, cases, found, optimum))
+        print_json(_data(results, cases, at_values, optimum))
         return
-    for line in _lines(results, found, optimum):
-        echo(line)
+    _show(results, at_values, optimum)
     if not quiet:
         from railsim.mechanisms.remarks import remarks
 
@@ -119,21 +116,6 @@ def command(
             echo(f"remark: {remark}", err=True)
         for path in written:
             echo(str(path))
-
-
-def _check_options(
-    files: Sequence[str], searched: bool, starts: int | None, seed: int | None
-) -> None:
-    if searched and len(files) > 1:
-        raise click.UsageError("--optimise takes one FILE")
-    if not searched and (starts is not None or seed is not None):
-        raise click.UsageError("--starts and --seed go with --optimise")
-
-
-def _loaded(file: str, assignments: Sequence[str]) -> "Mechanism":
-    from railsim.definitions.loading import load_mechanism
-
-    return load_mechanism(file, assignments)
 
 
 def _analysed(mechanism: "Mechanism", case: str | None) -> "Analysis":
@@ -204,28 +186,26 @@ def _data(
     return data[0]
 
 
-def _lines(
-    results: Sequence["Analysis"], found: Sequence[list[dict[str, Any]]], optimum: "Optimum | None"
-) -> list[str]:
+def _show(
+    results: Sequence["Analysis"], at: Sequence[list[dict[str, Any]]], optimum: "Optimum | None"
+) -> None:
     from railsim.mechanisms import tables
     from railsim.mechanisms.comparison import compare
 
-    lines: list[str] = []
     if optimum is not None:
-        lines += [*tables.optimum_sentences(optimum), ""]
-        lines += [*table(*tables.optimum_table(optimum)), ""]
-        if optimum.active:
-            lines += [*table(*tables.active_table(optimum), 2), ""]
-        lines += [*table(*tables.start_table(optimum)), ""]
-    for number, (result, values) in enumerate(zip(results, found, strict=True)):
-        lines += [""] if number else []
-        lines += _result_lines(result, values)
+        show(*tables.optimum_sentences(optimum), "")
+        for table in tables.optimum_tables(optimum):
+            show(table, "")
+    for number, (result, values) in enumerate(zip(results, at, strict=True)):
+        if number:
+            show("")
+        _show_result(result, values)
     if len(results) > 1:
-        lines += ["", *table(*tables.comparison_table(compare(results)))]
-    return lines
+        show("", tables.comparison_table(compare(results)))
 
 
-def _result_lines(result: "Analysis", at: Sequence[dict[str, Any]]) -> list[str]:
+def _show_result(result: "Analysis", at: Sequence[dict[str, Any]]) -> None:
+    from railsim.design_checks import check_table
     from railsim.mechanisms import tables
     from railsim.mechanisms.checks import checks
     from railsim.mechanisms.selection import selection
@@ -233,22 +213,20 @@ def _result_lines(result: "Analysis", at: Sequence[dict[str, Any]]) -> list[str]
 
     definition = result.definition
     case = f", case {result.case}" if result.case else ""
-    lines = [f"{definition.name}{case}", ""]
-    lines += table(*tables.upright(tables.position_table(result)))
+    show(f"{definition.name}{case}", "", tables.position_table(result), "")
     if at:
-        rows = [(p["where"], {k: v for k, v in p.items() if k != "where"}) for p in at]
-        lines += ["", *table(*tables.upright(tables.value_table(result, rows)))]
-    lines += ["", *tables.sentences(result)]
-    lines += ["", *table(*tables.reaction_table(result))]
-    if (published := tables.published_table(result))[1]:
-        lines += ["", *table(*published)]
-    if made := checks(result):
-        lines += ["", *table(*tables.check_table(made))]
-    if choices := selection(result):
-        lines += ["", *table(*tables.selection_table(choices), 4)]
-    if definition.tolerances:
-        lines += ["", *table(*tables.scatter_table(scatter(definition)))]
-    return lines
+        show(tables.value_table(result, [(values["where"], values) for values in at]), "")
+    show(*tables.sentences(result))
+    found = [
+        tables.reaction_table(result),
+        tables.published_table(result),
+        check_table(checks(result)),
+        tables.selection_table(selection(result)),
+        tables.scatter_table(scatter(definition) if definition.tolerances else []),
+    ]
+    for table in found:
+        if len(table):
+            show("", table)
 
 
 def _content(
@@ -257,10 +235,11 @@ def _content(
     """Page, pictures, animation and table, by the names of their files."""
     from railsim.mechanisms.comparison import compare
     from railsim.report import mechanisms as report
+    from railsim.report.document import as_png
 
     comparison = compare(results) if len(results) > 1 else None
     collected = report.Collected(results, cases, comparison, optimum)
-    drawn = {name: report.as_png(figure) for name, figure in report.figures(collected).items()}
+    drawn = {name: as_png(figure) for name, figure in report.figures(collected).items()}
     content = {f"{name}.png": png for name, png in drawn.items()}
     content["animation.gif"] = report.animation(collected.result)
     content["positions.csv"] = report.positions(collected.result)
@@ -278,13 +257,3 @@ def _optimised_text(
 
     base = Path(os.path.relpath(file, out)).as_posix() if Path(file).is_file() else file
     return optimised_text(base, optimum, assignments, case).encode()
-
-
-def _write(folder: Path, content: dict[str, bytes], overwrite: bool) -> list[Path]:
-    """Write files into a folder, which is created if it does not exist; nothing on a fault."""
-    check_folder(folder, content, overwrite=overwrite)
-    make_folder(folder)
-    for name, data in content.items():
-        with whole_file(folder / name) as partial:
-            partial.write_bytes(data)
-    return [folder / name for name in content]

@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar on a terminal, and a word when the first run takes its time.
+"""Progress on stderr: a bar on a terminal, and what is being prepared where that takes its time.
 
 What comes before a run, and may take as long, stands in the words of the bar.
 
@@ -9,17 +9,43 @@ import logging
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Timer
+from threading import Event, Thread, main_thread
 from typing import Any
 
 from railsim.cli.common import echo
 from railsim.cli.interrupts import obey
 
-PATIENCE = 5.0  # seconds without progress before the reason is printed
-FIRST_RUN = (
-    "preparing: the first run after an installation compiles the time loop and builds the contact "
-    "tables of its profiles (one to five minutes; kept for later runs)"
-)
+PATIENCE = 2.0  # seconds between looks at what the program is doing
+COMPILING = "preparing: compiling (after an installation; one to three minutes, kept for later)"
+CAUSES = {
+    "numba": COMPILING,
+    "railsim.contact.table": "preparing: the contact table of new profiles (kept for later)",
+}
+"""What takes long before a run, by the package or module that is at work."""
+
+_reported: set[str] = set()
+
+
+def _cause() -> str:
+    """What the main thread, or a worker that others wait for, prepares; nothing if it does not."""
+    frame = sys._current_frames().get(main_thread().ident or 0)
+    while frame is not None:
+        module = frame.f_globals.get("__name__", "")
+        for name, words in CAUSES.items():
+            if module == name or module.startswith(f"{name}.core"):
+                return words
+        frame = frame.f_back
+    studies = sys.modules.get("railsim.studies.execute")
+    return COMPILING if studies is not None and not studies.is_compiled() else ""
+
+
+def _report_causes(ended: Event) -> None:
+    """Report every cause once in a process, until the work has ended."""
+    while not ended.wait(PATIENCE):
+        words = _cause()
+        if words and words not in _reported:
+            _reported.add(words)
+            echo(words, err=True)
 
 
 @contextmanager
@@ -39,9 +65,8 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
         return
     from tqdm import tqdm
 
-    notice = Timer(PATIENCE, echo, (FIRST_RUN,), {"err": True})
-    notice.daemon = True
-    notice.start()
+    ended = Event()
+    Thread(target=_report_causes, args=(ended,), daemon=True).start()
     bar = tqdm(
         total=1.0,
         desc=words,
@@ -57,8 +82,6 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
 
     def show(fraction: float) -> None:
         obey()
-        if fraction > 0.0:
-            notice.cancel()
         bar.update(fraction - bar.n)
 
     doing.setLevel(logging.INFO)
@@ -68,7 +91,7 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     finally:
         doing.removeHandler(handler)
         doing.setLevel(before)
-        notice.cancel()
+        ended.set()
         bar.close()
 
 

@@ -2,9 +2,9 @@
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,16 +16,14 @@ from railsim.cli.common import (
     print_json,
     quiet_option,
     set_option,
-    table,
+    show,
 )
-from railsim.files import TABLES, check_file, check_folder, is_file, make_folder, whole_file
+from railsim.files import TABLES, check_file, check_folder, is_file, whole_file, write_folder
 
 if TYPE_CHECKING:
     from railsim.definitions.spring import TrailingArmSuspension
-    from railsim.springs.design import Design
     from railsim.springs.search import SearchResult
-    from railsim.springs.tolerance import RideHeight
-    from railsim.springs.verification import Case, Fatigue, Verification
+    from railsim.springs.verification import Case
 
 REPORT = "report.html"
 
@@ -45,20 +43,25 @@ def command() -> None:
     """  # noqa: D301 - click reads the escape
 
 
-def _pages_option(function: Any) -> Any:
-    return click.option(
-        "--out", metavar="DIR", help=f"Folder for the pictures and the page {REPORT}."
-    )(function)
+def _spring_command(function: Any) -> Any:
+    """Make a command of the group with a file, a folder for pages and the common options."""
+    options = (
+        quiet_option,
+        json_option,
+        overwrite_option,
+        set_option,
+        click.option(
+            "--out", metavar="DIR", help=f"Folder for the pictures and the page {REPORT}."
+        ),
+        click.argument("file", metavar="FILE"),
+    )
+    for option in options:
+        function = option(function)
+    return command.command()(function)
 
 
-@command.command()
-@click.argument("file", metavar="FILE")
+@_spring_command
 @click.option("--search", is_flag=True, help="Also search the nests that fit the table [search].")
-@_pages_option
-@set_option
-@overwrite_option
-@json_option
-@quiet_option
 def design(
     file: str,
     search: bool,
@@ -80,9 +83,9 @@ def design(
     """  # noqa: D301 - click reads the escape
     from railsim.springs.design import design as designed
     from railsim.springs.summary import design_data, search_data
+    from railsim.springs.tables import design_table, search_table
 
-    _check_out(out, overwrite)
-    suspension = _loaded(file, assignments)
+    suspension = _loaded(file, assignments, out, overwrite)
     with faults_in(file, "spring", suspension.name):
         result = designed(suspension)
         found = None
@@ -97,22 +100,23 @@ def design(
             data["search"] = search_data(found)
         print_json(data)
         return
-    for line in _design_lines(suspension, result):
-        echo(line)
+    low, high = (load * 1e-3 for load in result.load_range)
+    show(
+        design_table(suspension, result),
+        f"arm at the target: {math.degrees(result.rotation):.4f} deg; "
+        f"target load possible there: {low:.3f} to {high:.3f} kN",
+    )
     if found is not None:
-        echo()
-        for line in _search_lines(found):
-            echo(line)
-    _tell(suspension, written, quiet)
+        show(
+            "",
+            f"{found.tried} nests tried, {found.feasible} within all limits before refinement; "
+            f"ranked by {found.objective}",
+            search_table(found),
+        )
+    _finish(suspension, written, quiet)
 
 
-@command.command()
-@click.argument("file", metavar="FILE")
-@_pages_option
-@set_option
-@overwrite_option
-@json_option
-@quiet_option
+@_spring_command
 def verify(
     file: str,
     out: str | None,
@@ -131,12 +135,14 @@ def verify(
       railsim spring verify turasas_axlebox --out suspension --overwrite
       railsim spring verify turasas_axlebox --set inner.wire_diameter=0.028 --json
     """  # noqa: D301 - click reads the escape
+    from railsim.design_checks import check_table
+    from railsim.springs import tables
+    from railsim.springs.datasheet import data_sheets
     from railsim.springs.summary import ride_height_data, verification_data
     from railsim.springs.tolerance import ride_heights
     from railsim.springs.verification import verify as verified
 
-    _check_out(out, overwrite)
-    suspension = _loaded(file, assignments)
+    suspension = _loaded(file, assignments, out, overwrite)
     with faults_in(file, "spring", suspension.name):
         result = verified(suspension)
         heights = ride_heights(suspension) if suspension.tolerances is not None else ()
@@ -147,20 +153,17 @@ def verify(
             data["ride_height"] = ride_height_data(heights)
         print_json(data)
         return
-    for line in _verification_lines(suspension, result):
-        echo(line)
-    for line in _ride_height_lines(heights):
-        echo(line)
-    _tell(suspension, written, quiet)
+    if suspension.load_notes:
+        show(tables.load_table(suspension), "")
+    sheets = data_sheets(suspension, result)
+    show(tables.case_table(result), "", tables.loaded_table(sheets), "")
+    show(tables.sheet_table(sheets), "", check_table(result.checks))
+    if heights:
+        show("", tables.ride_height_table(heights))
+    _finish(suspension, written, quiet)
 
 
-@command.command()
-@click.argument("file", metavar="FILE")
-@_pages_option
-@set_option
-@overwrite_option
-@json_option
-@quiet_option
+@_spring_command
 def fatigue(
     file: str,
     out: str | None,
@@ -177,11 +180,11 @@ def fatigue(
       railsim spring fatigue turasas_axlebox --set fatigue.max_load=80e3 --json
     """  # noqa: D301 - click reads the escape
     from railsim.springs.summary import fatigue_data
+    from railsim.springs.tables import fatigue_table
     from railsim.springs.verification import dynamic_loads
     from railsim.springs.verification import fatigue as fatigue_of
 
-    _check_out(out, overwrite)
-    suspension = _loaded(file, assignments)
+    suspension = _loaded(file, assignments, out, overwrite)
     with faults_in(file, "spring", suspension.name):
         result = fatigue_of(suspension)
         loads = dynamic_loads(suspension)
@@ -189,9 +192,9 @@ def fatigue(
     if as_json:
         print_json(fatigue_data(suspension, result, loads))
         return
-    for line in _fatigue_lines(result, loads):
-        echo(line)
-    _tell(suspension, written, quiet)
+    low, high = (loads[key] * 1e-3 for key in ("min_load", "max_load"))
+    show(f"between {low:.3f} and {high:.3f} kN", fatigue_table(result))
+    _finish(suspension, written, quiet)
 
 
 @command.command()
@@ -220,6 +223,7 @@ def vehicle(
       railsim spring vehicle turasas_axlebox --out my_coach.toml --overwrite
       railsim run my_coach.toml curve_r250 --speed 20 --overwrite
     """  # noqa: D301 - click reads the escape
+    from railsim.errors import Fault, InputError, nearest
     from railsim.springs.vehicle_table import vehicle_part, vehicle_text
 
     suspension = _loaded(file, assignments)
@@ -227,7 +231,8 @@ def vehicle(
         check_file(Path(out), overwrite=overwrite, endings=TABLES)
     with faults_in(file, "spring", suspension.name):
         if load is not None and load not in suspension.loads:
-            _refuse("--load", f"no load '{load}' in [loads]", load, suspension.loads)
+            valid = nearest(load, suspension.loads)
+            raise InputError([Fault("--load", "", f"no load '{load}' in [loads]", valid)])
         part = vehicle_part(suspension, load)
         base, removed = _base(suspension, extends, out)
         text = vehicle_text(suspension, part, base, removed)
@@ -253,22 +258,15 @@ def vehicle(
             echo(out)
 
 
-def _loaded(file: str, assignments: Sequence[str]) -> "TrailingArmSuspension":
+def _loaded(
+    file: str, assignments: Sequence[str], out: str | None = None, overwrite: bool = False
+) -> "TrailingArmSuspension":
+    """Load a file; refuse a folder before anything is computed."""
     from railsim.definitions.loading import load_spring
 
-    return load_spring(file, assignments)
-
-
-def _refuse(option: str, found: str, name: str, valid: Iterable[str]) -> NoReturn:
-    from railsim.errors import Fault, InputError, nearest
-
-    raise InputError([Fault(option, "", found, nearest(name, valid))])
-
-
-def _check_out(out: str | None, overwrite: bool) -> None:
-    """Refuse a folder before anything is computed; the pictures' names are known when drawn."""
     if out:
         check_folder(Path(out), [REPORT], overwrite=overwrite)
+    return load_spring(file, assignments)
 
 
 def _write_pages(
@@ -278,19 +276,14 @@ def _write_pages(
     search: "SearchResult | None" = None,
 ) -> list[Path]:
     """Write pictures and page into a folder, created if it does not exist; nothing on a fault."""
-    from railsim.report.springs import as_png, collected, figures, page
+    from railsim.report.document import as_png
+    from railsim.report.springs import collected, figures, page
 
     results = collected(suspension, search)
     drawn = {name: as_png(figure) for name, figure in figures(results).items()}
-    folder = Path(out)
     files = {f"{name}.png": png for name, png in drawn.items()}
     files[REPORT] = page(results, drawn).encode()
-    check_folder(folder, files, overwrite=overwrite)
-    make_folder(folder)
-    for name, content in files.items():
-        with whole_file(folder / name) as partial:
-            partial.write_bytes(content)
-    return [folder / name for name in files]
+    return write_folder(Path(out), files, overwrite=overwrite)
 
 
 def _load_remarks(
@@ -338,13 +331,12 @@ def _base(
 
 def _holds(data: Any, path: Sequence[str]) -> bool:
     for part in path:
-        if not isinstance(data, dict) or part not in data:
-            return False
-        data = data[part]
-    return True
+        data = data.get(part) if isinstance(data, dict) else None
+    return data is not None
 
 
-def _tell(suspension: "TrailingArmSuspension", written: Sequence[Path], quiet: bool) -> None:
+def _finish(suspension: "TrailingArmSuspension", written: Sequence[Path], quiet: bool) -> None:
+    """Say what is unusual in the file, and what was written."""
     from railsim.definitions.spring import spring_remarks
 
     if quiet:
@@ -353,59 +345,3 @@ def _tell(suspension: "TrailingArmSuspension", written: Sequence[Path], quiet: b
         echo(f"remark: {remark}", err=True)
     for path in written:
         echo(str(path))
-
-
-def _design_lines(suspension: "TrailingArmSuspension", result: "Design") -> list[str]:
-    low, high = (load * 1e-3 for load in result.load_range)
-    rows = []
-    for (name, spring), K_V, n in zip(
-        suspension.springs.items(), result.K_V, result.n, strict=True
-    ):
-        wire = "-" if spring.wire_diameter is None else f"{spring.wire_diameter * 1e3:.6g}"
-        coils = "-" if n is None else f"{n:.4f}"
-        rows.append([name, f"{spring.mean_diameter * 1e3:.6g}", f"{K_V * 1e-3:.3f}", wire, coils])
-    header = ["spring", "D / mm", "K_V / (N/mm)", "d / mm", "n"]
-    return [
-        *table(header, rows),
-        f"arm at the target: {math.degrees(result.rotation):.4f} deg; "
-        f"target load possible there: {low:.3f} to {high:.3f} kN",
-    ]
-
-
-def _search_lines(result: "SearchResult") -> list[str]:
-    from railsim.springs.tables import search_table
-
-    header, rows = search_table(result)
-    lines = table(header[:-1], [row[:-1] for row in rows])
-    limits = [row[-1] for row in (header, *rows)]
-    return [
-        f"{result.tried} nests tried, {result.feasible} within all limits before refinement; "
-        f"ranked by {result.objective}",
-        *(f"{line}  {active}" for line, active in zip(lines, limits, strict=True)),
-    ]
-
-
-def _verification_lines(suspension: "TrailingArmSuspension", result: "Verification") -> list[str]:
-    from railsim.springs.datasheet import data_sheets
-    from railsim.springs.tables import case_table, check_table, loaded_table, sheet_table
-
-    sheets = data_sheets(suspension, result)
-    tables = (
-        case_table(result), loaded_table(sheets), sheet_table(sheets), check_table(result.checks)
-    )  # fmt: skip
-    return [line for texts in tables for line in (*table(*texts), "")][:-1]
-
-
-def _ride_height_lines(results: Sequence["RideHeight"]) -> list[str]:
-    from railsim.springs.tables import ride_height_table
-
-    return ["", *table(*ride_height_table(results))] if results else []
-
-
-def _fatigue_lines(result: Mapping[str, "Fatigue"], loads: Mapping[str, float]) -> list[str]:
-    from railsim.springs.tables import fatigue_table
-
-    return [
-        f"between {loads['min_load'] * 1e-3:.3f} and {loads['max_load'] * 1e-3:.3f} kN",
-        *table(*fatigue_table(result)),
-    ]

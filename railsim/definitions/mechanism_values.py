@@ -100,13 +100,26 @@ def point_names(mechanism: Mechanism) -> list[str]:
     return [*names, *(f"{b}.{p}" for b, part in mechanism.bodies.items() for p in part.points)]
 
 
+PAIRS = ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston", "spring",
+         "damper", "stop", "gas_spring")  # fmt: skip
+"""Keys of parts between two points."""
+
+
 def ends(part: Any) -> tuple[str, str] | None:
-    """The two points of a joint, actuator or element between points."""
-    for field in ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston",
-                  "spring", "damper", "stop", "gas_spring"):  # fmt: skip
-        if (pair := getattr(part, field, None)) is not None:
-            return pair  # type: ignore[no-any-return]
-    return None
+    """The two points of a joint, actuator or element between points; None of others."""
+    return next((pair for key in PAIRS if (pair := getattr(part, key, None)) is not None), None)
+
+
+def points_of(part: Any) -> tuple[str, str]:
+    """The two points of a part that is between points."""
+    pair = ends(part)
+    assert pair is not None
+    return pair
+
+
+def body_name(point: str) -> str:
+    """Name of the body of a point."""
+    return point.partition(".")[0]
 
 
 def sizes(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, float]:

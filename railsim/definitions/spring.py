@@ -297,6 +297,8 @@ class TrailingArmSuspension(FileDefinition):
     """One further load with its wanted deflection, for the design"""
     loads: dict[Text, Positive] = Field(min_length=1)
     """Loads of one primary suspension by name [N]"""
+    load_notes: dict[Text, Text] = Field(default_factory=dict)
+    """What each load is, by its name"""
     fatigue: Fatigue | None = None
     """Dynamic loads and Goodman-Smith line"""
     checks: Checks = Checks()
@@ -402,6 +404,11 @@ def _load_name_faults(suspension: TrailingArmSuspension) -> list[Fault]:
         Fault("", key, f"no load '{name}' in [loads]", nearest(name, suspension.loads))
         for key, name in named.items()
         if name is not None and name not in suspension.loads
+    ]
+    faults += [
+        Fault("", f"load_notes.{name}", "no such load in [loads]", nearest(name, suspension.loads))
+        for name in suspension.load_notes
+        if name not in suspension.loads
     ]
     if fatigue is None or fatigue.max_load is None or fatigue.min_load is None:
         return faults

@@ -209,7 +209,11 @@ class LossOfStability:
 
 
 def loss_of_stability(
-    at: At, low: float, high: float, points: int = 12, searched: tuple[float, float] = SEARCHED
+    at: At,
+    low: float,
+    high: float,
+    points: int = 12,
+    counts: Callable[[Eigenmodes], bool] | None = None,
 ) -> LossOfStability:
     """Find the lowest parameter at which an oscillation is no longer damped.
 
@@ -221,14 +225,14 @@ def loss_of_stability(
         Range of the search.
     points : int
         Values of the parameter at which the range is looked through.
-    searched : tuple of 2 floats
-        Frequencies that count [Hz].
+    counts : callable, optional
+        Whether a mode that is undamped counts; by default all do.
     """
     known: dict[float, Eigenmodes] = {}
 
     def growth(parameter: float) -> float:
         if parameter not in known:
-            known[parameter] = _least_damped(eigenmodes(at(parameter)), searched)
+            known[parameter] = _least_damped(eigenmodes(at(parameter)), counts)
         return float(known[parameter].eigenvalues[0].real)
 
     grid = np.linspace(low, high, points).tolist()
@@ -242,10 +246,19 @@ def loss_of_stability(
     return LossOfStability(None, False, (known[grid[0]], known[grid[-1]]))
 
 
-def _least_damped(modes: Eigenmodes, searched: tuple[float, float]) -> Eigenmodes:
-    """The mode of largest growth among the oscillations within a band of frequencies."""
+def _least_damped(
+    modes: Eigenmodes, counts: Callable[[Eigenmodes], bool] | None = None
+) -> Eigenmodes:
+    """The mode of largest growth among the oscillations in `SEARCHED`, if undamped one that counts.
+
+    Where no mode counts, the least damped of those that decay.
+    """
     frequency = modes.frequencies
-    inside = np.flatnonzero((frequency >= searched[0]) & (frequency <= searched[1]))
+    inside = np.flatnonzero((frequency >= SEARCHED[0]) & (frequency <= SEARCHED[1]))
     if len(inside) == 0:
         inside = np.arange(len(frequency))
-    return modes.taken([int(inside[np.argmax(modes.eigenvalues[inside].real)])])
+    order = inside[np.argsort(-modes.eigenvalues[inside].real)]
+    ordered = [modes.taken([int(k)]) for k in order]
+    if counts is not None:
+        ordered = [m for m in ordered if m.eigenvalues[0].real < 0.0 or counts(m)] or ordered
+    return ordered[0]

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
+from railsim.table import Column, Table
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -25,6 +27,9 @@ Complex = NDArray[np.complex128]
 SPEED_RANGE = (0.5, 150.0)  # m/s
 LEAST_SHARE = 0.005  # of the kinetic energy that is listed
 FOLLOWED = 100.0  # Hz, largest undamped frequency in a root locus
+SHOWN = 50.0  # Hz, up to which modes are tabulated
+FREQUENCY = Column("frequency", "f", "Hz", ".3f")
+DAMPING = Column("damping_ratio", "damping", "%", ".2f")
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,8 @@ class Modes(Plottable):
         Remarks for the reader.
     parameter : tuple of str and float, or None
         Key and value of another parameter than the speed.
+    vehicle, place : str
+        Name of the vehicle; the track in words.
     """
 
     speed: float
@@ -111,6 +118,8 @@ class Modes(Plottable):
     modes: tuple[Mode, ...]
     remarks: tuple[str, ...] = ()
     parameter: tuple[str, float] | None = None
+    vehicle: str = ""
+    place: str = ""
 
     def __iter__(self) -> Any:
         return iter(self.modes)
@@ -142,17 +151,46 @@ class Modes(Plottable):
         """Return speed, kind of linearisation and modes as plain data."""
         data: dict[str, Any] = {
             "speed": self.speed,
-            "linearisation": self.contact.linearisation,
-            "amplitude": (
-                self.contact.amplitude if self.contact.linearisation == "harmonic" else None
-            ),
-            "conicity": self.contact.conicity,
+            **self.contact.record(),
             "remarks": list(self.remarks),
             "modes": [mode.record() for mode in self.modes if mode.exists],
         }
         if self.parameter is not None:
             data["parameter"] = {"key": self.parameter[0], "value": self.parameter[1]}
         return data
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the table leaves out, in words."""
+        above = sum(mode.natural_frequency > SHOWN for mode in self.oscillations)
+        still = sum(mode.exists and not mode.oscillates for mode in self.modes)
+        return (
+            f"{above} oscillations above {SHOWN:g} Hz and {still} modes that do not oscillate: "
+            "--json",
+        )
+
+    def table(self) -> Table:
+        """Return the oscillations up to 50 Hz with the largest shares of their kinetic energy."""
+        columns = [
+            Column("mode"),
+            FREQUENCY,
+            Column("natural_frequency", "f0", "Hz", ".3f"),
+            DAMPING,
+            Column("participation", "kinetic energy"),
+        ]
+        rows = []
+        for mode in self.oscillations:
+            if mode.natural_frequency <= SHOWN:
+                largest = list(mode.participation.items())[:3]
+                shares = ", ".join(f"{name} {100 * share:.0f} %" for name, share in largest)
+                numbers = mode.frequency, mode.natural_frequency, mode.damping_ratio
+                rows.append([mode.name, *numbers, shares])
+        return Table(columns, rows, self.title)
+
+    @property
+    def title(self) -> str:
+        """Vehicle, speed, track and contact in words."""
+        return f"{self.vehicle}: {self.speed:g} m/s, {self.place}, contact {self.contact.words()}"
 
 
 @dataclass(frozen=True)
@@ -210,6 +248,33 @@ class RootLocus(Plottable):
     def record(self) -> list[dict[str, Any]]:
         """Return one record a value."""
         return [modes.record() for modes in self.sets]
+
+    notes: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks for the reader."""
+        return tuple(dict.fromkeys(remark for modes in self.sets for remark in modes.remarks))
+
+    def table(self) -> Table:
+        """Return the least damped oscillation from 0.3 to 40 Hz at every value."""
+        unit = "m/s" if self.key == "speed" else ""
+        columns = [Column(self.key, unit=unit, format="g"), Column("mode"), FREQUENCY, DAMPING]
+        rows: list[list[Any]] = []
+        for value, modes in zip(self.values, self.sets, strict=True):
+            least = modes.least_damped
+            if least is None:
+                rows.append([value, "no oscillation", None, None])
+            else:
+                name = self.names[modes.modes.index(least)]
+                rows.append([value, name, least.frequency, least.damping_ratio])
+        return Table(columns, rows, f"{self.title}; least damped oscillation from 0.3 to 40 Hz")
+
+    @property
+    def title(self) -> str:
+        """Vehicle, track and contact in words."""
+        first = self.sets[0]
+        return f"{first.vehicle}: {first.place}, contact {first.contact.words()}"
 
 
 def numbered(names: Sequence[str]) -> list[str]:
@@ -289,11 +354,11 @@ def modes(
     >>> print(f"{mode.natural_frequency:.2f} Hz, {100 * mode.damping_ratio:.0f} %")
     0.90 Hz, 11 %
     """
-    check_speeds([speed])
+    contact = Contact(linearisation, amplitude, conicity)
     prepared = LinearVehicle(
         vehicle,
         track or load_track("straight"),
-        contact=Contact(linearisation, amplitude, conicity),
+        contact=contact,
         radius=radius,
         cant=cant,
         held=held,
@@ -301,7 +366,8 @@ def modes(
         settings=smooth_law(settings),
         profiles=profiles,
     )
-    return modes_at(prepared, speed)
+    check_speeds([speed])
+    return _named(prepared, eigenmodes(prepared.linearised(speed)), speed)
 
 
 def root_locus(
@@ -318,35 +384,15 @@ def root_locus(
     **how
         The other arguments of `modes`: linearisation, amplitude, conicity, radius, cant, held,
         hold, settings, profiles.
-
-    Returns
-    -------
-    RootLocus
     """
     check_speeds(speeds)
-    settings, profiles = how.pop("settings", None), how.pop("profiles", None)
-    contact = Contact(
-        how.pop("linearisation", "tangent"),
-        how.pop("amplitude", AMPLITUDE),
-        how.pop("conicity", None),
-    )
-    prepared = LinearVehicle(
-        vehicle,
-        track or load_track("straight"),
-        contact=contact,
-        settings=smooth_law(settings),
-        profiles=profiles,
-        **how,
-    )
+    how = {**how, "settings": smooth_law(how.get("settings"))}
+    names = ("linearisation", "amplitude", "conicity")
+    contact = Contact(**{name: how.pop(name) for name in names if name in how})
+    prepared = LinearVehicle(vehicle, track or load_track("straight"), contact=contact, **how)
     sets = followed(prepared.linearised, list(speeds), FOLLOWED)
-    parts = parts_of(prepared.model, prepared.coordinates)
-    return RootLocus(
-        "speed",
-        tuple(speeds),
-        tuple(
-            _named(prepared, parts, found, speed) for found, speed in zip(sets, speeds, strict=True)
-        ),
-    )
+    named = [_named(prepared, found, speed) for found, speed in zip(sets, speeds, strict=True)]
+    return RootLocus("speed", tuple(speeds), tuple(named))
 
 
 def parameter_locus(
@@ -365,25 +411,13 @@ def parameter_locus(
         [m/s].
     """
     check_speeds([speed])
-    known: dict[float, LinearVehicle] = {}
-
-    def of(value: float) -> LinearVehicle:
-        if value not in known:
-            known[value] = prepared(value)
-        return known[value]
-
+    of = cache(prepared)
     sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
-    named = []
-    for found, value in zip(sets, values, strict=True):
-        parts = parts_of(of(value).model, of(value).coordinates)
-        named.append(_named(of(value), parts, found, speed, (key, value)))
+    named = [
+        _named(of(value), found, speed, (key, value))
+        for found, value in zip(sets, values, strict=True)
+    ]
     return RootLocus(key, tuple(values), tuple(named))
-
-
-def modes_at(prepared: LinearVehicle, speed: float) -> Modes:
-    """Return the modes of a prepared vehicle at a speed [m/s]."""
-    found = eigenmodes(prepared.linearised(speed))
-    return _named(prepared, parts_of(prepared.model, prepared.coordinates), found, speed)
 
 
 def check_speeds(speeds: Sequence[float]) -> None:
@@ -397,12 +431,11 @@ def check_speeds(speeds: Sequence[float]) -> None:
 
 def _named(
     prepared: LinearVehicle,
-    parts: Parts,
     found: Eigenmodes,
     speed: float,
     parameter: tuple[str, float] | None = None,
 ) -> Modes:
-    c = prepared.coordinates
+    c, parts = prepared.coordinates, parts_of(prepared.model, prepared.coordinates)
     names = [
         "" if np.isnan(value) else mode_name(parts, shape, complex(value), speed)
         for shape, value in zip(found.shapes, found.eigenvalues, strict=True)
@@ -414,22 +447,23 @@ def _named(
             continue
         positions = shape[c.positions]
         largest = positions[int(np.argmax(np.abs(positions)))]
-        shown = positions / largest if largest else positions
-        listed.append(
-            Mode(
-                name,
-                complex(value),
-                _participation(parts, shape),
-                dict(zip(c.names[: c.n_positions], shown.tolist(), strict=True)),
-            )
-        )
-    return Modes(speed, prepared.contact, tuple(listed), prepared.remarks, parameter)
+        shown = (positions / largest if largest else positions).tolist()
+        shapes = dict(zip(c.names[: c.n_positions], shown, strict=True))
+        listed.append(Mode(name, complex(value), _participation(parts, shape), shapes))
+    return Modes(
+        speed,
+        prepared.contact,
+        tuple(listed),
+        prepared.remarks,
+        parameter,
+        prepared.name,
+        prepared.place,
+    )
 
 
 def _participation(parts: Parts, shape: Complex) -> dict[str, float]:
-    shares = parts.energy_shares(shape)
-    names = [name.rstrip("'") for name in parts.coordinates.names[parts.coordinates.velocities]]
-    c = parts.coordinates
+    c, shares = parts.coordinates, parts.energy_shares(shape)
+    names = [name.rstrip("'") for name in c.names[c.velocities]]
     values = shares[c.bodies[c.velocities], c.components[c.velocities]]
     order = np.argsort(-values, kind="stable")
     return {names[k]: float(values[k]) for k in order if values[k] >= LEAST_SHARE}

@@ -50,6 +50,24 @@ def smooth_law(settings: Settings | None) -> Settings:
     return settings.replace(fastsim_grid=(along, across))
 
 
+def conditions(track: Track, settings: Settings) -> dict[str, str]:
+    """Return in words on what rails, with which creep law and friction."""
+
+    def words(settings: Settings) -> str:
+        law = CREEP_LAWS[settings.creep_law]
+        cells = " {} x {} cells".format(*settings.fastsim_grid) if law.grid else ""
+        return f"{law.label}{cells}"
+
+    sides = np.unique(track.friction)
+    friction = "from a table" if track.friction_table else "/".join(f"{mu:g}" for mu in sides)
+    return {
+        "rails": track.support.preset,
+        "law": words(settings),
+        "linear_law": words(smooth_law(settings)),
+        "friction": friction,
+    }
+
+
 @dataclass(frozen=True)
 class Contact:
     """How the contact of wheel and rail is linearised.
@@ -70,28 +88,44 @@ class Contact:
 
     def faults(self) -> list[Fault]:
         """Return what is wrong with it."""
-        found = []
-        if self.linearisation not in LINEARISATIONS:
-            found.append(
-                argument_fault(
-                    "linearisation",
-                    "",
-                    f"found '{self.linearisation}'",
-                    " or ".join(LINEARISATIONS),
-                )
-            )
-        if not (math.isfinite(self.amplitude) and self.amplitude > 0.0):
-            found.append(
-                argument_fault(
-                    "amplitude", "", f"found {self.amplitude:g} m", "a positive number of m"
-                )
-            )
         low, high = CONICITIES
-        if self.conicity is not None and not low <= self.conicity <= high:
-            found.append(
-                argument_fault("conicity", "", f"found {self.conicity:g}", f"{low:g} to {high:g}")
-            )
-        return found
+        checks = (
+            (
+                self.linearisation in LINEARISATIONS,
+                "linearisation",
+                f"found '{self.linearisation}'",
+                " or ".join(LINEARISATIONS),
+            ),
+            (
+                math.isfinite(self.amplitude) and self.amplitude > 0.0,
+                "amplitude",
+                f"found {self.amplitude:g} m",
+                "a positive number of m",
+            ),
+            (
+                self.conicity is None or low <= self.conicity <= high,
+                "conicity",
+                f"found {self.conicity}",
+                f"{low:g} to {high:g}",
+            ),
+        )
+        return [argument_fault(name, "", *words) for right, name, *words in checks if not right]
+
+    def record(self) -> dict[str, Any]:
+        """Return it as plain data; an amplitude where it counts."""
+        amplitude = self.amplitude if self.linearisation == "harmonic" else None
+        return {
+            "linearisation": self.linearisation,
+            "amplitude": amplitude,
+            "conicity": self.conicity,
+        }
+
+    def words(self) -> str:
+        """Return it in words."""
+        words = self.linearisation
+        if self.linearisation == "harmonic":
+            words += f" {1e3 * self.amplitude:g} mm"
+        return words if self.conicity is None else f"{words}, cones of {self.conicity:g}"
 
 
 class LinearVehicle:
@@ -112,6 +146,13 @@ class LinearVehicle:
     settings : Settings, optional
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
+
+    Attributes
+    ----------
+    name : str
+        Of the vehicle.
+    sticking : int
+        Number of friction elements, which a linearisation takes as sticking.
 
     Raises
     ------
@@ -142,7 +183,7 @@ class LinearVehicle:
             faults.append(argument_fault("cant", "", f"found {cant:g} m", "0.5 m at most"))
         if faults:
             raise InputError(faults)
-        self.held = held
+        self.held, self.name = held, vehicle.name
         self.curvature, self.cant = 1.0 / radius if math.isfinite(radius) else 0.0, cant
         known = dict(profiles or {})
         if self.contact.conicity is not None:
@@ -157,6 +198,7 @@ class LinearVehicle:
         self.model: Model = balance.model
         self.Q0: Floats = balance.Q0
         self._remarks = balance.remarks
+        self.sticking = int(np.count_nonzero(self.model.system.internal.kind == PAD))
         _check_hold(self.model, hold)
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
@@ -168,16 +210,25 @@ class LinearVehicle:
         self.system = without_loads(self.model.system)._replace(track=track_tables(there))
 
     @property
+    def place(self) -> str:
+        """The track that it rolls on, in words."""
+        shape = "straight track"
+        if self.curvature or self.cant:
+            shape = f"R {1.0 / self.curvature:.6g} m" if self.curvature else shape
+            shape += f", cant {1e3 * self.cant:g} mm"
+        where = conditions(self.track, Settings())
+        return f"{shape}, rails {where['rails']}, friction {where['friction']}"
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks for the reader of the results."""
-        found = list(self._remarks)
-        pads = np.flatnonzero(self.model.system.internal.kind == PAD)
-        if len(pads):
-            found.append(
-                f"{len(pads)} friction elements stick: they are linearised with their elasticity "
-                "in sticking, and what they damp in sliding is left out"
-            )
-        return tuple(found)
+        if not self.sticking:
+            return self._remarks
+        return (
+            *self._remarks,
+            f"{self.sticking} friction elements stick: they are linearised with their elasticity "
+            "in sticking, and what they damp in sliding is left out",
+        )
 
     def steady(self, speed: float) -> SteadyState:
         """Return the state of steady rolling at a speed [m/s].

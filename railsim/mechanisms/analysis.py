@@ -44,42 +44,18 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Results of a mechanism; arrays over its positions have the shape (position,).
+    """Results of a mechanism."""
 
-    Attributes
-    ----------
-    definition : Mechanism
-        The mechanism, with the parameters of its case.
-    model : Model
-        The same as arrays.
-    motion : Motion
-        Positions.
-    output : dict of str to ndarray
-        Named results over the positions, SI; names and units in `quantities`.
-    zone : dict of str to dict of str to float
-        The same at low, work and high height.
-    force_zeros : tuple of float
-        Values of the driver at which the unknown force changes its sign.
-    rests : tuple of Rest
-        Positions of rest of a mechanism without an unknown.
-    reactions : dict of str to Reaction
-    transitions : tuple of Transition
-        Changes of rollers from arc to arc.
-    contact, timed, release : results of the tables [contact], [motion], [release], or None
-    case : str or None
-        Name of the case.
-    """
-
-    definition: Mechanism
-    model: Model
-    motion: Motion
-    output: dict[str, Floats]
-    zone: dict[str, dict[str, float]]
-    force_zeros: tuple[float, ...]
-    rests: tuple[Rest, ...]
-    reactions: dict[str, Reaction]
-    transitions: tuple[Transition, ...]
-    contact: Contact | None
+    definition: Mechanism  # with the parameters of its case
+    model: Model  # the same as arrays
+    motion: Motion  # positions
+    output: dict[str, Floats]  # results at these positions, SI; names and units in `quantities`
+    zone: dict[str, dict[str, float]]  # the same at low, work and high height
+    force_zeros: tuple[float, ...]  # values of the driver where the unknown force changes its sign
+    rests: tuple[Rest, ...]  # positions of rest of a mechanism without an unknown
+    reactions: dict[str, Reaction]  # by joint
+    transitions: tuple[Transition, ...]  # changes of rollers from arc to arc
+    contact: Contact | None  # results of the tables [contact], [motion], [release]
     timed: TimedMotion | None
     release: FreeMotion | None
     case: str | None = None
@@ -200,9 +176,10 @@ def analyse(definition: Mechanism, case: str | None = None) -> Analysis:
     output = outputs(motion)
     check_pressure(motion, output)
     at_zone = zone_drivers(dense)
+    in_zone = outputs(solve(model, list(at_zone.values()))) if at_zone else {}
     zone = {
-        name: {key: float(array[i]) for key, array in outputs(solve(model, at_zone[1])).items()}
-        for i, name in enumerate(at_zone[0])
+        name: {key: float(array[i]) for key, array in in_zone.items()}
+        for i, name in enumerate(at_zone)
     }
     return Analysis(
         definition,
@@ -260,6 +237,5 @@ def _release(model: Model) -> FreeMotion | None:
     for key, value in (("start", start), ("until", until)):
         if not low - 1e-12 <= value <= high + 1e-12:
             allowed = f"{driver_words(model, low)} to {driver_words(model, high)}"
-            found = driver_words(model, value)
-            raise InputError([Fault(model.definition.name, f"release.{key}", found, allowed)])
+            raise model.refusal(f"release.{key}", driver_words(model, value), allowed)
     return free_motion(model, start, until, model.number(release.duration))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from railsim.definitions.mechanism_parts import Cam
+from railsim.definitions.mechanism_values import body_name
 from railsim.errors import InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels import linkage_motion as motion_kernel
@@ -20,28 +21,14 @@ HALVINGS = 48
 
 @dataclass(frozen=True)
 class Transition:
-    """Change of a roller from one arc to the next.
+    """Change of a roller from one arc to the next."""
 
-    Attributes
-    ----------
-    joint : str
-        The cam.
-    travel : float
-        Driver [rad or m].
-    before, after : int
-        Arcs, counted from 1 in the order of the file.
-    gap : float
-        Distance by which the arc after misses the roller's centre: 0 for tangent arcs [m].
-    rate_before, rate_after : float
-        Rate of the roller's body, dtheta/ds, on either arc.
-    """
-
-    joint: str
-    travel: float
-    before: int
+    joint: str  # the cam
+    travel: float  # driver [rad or m]
+    before: int  # arcs, counted from 1 in the order of the file
     after: int
-    gap: float
-    rate_before: float
+    gap: float  # distance by which the arc after misses the roller's centre: 0 if tangent [m]
+    rate_before: float  # of the roller's body, dtheta/ds, on either arc
     rate_after: float
 
 
@@ -56,16 +43,16 @@ def roller_body(motion: Motion, joint: str) -> int:
     """Number of the body that carries the roller of a cam."""
     cam = motion.model.definition.joints[joint]
     assert isinstance(cam, Cam)
-    return motion.model.bodies[cam.cam.partition(".")[0]]
+    return motion.model.bodies[body_name(cam.cam)]
 
 
 def transitions(dense: Motion) -> tuple[Transition, ...]:
     """All changes of arcs along a motion, in its order."""
-    found = []
-    for joint, row in cam_rows(dense).items():
-        for k in np.flatnonzero(np.diff(dense.arcs[:, row])):
-            found.append(_transition(dense, joint, row, int(k)))
-    return tuple(found)
+    return tuple(
+        _transition(dense, joint, row, int(k))
+        for joint, row in cam_rows(dense).items()
+        for k in np.flatnonzero(np.diff(dense.arcs[:, row]))
+    )
 
 
 def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:

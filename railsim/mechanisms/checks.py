@@ -1,45 +1,16 @@
 """Checks of a mechanism: every value that a file limits, against its limit."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from railsim.definitions.mechanism_parts import AirSpring, Cylinder, GasSpring, Piston
-from railsim.definitions.mechanism_values import ends
+from railsim.definitions.mechanism_values import points_of
+from railsim.design_checks import ROUNDING, Check
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.components import cylinder_area, lid_force, next_size
 from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion
 from railsim.mechanisms.outputs import actuator_of
-
-ROUNDING = 1e-5
-"""Share of a limit by which rounding may miss it: dimensions have six or seven digits."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """A value against its limit; `sense` says on which side it must be.
-
-    With the sense 'about' the limit is a rule of thumb, which no value breaks.
-    """
-
-    name: str
-    value: float
-    limit: float
-    sense: str
-    unit: str
-    note: str
-
-    @property
-    def ok(self) -> bool:
-        """Whether it is met; on the limit counts as met."""
-        margin = ROUNDING * abs(self.limit)
-        if self.sense == "about":
-            return True
-        if self.sense == "above":
-            return self.value >= self.limit - margin
-        return self.value <= self.limit + margin
 
 
 def checks(result: Analysis) -> list[Check]:
@@ -190,8 +161,7 @@ def _gas_spring(result: Analysis, name: str, spring: GasSpring) -> list[Check]:
 
 def rod_drop(result: Analysis, name: str) -> float:
     """Height of a gas spring's second end over its first where it is most compressed [m]."""
-    pair = ends(result.definition.elements[name])
-    assert pair is not None
+    pair = points_of(result.definition.elements[name])
     k = int(np.argmin(result.output[f"{name}_length"]))
     first, second = (result.motion.point(point)[0][k, 1] for point in pair)
     return float(second - first)

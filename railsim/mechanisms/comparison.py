@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from railsim.definitions.mechanism_values import ends
 from railsim.errors import InputError
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import solve
-from railsim.mechanisms.outputs import actuator_of
-from railsim.mechanisms.targets import Positions, follow_error, heights_and_ratios
+from railsim.mechanisms.outputs import equal_lengths, length_points
+from railsim.mechanisms.targets import Positions, follow_error
 
 POINTS = 215
 """Positions in the zone at which ratios are compared, in equal steps of the reference's length."""
@@ -19,20 +17,11 @@ POINTS = 215
 
 @dataclass(frozen=True)
 class Compared:
-    """One mechanism against the reference.
-
-    Attributes
-    ----------
-    name : str
-    values : dict of str to float
-        Results by name; NaN where the mechanism has none.
-    error : float
-        Sum of squared differences of the ratio from the reference's at equal heights.
-    """
+    """One mechanism against the reference."""
 
     name: str
-    values: dict[str, float]
-    error: float
+    values: dict[str, float]  # results by name; NaN where the mechanism has none
+    error: float  # sum of squared differences of the ratio from the reference's at equal heights
 
 
 @dataclass(frozen=True)
@@ -68,20 +57,15 @@ def compare(results: Sequence[Analysis]) -> Comparison:
 
 def _reference(result: Analysis) -> Positions | None:
     """Heights and ratios of a mechanism in its zone, else over its whole travel."""
-    definition = result.definition
-    name = actuator_of(definition)
-    pair = ends(definition.actuators[name]) if name is not None else None
-    if pair is None or definition.output is None:
+    pair = length_points(result.definition)
+    if pair is None or result.definition.output is None:
         return None
     edges = [result.model.start, result.model.end]
     if result.zone:
         edges = [result.zone[k]["travel"] for k in ("low", "high")]
     dense = solve(result.model, np.linspace(edges[0], edges[1], 101))
-    length = dense.length(pair)[0]
-    wanted = np.linspace(length[0], length[-1], POINTS)
-    s = driver_at(dense, lambda motion: motion.length(pair)[:2], wanted)
-    height, ratio = heights_and_ratios(solve(result.model, s), pair, definition.output.point)
-    return Positions(s, height, ratio)
+    s = equal_lengths(dense, pair, dense.length(pair)[0][[0, -1]], POINTS)
+    return Positions.of(solve(result.model, s), pair)
 
 
 def _error(result: Analysis, reference: Positions | None) -> float:

@@ -12,7 +12,6 @@ from railsim.definitions.expressions import Expression
 from railsim.definitions.mechanism_parts import AUTO
 from railsim.mechanisms.forces import (
     Rates,
-    contact_force,
     force_at_pressure,
     generalised_force,
     pressure_for,
@@ -28,58 +27,28 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rest:
-    """A position of rest, with dry friction a range of positions.
+    """A position of rest, with dry friction a range of positions [rad or m]."""
 
-    Attributes
-    ----------
-    at : float
-        Value of the driver, the middle of the range [rad or m].
-    low, high : float
-        Ends of the range; equal without friction.
-    stable : bool
-        Whether the mechanism comes back to it from either side.
-    """
-
-    at: float
-    low: float
+    at: float  # value of the driver, the middle of the range
+    low: float  # ends of the range; equal without friction
     high: float
-    stable: bool
+    stable: bool  # whether the mechanism comes back to it from either side
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Static contact force of the output.
+    """Static contact force of the output; NaN where the actuator has no value [N]."""
 
-    Attributes
-    ----------
-    pressure : float
-        Pressure held [Pa]; by default what gives the wanted force at work height without friction,
-        the mean of the forces of a rising and a falling output.
-    force : dict of str to float
-        At low, work and high height without friction; NaN where the actuator has no value [N].
-    rising, falling : dict of str to float
-        The same with friction, for the output on its way from start to end and back.
-    curve : ndarray, shape (position,)
-        At all positions, without friction [N].
-    bounds : tuple of two ndarray, shape (position,)
-        The same with friction, rising and falling.
-    rests : tuple of Rest
-        Where the mechanism rests without a contact force.
-    heights : tuple of (low, high)
-        Heights of these positions [m].
-    reason : str
-        Why values are missing.
-    """
-
-    pressure: float
-    force: Mapping[str, float]
-    rising: Mapping[str, float]
-    falling: Mapping[str, float]
-    curve: Floats
-    bounds: tuple[Floats, Floats]
-    rests: tuple[Rest, ...]
-    heights: tuple[tuple[float, float], ...]
-    reason: str = ""
+    pressure: float  # pressure held [Pa]; by default what gives the wanted force at work height
+    # without friction, the mean of the forces of a rising and a falling output
+    force: Mapping[str, float]  # at low, work and high height without friction
+    rising: Mapping[str, float]  # the same with friction, output on its way from start to end
+    falling: Mapping[str, float]  # and back
+    curve: Floats  # at all positions, without friction
+    bounds: tuple[Floats, Floats]  # the same with friction, rising and falling
+    rests: tuple[Rest, ...]  # where the mechanism rests without a contact force
+    heights: tuple[tuple[float, float], ...]  # lowest and highest of each of these positions [m]
+    reason: str = ""  # why values are missing
 
     @property
     def equilibria(self) -> tuple[tuple[float, bool], ...]:
@@ -145,17 +114,17 @@ def _rest_ranges(dense: Motion, force: Force) -> tuple[Rest, ...]:
     return tuple(found)
 
 
-def held_pressure(dense: Motion, work: float) -> float:
-    """Pressure of `[contact]`: given, or what gives the wanted force at work height [Pa]."""
+def _held_pressure(dense: Motion, work: float) -> float:
+    """Pressure of `[contact]`: stated, or what gives the wanted force at work height [Pa]."""
     definition = dense.model.definition
     contact, solve_for = definition.contact, definition.solve
     assert contact is not None
     assert solve_for is not None
     assert definition.output is not None
-    given = contact.pressure
-    automatic = isinstance(given, Expression) and bool(given.names & definition.automatic)
-    if given != AUTO and not automatic:
-        return float(dense.model.number(given))
+    stated = contact.pressure
+    automatic = isinstance(stated, Expression) and bool(stated.names & definition.automatic)
+    if stated != AUTO and not automatic:
+        return float(dense.model.number(stated))
     at = solve(dense.model, [work])
     _, r1, _ = at.point(definition.output.point)
     wanted = dense.model.number(contact.force) * r1[:, 1] - generalised_force(at)
@@ -163,34 +132,33 @@ def held_pressure(dense: Motion, work: float) -> float:
     return float(pressure_for(at, solve_for.unknown, force)[0])
 
 
-def contact_of(dense: Motion, motion: Motion, at_zone: tuple[list[str], Floats]) -> Contact | None:
-    """Static contact force that `[contact]` asks for, at the zone's heights and all positions."""
+def contact_of(dense: Motion, motion: Motion, at_zone: Mapping[str, float]) -> Contact | None:
+    """Static contact force that `[contact]` asks for, at the zone's heights and all positions.
+
+    `(F w + Q)/y'` with the actuator's force F at the pressure held and the work w of a unit of it.
+    """
     definition = dense.model.definition
     if definition.contact is None or definition.solve is None:
         return None
-    names, drivers = at_zone
     unknown = definition.solve.unknown
-    pressure = held_pressure(dense, drivers[names.index("work")])
-    sense = dense.model.sense
-
-    def force(positions: Motion, friction: int) -> Any:
-        held = force_at_pressure(positions, unknown, pressure)
-        return np.asarray(contact_force(positions, unknown, held, Rates(friction=friction)))
+    pressure = _held_pressure(dense, at_zone["work"])
 
     def generalised(positions: Motion, friction: int) -> Any:
         push = force_at_pressure(positions, unknown, pressure)
         work = unit_work(positions, definition.actuators[unknown])
         return push * work + generalised_force(positions, Rates(friction=friction))
 
+    def force(positions: Motion, way: int) -> Floats:
+        return np.asarray(generalised(positions, way * dense.model.sense) / height_of(positions)[1])
+
     found = rests(dense, generalised)
     edges = [height_of(solve(dense.model, [rest.low, rest.high]))[0] for rest in found]
-    in_zone = solve(dense.model, drivers)
-    at_heights = {k: force(in_zone, k * sense) for k in (0, 1, -1)}
+    in_zone = solve(dense.model, list(at_zone.values()))
     zone, up, down = (
-        dict(zip(names, map(float, values), strict=True)) for values in at_heights.values()
+        dict(zip(at_zone, force(in_zone, way).tolist(), strict=True)) for way in (0, 1, -1)
     )
-    curve, rising, falling = (force(motion, k * sense) for k in (0, 1, -1))
-    missing = not (np.all(np.isfinite(curve)) and np.all(np.isfinite(list(zone.values()))))
+    curve, rising, falling = (force(motion, way) for way in (0, 1, -1))
+    missing = not np.all(np.isfinite([*curve, *zone.values()]))
     reason = f"{pressure / 1e6:.5f} MPa leaves the air spring's table" if missing else ""
     heights = tuple((float(min(y)), float(max(y))) for y in edges)
     return Contact(pressure, zone, up, down, curve, (rising, falling), found, heights, reason)

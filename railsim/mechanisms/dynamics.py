@@ -1,6 +1,6 @@
 """Motion in time: inverse dynamics along a motion law, free motion under the elements' forces."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions import mechanism as written
-from railsim.definitions.mechanism_values import ends
-from railsim.errors import Fault, InputError
+from railsim.definitions.mechanism_values import points_of
 from railsim.mechanisms.forces import Rates, actuator_force, generalised_force, inertia
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, solve
+from railsim.mechanisms.links import Course
 from railsim.mechanisms.model import Model
 
 Floats = NDArray[np.float64]
@@ -38,25 +38,17 @@ def polynomial_345(duration: float, stroke: float) -> tuple[float, float, float]
 
 @dataclass(frozen=True)
 class TimedMotion:
-    """A motion in time with the force that makes it.
+    """A motion in time with the force that makes it; arrays of shape (time,)."""
 
-    Attributes
-    ----------
-    time : ndarray, shape (time,)
-        [s]
-    motion : Motion
-        Positions at these times.
-    speed, acceleration : ndarray, shape (time,)
-        Of the driver [rad/s or m/s], [rad/s2 or m/s2].
-    force : ndarray, shape (time,)
-        Of the actuator that drives [N].
-    """
+    time: Floats  # [s]
+    motion: Motion  # positions at these times
+    speed: Floats  # of the driver [rad/s or m/s]
+    acceleration: Floats  # of the driver [rad/s2 or m/s2]
+    force: Floats  # of the actuator that drives [N or N m]
 
-    time: Floats
-    motion: Motion
-    speed: Floats
-    acceleration: Floats
-    force: Floats
+    def in_time(self, courses: Mapping[str, Course]) -> dict[str, Course]:
+        """Angles or lengths with derivatives by time."""
+        return {n: c.in_time(self.speed, self.acceleration) for n, c in courses.items()}
 
     def point(self, name: str) -> tuple[Floats, Floats]:
         """Velocity and acceleration of a named point, shape (time, 2) [m/s], [m/s2]."""
@@ -85,8 +77,7 @@ def law_of(model: Model, law: written.Motion, stroke: float) -> tuple[Law, float
         assert law.table is not None
         time, travel = np.array([[n(x) for x in row] for row in law.table]).T
         if not np.all(np.diff(time) > 0.0):
-            fault = Fault(model.definition.name, "motion.table", "times not rising", "rising")
-            raise InputError([fault])
+            raise model.refusal("motion.table", "times not rising", "rising")
         from scipy.interpolate import CubicSpline
 
         spline = CubicSpline(time, travel)
@@ -115,12 +106,7 @@ def driving(definition: written.Mechanism) -> str:
 
 
 def driven_motion(whole: Motion) -> TimedMotion:
-    """Inverse dynamics along the file's motion law.
-
-    Parameters
-    ----------
-    whole : Motion
-        Positions over the whole range, dense.
+    """Inverse dynamics along the file's motion law, from dense positions over the whole range.
 
     Raises
     ------
@@ -135,53 +121,40 @@ def driven_motion(whole: Motion) -> TimedMotion:
         if law.angle is not None:
             k = model.bodies[law.angle]
             return motion.q[:, k, 2], motion.q1[:, k, 2], motion.q2[:, k, 2]
-        pair = ends(model.definition.actuators[law.actuator or ""])
-        assert pair is not None
-        return motion.length(pair)
+        return motion.length(points_of(model.definition.actuators[law.actuator or ""]))
 
-    lengths = moved(whole)[0]
-    function, duration = law_of(model, law, float(lengths[-1] - lengths[0]))
+    first, last = moved(whole)[0][[0, -1]]
+    low, high = sorted((first, last))
+    function, duration = law_of(model, law, float(last - first))
     time = np.linspace(0.0, duration, law.points)
     travel, speed, acceleration = function(time)
-    wanted = np.clip(
-        lengths[0] + travel, *np.sort(lengths[[0, -1]])
-    ) if law.law != "table" else lengths[0] + travel  # fmt: skip
+    wanted = first + travel
+    if law.law != "table":
+        wanted = np.clip(wanted, low, high)  # rounding at the ends
     s = driver_at(whole, lambda motion: moved(motion)[:2], wanted)
-    if not np.all(np.isfinite(s)):
-        t = time[np.flatnonzero(~np.isfinite(s))[0]]
-        what, unit, scale = ("angle", "deg", float(np.degrees(1.0))) if law.angle else (
-            "length", "mm", 1e3,
-        )  # fmt: skip
-        value = wanted[~np.isfinite(s)][0] * scale
-        found = f"at {t:.4g} s the {what} would be {value:.3f} {unit}"
-        low, high = np.sort(lengths[[0, -1]]) * scale
-        allowed = f"{low:.3f} to {high:.3f} {unit}"
-        raise InputError([Fault(model.definition.name, "motion", found, allowed)])
+    if len(lost := np.flatnonzero(~np.isfinite(s))):
+        what, unit, scale = "length", "mm", 1e3
+        if law.angle is not None:
+            what, unit, scale = "angle", "deg", float(np.degrees(1.0))
+        value = f"{wanted[lost[0]] * scale:.3f} {unit}"
+        found = f"at {time[lost[0]]:.4g} s the {what} would be {value}"
+        raise model.refusal("motion", found, f"{low * scale:.3f} to {high * scale:.3f} {unit}")
     motion = solve(model, s)
     _, slope, bend = moved(motion)
     s1 = speed / slope
     s2 = (acceleration - bend * s1**2) / slope
-    unknown = driving(model.definition)
-    force = actuator_force(motion, unknown, Rates(s1, s2, model.sense))
+    force = actuator_force(motion, driving(model.definition), Rates(s1, s2, model.sense))
     return TimedMotion(time, motion, s1, s2, force)
 
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """A mechanism let go.
+    """A mechanism let go."""
 
-    Attributes
-    ----------
-    time, s, speed : ndarray, shape (time,)
-        [s], driver [rad or m], its rate.
-    reached : bool
-        Whether it came to where it was to end.
-    """
-
-    time: Floats
-    s: Floats
-    speed: Floats
-    reached: bool
+    time: Floats  # [s]
+    s: Floats  # driver [rad or m]
+    speed: Floats  # its rate
+    reached: bool  # whether it came to where it was to end
 
 
 def free_motion(
@@ -227,8 +200,7 @@ def free_motion(
         sense = int(np.sign(state[1])) if state[1] != 0.0 else int(np.sign(until - start))
         mass, slope = inertia(motion)
         if not mass[0] > 0.0:
-            fault = Fault(model.definition.name, "release", "no mass moves", "masses of bodies")
-            raise InputError([fault])
+            raise model.refusal("release", "no mass moves", "masses of bodies")
         pull = generalised_force(motion, Rates(np.array([state[1]]), 0.0, sense, trial=True))
         if force is not None:
             pull = pull + force(t, motion)
@@ -242,8 +214,7 @@ def free_motion(
         rate, (0.0, duration), [start, speed], "DOP853", events=[there], rtol=ACCURACY, atol=1e-13
     )
     if not found.success:
-        fault = Fault(model.definition.name, "release", "the motion has no solution", found.message)
-        raise InputError([fault])
+        raise model.refusal("release", "the motion has no solution", found.message)
     generalised_force(solve(model, found.y[0]))  # a gas spring beyond its stroke is reported here
     return FreeMotion(found.t, found.y[0], found.y[1], found.status == 1)
 

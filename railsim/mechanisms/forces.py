@@ -10,12 +10,13 @@ A force F at a point r has the generalised force F r'; one between two points at
 positive when it pushes, F L'.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from railsim.definitions.mechanism import Actuator
+from railsim.definitions.mechanism import Actuator, Element
 from railsim.definitions.mechanism_parts import (
     AirSpring,
     Cylinder,
@@ -31,8 +32,7 @@ from railsim.definitions.mechanism_parts import (
     Torque,
     TorsionSpring,
 )
-from railsim.definitions.mechanism_values import ends
-from railsim.errors import Fault, InputError
+from railsim.definitions.mechanism_values import body_name, points_of
 from railsim.kernels import linkage_motion as motion_kernel
 from railsim.mechanisms.components import (
     AirSpringTable,
@@ -41,7 +41,7 @@ from railsim.mechanisms.components import (
     table_value,
 )
 from railsim.mechanisms.kinematics import Motion, driver_words
-from railsim.mechanisms.model import Model
+from railsim.mechanisms.model import Model, real
 
 STROKE_EDGE = 1e-4
 """Share of a gas spring's stroke by which rounding may take it beyond its ends."""
@@ -49,39 +49,65 @@ STROKE_EDGE = 1e-4
 
 @dataclass(frozen=True)
 class Rates:
-    """How the mechanism moves: driver's rate and acceleration, and the sense of friction.
+    """How the mechanism moves: driver's rate and acceleration, and the sense of friction."""
 
-    Attributes
-    ----------
-    speed, acceleration : float or ndarray, shape (position,)
-        ds/dt, d2s/dt2.
-    friction : {-1, 0, 1}
-        Sense of the driver's (slow) motion for friction; 0 leaves friction out.
-    trial : bool
-        Whether a step is only tried: a gas spring may then go beyond its stroke.
-    """
-
-    speed: Any = 0.0
-    acceleration: Any = 0.0
-    friction: int = 0
-    trial: bool = False
+    speed: Any = 0.0  # ds/dt, a number or one for each position
+    acceleration: Any = 0.0  # d2s/dt2, likewise
+    friction: int = 0  # sense of the driver's (slow) motion for friction; 0 leaves friction out
+    trial: bool = False  # a step is only tried: a gas spring may then go beyond its stroke
 
 
 AT_REST = Rates()
 
 
-def masses(motion: Motion) -> list[tuple[Any, Any, Any, Any]]:
-    """Every mass with the motion of its centre and its inertia's body: (m, triple, I, body)."""
+class Between(NamedTuple):
+    """A push between two points [N]."""
+
+    pair: tuple[str, str]
+    push: Any
+
+
+class AtPoint(NamedTuple):
+    """A force at a point [N]."""
+
+    point: str
+    x: Any
+    y: Any
+
+
+class OnBody(NamedTuple):
+    """A torque on a body [N m]."""
+
+    body: str
+    torque: Any
+
+
+Load = Between | AtPoint | OnBody
+"""What a part exerts on the bodies."""
+
+
+class Mass(NamedTuple):
+    """A mass [kg], the motion of its centre, its moment of inertia [kg m2], number of its body."""
+
+    mass: Any
+    centre: tuple[Any, Any, Any]
+    inertia: Any
+    body: int
+
+
+def masses(motion: Motion) -> list[Mass]:
+    """Every mass of bodies and elements."""
     model = motion.model
-    found: list[tuple[Any, Any, Any, Any]] = []
+    found = []
     for name, body in model.definition.bodies.items():
         m, inertia = model.number(body.mass), model.number(body.inertia)
         if np.any(np.real(m) != 0.0) or np.any(np.real(inertia) != 0.0):
             k = model.bodies[name]
-            found.append((m, motion.at(k, *model.position(body.centre)), inertia, k))
-    for element in model.definition.elements.values():
-        if isinstance(element, PointMass):
-            found.append((model.number(element.mass), motion.point(element.point_mass), 0.0, 0))
+            found.append(Mass(m, motion.at(k, *model.position(body.centre)), inertia, k))
+    for part in model.definition.elements.values():
+        if isinstance(part, PointMass):
+            k = model.bodies[body_name(part.point_mass)]
+            found.append(Mass(model.number(part.mass), motion.point(part.point_mass), 0.0, k))
     return found
 
 
@@ -97,48 +123,35 @@ def inertia(motion: Motion) -> tuple[Any, Any]:
     return mass, slope
 
 
-def gravity_force(motion: Motion) -> Any:
-    """Generalised force of the weights, shape (..., position)."""
-    g = motion.model.number(motion.model.definition.ground.gravity)
-    total = 0.0 * motion.s
-    for m, (_, r1, _), _, _ in masses(motion):
-        total = total - m * g * r1[..., 1]
-    return total
-
-
 def element_push(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
     """Push of an element between two points at every position [N].
 
     Raises
     ------
-    InputError : a gas spring beyond its stroke.
+    InputError : a gas spring beyond its stroke, a spring outside its table.
     """
     model = motion.model
-    element = model.definition.elements[name]
-    pair = ends(element)
-    assert pair is not None
-    length, slope, _ = motion.length(pair)
+    element, n = model.definition.elements[name], model.number
+    length, slope, _ = motion.length(points_of(element))
     speed = slope * rates.speed
-    n = model.number
     match element:
         case Spring():
             return _spring_law(motion, name, element, length, element.free_length, rates)
         case Damper():
             return -n(element.damping) * speed
         case Stop():
-            return _stop_push(motion, element, length, speed)
+            sense = 1.0 if element.side == "shortest" else -1.0
+            depth = sense * (n(element.length) - length)
+            push = n(element.stiffness) * depth - sense * n(element.damping) * speed
+            met = (np.real(depth) > 0.0) & (np.real(push) > 0.0)  # a stop does not pull
+            return sense * np.where(met, push, 0.0)
         case GasSpring():
             return _gas_push(motion, name, element, (length, slope, speed), rates)
     raise AssertionError(name)
 
 
 def _spring_law(
-    motion: Motion,
-    name: str,
-    spring: Spring | TorsionSpring,
-    x: Any,
-    free: float | str | None,
-    rates: Rates,
+    motion: Motion, name: str, spring: Spring | TorsionSpring, x: Any, free: Any, rates: Rates
 ) -> Any:
     """Push or torque of a spring at a length or angle, linear or by its table.
 
@@ -146,41 +159,28 @@ def _spring_law(
     ------
     InputError : outside the table.
     """
-    model = motion.model
-    n = model.number
+    model, n = motion.model, motion.model.number
     if spring.table is None:
         assert spring.stiffness is not None
-        assert free is not None
         return n(spring.stiffness) * (n(free) - x)
-    rows = np.array([[float(np.ravel(np.real(n(q)))[0]) for q in row] for row in spring.table])
+    rows = np.array([[real(n(q)) for q in row] for row in spring.table])
     found = table_value(rows, x)
-    outside = np.flatnonzero(np.isnan(np.real(found)).reshape(-1, motion.s.shape[-1])[0])
+    outside = np.flatnonzero(np.isnan(_first_lane(motion, found)))
     if len(outside) and not rates.trial:
-        k = outside[0]
-        at = driver_words(model, float(np.ravel(np.real(motion.s))[k]))
-        value, scale, unit = np.ravel(np.real(x))[k], 1e3, "mm"
-        if isinstance(spring, TorsionSpring):
-            scale, unit = float(np.degrees(1.0)), "deg"
+        turns = isinstance(spring, TorsionSpring)
+        scale, unit = (float(np.degrees(1.0)), "deg") if turns else (1e3, "mm")
+        at = driver_words(model, float(_first_lane(motion, motion.s)[outside[0]]))
+        value = float(_first_lane(motion, x)[outside[0]]) * scale
         low, high = rows[[0, -1], 0] * scale
-        words = f"driver at {at}: {value * scale:.2f} {unit} is outside the table"
+        words = f"driver at {at}: {value:.2f} {unit} is outside the table"
         allowed = f"{low:g} to {high:g} {unit}: a longer table"
-        raise InputError([Fault(model.definition.name, f"elements.{name}", words, allowed)])
+        raise model.refusal(f"elements.{name}", words, allowed)
     return found
 
 
-def _twist(motion: Motion, spring: TorsionSpring) -> tuple[Any, Any]:
-    """Angle of a torsion spring's first body less that of its second, and its rate."""
-    first, second = (motion.model.bodies[name] for name in spring.torsion_spring)
-    return tuple(a[..., first, 2] - a[..., second, 2] for a in (motion.q, motion.q1))
-
-
-def _stop_push(motion: Motion, stop: Stop, length: Any, speed: Any) -> Any:
-    n = motion.model.number
-    sense = 1.0 if stop.side == "shortest" else -1.0
-    depth = sense * (n(stop.length) - length)
-    push = n(stop.stiffness) * depth - sense * n(stop.damping) * speed
-    met = (np.real(depth) > 0.0) & (np.real(push) > 0.0)  # a stop does not pull
-    return sense * np.where(met, push, 0.0)
+def _first_lane(motion: Motion, values: Any) -> Any:
+    """Real values at all positions, of the first lane of a model that has several."""
+    return np.real(values).reshape(-1, motion.s.shape[-1])[0]
 
 
 def _gas_push(motion: Motion, name: str, gas: GasSpring, moved: Any, rates: Rates) -> Any:
@@ -207,92 +207,97 @@ def _gas_push(motion: Motion, name: str, gas: GasSpring, moved: Any, rates: Rate
 
 
 def _check_stroke(motion: Motion, name: str, compressed: Any, stroke: Any) -> None:
-    beyond = np.real(np.maximum(-compressed, compressed - stroke))
-    beyond = beyond.reshape(-1, motion.s.shape[-1])[0]
+    inner = _first_lane(motion, compressed)
+    limit = real(stroke)
+    beyond = np.maximum(-inner, inner - limit)
     worst = int(np.argmax(beyond))
-    limit = float(np.ravel(np.real(stroke))[0])
-    if beyond[worst] <= STROKE_EDGE * limit:
-        return
-    model = motion.model
-    side = "extension" if np.ravel(np.real(compressed))[worst] < 0.0 else "compression"
-    at = driver_words(model, float(np.ravel(np.real(motion.s))[worst]))
-    found = f"driver at {at}: {beyond[worst] * 1e3:.2f} mm beyond its stroke in {side}"
-    allowed = f"a stroke of {limit * 1e3:g} mm: other 'extended', 'stroke' or points"
-    raise InputError([Fault(model.definition.name, f"elements.{name}", found, allowed)])
+    if beyond[worst] > STROKE_EDGE * limit:
+        side = "extension" if inner[worst] < 0.0 else "compression"
+        at = driver_words(motion.model, float(_first_lane(motion, motion.s)[worst]))
+        found = f"driver at {at}: {beyond[worst] * 1e3:.2f} mm beyond its stroke in {side}"
+        allowed = f"a stroke of {limit * 1e3:g} mm: other 'extended', 'stroke' or points"
+        raise motion.model.refusal(f"elements.{name}", found, allowed)
+
+
+def element_loads(motion: Motion, name: str, element: Element, rates: Rates) -> list[Load]:
+    """What an element exerts on the bodies; nothing of a mass, whose weight is counted apart."""
+    n, bodies = motion.model.number, motion.model.bodies
+    match element:
+        case PointMass():
+            return []
+        case Force():
+            c, s = _direction(motion, element.force, element)
+            return [AtPoint(element.force, n(element.size) * c, n(element.size) * s)]
+        case Torque():
+            return [OnBody(element.torque, n(element.size))]
+        case TorsionSpring():
+            first, second = element.torsion_spring
+            twist = motion.q[..., bodies[first], 2] - motion.q[..., bodies[second], 2]
+            torque = _spring_law(motion, name, element, twist, element.free_angle, rates)
+            return [OnBody(first, torque), OnBody(second, -torque)]
+        case JointFriction():
+            turning = motion.q1[..., bodies[element.joint_friction], 2]
+            torque = -n(element.moment) * rates.friction * np.sign(np.real(turning))
+            return [OnBody(element.joint_friction, torque)]
+    return [Between(points_of(element), element_push(motion, name, rates))]
+
+
+def actuator_load(motion: Motion, actuator: Actuator, force: Any = 1.0) -> Load:
+    """What an actuator of a force, or torque, exerts on the bodies."""
+    match actuator:
+        case HandForce():
+            c, s = _direction(motion, actuator.push, actuator)
+            return AtPoint(actuator.push, force * c, force * s)
+        case HandTorque():
+            return OnBody(actuator.turn, force)
+    pulls = isinstance(actuator, Cylinder) and actuator.acts == "pull"
+    return Between(points_of(actuator), -force if pulls else force)
+
+
+def _direction(motion: Motion, point: str, part: Force | HandForce) -> tuple[Any, Any]:
+    turned = motion.model.number(part.angle)
+    if part.turns:
+        turned = turned + motion.q[..., motion.model.bodies[body_name(point)], 2]
+    return np.cos(turned), np.sin(turned)
+
+
+def work(motion: Motion, load: Load) -> Any:
+    """Generalised force of a load, shape (..., position)."""
+    match load:
+        case Between(pair, push):
+            return push * motion.length(pair)[1]
+        case AtPoint(point, x, y):
+            _, r1, _ = motion.point(point)
+            return x * r1[..., 0] + y * r1[..., 1]
+        case OnBody(body, torque):
+            return torque * motion.q1[..., motion.model.bodies[body], 2]
+
+
+def unit_work(motion: Motion, actuator: Actuator) -> Any:
+    """Generalised force of an actuator's unit force (or torque), shape (..., position)."""
+    return work(motion, actuator_load(motion, actuator))
 
 
 def generalised_force(motion: Motion, rates: Rates = AT_REST) -> Any:
     """Generalised force Q of weights and elements, without the actuators, shape (..., position)."""
-    model = motion.model
-    total = gravity_force(motion)
-    for name, element in model.definition.elements.items():
-        if isinstance(element, PointMass):
-            continue
-        if isinstance(element, Force):
-            work = _direction_work(motion, element.force, element.angle, element.turns)
-            total = total + model.number(element.size) * work
-        elif isinstance(element, Torque):
-            turning = motion.q1[..., model.bodies[element.torque], 2]
-            total = total + model.number(element.size) * turning
-        elif isinstance(element, TorsionSpring):
-            angle, turning = _twist(motion, element)
-            torque = _spring_law(motion, name, element, angle, element.free_angle, rates)
-            total = total + torque * turning
-        elif isinstance(element, JointFriction):
-            turning = motion.q1[..., model.bodies[element.joint_friction], 2]
-            total = total + friction_torque(motion, element, rates) * turning
-        else:
-            pair = ends(element)
-            assert pair is not None
-            total = total + element_push(motion, name, rates) * motion.length(pair)[1]
-    return total
+    g = motion.model.number(motion.model.definition.ground.gravity)
+    total = 0.0 * motion.s
+    for m, (_, r1, _), _, _ in masses(motion):
+        total = total - m * g * r1[..., 1]
+    return total + sum(work(motion, load) for load in _loads(motion, rates))
 
 
-def friction_torque(motion: Motion, element: JointFriction, rates: Rates) -> Any:
-    """Torque on a body that rubs, against its turning, shape (..., position) [N m]."""
-    turning = motion.q1[..., motion.model.bodies[element.joint_friction], 2]
-    return -motion.model.number(element.moment) * rates.friction * np.sign(np.real(turning))
+def _loads(motion: Motion, rates: Rates) -> Iterator[Load]:
+    for name, element in motion.model.definition.elements.items():
+        yield from element_loads(motion, name, element, rates)
 
 
 def rubs(model: Model) -> bool:
     """Whether any element has friction, so that the way back needs another force."""
     parts = model.definition.elements.values()
-    moments = [e.moment for e in parts if isinstance(e, JointFriction)]
-    return any(
-        np.any(np.real(model.number(quantity)))
-        for quantity in (*moments, *(e.friction for e in parts if isinstance(e, GasSpring)))
-    )
-
-
-def _direction(motion: Motion, point: str, angle: Any, turns: bool) -> tuple[Any, Any]:
-    turned = motion.model.number(angle)
-    if turns:
-        body = motion.model.bodies[point.partition(".")[0]]
-        turned = turned + motion.q[..., body, 2]
-    return np.cos(turned), np.sin(turned)
-
-
-def _direction_work(motion: Motion, point: str, angle: Any, turns: bool) -> Any:
-    c, s = _direction(motion, point, angle, turns)
-    _, r1, _ = motion.point(point)
-    return c * r1[..., 0] + s * r1[..., 1]
-
-
-def unit_work(motion: Motion, actuator: Actuator) -> Any:
-    """Generalised force of an actuator's unit force (or torque), shape (..., position)."""
-    match actuator:
-        case HandForce():
-            return _direction_work(motion, actuator.push, actuator.angle, actuator.turns)
-        case HandTorque():
-            return motion.q1[..., motion.model.bodies[actuator.turn], 2]
-    pair = ends(actuator)
-    assert pair is not None
-    return sense(actuator) * motion.length(pair)[1]
-
-
-def sense(actuator: Actuator) -> float:
-    """1 for what pushes its ends apart when its force is positive, -1 for what pulls."""
-    return -1.0 if isinstance(actuator, Cylinder) and actuator.acts == "pull" else 1.0
+    sizes = [part.moment for part in parts if isinstance(part, JointFriction)]
+    sizes += [part.friction for part in parts if isinstance(part, GasSpring)]
+    return any(np.any(np.real(model.number(size))) for size in sizes)
 
 
 def actuator_force(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
@@ -304,61 +309,54 @@ def actuator_force(motion: Motion, name: str, rates: Rates = AT_REST) -> Any:
     ------
     InputError : the actuator has a dead point within the motion: no finite force holds there.
     """
-    work = unit_work(motion, motion.model.definition.actuators[name])
-    check_dead_point(motion, name, work)
+    effect = check_dead_point(motion, name)
     needed = -generalised_force(motion, rates)
     if np.any(rates.speed) or np.any(rates.acceleration):
         mass, slope = inertia(motion)
         needed = needed + mass * rates.acceleration + 0.5 * slope * rates.speed**2
-    return needed / work
+    return needed / effect
 
 
-def check_dead_point(motion: Motion, name: str, work: Any) -> None:
-    """Refuse a motion in which an actuator's rate goes through zero."""
-    first = np.real(work).reshape(-1, motion.s.shape[-1])[0]
+def check_dead_point(motion: Motion, name: str) -> Any:
+    """Return the work of an actuator's unit force; refuse a motion in which it changes its sign."""
+    effect = unit_work(motion, motion.model.definition.actuators[name])
+    first = _first_lane(motion, effect)
     size = np.max(np.abs(first))
     turned = np.flatnonzero((first * first[0] <= 0.0) | (np.abs(first) < 1e-9 * size))
-    if not len(turned):
-        return
-    model = motion.model
-    at = driver_words(model, float(np.ravel(np.real(motion.s))[turned[0]]))
-    found = f"driver at {at}: dead point, no force of this actuator moves the mechanism"
-    fault = Fault(model.definition.name, f"actuators.{name}", found, "another range or geometry")
-    raise InputError([fault])
+    if len(turned):
+        at = driver_words(motion.model, float(_first_lane(motion, motion.s)[turned[0]]))
+        found = f"driver at {at}: dead point, no force of this actuator moves the mechanism"
+        raise motion.model.refusal(f"actuators.{name}", found, "another range or geometry")
+    return effect
 
 
 def table_of(motion: Motion, spring: AirSpring) -> AirSpringTable:
     """The table of an air spring."""
-
-    def real(quantity: float | str) -> float:
-        return float(np.ravel(np.real(motion.model.number(quantity)))[0])
-
-    return AirSpringTable(
-        np.array([real(x) for x in spring.heights]),
-        np.array([real(x) for x in spring.pressures]),
-        np.array([[real(x) for x in row] for row in spring.forces]),
-    )
+    n = motion.model.number
+    heights, pressures = ([real(n(x)) for x in row] for row in (spring.heights, spring.pressures))
+    forces = [[real(n(x)) for x in row] for row in spring.forces]
+    return AirSpringTable(np.array(heights), np.array(pressures), np.array(forces))
 
 
 def pressure_for(motion: Motion, name: str, force: Any) -> Any:
     """Pressure at which an actuator has a force [Pa]; NaN where it has none."""
     actuator = motion.model.definition.actuators[name]
-    if isinstance(actuator, Cylinder):
-        if actuator.acts == "both":
-            pushes = force / _area(motion, actuator, "push")
-            return np.where(np.real(force) < 0.0, -force / _area(motion, actuator, "pull"), pushes)
+    if isinstance(actuator, AirSpring):
+        return table_of(motion, actuator).pressure(motion.length(actuator.air_spring)[0], force)
+    assert isinstance(actuator, Cylinder)
+    if actuator.acts != "both":
         return force / _area(motion, actuator, actuator.acts)
-    assert isinstance(actuator, AirSpring)
-    return table_of(motion, actuator).pressure(motion.length(actuator.air_spring)[0], force)
+    pulls = -force / _area(motion, actuator, "pull")
+    return np.where(np.real(force) < 0.0, pulls, force / _area(motion, actuator, "push"))
 
 
 def force_at_pressure(motion: Motion, name: str, pressure: Any) -> Any:
     """Force of an actuator at a pressure [N]; NaN where it has none."""
     actuator = motion.model.definition.actuators[name]
-    if isinstance(actuator, Cylinder):
-        return pressure * _area(motion, actuator, actuator.acts) + 0.0 * motion.s
-    assert isinstance(actuator, AirSpring)
-    return table_of(motion, actuator).force(motion.length(actuator.air_spring)[0], pressure)
+    if isinstance(actuator, AirSpring):
+        return table_of(motion, actuator).force(motion.length(actuator.air_spring)[0], pressure)
+    assert isinstance(actuator, Cylinder)
+    return pressure * _area(motion, actuator, actuator.acts) + 0.0 * motion.s
 
 
 def _area(motion: Motion, cylinder: Cylinder, acts: str) -> Any:
@@ -366,104 +364,47 @@ def _area(motion: Motion, cylinder: Cylinder, acts: str) -> Any:
     return cylinder_area(n(cylinder.bore), n(cylinder.rod), n(cylinder.count), acts)
 
 
-def contact_force(motion: Motion, name: str, force: Any, rates: Rates = AT_REST) -> Any:
-    """Static force of the output along its axis at a given actuator force, `(F w + Q)/y'` [N]."""
-    model = motion.model
-    assert model.definition.output is not None
-    _, r1, _ = motion.point(model.definition.output.point)
-    work = unit_work(motion, model.definition.actuators[name])
-    return (force * work + generalised_force(motion, rates)) / r1[..., model.axis]
-
-
-def applied(motion: Motion, forces: dict[str, Any], rates: Rates = AT_REST) -> Any:
+def applied(motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST) -> Any:
     """Applied forces less inertia on every body, shape (position, 3 n_bodies).
 
-    Parameters
-    ----------
-    forces : dict of str to ndarray
-        Forces of actuators by name.
+    `forces` are those of the actuators by name.
     """
     model = motion.model
+    actuators = model.definition.actuators
+    loads: list[Load] = [*_loads(motion, rates)]
+    loads += [actuator_load(motion, actuators[name], force) for name, force in forces.items()]
     n = motion.s.shape[-1]
     total = np.zeros((n, model.linkage.n_bodies + 1, 3))
 
-    def add(name: str, x: Any, y: Any) -> None:
-        k = model.bodies[name.partition(".")[0]]
-        r, _, _ = motion.point(name)
-        _add_force(total, motion, k, r, x, y)
+    def add(k: int, r: Any, x: Any, y: Any) -> None:
+        total[:, k, 0] += x
+        total[:, k, 1] += y
+        ax, ay = r[:, 0] - motion.q[:, k, 0], r[:, 1] - motion.q[:, k, 1]
+        total[:, k, 2] += ax * y - ay * x
 
-    def between(pair: Any, push: Any) -> None:
-        d = motion.point(pair[1])[0] - motion.point(pair[0])[0]
-        unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
-        add(pair[1], push * unit[:, 0], push * unit[:, 1])
-        add(pair[0], -push * unit[:, 0], -push * unit[:, 1])
-
-    definition = model.definition
-    for name, element in definition.elements.items():
-        if isinstance(element, PointMass):
-            continue
-        if isinstance(element, Force):
-            c, s = _direction(motion, element.force, element.angle, element.turns)
-            size = model.number(element.size)
-            add(element.force, size * c, size * s)
-        elif isinstance(element, Torque):
-            total[:, model.bodies[element.torque], 2] += model.number(element.size)
-        elif isinstance(element, TorsionSpring):
-            angle, _ = _twist(motion, element)
-            torque = _spring_law(motion, name, element, angle, element.free_angle, rates)
-            for body, sign in zip(element.torsion_spring, (1.0, -1.0), strict=True):
-                total[:, model.bodies[body], 2] += sign * torque
-        elif isinstance(element, JointFriction):
-            k = model.bodies[element.joint_friction]
-            total[:, k, 2] += friction_torque(motion, element, rates)
-        else:
-            between(ends(element), element_push(motion, name, rates))
-    for name, force in forces.items():
-        actuator = definition.actuators[name]
-        if isinstance(actuator, HandForce):
-            c, s = _direction(motion, actuator.push, actuator.angle, actuator.turns)
-            add(actuator.push, force * c, force * s)
-        elif isinstance(actuator, HandTorque):
-            total[:, model.bodies[actuator.turn], 2] += force
-        else:
-            between(ends(actuator), sense(actuator) * force)
-    _add_inertia(total, motion, rates)
+    for load in loads:
+        match load:
+            case Between(pair, push):
+                ends = [(model.bodies[body_name(p)], motion.point(p)[0]) for p in pair]
+                d = ends[1][1] - ends[0][1]
+                unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
+                for (k, r), sign in zip(ends, (-1.0, 1.0), strict=True):
+                    add(k, r, sign * push * unit[:, 0], sign * push * unit[:, 1])
+            case AtPoint(point, x, y):
+                add(model.bodies[body_name(point)], motion.point(point)[0], x, y)
+            case OnBody(body, torque):
+                total[:, model.bodies[body], 2] += torque
+    g = model.number(model.definition.ground.gravity)
+    speed2, acceleration = np.asarray(rates.speed) ** 2, np.asarray(rates.acceleration)
+    for m, (r, r1, r2), rotary, k in masses(motion):
+        a = r2 * speed2[..., None] + r1 * acceleration[..., None]
+        add(k, r, -m * a[:, 0], -m * (a[:, 1] + g))
+        total[:, k, 2] -= rotary * (motion.q2[:, k, 2] * speed2 + motion.q1[:, k, 2] * acceleration)
     return total[:, 1:].reshape(n, -1)
 
 
-def _add_force(total: Any, motion: Motion, k: int, r: Any, x: Any, y: Any) -> None:
-    total[:, k, 0] += x
-    total[:, k, 1] += y
-    ax, ay = r[:, 0] - motion.q[:, k, 0], r[:, 1] - motion.q[:, k, 1]
-    total[:, k, 2] += ax * y - ay * x
-
-
-def _add_inertia(total: Any, motion: Motion, rates: Rates) -> None:
-    """Add weights and inertia forces -m a."""
-    model = motion.model
-    definition = model.definition
-    g = model.number(definition.ground.gravity)
-    carriers = [
-        model.bodies[name]
-        for name, body in definition.bodies.items()
-        if model.number(body.mass) or model.number(body.inertia)
-    ]
-    carriers += [
-        model.bodies[element.point_mass.partition(".")[0]]
-        for element in definition.elements.values()
-        if isinstance(element, PointMass)
-    ]
-    speed2, acceleration = np.asarray(rates.speed) ** 2, np.asarray(rates.acceleration)
-    for k, (m, (r, r1, r2), rotary, body) in zip(carriers, masses(motion), strict=True):
-        a = r2 * speed2[..., None] + r1 * acceleration[..., None]
-        _add_force(total, motion, k, r, -m * a[:, 0], -m * (a[:, 1] + g))
-        if body:
-            turning = motion.q2[:, k, 2] * speed2 + motion.q1[:, k, 2] * acceleration
-            total[:, k, 2] -= rotary * turning
-
-
 def reactions(
-    motion: Motion, forces: dict[str, Any], rates: Rates = AT_REST
+    motion: Motion, forces: Mapping[str, Any], rates: Rates = AT_REST
 ) -> tuple[dict[str, Any], Any]:
     """Reactions of the joints by Lagrange's multipliers, `Phi_q^T lambda = M q'' - Q`.
 

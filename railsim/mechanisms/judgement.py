@@ -28,7 +28,7 @@ from railsim.mechanisms.forces import Rates, generalised_force, rubs, unit_work
 from railsim.mechanisms.inversion import largest
 from railsim.mechanisms.kinematics import Motion, derivative, solve, tangents
 from railsim.mechanisms.model import Model, build, with_lanes
-from railsim.mechanisms.outputs import actuator_of
+from railsim.mechanisms.outputs import length_points
 from railsim.mechanisms.targets import Positions, drivers_at_heights, positions
 
 Floats = NDArray[np.float64]
@@ -42,25 +42,14 @@ SLOWEST = 0.05
 
 @dataclass(frozen=True)
 class Judgement:
-    """Objective and constraints of one set of parameters.
+    """Objective and constraints of one set of parameters, with their derivatives by these."""
 
-    Attributes
-    ----------
-    objective : float
-    residuals, jacobian : ndarray, shapes (residual,), (residual, parameter)
-        Of the sum of squares.
-    peak, peak_gradient : float, ndarray of shape (parameter,)
-        What is added to the sum of squares.
-    margins, slopes : ndarray, shapes (constraint,), (constraint, parameter)
-        In units of each constraint's scale; negative where it is broken.
-    """
-
-    residuals: Floats
-    jacobian: Floats
-    peak: float
-    peak_gradient: Floats
-    margins: Floats
-    slopes: Floats
+    residuals: Floats  # of the sum of squares, (residual,)
+    jacobian: Floats  # (residual, parameter)
+    peak: float  # what is added to the sum of squares
+    peak_gradient: Floats  # (parameter,)
+    margins: Floats  # in units of each constraint's scale; negative where broken, (constraint,)
+    slopes: Floats  # (constraint, parameter)
 
     @property
     def objective(self) -> float:
@@ -109,8 +98,7 @@ class Judge:
         bounds = [[number(b, self.values) for b in self.wanted.bounds[n]] for n in self.names]
         self.lower, self.upper = np.array(bounds, dtype=float).T
         self.unknown = definition.actuators[definition.solve.unknown]
-        name = actuator_of(definition)
-        self.pair = ends(definition.actuators[name]) if name is not None else None
+        self.pair = length_points(definition)
         self.output = definition.output.point if definition.output is not None else None
         kind = self.wanted.objective
         self.weights = {kind: 1.0} if isinstance(kind, str) else dict(kind)

@@ -93,16 +93,17 @@ class Motion:
         """Distance of two points with two derivatives, shape (..., position) [m]."""
         first, second = self.point(pair[0]), self.point(pair[1])
         d, d1, d2 = (b - a for a, b in zip(first, second, strict=True))
-        length = np.sqrt(_dot(d, d))
-        rate = _dot(d, d1) / length
-        return length, rate, (_dot(d1, d1) + _dot(d, d2) - rate * rate) / length
+        length = np.sqrt(dot(d, d))
+        rate = dot(d, d1) / length
+        return length, rate, (dot(d1, d1) + dot(d, d2) - rate * rate) / length
 
     def angle(self, name: str) -> Any:
         """Body's angle or a named angle, not folded, shape (..., position) [rad]."""
         return angle_between(self, self.model.definition.angles[name])
 
 
-def _dot(a: Any, b: Any) -> Any:
+def dot(a: Any, b: Any) -> Any:
+    """Scalar product of vectors in the last axis."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.mechanism_parts import AUTO, Cam, Link, Prismatic, Revolute, Slot
 from railsim.definitions.mechanism_values import coordinates, number, parameter_values, point_names
+from railsim.errors import Fault, InputError
 from railsim.kernels import linkage as kernel
 from railsim.kernels.linkage import Linkage
 
@@ -78,8 +79,12 @@ class Model:
             for name, value in self.linkage._asdict().items()
             if np.iscomplexobj(value)
         }
-        values = {name: _real(value) for name, value in self.values.items()}
+        values = {name: real(value) for name, value in self.values.items()}
         return replace(self, values=values, linkage=self.linkage._replace(**arrays))
+
+    def refusal(self, key: str, found: str, allowed: str) -> InputError:
+        """The error that refuses the mechanism at a key of its file."""
+        return InputError([Fault(self.definition.name, key, found, allowed)])
 
     @property
     def axis(self) -> int:
@@ -91,11 +96,6 @@ class Model:
     def sense(self) -> int:
         """Sense of the driver's motion from start to end."""
         return 1 if self.end > self.start else -1
-
-    @property
-    def joints(self) -> list[str]:
-        """Names of the joints."""
-        return list(self.definition.joints)
 
     @property
     def joint_rows(self) -> dict[str, tuple[int, int]]:
@@ -134,8 +134,8 @@ def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Mo
         arrays.points,
         arrays.bodies,
         _pose(definition, values, arrays),
-        _real(number(driver.start, values)),
-        _real(number(driver.end, values)),
+        real(number(driver.start, values)),
+        real(number(driver.end, values)),
     )
 
 
@@ -148,7 +148,8 @@ def with_lanes(values: Mapping[str, float]) -> dict[str, NDArray[np.complex128]]
     return moved
 
 
-def _real(value: Any) -> float:
+def real(value: Any) -> float:
+    """First real value of a number or of lanes."""
     return float(np.ravel(np.real(value))[0])
 
 
@@ -270,7 +271,7 @@ def tangent_arcs(cam: Cam, x: Any, y: Any, values: Mapping[str, Any]) -> list[An
         cx, cy = x + radius * u, y + radius * v
         direction = direction + turn * number(arc.length, values) / radius
         u2, v2 = -turn * np.sin(direction), turn * np.cos(direction)
-        found.append((cx, cy, radius, [*map(_real, (-u, -v, -u2, -v2)), turn]))
+        found.append((cx, cy, radius, [*map(real, (-u, -v, -u2, -v2)), turn]))
         x, y = cx - radius * u2, cy - radius * v2
     return found
 
@@ -285,10 +286,10 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
     radii = [number(arc.radius, values) for arc in cam.arcs]
     shared: list[tuple[float, float]] = []
     for i in range(len(cam.arcs) - 1):
-        dx, dy = (_real(b) - _real(a) for a, b in zip(centres[i], centres[i + 1], strict=True))
+        dx, dy = (real(b) - real(a) for a, b in zip(centres[i], centres[i + 1], strict=True))
         angle = float(np.arctan2(dy, dx))
         same = cam.arcs[i].turns == cam.arcs[i + 1].turns
-        here = angle + (np.pi if same and _real(radii[i]) < _real(radii[i + 1]) else 0.0)
+        here = angle + (np.pi if same and real(radii[i]) < real(radii[i + 1]) else 0.0)
         there = here if same else here + np.pi
         shared.append((here, there))
     found = []
@@ -296,8 +297,8 @@ def centred_arcs(cam: Cam, values: Mapping[str, Any]) -> list[Any]:
         turn = 1.0 if arc.turns == "left" else -1.0
         begin = shared[i - 1][1] if i > 0 else None
         end = shared[i][0] if i < len(shared) else None
-        begin = begin if arc.begin is None else _real(number(arc.begin, values))
-        end = end if arc.end is None else _real(number(arc.end, values))
+        begin = begin if arc.begin is None else real(number(arc.begin, values))
+        end = end if arc.end is None else real(number(arc.end, values))
         # the open end of the first and of the last arc: nearly half a turn on
         if begin is None and end is not None:
             begin = end - turn * OPEN_ARC
@@ -321,14 +322,14 @@ def _pose(definition: Mechanism, values: Mapping[str, Any], arrays: _Arrays) -> 
         if start is None:
             continue
         k = arrays.bodies[name]
-        pose[k, 2] = _real(number(start.angle, values))
+        pose[k, 2] = real(number(start.angle, values))
         if AUTO not in (start.x, start.y):
-            pose[k, :2] = _real(number(start.x, values)), _real(number(start.y, values))
+            pose[k, :2] = real(number(start.x, values)), real(number(start.y, values))
             placed.add(name)
     if definition.driver.angle is not None:
         driver = definition.driver
         k = arrays.bodies[driver.angle or ""]
-        pose[k, 2] = _real(number(driver.zero, values)) + _real(number(driver.start, values))
+        pose[k, 2] = real(number(driver.zero, values)) + real(number(driver.start, values))
     moved = True
     while moved:
         moved = False

@@ -25,44 +25,22 @@ ACTIVE = 1e-5
 
 @dataclass(frozen=True)
 class Active:
-    """A limit that holds the optimum in place.
+    """A limit that holds the optimum in place."""
 
-    Attributes
-    ----------
-    name : str
-        Constraint, or parameter with `side` 'lower' or 'upper'.
-    side : str
-    slack : float
-        What is left to the limit, SI.
-    multiplier : float
-        Decrease of the objective for each unit (SI) that the limit gives way.
-    """
-
-    name: str
-    side: str
-    slack: float
-    multiplier: float
+    name: str  # constraint, or parameter
+    side: str  # "lower" or "upper" of a parameter's bound, else empty
+    slack: float  # what is left to the limit, SI
+    multiplier: float  # decrease of the objective for each unit (SI) that the limit gives way
 
 
 @dataclass(frozen=True)
 class Start:
-    """One start of the search.
+    """One start of the search."""
 
-    Attributes
-    ----------
-    number : int
-        0 is the file's own.
-    begin, end : dict of str to float
-        Parameters.
-    objective, violation : float
-        At the end; NaN where it never could be assembled.
-    evaluations : int
-    """
-
-    number: int
-    begin: dict[str, float]
+    number: int  # 0 is the file's own
+    begin: dict[str, float]  # parameters
     end: dict[str, float]
-    objective: float
+    objective: float  # at the end; NaN where it never could be assembled
     violation: float
     evaluations: int
 
@@ -74,32 +52,15 @@ class Start:
 
 @dataclass(frozen=True)
 class Optimum:
-    """Result of a search.
+    """Result of a search."""
 
-    Attributes
-    ----------
-    definition : Mechanism
-        The mechanism with the best parameters.
-    before, after : Analysis
-        Results with the file's own parameters and with the best.
-    objective, objective_before : float
-        NaN for parameters of the file that cannot be assembled.
-    feasible : bool
-        Whether all constraints are kept; else it is the compromise with the smallest breach.
-    breaches : dict of str to float
-        Broken constraints and by how much, SI.
-    active : tuple of Active
-    starts : tuple of Start
-    seed : int
-    """
-
-    definition: Mechanism
-    before: Analysis | None
-    after: Analysis
+    definition: Mechanism  # the mechanism with the best parameters
+    before: Analysis | None  # results with the file's own parameters, if they can be assembled
+    after: Analysis  # and with the best
     objective: float
-    objective_before: float
-    feasible: bool
-    breaches: dict[str, float]
+    objective_before: float  # NaN for parameters that cannot be assembled
+    feasible: bool  # all constraints kept; else the compromise with the smallest breach
+    breaches: dict[str, float]  # broken constraints and by how much, SI
     active: tuple[Active, ...]
     starts: tuple[Start, ...]
     seed: int
@@ -107,8 +68,7 @@ class Optimum:
     @property
     def parameters(self) -> dict[str, float]:
         """The best parameters among those that may change."""
-        best = best_of(self.starts)
-        return best.end
+        return best_of(self.starts).end
 
 
 def best_of(starts: Sequence[Start]) -> Start:

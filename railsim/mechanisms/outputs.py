@@ -1,4 +1,4 @@
-"""Named results of a mechanism at positions of its driver, and positions where they are wanted."""
+"""Named results of a mechanism at positions of its driver, and positions where they are needed."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,12 +23,12 @@ from railsim.mechanisms.forces import (
     pressure_for,
     rubs,
     table_of,
-    unit_work,
 )
 from railsim.mechanisms.inversion import driver_at
 from railsim.mechanisms.kinematics import Motion, driver_words, solve
 
 Floats = NDArray[np.float64]
+ZONE = ("low", "work", "high")
 
 
 def actuator_of(definition: Mechanism) -> str | None:
@@ -39,50 +39,50 @@ def actuator_of(definition: Mechanism) -> str | None:
     return name if ends(definition.actuators[name]) is not None else None
 
 
+def length_points(definition: Mechanism) -> tuple[str, str] | None:
+    """Points between which the ratios' actuator is; None where there is none."""
+    name = actuator_of(definition)
+    return None if name is None else ends(definition.actuators[name])
+
+
+def equal_lengths(dense: Motion, pair: tuple[str, str], edges: Any, count: int) -> Floats:
+    """Values of the driver at equal steps of a length between two lengths."""
+    wanted = np.linspace(edges[0], edges[1], count)
+    return driver_at(dense, lambda motion: motion.length(pair)[:2], wanted)
+
+
 def sampled(dense: Motion) -> Floats:
     """Values of the driver at the positions that `[sampling]` asks for."""
     model, sampling = dense.model, dense.model.definition.sampling
-    name = actuator_of(model.definition)
+    name, pair = actuator_of(model.definition), length_points(model.definition)
     by, count = sampling.by, sampling.points
-    if by == "travel" or (by == "length" and name is None):
+    if by == "travel" or (by == "length" and pair is None):
         return np.linspace(model.start, model.end, count)
     if by == "time" and model.definition.motion is not None:
         law = model.definition.motion.model_copy(update={"points": count})
         timed = model.definition.model_copy(update={"motion": law})
         return driven_motion(replace(dense, model=replace(model, definition=timed))).motion.s
-    if name is None or by == "time":
-        fault = Fault(model.definition.name, "sampling.by", f"'{by}'", "'time' needs a [motion]")
-        raise InputError([fault])
-    pair = ends(model.definition.actuators[name])
-    assert pair is not None
-    length = dense.length(pair)[0]
-    check_monotonic(dense, name)
-    wanted = np.linspace(length[0], length[-1], count)
-    s = driver_at(dense, lambda motion: motion.length(pair)[:2], wanted)
+    if name is None or pair is None or by == "time":
+        raise model.refusal("sampling.by", f"'{by}'", "'time' needs a [motion]")
+    check_dead_point(dense, name)
+    s = equal_lengths(dense, pair, dense.length(pair)[0][[0, -1]], count)
     s[0], s[-1] = model.start, model.end
     return s
 
 
-def check_monotonic(dense: Motion, name: str) -> None:
-    """Refuse a range in which an actuator's length turns back: a dead point."""
-    check_dead_point(dense, name, unit_work(dense, dense.model.definition.actuators[name]))
-
-
 def outputs(motion: Motion) -> dict[str, Any]:
-    """Named results at all positions of a motion, SI; the table is `quantities.QUANTITIES`."""
+    """Named results at all positions of a motion, SI; names and units in `quantities`."""
     model = motion.model
     definition = model.definition
     found: dict[str, Any] = {"travel": motion.s}
-    actuator = actuator_of(definition)
-    if actuator is not None:
-        pair = ends(definition.actuators[actuator])
-        assert pair is not None
+    pair = length_points(definition)
+    if pair is not None:
         found["length"], found["rate"], _ = motion.length(pair)
     if definition.output is not None:
         r, r1, _ = motion.point(definition.output.point)
         closed = solve(model, [model.start]).point(definition.output.point)[0][0]
         found["height"], found["x"] = r[:, 1] - closed[1], r[:, 0] - closed[0]
-        if actuator is not None:
+        if pair is not None:
             found["ratio"], found["ratio_x"] = (r1[:, k] / found["rate"] for k in (model.axis, 0))
     if definition.solve is not None:
         found |= _forces(motion, definition.solve.unknown)
@@ -94,10 +94,9 @@ def outputs(motion: Motion) -> dict[str, Any]:
             if isinstance(element, GasSpring) and element.rod is not None:
                 area = 0.25 * np.pi * model.number(element.rod) ** 2
                 found[f"{name}_pressure"] = np.abs(found[f"{name}_force"]) / area
-    for name in definition.angles:
-        found[name] = motion.angle(name)
+    found |= {name: motion.angle(name) for name in definition.angles}
     for name, row in cam_rows(motion).items():
-        found[f"{name}_pressure_angle"] = pressure_angle(motion, name, row)
+        found[f"{name}_pressure_angle"] = _pressure_angle(motion, name, row)
     return found
 
 
@@ -105,24 +104,24 @@ def _forces(motion: Motion, unknown: str) -> dict[str, Any]:
     """Force of the unknown actuator, its pressure, what it means at the output."""
     model = motion.model
     definition = model.definition
-    sense = model.sense
-    found: dict[str, Any] = {"force": actuator_force(motion, unknown, Rates(friction=sense))}
-    if rubs(model):
-        found["force_back"] = actuator_force(motion, unknown, Rates(friction=-sense))
+    found: dict[str, Any] = {}
+    for way, sense in (("", 1), ("_back", -1))[: 2 if rubs(model) else 1]:
+        rates = Rates(friction=sense * model.sense)
+        found[f"force{way}"] = actuator_force(motion, unknown, rates)
     if isinstance(definition.actuators[unknown], Cylinder | AirSpring):
-        found["pressure"] = pressure_for(motion, unknown, found["force"])
-        if "force_back" in found:
-            found["pressure_back"] = pressure_for(motion, unknown, found["force_back"])
+        found |= {
+            name.replace("force", "pressure"): pressure_for(motion, unknown, force)
+            for name, force in found.items()
+        }
     if definition.output is not None:
-        _, r1, _ = motion.point(definition.output.point)
+        along = motion.point(definition.output.point)[1][:, model.axis]
         with np.errstate(divide="ignore", invalid="ignore"):
-            along = r1[:, model.axis]
             found["effective_weight"] = -generalised_force(motion) / along
             found["effective_mass"] = inertia(motion)[0] / along**2
     return found
 
 
-def pressure_angle(motion: Motion, name: str, row: int) -> Any:
+def _pressure_angle(motion: Motion, name: str, row: int) -> Any:
     """Pressure angle of a roller on its cam [rad]: from its path over the ground to its force.
 
     The normal is taken on the side to which the roller moves, so that the angle goes on from arc
@@ -139,23 +138,21 @@ def pressure_angle(motion: Motion, name: str, row: int) -> Any:
 
 def check_pressure(motion: Motion, output: Mapping[str, Any]) -> None:
     """Refuse an air spring as the actuator that has no value somewhere."""
-    if "pressure" not in output or np.all(np.isfinite(output["pressure"])):
-        return
-    definition = motion.model.definition
-    assert definition.solve is not None
-    name = definition.solve.unknown
-    spring = definition.actuators[name]
-    assert isinstance(spring, AirSpring)
-    k = np.flatnonzero(~np.isfinite(output["pressure"]))[0]
-    height = float(motion.length(spring.air_spring)[0][k])
-    reason = table_of(motion, spring).reason(height, float(output["force"][k]))
-    where = f"driver at {driver_words(motion.model, float(motion.s[k]))}: {reason}"
-    fault = Fault(definition.name, f"actuators.{name}", where, "another range or table")
-    raise InputError([fault])
+    missing = np.flatnonzero(~np.isfinite(output.get("pressure", 0.0)))
+    if len(missing):
+        definition, k = motion.model.definition, missing[0]
+        assert definition.solve is not None
+        spring = definition.actuators[definition.solve.unknown]
+        assert isinstance(spring, AirSpring)
+        height = float(motion.length(spring.air_spring)[0][k])
+        reason = table_of(motion, spring).reason(height, float(output["force"][k]))
+        where = f"driver at {driver_words(motion.model, float(motion.s[k]))}: {reason}"
+        key = f"actuators.{definition.solve.unknown}"
+        raise motion.model.refusal(key, where, "another range or table")
 
 
-def zone_drivers(dense: Motion) -> tuple[list[str], Floats]:
-    """Names of the zone's heights and the driver's values there.
+def zone_drivers(dense: Motion) -> dict[str, float]:
+    """Values of the driver at the zone's heights; none without a zone.
 
     Raises
     ------
@@ -165,32 +162,30 @@ def zone_drivers(dense: Motion) -> tuple[list[str], Floats]:
     model = dense.model
     zone, output = model.definition.zone, model.definition.output
     if zone is None or output is None:
-        return [], np.zeros(0)
-    names = ["low", "work", "high"]
-    heights = np.array([model.number(getattr(zone, name)) for name in names])
-    s = height_drivers(dense, heights)
-    faults = []
-    for name, height, value in zip(names, heights, s, strict=True):
-        if not np.isfinite(value):
-            y = height_of(dense)[0]
-            found = f"a height of {height * 1e3:.1f} mm is never reached"
-            allowed = f"{y.min() * 1e3:.1f} to {y.max() * 1e3:.1f} mm"
-            faults.append(Fault(model.definition.name, f"zone.{name}", found, allowed))
+        return {}
+    heights = np.array([model.number(getattr(zone, name)) for name in ZONE])
+    found = dict(zip(ZONE, driver_at(dense, height_of, heights).tolist(), strict=True))
+    y = height_of(dense)[0]
+    faults = [
+        Fault(
+            model.definition.name,
+            f"zone.{name}",
+            f"a height of {height * 1e3:.1f} mm is never reached",
+            f"{y.min() * 1e3:.1f} to {y.max() * 1e3:.1f} mm",
+        )
+        for name, height in zip(ZONE, heights, strict=True)
+        if np.isnan(found[name])
+    ]
     if faults:
         raise InputError(faults)
-    return names, s
+    return found
 
 
 def height_of(motion: Motion) -> tuple[Any, Any]:
     """Way of the output along its axis since the start, with its derivative by the driver [m]."""
-    assert motion.model.definition.output is not None
-    point = motion.model.definition.output.point
+    model = motion.model
+    assert model.definition.output is not None
+    point = model.definition.output.point
     r, r1, _ = motion.point(point)
-    k = motion.model.axis
-    start = solve(motion.model, [motion.model.start]).point(point)[0][0, k]
-    return r[..., k] - start, r1[..., k]
-
-
-def height_drivers(dense: Motion, heights: Any) -> Floats:
-    """Values of the driver at heights of the output over the start; NaN where never reached."""
-    return driver_at(dense, height_of, heights)
+    start = solve(model, [model.start]).point(point)[0][0, model.axis]
+    return r[..., model.axis] - start, r1[..., model.axis]

@@ -1,72 +1,49 @@
 """Names, units and meanings of a mechanism's results: tables, files and pictures take them here."""
 
-from dataclasses import dataclass
-
-import numpy as np
-
 from railsim.definitions.mechanism import Mechanism
+from railsim.definitions.mechanism_parts import HandTorque
+from railsim.table import Column
 
-
-@dataclass(frozen=True)
-class Quantity:
-    """A result: its unit in files, the unit shown, the factor between them, what it is."""
-
-    unit: str
-    shown: str
-    scale: float
-    digits: int
-    meaning: str
-
-
-DEGREES = float(np.degrees(1.0))
 QUANTITIES = {
-    "travel": Quantity("rad", "deg", DEGREES, 4, "driver"),
-    "length": Quantity("m", "mm", 1e3, 3, "length of the actuator"),
-    "rate": Quantity("m/rad", "mm/rad", 1e3, 3, "length over the driver, derivative"),
-    "height": Quantity("m", "mm", 1e3, 2, "height of the output over the start"),
-    "x": Quantity("m", "mm", 1e3, 2, "the same along x"),
-    "ratio": Quantity("1", "", 1.0, 4, "height over length, derivative"),
-    "ratio_x": Quantity("1", "", 1.0, 4, "the same along x"),
-    "force": Quantity("N", "N", 1.0, 2, "force of the unknown actuator"),
-    "force_back": Quantity("N", "N", 1.0, 2, "the same on the way back"),
-    "pressure": Quantity("Pa", "MPa", 1e-6, 5, "pressure that gives this force"),
-    "pressure_back": Quantity("Pa", "MPa", 1e-6, 5, "the same on the way back"),
-    "effective_weight": Quantity("N", "N", 1.0, 2, "weight of everything, felt at the output"),
-    "effective_mass": Quantity("kg", "kg", 1.0, 3, "mass of everything, felt at the output"),
+    column.name: column
+    for column in (
+        Column("length", "length of the actuator", "mm", ".3f"),
+        Column("height", "height of the output over the start", "mm", ".2f"),
+        Column("x", "x of the output over the start", "mm", ".2f"),
+        Column("ratio", "height over length, derivative", "", ".4f"),
+        Column("ratio_x", "x over length, derivative", "", ".4f"),
+        Column("pressure", "pressure that gives the force", "MPa", ".5f"),
+        Column("pressure_back", "pressure on the way back", "MPa", ".5f"),
+        Column("effective_weight", "weight of everything, felt at the output", "N", ".2f"),
+        Column("effective_mass", "mass of everything, felt at the output", "kg", ".3f"),
+    )
 }
-ANGLE = Quantity("rad", "deg", DEGREES, 3, "angle")
-LENGTH = Quantity("m", "mm", 1e3, 3, "length")
-GAS = Quantity("Pa", "MPa", 1e-6, 3, "pressure of the gas over the outside")
-FORCE = Quantity("N", "N", 1.0, 2, "push")
-TORQUE = Quantity("N m", "N m", 1.0, 3, "torque of the unknown actuator")
-SHOWN = {"m": ("mm", 1e3), "rad": ("deg", DEGREES), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}
 
 
-def quantity(name: str, definition: Mechanism) -> Quantity:
+def quantity(name: str, definition: Mechanism) -> Column:
     """What a named result of a mechanism is."""
     angular = definition.driver.angle is not None
-    if name == "travel":
-        return QUANTITIES[name] if angular else Quantity("m", "mm", 1e3, 3, "driver")
-    if name == "rate" and not angular:
-        return Quantity("1", "", 1.0, 4, QUANTITIES[name].meaning)
-    if name in ("force", "force_back") and definition.solve is not None:
-        turns = force_unit(definition.solve.unknown, definition) == "N m"
-        return TORQUE if turns else QUANTITIES[name]
     if name in QUANTITIES:
         return QUANTITIES[name]
+    if name == "travel":
+        return Column(name, "driver", "deg" if angular else "mm", ".4f" if angular else ".3f")
+    if name == "rate":
+        unit, shown = ("mm/rad", ".3f") if angular else ("", ".4f")
+        return Column(name, "length over the driver, derivative", unit, shown)
+    if name in ("force", "force_back") and definition.solve is not None:
+        unit = force_unit(definition.solve.unknown, definition)
+        way = " on the way back" if name == "force_back" else ""
+        words = f"{'torque' if unit == 'N m' else 'force'} of the unknown actuator{way}"
+        return Column(name, words, unit, ".3f" if unit == "N m" else ".2f")
     if name in definition.angles or name.endswith("_pressure_angle"):
-        return ANGLE
+        return Column(name, "angle", "deg", ".3f")
     if name.endswith("_pressure"):
-        return GAS
-    return LENGTH if name.endswith("_length") else FORCE
+        return Column(name, "pressure of the gas over the outside", "MPa", ".3f")
+    if name.endswith("_length"):
+        return Column(name, "length", "mm", ".3f")
+    return Column(name, "push", "N", ".2f")
 
 
 def force_unit(actuator: str, definition: Mechanism) -> str:
     """Unit of the force, or torque, of an actuator."""
-    return "N m" if hasattr(definition.actuators[actuator], "turn") else "N"
-
-
-def shown(value: float, unit: str, digits: int = 6) -> str:
-    """A parameter's value in the unit in which it is shown."""
-    name, scale = SHOWN.get(unit, (unit, 1.0))
-    return f"{value * scale:.{digits}g} {name}".rstrip()
+    return "N m" if isinstance(definition.actuators[actuator], HandTorque) else "N"

@@ -3,7 +3,15 @@
 import numpy as np
 
 from railsim.definitions.mechanism_faults import bounds_remarks
-from railsim.definitions.mechanism_parts import GasSpring, HandForce, HandTorque, Link
+from railsim.definitions.mechanism_parts import (
+    GasSpring,
+    HandForce,
+    HandTorque,
+    Link,
+    Prismatic,
+    Revolute,
+)
+from railsim.definitions.mechanism_values import body_name
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks, rod_drop, runs_ahead
 from railsim.mechanisms.kinematics import solve
@@ -42,29 +50,29 @@ def _forces(result: Analysis) -> list[str]:
 
 def _rods(result: Analysis) -> list[str]:
     """A rod hardly longer than its crank: close to a dead point when they lie on each other."""
-    model = result.model
-    joints = result.definition.joints
-    cranks = {p for j in joints.values() for p in getattr(j, "revolute", ()) if "ground." in p}
+    model, joints = result.model, result.definition.joints
     pivots = {
-        body: point
+        body_name(point): point
         for joint in joints.values()
-        for point, body in _on_ground(getattr(joint, "revolute", ()))
+        if isinstance(joint, Revolute) and "ground" in map(body_name, joint.revolute)
+        for point in joint.revolute
+        if body_name(point) != "ground"
     }
     slides = {
-        point.partition(".")[0]
+        body_name(point)
         for joint in joints.values()
-        for point in getattr(joint, "prismatic", ())
+        if isinstance(joint, Prismatic)
+        for point in joint.prismatic
     }
     found = []
     for name, joint in joints.items():
-        if not isinstance(joint, Link) or not cranks:
+        if not isinstance(joint, Link):
             continue
-        bodies = [point.partition(".")[0] for point in joint.link]
-        for end, other in ((0, 1), (1, 0)):
-            if bodies[end] not in pivots or bodies[other] not in slides:
+        for end, other in (joint.link, joint.link[::-1]):
+            if body_name(end) not in pivots or body_name(other) not in slides:
                 continue
             motion = solve(model, [model.start])
-            d = motion.point(joint.link[end])[0] - motion.point(pivots[bodies[end]])[0]
+            d = motion.point(end)[0] - motion.point(pivots[body_name(end)])[0]
             crank, rod = float(np.hypot(*d[0])), float(model.number(joint.length))
             if abs(rod - crank) < NEAR * crank:
                 longer = f"{abs(rod - crank) * 1e3:.3f} mm {'longer' if rod > crank else 'shorter'}"
@@ -73,13 +81,6 @@ def _rods(result: Analysis) -> list[str]:
                     "to a dead point, sensitive to every tolerance"
                 )
     return found
-
-
-def _on_ground(pair: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Point and body of a revolute joint with the ground."""
-    if len(pair) != 2 or not any(point.startswith("ground.") for point in pair):
-        return []
-    return [(p, p.partition(".")[0]) for p in pair if not p.startswith("ground.")]
 
 
 def _gas_springs(result: Analysis) -> list[str]:

@@ -7,50 +7,36 @@ import numpy as np
 
 from railsim.definitions.mechanism import CatalogueRow
 from railsim.definitions.mechanism_parts import Cylinder, GasSpring
+from railsim.design_checks import ROUNDING
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.checks import ROUNDING, Check, checks, force_range
+from railsim.mechanisms.checks import force_range
 from railsim.mechanisms.components import gas_temperature_factor, next_size
 from railsim.mechanisms.forces import Rates, actuator_force
 from railsim.mechanisms.kinematics import Motion
 
-# checks are computed beside this module, and offered here
-__all__ = ["Check", "Choice", "checks", "needed_bore", "selection"]
-
 
 @dataclass(frozen=True)
 class Choice:
-    """A row of a catalogue: whether it fits, or why not.
-
-    Attributes
-    ----------
-    catalogue, name : str
-        Where it stands.
-    fits : bool
-    reasons : tuple of str
-        Why it does not fit; of a row that fits, what was chosen.
-    values : dict of str to float
-        Of a gas spring that fits: stroke, extended length, body, rod, progression, tolerance of F1
-        (`F1_low`, `F1_high`), force of the lock; the unknown force with it (`force_least`,
-        `force_most`), and the same over temperatures in service and tolerances of F1
-        (`force_lowest`, `force_highest`); the gas pressure over the outside (`pressure_least`,
-        `pressure_most`).
-    """
+    """A row of a catalogue: whether it fits, or why not."""
 
     catalogue: str
     name: str
     fits: bool
-    reasons: tuple[str, ...]
+    reasons: tuple[str, ...]  # why it does not fit; of a row that fits, what was chosen
     values: dict[str, float]
+    """Of a gas spring that fits: stroke, extended length, body, rod, progression, tolerance of F1
+    (`F1_low`, `F1_high`), force of the lock; the unknown force with it (`force_least`,
+    `force_most`), and the same over temperatures in service and tolerances of F1 (`force_lowest`,
+    `force_highest`); the gas pressure over the outside (`pressure_least`, `pressure_most`)."""
 
 
 def selection(result: Analysis) -> list[Choice]:
     """Cylinders and gas springs of the catalogues, each with its verdict."""
     found: list[Choice] = []
     definition = result.definition
-    for name, actuator in definition.actuators.items():
-        solved = definition.solve is not None and name == definition.solve.unknown
-        if isinstance(actuator, Cylinder) and solved:
-            found += _cylinders(result, actuator)
+    if definition.solve is not None:
+        unknown = definition.actuators[definition.solve.unknown]
+        found += _cylinders(result, unknown) if isinstance(unknown, Cylinder) else []
     for wanted in definition.selection:
         element = definition.elements[wanted.element]
         assert isinstance(element, GasSpring)
@@ -217,17 +203,13 @@ def _unknown_forces(
     """
     definition = result.definition
     assert definition.solve is not None
-    elements = {
-        key: part.model_copy(update={"temperature": temperature})
-        if isinstance(part, GasSpring)
-        else part
-        for key, part in definition.elements.items()
-    }
-    elements[name] = spring
+    elements = {**definition.elements, name: spring}
+    for key, part in elements.items():
+        if isinstance(part, GasSpring):
+            elements[key] = part.model_copy(update={"temperature": temperature})
     model = replace(result.model, definition=definition.model_copy(update={"elements": elements}))
     motion: Motion = replace(result.motion, model=model, known={})
-    senses = (model.sense, -model.sense)
     return [
-        actuator_force(motion, definition.solve.unknown, Rates(friction=k, trial=True))
-        for k in senses
+        actuator_force(motion, definition.solve.unknown, Rates(friction=way, trial=True))
+        for way in (1, -1)
     ]

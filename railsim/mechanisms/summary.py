@@ -4,16 +4,16 @@ The keys are part of the interface and documented in docs/user/mechanisms.md.
 """
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from railsim.definitions.mechanism import Mechanism
 from railsim.mechanisms.analysis import Analysis
 from railsim.mechanisms.checks import checks
 from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact
-from railsim.mechanisms.dynamics import FreeMotion
+from railsim.mechanisms.dynamics import TimedMotion
 from railsim.mechanisms.links import Course, actuators, links
 from railsim.mechanisms.remarks import remarks
 from railsim.mechanisms.selection import selection
@@ -34,11 +34,6 @@ def parameter_data(result: Analysis) -> Data:
     return values
 
 
-def provenance_data(definition: Mechanism) -> dict[str, str]:
-    """Where every parameter is from."""
-    return {name: definition.provenance_of(name) for name in definition.parameters}
-
-
 def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
     """One analysis as plain numbers, with `courses` also those of every link and actuator."""
     definition = result.definition
@@ -48,19 +43,14 @@ def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
         "source": definition.source,
         "remarks": remarks(result),
         "parameters": parameter_data(result),
-        "provenance": provenance_data(definition),
+        "provenance": {name: definition.provenance_of(name) for name in definition.parameters},
         "travel": result.travel,
+        **_extremes(result),
     }
-    if "length" in result.output:
-        length = result.output["length"]
-        data["stroke"] = result.stroke
-        data["length_start"], data["length_end"] = float(length[0]), float(length[-1])
     if "force" in result.output:
         force = result.extremes("force")
-        data["max_force"], data["min_force"] = force.most, force.least
-        data["max_force_at"], data["min_force_at"] = force.most_at, force.least_at
-        data["peak_force"] = result.peak_force
-        data["force_zeros"] = list(result.force_zeros)
+        data |= {"max_force_at": force.most_at, "min_force_at": force.least_at}
+        data |= {"peak_force": result.peak_force, "force_zeros": list(result.force_zeros)}
     if result.rests:
         data["equilibria"] = [
             {"travel": rest.at, "stable": rest.stable, "from": rest.low, "to": rest.high}
@@ -74,52 +64,66 @@ def analysis_data(result: Analysis, *, courses: bool = True) -> Data:
         data["zone"] = {
             name: {at: values[name] for at, values in result.zone.items()} for name in names
         }
-    parts = (("links", links(result.motion)), ("actuators", actuators(result.motion)))
-    for key, found in parts if courses else ():
-        data[key] = course_data(found, "angle" if key == "links" else "length")
+    if courses:
+        data["links"] = _courses(links(result.motion), "angle")
+        data["actuators"] = _courses(actuators(result.motion), "length")
     if result.timed is not None:
-        data["motion"] = motion_data(result, courses=courses)
+        data["motion"] = _motion_data(result, result.timed, courses=courses)
     if result.contact is not None:
-        data["contact"] = contact_data(result.contact)
-    if result.release is not None:
-        data["release"] = release_data(result.release)
+        data["contact"] = _contact_data(result.contact)
+    if (released := result.release) is not None:
+        data["release"] = {
+            "time": _list(released.time),
+            "travel": _list(released.s),
+            "speed": _list(released.speed),
+            "reached": released.reached,
+            "duration": float(released.time[-1]),
+        }
     data["reactions"] = {
         name: {"max": r.max, "at": r.at, "components": [_list(row) for row in r.components.T]}
         for name, r in result.reactions.items()
     }
-    data["transitions"] = [dict(vars(one)) for one in result.transitions]
+    data["transitions"] = [asdict(one) for one in result.transitions]
     data["selection"] = [
-        {
-            "catalogue": c.catalogue,
-            "name": c.name,
-            "fits": c.fits,
-            "reasons": list(c.reasons),
-            **c.values,
-        }
-        for c in selection(result)
+        {k: v for k, v in vars(choice).items() if k != "values"} | choice.values
+        for choice in selection(result)
     ]
     if definition.tolerances:
-        data["scatter"] = [dict(vars(one)) for one in scatter(definition)]
+        data["scatter"] = [asdict(one) for one in scatter(definition)]
     made = checks(result)
-    data["checks"] = [
-        {
-            "name": check.name,
-            "value": check.value,
-            "limit": check.limit,
-            "ok": check.ok,
-            "unit": check.unit,
-            "must_be": check.sense,
-            "note": check.note,
-        }
-        for check in made
-    ]
+    data["checks"] = [check.data for check in made]
     data["ok"] = all(check.ok for check in made)
     return data
 
 
-def contact_data(contact: Contact) -> Data:
+def _extremes(result: Analysis) -> Data:
+    """Stroke, lengths at both ends and extreme forces, where there are any."""
+    data: Data = {}
+    if "length" in result.output:
+        length = result.output["length"]
+        data |= {"stroke": result.stroke, "length_start": float(length[0])}
+        data["length_end"] = float(length[-1])
+    if "force" in result.output:
+        data |= {"max_force": result.max_force, "min_force": result.min_force}
+    return data
+
+
+def published_data(result: Analysis) -> dict[str, Data]:
+    """Results that the source prints beside the computed ones; none with changed parameters."""
+    definition = result.definition
+    changed = {"set", "optimised"} & {definition.provenance_of(p) for p in definition.parameters}
+    if changed or result.case is not None:
+        return {}
+    computed: Data = {"travel": result.travel, **result.min_angles, **_extremes(result)}
+    return {
+        name: {"published": float(result.model.number(value)), "ours": computed[name]}
+        for name, value in definition.published.items()
+        if name in computed
+    }
+
+
+def _contact_data(contact: Contact) -> Data:
     """The static contact force as plain numbers."""
-    equilibria = zip(contact.equilibria, contact.heights, strict=True)
     return {
         "pressure": contact.pressure,
         "force": dict(contact.force),
@@ -128,47 +132,14 @@ def contact_data(contact: Contact) -> Data:
         "curve": _list(contact.curve),
         "equilibria": [
             {"height": y, "stable": stable, "from": low, "to": high}
-            for (y, stable), (low, high) in equilibria
+            for (y, stable), (low, high) in zip(contact.equilibria, contact.heights, strict=True)
         ],
         "reason": contact.reason or None,
     }
 
 
-def release_data(released: FreeMotion) -> Data:
-    """The free motion as plain numbers."""
-    return {
-        "time": _list(released.time),
-        "travel": _list(released.s),
-        "speed": _list(released.speed),
-        "reached": released.reached,
-        "duration": float(released.time[-1]),
-    }
-
-
-def published_data(result: Analysis) -> dict[str, Data]:
-    """Results that the source prints beside ours; none with parameters that are not the file's."""
-    definition = result.definition
-    changed = {"set", "optimised"} & {definition.provenance_of(p) for p in definition.parameters}
-    if changed or result.case is not None:
-        return {}
-    ours: dict[str, float] = {"travel": result.travel, **result.min_angles}
-    if "length" in result.output:
-        length = result.output["length"]
-        ours |= {"stroke": result.stroke, "length_start": float(length[0])}
-        ours["length_end"] = float(length[-1])
-    if "force" in result.output:
-        ours |= {"max_force": result.max_force, "min_force": result.min_force}
-    return {
-        name: {"published": float(result.model.number(value)), "ours": ours[name]}
-        for name, value in definition.published.items()
-        if name in ours
-    }
-
-
-def motion_data(result: Analysis, *, courses: bool = True) -> Data:
+def _motion_data(result: Analysis, timed: TimedMotion, *, courses: bool) -> Data:
     """The motion in time as plain numbers."""
-    timed = result.timed
-    assert timed is not None
     data: Data = {
         "time": _list(timed.time),
         "travel": _list(timed.motion.s),
@@ -178,25 +149,23 @@ def motion_data(result: Analysis, *, courses: bool = True) -> Data:
         "max_force": float(np.max(timed.force)),
         "min_force": float(np.min(timed.force)),
     }
-    parts = (("links", links(timed.motion)), ("actuators", actuators(timed.motion)))
-    for key, found in parts if courses else ():
-        moving = {n: c.in_time(timed.speed, timed.acceleration) for n, c in found.items()}
-        value = "angle" if key == "links" else "length"
-        data[key] = course_data(moving, value, "speed", "acceleration")
+    if courses:
+        rates = ("speed", "acceleration")
+        data["links"] = _courses(timed.in_time(links(timed.motion)), "angle", *rates)
+        data["actuators"] = _courses(timed.in_time(actuators(timed.motion)), "length", *rates)
     if result.definition.output is not None:
-        v, a = timed.point(result.definition.output.point)
-        data["velocity_x"], data["velocity_y"] = _list(v[:, 0]), _list(v[:, 1])
-        data["acceleration_x"], data["acceleration_y"] = _list(a[:, 0]), _list(a[:, 1])
+        moving = timed.point(result.definition.output.point)
+        for name, values in zip(("velocity", "acceleration"), moving, strict=True):
+            data |= {f"{name}_{axis}": _list(values[:, k]) for k, axis in enumerate("xy")}
     return data
 
 
-def course_data(
-    courses: Mapping[str, Course], value: str, first: str = "first", second: str = "second"
-) -> Data:
+def _courses(courses: Mapping[str, Course], *names: str) -> Data:
     """Angles or lengths with two derivatives as plain numbers, by the names given."""
+    names = names if len(names) == 3 else (*names, "first", "second")
     return {
-        name: {value: _list(c.value), first: _list(c.first), second: _list(c.second)}
-        for name, c in courses.items()
+        course: dict(zip(names, map(_list, vars(values).values()), strict=True))
+        for course, values in courses.items()
     }
 
 
@@ -213,7 +182,7 @@ def optimum_data(optimum: "Optimum") -> Data:
         "objective_before": optimum.objective_before,
         "feasible": optimum.feasible,
         "breaches": dict(optimum.breaches),
-        "active": [dict(vars(active)) for active in optimum.active],
+        "active": [asdict(active) for active in optimum.active],
         "starts": [
             {
                 "number": start.number,
@@ -231,4 +200,4 @@ def optimum_data(optimum: "Optimum") -> Data:
 
 
 def _list(array: Any) -> list[float]:
-    return [float(x) for x in np.asarray(array)]
+    return np.asarray(array, dtype=float).tolist()  # type: ignore[no-any-return]

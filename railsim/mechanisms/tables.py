@@ -1,148 +1,138 @@
-"""Results as tables of texts in the field's units, for the terminal and for the page."""
+"""Results as tables and sentences in the field's units, for terminal, notebook and page."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from railsim.design_checks import SHOWN, shown
 from railsim.mechanisms.analysis import Analysis
-from railsim.mechanisms.checks import Check
 from railsim.mechanisms.comparison import Comparison
 from railsim.mechanisms.contact import Contact, moved
 from railsim.mechanisms.dynamics import driving
 from railsim.mechanisms.kinematics import folded
-from railsim.mechanisms.quantities import SHOWN, force_unit, quantity, shown
+from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.mechanisms.selection import Choice
-from railsim.mechanisms.summary import parameter_data, published_data
+from railsim.mechanisms.summary import comparison_data, parameter_data, published_data
 from railsim.mechanisms.tolerance import Scatter
+from railsim.table import Amount, Column, Table
 
 if TYPE_CHECKING:
     from railsim.mechanisms.optimum import Optimum
 
-Texts = tuple[list[str], list[list[str]]]
+COMPARISON = [
+    Column("name", "mechanism"),
+    Column("stroke", "", "mm", ".4f"),
+    Column("length_start", "length closed", "mm", ".3f"),
+    Column("peak_force", "largest force", "N", ".1f"),
+    Column("work_force", "force at work", "N", ".1f"),
+    Column("zone_spread", "spread in the zone", "%", ".2f"),
+    Column("min_angle", "least angle", "deg", ".3f"),
+    Column("error", "error of ratio", "", ".4g"),
+]
+SELECTION = [
+    Column("catalogue"),
+    Column("row"),
+    Column("fits"),
+    Column("reasons", "stroke, or why not"),
+    Column("sizes", "body/rod (mm)", format=">"),
+    Column("progression", "p", "", ".2f"),
+    Column("F1", "F1 (N)", format=">"),
+    Column("force", "unknown force (N)", format=">"),
+    Column("extreme", "over temperature and F1 (N)", format=">"),
+]
 
 
-def position_table(result: Analysis) -> Texts:
-    """Results at the start, in the zone and at the end."""
-    rows = [("start", {k: float(v[0]) for k, v in result.output.items()})]
-    rows += list(result.zone.items())
-    rows += [("end", {k: float(v[-1]) for k, v in result.output.items()})]
+def position_table(result: Analysis) -> Table:
+    """Return results at the start, in the zone and at the end; a row for each of them."""
+    rows: list[tuple[str, Mapping[str, Any]]] = [
+        ("start", {k: v[0] for k, v in result.output.items()}),
+        *result.zone.items(),
+        ("end", {k: v[-1] for k, v in result.output.items()}),
+    ]
     return value_table(result, rows)
 
 
-def value_table(result: Analysis, rows: Sequence[tuple[str, dict[str, float]]]) -> Texts:
-    """Rows of results by name, a column each."""
-    names = list(result.output)
-    header = ["at"]
-    for name in names:
-        unit = quantity(name, result.definition).shown
-        header.append(f"{name} / {unit}" if unit else name)
-    texts = []
-    for row, values in rows:
-        cells = []
-        for name in names:
-            what = quantity(name, result.definition)
-            value = values[name]
-            if name in result.definition.angles:
-                value = float(folded(value))
-            cells.append(f"{value * what.scale:.{what.digits}f}" if np.isfinite(value) else "-")
-        texts.append([row, *cells])
-    return header, texts
+def value_table(result: Analysis, at: Sequence[tuple[str, Mapping[str, Any]]]) -> Table:
+    """Return a row for each result and a column for each of some positions."""
+    definition, rows = result.definition, []
+    for name in result.output:
+        column = quantity(name, definition)
+        unit = f" ({column.unit})" if column.unit else ""
+        values = [folded(v[name]) if name in definition.angles else v[name] for _, v in at]
+        rows.append([f"{name}{unit}", *(Amount(float(value), column) for value in values)])
+    return Table(["at", *(Column(where, format=">") for where, _ in at)], rows)
 
 
-def upright(table: Texts) -> Texts:
-    """A table with rows and columns exchanged, for the terminal."""
-    header, rows = table
-    turned = [list(column) for column in zip(header, *rows, strict=True)]
-    return turned[0], turned[1:]
-
-
-def parameter_table(result: Analysis) -> Texts:
-    """Every parameter with its unit and where it is from."""
+def parameter_table(result: Analysis) -> Table:
+    """Return every parameter with its unit and where it is from."""
     definition = result.definition
     rows = [
         [name, shown(value, definition.unit_of(name), 8), definition.provenance_of(name)]
         for name, value in parameter_data(result).items()
     ]
-    return ["parameter", "value", "provenance"], rows
+    return Table(["parameter", Column("value", format=">"), "provenance"], rows)
 
 
-def published_table(result: Analysis) -> Texts:
-    """Results that the source prints, beside ours."""
+def published_table(result: Analysis) -> Table:
+    """Return results that the source prints, beside the computed ones."""
     rows = []
     for name, both in published_data(result).items():
         unit = "N" if name.endswith("force") else "rad" if name in result.min_angles else "m"
         if name == "travel":
-            unit = quantity("travel", result.definition).unit
-        difference = both["ours"] / both["published"] - 1.0
+            unit = quantity("travel", result.definition).si_unit
         cells = [shown(both[key], unit, 8) for key in ("published", "ours")]
-        rows.append([name, *cells, f"{difference:+.1e}"])
-    return ["result", "published", "computed", "relative difference"], rows
+        rows.append([name, *cells, both["ours"] / both["published"] - 1.0])
+    numbers = [Column("published", format=">"), Column("computed", format=">")]
+    return Table(["result", *numbers, Column("relative difference", format="+.1e")], rows)
 
 
-def check_table(checks: Sequence[Check]) -> Texts:
-    """One row for each check."""
-    rows = []
-    for check in checks:
-        unit, scale = SHOWN.get(check.unit, (check.unit, 1.0))
-        sign = {"above": ">=", "below": "<="}.get(check.sense, "about")
-        rows.append(
-            [
-                check.name,
-                f"{check.value * scale:.2f}",
-                f"{sign} {check.limit * scale:.2f}",
-                unit,
-                "-" if check.sense == "about" else "yes" if check.ok else "NO",
-            ]
-        )
-    return ["check", "value", "must be", "unit", "met"], rows
+def selection_table(choices: Sequence[Choice]) -> Table:
+    """Return one row for each row of a catalogue, with the force that the mechanism then needs.
 
-
-def selection_table(choices: Sequence[Choice]) -> Texts:
-    """One row for each row of a catalogue, with the force that the mechanism then needs."""
-    rows = []
-    for alike in _alike(choices):
-        c = alike[0]
-        name = c.name if len(alike) == 1 else f"{c.name} ... {alike[-1].name} ({len(alike)} rows)"
-        v = {key: f"{value:.1f}" for key, value in c.values.items() if key.startswith(("F", "f"))}
-        sizes = [f"{c.values[key] * 1e3:g}" for key in ("body", "rod") if key in c.values]
-        rows.append(
-            [
-                c.catalogue,
-                name,
-                "yes" if c.fits else "no",
-                "; ".join(c.reasons),
-                "/".join(sizes) or "-",
-                f"{c.values['progression']:.2f}" if c.values else "-",
-                f"{v['F1_low']} to {v['F1_high']}" if c.values else "-",
-                f"{v['force_least']} to {v['force_most']}" if "force_least" in v else "-",
-                f"{v['force_lowest']} to {v['force_highest']}" if "force_least" in v else "-",
-            ]
-        )
-    header = ["catalogue", "row", "fits", "stroke, or why not", "body/rod / mm", "p", "F1 / N"]
-    return [*header, "unknown force / N", "over temperature and F1 / N"], rows
-
-
-def _alike(choices: Sequence[Choice]) -> list[list[Choice]]:
-    """Rows in turn, those of a catalogue that do not fit for the same reason together."""
+    Neighbours that do not fit for the same reason share a row.
+    """
     groups: list[list[Choice]] = []
     for choice in choices:
-        same = groups and not choice.fits and groups[-1][0].reasons == choice.reasons
-        if same and groups[-1][0].catalogue == choice.catalogue:
+        same = bool(groups) and not choice.fits and not groups[-1][0].fits
+        if same and vars(groups[-1][0]) == {**vars(choice), "name": groups[-1][0].name}:
             groups[-1].append(choice)
         else:
             groups.append([choice])
-    return groups
+    rows = []
+    for first, *others in groups:
+        v, name = first.values, first.name
+        if others:
+            name = f"{name} ... {others[-1].name} ({len(others) + 1} rows)"
+        row: dict[str, Any] = {
+            "catalogue": first.catalogue,
+            "row": name,
+            "fits": "yes" if first.fits else "no",
+            "reasons": "; ".join(first.reasons),
+            "sizes": "/".join(f"{v[k] * 1e3:g}" for k in ("body", "rod") if k in v) or "-",
+            "progression": v.get("progression", np.nan),
+        }
+        for column, pair in (
+            ("F1", ("F1_low", "F1_high")),
+            ("force", ("force_least", "force_most")),
+            ("extreme", ("force_lowest", "force_highest")),
+        ):
+            known = pair[0] in v
+            row[column] = f"{v[pair[0]]:.1f} to {v[pair[1]]:.1f}" if known else "-"
+        rows.append(row)
+    return Table(SELECTION, rows)
 
 
-def reaction_table(result: Analysis) -> Texts:
-    """Largest reaction of every joint."""
-    what = quantity("travel", result.definition)
-    rows = [
-        [name, f"{r.max:.1f}", f"{r.at * what.scale:.{what.digits}f}"]
-        for name, r in result.reactions.items()
+def reaction_table(result: Analysis) -> Table:
+    """Return the largest reaction of every joint."""
+    travel = quantity("travel", result.definition)
+    columns = [
+        Column("joint"),
+        Column("largest reaction", unit="N", format=".1f"),
+        Column("at", "at the driver", travel.unit, travel.format),
     ]
-    return ["joint", "largest reaction / N", f"at {what.shown}"], rows
+    rows = [[name, r.max, r.at] for name, r in result.reactions.items()]
+    return Table(columns, rows, "Reactions")
 
 
 def sentences(result: Analysis) -> list[str]:
@@ -150,7 +140,7 @@ def sentences(result: Analysis) -> list[str]:
     travel = quantity("travel", result.definition)
 
     def driver(value: float) -> str:
-        return f"{value * travel.scale:.4f} {travel.shown}"
+        return f"{value * travel.scale:.4f} {travel.unit}"
 
     found = []
     if "length" in result.output:
@@ -174,10 +164,10 @@ def sentences(result: Analysis) -> list[str]:
         found.append(
             f"{change.joint}: from arc {change.before} to {change.after} at "
             f"{driver(change.travel)}, gap {change.gap * 1e3:.4f} mm, jump of the rate "
-            f"{round(jump * 100.0, 3) + 0.0:.3f} %"
+            f"{jump * 100.0:z.3f} %"
         )
-    if (contact := result.contact) is not None:
-        found += _contact_sentences(contact)
+    if result.contact is not None:
+        found += _contact_sentences(result.contact)
     if (timed := result.timed) is not None:
         drives = driving(result.definition)
         unit = force_unit(drives, result.definition)
@@ -197,12 +187,12 @@ def sentences(result: Analysis) -> list[str]:
 def _force_sentence(result: Analysis, driver: Callable[[float], str]) -> str:
     """Least and largest unknown force, on the way back too where there is friction."""
     assert result.definition.solve is not None
-    unit = quantity("force", result.definition).shown
+    unit = quantity("force", result.definition).unit
     found = []
     for name, words in (("force", ""), ("force_back", "on the way back ")):
         if name in result.output:
             ends = result.extremes(name)
-            low, high = (f"{force + 0.0:.2f} {unit} at" for force in (ends.least, ends.most))
+            low, high = (f"{force:z.2f} {unit} at" for force in (ends.least, ends.most))
             found.append(f"{words}{low} {driver(ends.least_at)} to {high} {driver(ends.most_at)}")
     largest = f"largest amount {result.peak_force:.2f} {unit}"
     return f"force of '{result.definition.solve.unknown}' {'; '.join(found)}; {largest}"
@@ -228,30 +218,15 @@ def _contact_sentences(contact: Contact) -> list[str]:
     return found
 
 
-def comparison_table(comparison: Comparison) -> Texts:
-    """One row for each mechanism; the first is the reference of the error."""
-    scales = {
-        "stroke": ("stroke / mm", 1e3, 4),
-        "length_start": ("length closed / mm", 1e3, 3),
-        "peak_force": ("largest force / N", 1.0, 1),
-        "work_force": ("at work / N", 1.0, 1),
-        "zone_spread": ("spread in the zone / %", 100.0, 2),
-        "min_angle": ("least angle / deg", float(np.degrees(1.0)), 3),
-    }
-    rows = []
-    for row in comparison.rows:
-        cells = [row.name]
-        for name, (_, scale, digits) in scales.items():
-            value = row.values.get(name, np.nan) * scale
-            cells.append(f"{value:.{digits}f}" if np.isfinite(value) else "-")
-        rows.append([*cells, f"{row.error:.4g}" if np.isfinite(row.error) else "-"])
-    return ["mechanism", *(title for title, _, _ in scales.values()), "error of ratio"], rows
+def comparison_table(comparison: Comparison) -> Table:
+    """Return one row for each mechanism; the first is the reference of the error."""
+    return Table(COMPARISON, [dict.fromkeys((c.name for c in COMPARISON), np.nan) | row
+                              for row in comparison_data(comparison)])  # fmt: skip
 
 
 def optimum_sentences(optimum: "Optimum") -> list[str]:
     """How the search went."""
-    kept = sum(start.feasible for start in optimum.starts if np.isfinite(start.objective))
-    lost = sum(not np.isfinite(start.objective) for start in optimum.starts)
+    assembled = [start for start in optimum.starts if np.isfinite(start.objective)]
     before = (
         f"{optimum.objective_before:.6g}"
         if np.isfinite(optimum.objective_before)
@@ -259,8 +234,9 @@ def optimum_sentences(optimum: "Optimum") -> list[str]:
     )
     found = [
         f"objective {optimum.objective:.6g}, before {before}",
-        f"{len(optimum.starts)} starts with seed {optimum.seed}: {kept} keep all constraints, "
-        f"{lost} could not be assembled",
+        f"{len(optimum.starts)} starts with seed {optimum.seed}: "
+        f"{sum(start.feasible for start in assembled)} keep all constraints, "
+        f"{len(optimum.starts) - len(assembled)} could not be assembled",
     ]
     if not optimum.feasible:
         breaches = ", ".join(f"{name} by {value:.6g}" for name, value in optimum.breaches.items())
@@ -268,54 +244,51 @@ def optimum_sentences(optimum: "Optimum") -> list[str]:
     return found
 
 
-def optimum_table(optimum: "Optimum") -> Texts:
-    """Parameters before and after, with their bounds' names where they are active."""
-    definition = optimum.definition
+def optimum_tables(optimum: "Optimum") -> list[Table]:
+    """Return parameters before and after, limits that hold the optimum, and the starts."""
+    unit_of = optimum.definition.unit_of
     own = next((start for start in optimum.starts if start.number == 0), optimum.starts[0])
-    rows = [
-        [
-            name,
-            shown(own.begin[name], definition.unit_of(name), 8),
-            shown(value, definition.unit_of(name), 8),
-        ]
+    changed = [
+        [name, shown(own.begin[name], unit_of(name), 8), shown(value, unit_of(name), 8)]
         for name, value in optimum.parameters.items()
     ]
-    return ["parameter", "before", "after"], rows
-
-
-def active_table(optimum: "Optimum") -> Texts:
-    """Limits that hold the optimum."""
-    rows = [[a.name, a.side, f"{a.slack:.3g}", f"{a.multiplier:.4g}"] for a in optimum.active]
-    return ["active limit", "side", "slack / SI", "multiplier / SI"], rows
-
-
-def start_table(optimum: "Optimum") -> Texts:
-    """One row for each start."""
-    rows = [
+    number = Column("slack", "slack (SI)", format=".3g")
+    multiplier = Column("multiplier", "multiplier (SI)", format=".4g")
+    limits = [Column("active limit"), Column("side"), number, multiplier]
+    starts = [
         [
-            str(start.number),
-            f"{start.objective:.5g}" if np.isfinite(start.objective) else "not assembled",
+            start.number,
+            start.objective if np.isfinite(start.objective) else "not assembled",
             "yes" if start.feasible else "no",
-            str(start.evaluations),
+            start.evaluations,
         ]
         for start in optimum.starts
     ]
-    return ["start", "objective", "constraints kept", "evaluations"], rows
+    columns = [
+        Column("start", format="d"),
+        Column("objective", format=".5g"),
+        Column("constraints kept"),
+        Column("evaluations", format="d"),
+    ]
+    before_after = [Column("before", format=">"), Column("after", format=">")]
+    found = [
+        Table(["parameter", *before_after], changed),
+        Table(limits, [[a.name, a.side, a.slack, a.multiplier] for a in optimum.active]),
+        Table(columns, starts),
+    ]
+    return [table for table in found if len(table)]
 
 
-def scatter_table(found: Sequence[Scatter]) -> Texts:
-    """One row for each result: its scatter and the parameter that matters most."""
+def scatter_table(found: Sequence[Scatter]) -> Table:
+    """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
     for one in found:
-        unit, scale = SHOWN.get(one.unit, (one.unit, 1.0))
-        worst = max(one.single, key=lambda name: abs(one.single[name]))
-        rows.append(
-            [
-                one.name,
-                f"{one.value * scale:.4f} {unit}".rstrip(),
-                f"+- {one.random * scale:.4f}",
-                f"+- {one.worst * scale:.4f}",
-                f"{worst} ({one.single[worst] * scale:+.4f})",
-            ]
-        )
-    return ["result", "nominal", "random", "worst case", "most by"], rows
+        column = Column("", unit=SHOWN.get(one.unit, "" if one.unit == "1" else one.unit),
+                        format=".4f")  # fmt: skip
+        most = max(one.single, key=lambda name: abs(one.single[name]))
+        values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
+        change = one.single[most] * column.scale
+        name = f"{one.name} ({column.unit})" if column.unit else one.name
+        rows.append([name, *values, f"{most} ({change:+.4f})"])
+    numbers = [Column(name, format=">") for name in ("nominal", "RSS, ±", "worst case, ±")]
+    return Table(["result", *numbers, "most by"], rows)

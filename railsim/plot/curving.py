@@ -24,20 +24,20 @@ HALF, WHEEL = (
 WIDE = 4.0  # ratio of radii from which on their axis is logarithmic
 
 
-def curving_figure(found: Curving, title: str) -> Figure:
+def curving_figure(found: Curving, title: str = "") -> Figure:
     """Leading wheelset over radius, one line for each friction; wear of all over radius.
 
     Parameters
     ----------
     found : Curving
     title : str
-        What was analysed.
+        By default vehicle, cant and rails.
     """
     with styled():
         mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
         heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
         figure = Picture(figsize=(10.2, sum(heights)), layout="constrained")
-        figure.suptitle(title, x=0.01, ha="left")
+        figure.suptitle(title or found.title, x=0.01, ha="left")
         rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         _plan(figure.add_subfigure(rows[1]).subplots(), found)
         if mapped:

@@ -25,7 +25,7 @@ def line_style(i: int) -> dict[str, Any]:
 
 def label_of(name: str, result: Analysis, words: str = "") -> str:
     """Label of an axis for a named result."""
-    unit = quantity(name, result.definition).shown
+    unit = quantity(name, result.definition).unit
     text = words or name.replace("_", " ")
     return f"{text} / {unit.replace('deg', '°')}" if unit else text
 

@@ -75,7 +75,7 @@ def drawing_figure(result: Analysis) -> Figure:
         axes = [figure.subplots()]
     scale = quantity("travel", result.definition)
     for k in range(4):
-        label = f"{s[k] * scale.scale:.1f} {scale.shown.replace('deg', '°')}"
+        label = f"{s[k] * scale.scale:.1f} {scale.unit.replace('deg', '°')}"
         draw(axes[0], lines(motion), k, SHADES[k], label)
     named = axes[-1]
     if small:

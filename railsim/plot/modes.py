@@ -28,18 +28,18 @@ PHASES = {
 DAMPED = 0.6  # damping ratio beyond which a mode is drawn thin
 
 
-def locus_figure(locus: RootLocus, title: str) -> Figure:
+def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     """Damping ratio and frequency over the parameter, and the root locus.
 
     Parameters
     ----------
     locus : RootLocus
     title : str
-        What was analysed.
+        By default vehicle, track and contact.
     """
     with styled():
         figure = Picture(figsize=(10.2, 7.4), layout="constrained")
-        figure.suptitle(title, x=0.01, ha="left")
+        figure.suptitle(title or locus.title, x=0.01, ha="left")
         grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
         damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
         plane = figure.add_subplot(grid[1, 1])
@@ -120,14 +120,14 @@ def _colours(names: Sequence[str], chosen: Sequence[int]) -> dict[int, tuple[str
     return found
 
 
-def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
+def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
     """Shapes of the least damped oscillations as bars with their phase.
 
     Parameters
     ----------
     modes : Modes
     title : str
-        What was analysed.
+        By default vehicle, track and contact.
     most : int
         How many modes are drawn.
     """
@@ -135,7 +135,7 @@ def modes_figure(modes: Modes, title: str, most: int = 8) -> Figure:
     with styled():
         rows = max(1, (len(drawn) + 1) // 2)
         figure = Picture(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
-        figure.suptitle(title, x=0.01, ha="left")
+        figure.suptitle(title or modes.title, x=0.01, ha="left")
         grid = figure.add_gridspec(rows, 2)
         if not drawn:
             say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")

@@ -1,6 +1,6 @@
 """Pictures of stability: amplitude over speed with its branches, maps of critical speeds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,139 +8,141 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from railsim.plot.style import DISTINCT, LIMIT, Picture, say, styled
-from railsim.stability.critical_speed import CriticalSpeed
-from railsim.stability.ramp import THRESHOLD, Diagram
+from railsim.stability.branches import THRESHOLD, Branch
+from railsim.stability.result import Conicity, CriticalSpeed
 
-COLOURS = {
-    "up": DISTINCT[0],
-    "down": DISTINCT[1],
-    "further": DISTINCT[3],
-    "threshold": "0.3",
-    "ramp": "0.6",
-    "continuation": DISTINCT[2],
+DASHED = (0, (4, 2))
+# colour, marker and words of the branches by how they were found
+BRANCHES: dict[str, tuple[str, str, str]] = {
+    "up": (DISTINCT[0], "^", "steps upwards"),
+    "down": (DISTINCT[1], "v", "steps downwards"),
+    "further": (DISTINCT[3], "d", "from other disturbances"),
+    "threshold": ("0.3", "x", "disturbance that decides (unstable)"),
+    "ramp": ("0.6", "", "falling ramp"),
+    "continuation": (DISTINCT[2], "", "continuation, dashed: unstable"),
 }
-MARKERS = {"up": "^", "down": "v", "further": "d", "threshold": "x"}
 SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
-WORDS = {
-    "up": "steps upwards",
-    "down": "steps downwards",
-    "further": "from other disturbances",
-    "threshold": "disturbance that decides",
-    "ramp": "falling ramp",
-    "continuation": "continuation, dashed where unstable",
-}
 
 
-def bifurcation_figure(found: CriticalSpeed, title: str) -> Figure:
-    """Amplitude and frequency of the hunting motion over speed.
+def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
+    """Amplitude, frequency and track shifting force of the hunting motion over speed.
 
     Parameters
     ----------
     found : CriticalSpeed
     title : str
-        What was analysed.
+        By default vehicle, rails, friction and creep law.
     """
     if not found.branches:
-        return _linear_figure(found, title)
+        return _linear_figure(found, title or _title(found))
     with styled():
-        figure = Picture(figsize=(10.2, 6.0), layout="constrained")
-        figure.suptitle(title, x=0.01, ha="left")
-        grid = figure.add_gridspec(2, 2, height_ratios=[2.2, 1.0], width_ratios=[3.0, 1.0])
+        figure = Picture(figsize=(10.2, 7.2), layout="constrained")
+        figure.suptitle(title or _title(found), x=0.01, ha="left")
+        grid = figure.add_gridspec(3, 2, height_ratios=[2.4, 1.0, 1.0], width_ratios=[3.0, 1.0])
         upper = figure.add_subplot(grid[0, 0])
-        lower = figure.add_subplot(grid[1, 0], sharex=upper)
+        lower = [figure.add_subplot(grid[row, 0], sharex=upper) for row in (1, 2)]
         for branch in found.branches:
-            _draw(upper, branch, 1e3 * np.array(branch.amplitude), label=True)
-            shown = np.where(np.array(branch.amplitude) > THRESHOLD, branch.frequency, np.nan)
-            _draw(lower, branch, shown, label=False)
-        _critical(upper, found)
-        _over_amplitude(upper, found)
-        upper.set(
-            ylabel="amplitude of the wheelsets (mm)",
-            title=f"Hunting{f', {found.type}' if found.type else ''}",
-        )
+            hunts = branch.column("amplitude") > THRESHOLD
+            _draw(upper, branch, 1e3 * branch.column("amplitude"))
+            _draw(lower[0], branch, np.where(hunts, branch.column("frequency"), np.nan))
+            _draw(lower[1], branch, 1e-3 * branch.column("sum_Y_rms"))
+        _mark(upper, found)
+        for axes, limit, scale in (
+            (upper, found.amplitude_limit, 1e3),
+            (lower[1], found.instability_limit, 1e-3),
+        ):
+            if limit is not None:
+                words = "limits: 3 mm, half the limit of ΣY"
+                axes.axhline(scale * limit.limit, color=LIMIT, lw=0.8, ls=(0, (1, 2)), label=words)
+        words = f"Hunting, {found.type}" if found.type else "Hunting"
+        upper.set(ylabel="amplitude of the wheelsets (mm)", title=words, xlim=_shown(found))
         upper.set_ylim(0.0, None)
-        upper.set_xlim(*_shown(found))
-        lower.set(xlabel="speed (m/s)", ylabel="frequency (Hz)")
+        lower[0].set(ylabel="frequency (Hz)")
+        lower[1].set(xlabel="speed (m/s)", ylabel="ΣY, rms (kN)", ylim=(0.0, None))
         if found.conicity_over_amplitude is not None:
             _conicity(figure.add_subplot(grid[0, 1], sharey=upper), found.conicity_over_amplitude)
         handles, labels = upper.get_legend_handles_labels()
         named = dict(zip(labels, handles, strict=True))  # of several branches of a kind once
-        if named:
-            figure.add_subplot(grid[1, 1], frame_on=False, xticks=[], yticks=[]).legend(
-                named.values(), named.keys(), loc="upper left", fontsize=7.5, borderpad=0.0
-            )
+        figure.add_subplot(grid[1:, 1], frame_on=False, xticks=[], yticks=[]).legend(
+            named.values(), named.keys(), loc="upper left", fontsize=7.5, borderpad=0.0
+        )
     return figure
+
+
+def _title(found: CriticalSpeed) -> str:
+    where = found.conditions
+    return (
+        f"{found.vehicle}: straight track, rails {where['rails']}, friction {where['friction']}, "
+        f"{where['law']}"
+    )
 
 
 def _shown(found: CriticalSpeed) -> tuple[float | None, float | None]:
     """Range of speeds: from somewhat below the slowest hunting to somewhat above the last jump."""
-    alive = [branch.speed[k] for branch in found.branches for k in branch.alive]
+    alive = [point.speed for branch in found.branches for point in branch.alive]
     if not alive:
         return None, None
-    marks = [jump["speed"] for jump in found.jumps] + [min(alive)]
+    marks = [min(alive), *(jump.speed for jump in found.jumps)]
     if found.linear is not None:
-        marks.append(found.linear["speed"])
+        marks.append(found.linear.speed)
     return 0.9 * min(marks), min(found.high, 1.25 * max(marks))
 
 
 def _linear_figure(found: CriticalSpeed, title: str) -> Figure:
-    """What there is without a branch: the linear critical speed in words, the conicity."""
+    """What there is without a branch: linear critical speeds over amplitude, the conicity."""
     words = "no linear critical speed in the range"
     if found.linear is not None:
-        words = (
-            f"linear critical speed {found.linear['speed']:.2f} m/s, {found.linear['mode']}, "
-            f"{found.linear['frequency']:.2f} Hz"
-        )
+        words = f"linear critical speed {found.linear.speed:.2f} m/s ({found.linear.mode})"
     with styled():
-        figure = Picture(figsize=(7.2, 4.4), layout="constrained")
+        figure = Picture(figsize=(8.4, 4.4), layout="constrained")
         figure.suptitle(f"{title}\n{words}", x=0.01, ha="left")
-        axes = figure.subplots()
+        left, right = figure.subplots(1, 2, sharey=True)
+        left.set(xlabel="speed (m/s)", ylabel="amplitude of the wheelsets (mm)")
+        left.set(title="Linear critical speed", ylim=(0.0, SMALL_AMPLITUDES))
+        _mark(left, found)
+        if left.has_data():
+            left.legend(fontsize=7.5)
         if found.conicity_over_amplitude is None:
-            say(axes, "the wheelset does not fit between the rails")
+            say(right, "the wheelset does not fit between the rails")
         else:
-            _conicity(axes, found.conicity_over_amplitude)
-            axes.set(ylabel="amplitude of the wheelset (mm)", ylim=(0.0, SMALL_AMPLITUDES))
-            axes.tick_params(labelleft=True)
+            _conicity(right, found.conicity_over_amplitude)
     return figure
 
 
-def _critical(axes: Axes, found: CriticalSpeed) -> None:
-    """The linear critical speed as a line, the lowest speeds of sustained hunting as circles."""
-    if found.linear is not None:
-        axes.axvline(
-            found.linear["speed"],
-            color=LIMIT,
-            lw=0.9,
-            label=f"linear: {found.linear['speed']:.2f} m/s",
-        )
+def _mark(axes: Axes, found: CriticalSpeed) -> None:
+    """Linear critical speeds as lines, the lowest speeds of sustained hunting as circles."""
+    for words, speed, line in _linear_speeds(found):
+        axes.axvline(speed, color="0.1", lw=0.9, ls=line, label=f"{words}: {speed:.2f} m/s")
+    line = found.linear_over_amplitude
+    if line is not None and line.smallest is not None:
+        speeds = np.array(line.speed, dtype=float)
+        sizes = 1e3 * np.array(line.amplitude)
+        words = "linear, harmonic, over amplitude"
+        axes.plot(speeds, sizes, color="0.1", lw=0.9, ls=":", label=words)
     for method, lowest in found.nonlinear.items():
-        if lowest.speed is not None:
+        if lowest is not None:
             axes.plot(
                 [lowest.speed],
                 [1e3 * lowest.amplitude],
                 "o",
                 ms=6,
                 mfc="none",
-                ls="none",
-                color=COLOURS["down" if method == "bifurcation" else method],
+                color=BRANCHES["down" if method == "bifurcation" else method][0],
                 label=f"lowest by {method}: {lowest.speed:.2f} m/s",
             )
 
 
-def _over_amplitude(axes: Axes, found: CriticalSpeed) -> None:
-    """Linear critical speed over the amplitude for which the contact is linearised."""
-    line = found.linear_over_amplitude
-    if line is not None and any(speed is not None for speed in line["speed"]):
-        speeds = [np.nan if speed is None else speed for speed in line["speed"]]
-        sizes = 1e3 * np.array(line["amplitude"])
-        axes.plot(
-            speeds, sizes, color=LIMIT, lw=0.9, ls=":", label="linear, harmonic, over amplitude"
-        )
+def _linear_speeds(found: CriticalSpeed) -> Iterator[tuple[str, float, Any]]:
+    lost = found.linear
+    if lost is not None:
+        yield f"linear, {found.contact.words()}", lost.speed, "-"
+        if lost.speed_on_rigid_rails is not None:
+            yield "the same on rigid rails", lost.speed_on_rigid_rails, (0, (6, 2, 1, 2))
 
 
-def _conicity(axes: Axes, conicity: Mapping[str, Any]) -> None:
+def _conicity(axes: Axes, conicity: Conicity) -> None:
     """Equivalent conicity, on the amplitudes of the diagram beside it."""
-    values, amplitudes = np.array(conicity["conicity"]), 1e3 * np.array(conicity["amplitude"])
+    values, amplitudes = np.array(conicity.conicity), 1e3 * np.array(conicity.amplitude)
     axes.plot(values, amplitudes, color="0.25")
     axes.set(xlabel="equivalent conicity (1)", title="Conicity (EN 15302)")
     shown = values[amplitudes <= max(axes.get_ylim()[1], SMALL_AMPLITUDES)]
@@ -148,22 +150,20 @@ def _conicity(axes: Axes, conicity: Mapping[str, Any]) -> None:
     axes.tick_params(labelleft=False)
 
 
-def _draw(axes: Axes, branch: Diagram, values: np.ndarray, *, label: bool) -> None:
+def _draw(axes: Axes, branch: Branch, values: np.ndarray) -> None:
     """A branch, dashed where its motions are unstable."""
-    speed, stable = np.array(branch.speed), np.array(branch.stable, dtype=bool)
-    words = WORDS[branch.direction] if label else None
-    colour = COLOURS[branch.direction]
-    marker = MARKERS.get(branch.direction)
-    if marker is not None:
-        line = "-" if all(branch.stable) else (0, (4, 2))
-        axes.plot(speed, values, marker=marker, ms=3.5, ls=line, color=colour, label=words)
+    speed, stable = branch.column("speed"), branch.column("stable") > 0.0
+    colour, marker, words = BRANCHES[branch.direction]
+    style: dict[str, Any] = {"color": colour, "marker": marker, "ms": 3.5, "label": words}
+    if marker:
+        axes.plot(speed, values, ls="-" if stable.all() else DASHED, **style)
         return
-    for is_stable, line in ((True, "-"), (False, (0, (4, 2)))):
+    for is_stable, line in ((True, "-"), (False, DASHED)):
         # a piece reaches to its neighbour of the other kind
         inside = stable == is_stable
         reach = inside | np.roll(inside, 1) & (np.arange(len(inside)) > 0)
-        axes.plot(speed, np.where(reach, values, np.nan), ls=line, color=colour, label=words)
-        words = None
+        axes.plot(speed, np.where(reach, values, np.nan), ls=line, **style)
+        style["label"] = None  # once
 
 
 def map_figure(
@@ -179,26 +179,24 @@ def map_figure(
         Critical speeds by method over the parameters, NaN where there is none [m/s].
     title : str
     """
-    names = list(axes_values)
+    first, *others = axes_values
     with styled():
         figure = Picture(figsize=(8.4, 4.6), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left")
         axes = figure.subplots()
-        lines = axes_values[names[1]] if len(names) > 1 else [None]
-        for number, second in enumerate(lines):
-            for method, values in speeds.items():
-                column = values[:, number] if len(names) > 1 else values
-                words = method if second is None else f"{method}, {names[1]} {second:g}"
+        for method, values in speeds.items():
+            for number, column in enumerate(values.reshape(len(axes_values[first]), -1).T):
+                more = f", {others[0]} {axes_values[others[0]][number]:g}" if others else ""
                 axes.plot(
-                    axes_values[names[0]],
+                    axes_values[first],
                     column,
                     marker="o",
                     ms=3.5,
                     color=DISTINCT[number % len(DISTINCT)],
-                    ls="-" if method == "linear" else (0, (4, 2)),
-                    label=words,
+                    ls="-" if method.startswith("linear") else DASHED,
+                    label=f"{method}{more}",
                 )
-        axes.set(xlabel=names[0], ylabel="critical speed (m/s)")
+        axes.set(xlabel=first, ylabel="critical speed (m/s)")
         if not any(np.isfinite(values).any() for values in speeds.values()):
             say(axes, "no critical speed in the range at any point")
             return figure

@@ -1,180 +1,190 @@
-"""Results as tables of texts in the field's units, for the terminal and for the page.
+"""Results as tables in the field's units, for the terminal, for notebooks and for the page."""
 
-Every function returns the header and the rows, in ASCII; the page sets signs in true typography.
-"""
-
-import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from railsim.definitions.spring import TrailingArmSuspension
 from railsim.springs.datasheet import LATERAL, Sheet
+from railsim.springs.design import Design
+from railsim.springs.summary import case_data
 from railsim.springs.tolerance import RideHeight
-from railsim.springs.verification import Check, Fatigue, Verification
+from railsim.springs.verification import Fatigue, Verification
+from railsim.table import Column, Table
 
 if TYPE_CHECKING:
     from railsim.springs.search import SearchResult
 
-Texts = tuple[list[str], list[list[str]]]
+SHEET = [
+    Column("spring"),
+    Column("d", "wire diameter d", "mm", ".2f"),
+    Column("D", "mean coil diameter D", "mm", ".2f"),
+    Column("D_outer", "outside diameter", "mm", ".2f"),
+    Column("D_inner", "inside diameter", "mm", ".2f"),
+    Column("index", "spring index D/d", "", ".3f"),
+    Column("n", "active coils n", "", ".3f"),
+    Column("n_total", "total coils", "", ".3f"),
+    Column("H0", "free height H0", "mm", ".2f"),
+    Column("L_solid", "solid height", "mm", ".2f"),
+    Column("K_V", "vertical stiffness K_V", "N/mm", ".3f"),
+    Column("mass", "mass", "kg", ".2f"),
+    Column("surge_frequency", "surge frequency", "Hz", ".1f"),
+    Column("tau_solid", "stress at solid height", "MPa", ".1f"),
+]
+FATIGUE = [
+    Column("spring"),
+    Column("tau_min", "lower stress", "MPa", ".1f"),
+    Column("tau_max", "upper stress", "MPa", ".1f"),
+    Column("limit", "allowable upper stress", "MPa", ".1f"),
+    Column("margin", "", "", ".3f"),
+]
+RIDE_HEIGHT = [
+    Column("name", "ride height at"),
+    Column("load", "P", "kN", ".3f"),
+    Column("random", "statistical (RSS), ±", "mm", ".2f"),
+    Column("lowest", "worst case, low", "mm", "+.2f"),
+    Column("highest", "worst case, high", "mm", "+.2f"),
+]
+SEARCH = [
+    Column("rank", format="d"),
+    Column("outer", "outer d x D (mm), n", format=">"),
+    Column("inner", "inner d x D (mm), n", format=">"),
+    Column("heights", "H0 outer/inner (mm)", format=">"),
+    Column("mass", "mass", "kg", ".2f"),
+    Column("fatigue_margin", "fatigue margin", "", ".3f"),
+    Column("mounting_error", "error at mounting", "mm", "+.2f"),
+    Column("target_error", "error at target", "mm", "+.2f"),
+    Column("active", "active limits"),
+]
 
-UNITS = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}
+
+def input_tables(suspension: TrailingArmSuspension) -> list[Table]:
+    """Return the springs, and the arm with its loads, as the file gives them."""
+    arm, material, seats = suspension.arm, suspension.material, suspension.seat_heights
+    columns = [
+        Column("spring"),
+        Column("D", "mean coil diameter D", "mm", ".6g"),
+        Column("d", "wire diameter d", "mm", ".6g"),
+        Column("n", "active coils n", "", ".6g"),
+        Column("H0", "free height H0", "mm", ".6g"),
+        Column("seat", "seat above the axle", "mm", ".6g"),
+        Column("start", "works from a deflection of", "mm", ".6g"),
+    ]
+    starts = (0.0, suspension.engagement)[: len(seats)]
+    rows = [
+        [name, s.mean_diameter, s.wire_diameter, s.active_coils, s.free_height, seat, start]
+        for (name, s), seat, start in zip(suspension.springs.items(), seats, starts, strict=True)
+    ]
+    general = [
+        (Column("arm length", unit="mm", format=".6g"), arm.length),
+        (Column("bush", unit="N m/rad", format=".6g"), arm.bush_torsional_stiffness),
+        (Column("shear modulus", unit="MPa", format=".6g"), material.G),
+        (Column("Young's modulus", unit="MPa", format=".6g"), material.E),
+    ]
+    for name, point in (("mounting", suspension.mounting), ("target", suspension.target)):
+        if point is not None:
+            general.append((Column(f"{name} load", unit="kN", format=".6g"), point.load))
+            deflection = Column(f"deflection under {name} load", unit="mm", format=".6g")
+            general.append((deflection, point.deflection))
+    arm_table = Table(
+        [Column("arm"), *(column for column, _ in general)], [["", *(v for _, v in general)]]
+    )
+    return [Table(columns, rows).transposed("spring"), arm_table.transposed("arm and loads")]
 
 
-def signed(value: float, digits: int) -> str:
-    """Return a number with its sign, and without one where it rounds to zero."""
-    if abs(value) < 0.5 * 10.0**-digits:
-        return f"{0.0:.{digits}f}"
-    return f"{value:+.{digits}f}"
+def design_table(suspension: TrailingArmSuspension, result: Design) -> Table:
+    """Return one row for each spring: designed stiffness, and coils for the file's wire."""
+    columns = [
+        Column("spring"),
+        Column("D", "", "mm", ".6g"),
+        Column("K_V", "", "N/mm", ".3f"),
+        Column("d", "", "mm", ".6g"),
+        Column("n", "", "", ".4f"),
+    ]
+    rows = [
+        [name, spring.mean_diameter, K_V, spring.wire_diameter, n]
+        for (name, spring), K_V, n in zip(
+            suspension.springs.items(), result.K_V, result.n, strict=True
+        )
+    ]
+    return Table(columns, rows)
 
 
-def case_table(result: Verification) -> Texts:
+def load_table(suspension: TrailingArmSuspension) -> Table:
+    """Return the loads with what they are."""
+    columns = [Column("name", "load case"), Column("load", "P", "kN", ".3f"), Column("meaning")]
+    notes = suspension.load_notes
+    return Table(columns, [[name, P, notes.get(name)] for name, P in suspension.loads.items()])
+
+
+def case_table(result: Verification) -> Table:
     """Return one row for each load: position, stiffnesses, heights."""
-    header = [
-        "load case",
-        "P / kN",
-        "rotation / deg",
-        "dz / mm",
-        "K_sys / (N/mm)",
-        "rate / (N/mm)",
-        *(f"H {name} / mm" for name in result.cases[0].springs),
-        "dx / mm",
-        "K_L / (N/mm)",
-        "K_C / (kNm/rad)",
+    columns = [
+        Column("name", "load case"),
+        Column("load", "P", "kN", ".3f"),
+        Column("rotation", "", "deg", "+.4f"),
+        Column("deflection", "dz", "mm", ".3f"),
+        Column("K_sys", "", "N/mm", ".3f"),
+        Column("rate", "tangent", "N/mm", ".1f"),
+        *(Column(f"height_{name}", f"H {name}", "mm", ".2f") for name in result.cases[0].springs),
+        Column("dx", "", "mm", "+.3f"),
+        Column("K_L", "", "N/mm", ".2f"),
+        Column("K_C", "", "kN m/rad", ".3f"),
     ]
-    rows = [
-        [
-            case.name,
-            f"{case.load * 1e-3:.3f}",
-            signed(math.degrees(case.rotation), 4),
-            f"{case.deflection * 1e3:.3f}",
-            f"{case.K_sys * 1e-3:.3f}",
-            f"{case.rate * 1e-3:.1f}",
-            *(f"{float(state.height) * 1e3:.2f}" for state in case.springs.values()),
-            signed(float(case.springs["outer"].lateral) * 1e3, 3),
-            f"{case.K_L * 1e-3:.2f}",
-            f"{case.K_C * 1e-3:.3f}",
-        ]
-        for case in result.cases
-    ]
-    return header, rows
+    rows = [{**case_data(c), "dx": float(c.springs["outer"].lateral)} for c in result.cases]
+    return Table(columns, rows)
 
 
-def sheet_table(sheets: Mapping[str, Sheet]) -> Texts:
+def sheet_table(sheets: Mapping[str, Sheet]) -> Table:
     """Return one row for each quantity of the springs' data sheets, a column a spring."""
-    shown = {
-        "d": ("wire diameter d / mm", 1e3, 2),
-        "D": ("mean coil diameter D / mm", 1e3, 2),
-        "D_outer": ("outside diameter / mm", 1e3, 2),
-        "D_inner": ("inside diameter / mm", 1e3, 2),
-        "index": ("spring index D/d", 1.0, 3),
-        "n": ("active coils n", 1.0, 3),
-        "n_total": ("total coils", 1.0, 3),
-        "H0": ("free height / mm", 1e3, 2),
-        "L_solid": ("solid height / mm", 1e3, 2),
-        "K_V": ("vertical stiffness / (N/mm)", 1e-3, 3),
-        "mass": ("mass / kg", 1.0, 2),
-        "surge_frequency": ("surge frequency / Hz", 1.0, 1),
-        "tau_solid": ("stress at solid height / MPa", 1e-6, 1),
-    }
-    rows = [
-        [label, *(f"{sheet.values[name] * scale:.{digits}f}" for sheet in sheets.values())]
-        for name, (label, scale, digits) in shown.items()
-    ]
-    return ["spring", *sheets], rows
+    rows = [{"spring": name, **sheet.values} for name, sheet in sheets.items()]
+    return Table(SHEET, rows).transposed("spring")
 
 
-def loaded_table(sheets: Mapping[str, Sheet]) -> Texts:
+def loaded_table(sheets: Mapping[str, Sheet]) -> Table:
     """Return one row for each spring and load: force, height, stresses, lateral stiffnesses."""
+    columns = [
+        Column("load case"),
+        Column("spring"),
+        Column("force", "F", "kN", ".3f"),
+        Column("height", "H", "mm", ".2f"),
+        Column("tau", "", "MPa", ".1f"),
+        Column("tau_k", "", "MPa", ".1f"),
+        *(Column(method, f"K_L {method}", "N/mm", ".2f") for method in LATERAL),
+    ]
     rows = [
-        [
-            f"{load}, {name}",
-            f"{state.force * 1e-3:.3f}",
-            f"{state.height * 1e3:.2f}",
-            f"{state.tau * 1e-6:.1f}",
-            f"{state.tau_k * 1e-6:.1f}",
-            *(f"{state.lateral[m] * 1e-3:.2f}" if m in state.lateral else "-" for m in LATERAL),
-        ]
+        {
+            "load case": load,
+            "spring": name,
+            **asdict(sheet.loads[load]),
+            **sheet.loads[load].lateral,
+        }
         for load in next(iter(sheets.values())).loads
         for name, sheet in sheets.items()
-        for state in (sheet.loads[load],)
     ]
-    lateral = [f"K_L {method} / (N/mm)" for method in LATERAL]
-    return ["load, spring", "F / kN", "H / mm", "tau / MPa", "tau_k / MPa", *lateral], rows
+    return Table(columns, rows)
 
 
-def check_table(checks: Sequence[Check]) -> Texts:
-    """Return one row for each check."""
-    rows = []
-    for check in checks:
-        unit, scale = UNITS[check.unit]
-        digits = 3 if check.unit == "1" else 1
-        sign = ">" if check.sense == "above" else "<"
-        rows.append(
-            [
-                check.name,
-                f"{check.value * scale:.{digits}f}",
-                f"{sign} {check.limit * scale:.{digits}f}",
-                unit,
-                "yes" if check.ok else "NO",
-            ]
-        )
-    return ["check", "value", "must be", "unit", "met"], rows
-
-
-def fatigue_table(result: Mapping[str, Fatigue]) -> Texts:
+def fatigue_table(result: Mapping[str, Fatigue]) -> Table:
     """Return one row for each spring: its stress range against the Goodman-Smith line."""
-    rows = [
-        [
-            name,
-            f"{spring.tau_min * 1e-6:.1f}",
-            f"{spring.tau_max * 1e-6:.1f}",
-            f"{spring.limit * 1e-6:.1f}",
-            f"{spring.margin:.3f}",
-        ]
-        for name, spring in result.items()
-    ]
-    return ["spring", "tau_min / MPa", "tau_max / MPa", "allowable / MPa", "margin"], rows
+    return Table(FATIGUE, [{"spring": name, **asdict(one)} for name, one in result.items()])
 
 
-def ride_height_table(results: Sequence[RideHeight]) -> Texts:
+def ride_height_table(results: Sequence[RideHeight]) -> Table:
     """Return one row for each load: scatter of the ride height."""
-    rows = [
-        [
-            result.name,
-            f"{result.load * 1e-3:.3f}",
-            f"+-{result.random * 1e3:.2f}",
-            f"{signed(result.lowest * 1e3, 2)} to {signed(result.highest * 1e3, 2)}",
-        ]
-        for result in results
-    ]
-    return ["ride height", "P (kN)", "statistical, RSS (mm)", "worst case (mm)"], rows
+    return Table(RIDE_HEIGHT, [vars(result) for result in results])
 
 
-def search_table(result: "SearchResult") -> Texts:
+def search_table(result: "SearchResult") -> Table:
     """Return one row for each nest, the best first; the last column are the active limits."""
-    header = [
-        "rank",
-        "outer d x D, n",
-        "inner d x D, n",
-        "H0 / mm",
-        "kg",
-        "fatigue",
-        "error / mm",
-        "active limits",
-    ]
-    rows = [
-        [
-            str(rank),
-            *(
-                f"{spring.wire_diameter * 1e3:.6g} x {spring.mean_diameter * 1e3:.6g}, "
-                f"{spring.active_coils:.6g}"
-                for spring in (nest.outer, nest.inner)
-            ),
-            f"{nest.outer.free_height * 1e3:.6g}/{nest.inner.free_height * 1e3:.6g}",
-            f"{nest.mass:.2f}",
-            f"{nest.fatigue_margin:.3f}",
-            f"{signed(nest.mounting_error * 1e3, 2)}/{signed(nest.target_error * 1e3, 2)}",
-            ", ".join(nest.active) or "none",
-        ]
-        for rank, nest in enumerate(result.nests, start=1)
-    ]
-    return header, rows
+    rows = []
+    for rank, nest in enumerate(result.nests, start=1):
+        springs = {
+            name: f"{spring.wire_diameter * 1e3:.6g} x {spring.mean_diameter * 1e3:.6g}, "
+            f"{spring.active_coils:.6g}"
+            for name, spring in (("outer", nest.outer), ("inner", nest.inner))
+        }
+        heights = "/".join(f"{s.free_height * 1e3:.6g}" for s in (nest.outer, nest.inner))
+        active = ", ".join(nest.active) or "none"
+        rows.append({**vars(nest), **springs, "rank": rank, "heights": heights, "active": active})
+    return Table(SEARCH, rows)

@@ -8,11 +8,11 @@ what to change; a check that is not met is a result.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from railsim.definitions.spring import HelicalSpring, TrailingArmSuspension, radial_clearance
+from railsim.design_checks import Check
 from railsim.errors import Fault, InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import checks, helical
@@ -52,23 +52,6 @@ class Case:
         """Sideways displacement of a spring's seat, counted as theta: positive both ways [m]."""
         displacement = float(self.springs[spring].lateral)
         return displacement if self.rotation >= 0.0 else -displacement
-
-
-@dataclass(frozen=True)
-class Check:
-    """A value against its limit, in SI units."""
-
-    name: str  # what is checked, with the spring's name
-    value: float
-    limit: float
-    unit: str
-    sense: Literal["above", "below"]  # side of the limit on which the value must lie
-    note: str  # what the limit comes from
-
-    @property
-    def ok(self) -> bool:
-        """Whether the check is met."""
-        return self.value > self.limit if self.sense == "above" else self.value < self.limit
 
 
 @dataclass(frozen=True)
@@ -338,13 +321,13 @@ def _checks(
         for name, (d, n, coil) in springs.items():
             least = solid[name] + checks.coil_clearance(n, coil.D, d, factor)
             height = float(case.springs[name].height)
-            yield Check(f"{kind}_{name}", height, least, "m", "above", note)
+            yield Check(f"{kind}_{name}", height, least, "above", "m", note)
     if (table := suspension.material.tau_allowable) is not None:
         note = "stress of the solid spring against material.tau_allowable"
         for name, (d, _, coil) in springs.items():
             tau = checks.solid_stress(coil.K_V, d, coil.D, coil.H0 - solid[name])
             allowable = float(checks.allowable_stress(table, d))
-            yield Check(f"yield_{name}", tau, allowable, "Pa", "below", note)
+            yield Check(f"yield_{name}", tau, allowable, "below", "Pa", note)
     for name, (_, _, coil) in springs.items():
         note = f"largest deflection against buckling, EN 13906-1, seating {limits.seating:g}"
         limit = float(helical.buckling_deflection(coil.H0, coil.D, frame.nu, limits.seating))
@@ -352,13 +335,13 @@ def _checks(
             limit = coil.H0
             note += ": does not buckle, limit is the free height"
         deflection = max(float(case.springs[name].deflection) for case in cases)
-        yield Check(f"buckling_{name}", deflection, limit, "m", "below", note)
+        yield Check(f"buckling_{name}", deflection, limit, "below", "m", note)
     if suspension.inner is not None:
         gap = radial_clearance(suspension.outer, suspension.inner)
         note = "gap between inner and outer spring"
-        yield Check("radial_clearance", gap, limits.radial_clearance, "m", "above", note)
+        yield Check("radial_clearance", gap, limits.radial_clearance, "above", "m", note)
     if suspension.fatigue is not None:
         note = "allowable over actual upper stress on the Goodman-Smith line"
         for name, found in fatigue(suspension).items():
             limit = limits.fatigue_margin
-            yield Check(f"fatigue_{name}", found.margin, limit, "1", "above", note)
+            yield Check(f"fatigue_{name}", found.margin, limit, "above", "1", note)

@@ -1,74 +1,61 @@
 """Branches of periodic motions of a vehicle, followed by shooting from every motion that is known.
 
-One begins where rest loses its stability, others at the ends of the branches that runs have found:
-there the stable motion meets an unstable one and turns back.
+One begins where rest loses its stability, others on the branches that runs have found, near their
+slow ends: there the stable motion meets an unstable one and turns back.
 """
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from railsim.errors import ModelError
 from railsim.linear.eigenmodes import LossOfStability
-from railsim.stability.motion import VehicleMotion
-from railsim.stability.periodic import Branch, PeriodicMotion
-from railsim.stability.ramp import Diagram, Sustained
+from railsim.stability.branches import Branch, Point
+from railsim.stability.motion import LeftRange, VehicleMotion
+from railsim.stability.periodic import PeriodicMotion, Shooting
 from railsim.stability.vehicle_flow import VehicleFlow
 
 Progress = Callable[[float], None]
-Start = Callable[[], tuple[Branch, PeriodicMotion] | None]
 
 LARGEST_AMPLITUDE = 12e-3  # m, at which a branch is followed no further
 ARC_STEP = 1.0  # units of the arc length, about 1 mm or 1 m/s
 MOST_MOTIONS = 30  # of one branch
 FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken
-RUNS = ("down", "further")  # branches of which the slowest motion begins another line
+FROM_END = 1.0  # m/s above the slow end of a branch of runs, where its motion is taken
+RUNS = ("up", "down", "further")  # branches of runs
 COVERED = 0.05  # relative difference of amplitudes within which a motion is on a known line
 
 
-class _Line:
-    """One branch as it is followed: its motions, and those where it turns back in speed."""
+@dataclass
+class Continued:
+    """What continuation found.
 
-    def __init__(self) -> None:
-        self.points = Diagram("continuation")
-        self.folds: list[Sustained] = []
-        self.remark = ""
+    Attributes
+    ----------
+    branches : list of Branch
+    begins : Point or None
+        First motion of the branch that begins where rest loses its stability.
+    folds : list of Point
+        Where the branches turn back in speed.
+    remarks : list of str
+        Which branches were not followed, or not to their end, and why.
+    """
 
-    def follow(
-        self, branch: Branch, start: PeriodicMotion, within: Callable[[PeriodicMotion], bool]
-    ) -> None:
-        """Append the motions from `start` on while they are `within`."""
-        before = start
-        try:
-            for now in branch.followed(start, ARC_STEP, within):
-                if before.tangent[-1] * now.tangent[-1] < 0.0 and before.amplitude > 0.0:
-                    length = float(np.linalg.norm(now.tangent)) * ARC_STEP
-                    fold = branch.fold(before, now, length)
-                    self.folds.append(Sustained(fold.speed, fold.amplitude, fold.frequency))
-                self.append(now)
-                before = now
-        except ModelError as error:
-            self.remark = f"continuation: ended at {before.speed:.4g} m/s: {error}"
-
-    def append(self, now: PeriodicMotion) -> None:
-        """Add one motion."""
-        line = self.points
-        line.speed.append(now.speed)
-        line.amplitude.append(now.amplitude)
-        line.frequency.append(now.frequency)
-        line.sum_Y_rms.append(float("nan"))
-        line.stable.append(now.is_stable)
+    branches: list[Branch] = field(default_factory=list)
+    begins: Point | None = None
+    folds: list[Point] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
 
 def followed_branches(
     motion: VehicleMotion,
     lost: LossOfStability,
-    known: Sequence[Diagram],
+    known: Sequence[Branch],
     speeds: tuple[float, float],
     progress: Progress,
-) -> tuple[list[Diagram], list[Sustained], list[str]]:
+) -> Continued:
     """Follow the branch that begins at the loss of stability, and those that runs have found.
 
     Parameters
@@ -76,81 +63,112 @@ def followed_branches(
     motion : VehicleMotion
     lost : LossOfStability
         Of rest, with the runs' own creep law.
-    known : sequence of Diagram
+    known : sequence of Branch
         Branches of runs.
     speeds : tuple of 2 floats
         Range [m/s].
     progress : callable
-
-    Returns
-    -------
-    list of Diagram, list of Sustained, list of str
-        The branches, the first one that of the small motions; folds; remarks.
     """
-    lines: list[_Line] = []
-    starts: list[Start] = [] if lost.parameter is None else [partial(_birth, motion, lost)]
-    remarks = [] if starts else ["continuation: no loss of stability at which it could begin"]
-    starts += [partial(_at_end, motion, one) for one in known if one.direction in RUNS]
-    for number, start in enumerate(starts):
-        line = _Line()
-
-        def within(now: PeriodicMotion, line: _Line = line, number: int = number) -> bool:
-            share = len(line.points.speed) / MOST_MOTIONS
-            progress(min(0.99, (number + share) / len(starts)))
-            inside = speeds[0] < now.speed < speeds[1] and now.amplitude < LARGEST_AMPLITUDE
-            return inside and len(line.points.speed) < MOST_MOTIONS
-
-        try:
-            found = start()
-        except ModelError as error:
-            remarks.append(f"continuation: {error}")
+    found = Continued()
+    if lost.parameter is None:
+        found.remarks.append("continuation: no loss of stability at which it could begin")
+    else:
+        _follow(found, lambda: _birth(motion, lost), speeds, "the branch of small motions")
+        if found.branches:
+            found.begins = found.branches[0].points[0]
+    pieces = [piece for one in known if one.direction in RUNS for piece in one.pieces()]
+    tried: list[Sequence[Point]] = []
+    for number, piece in enumerate(pieces):
+        progress((1.0 + number) / (1.0 + len(pieces)))
+        seed = next((p for p in piece if p.speed >= piece[0].speed + FROM_END), piece[-1])
+        lines = [branch.points for branch in found.branches]
+        if seed.amplitude < FIRST or _is_covered(seed, [*lines, *tried]):
             continue
-        if found is None or _is_covered(found[1], [one.points for one in lines]):
-            continue
-        line.follow(*found, within)
-        remarks += [line.remark] if line.remark else []
-        lines.append(line)
-    folds = [fold for line in lines for fold in line.folds]
-    return [line.points for line in lines], folds, remarks
+        tried.append(piece)
+        name = (
+            f"the branch of runs from {piece[0].speed:.4g} to {piece[-1].speed:.4g} m/s, "
+            f"{1e3 * seed.amplitude:.2f} mm at {seed.speed:.4g} m/s,"
+        )
+        _follow(found, lambda seed=seed: _at(motion, seed), speeds, name)  # type: ignore[misc]
+    return found
 
 
-def _is_covered(motion: PeriodicMotion, lines: Sequence[Diagram]) -> bool:
-    """Whether a line passes a motion."""
-    for line in lines:
-        for before, after in pairwise(range(len(line.speed))):
-            low, high = sorted((line.speed[before], line.speed[after]))
-            if low <= motion.speed <= high:
-                near = np.interp(
-                    motion.speed,
-                    (low, high),
-                    sorted((line.amplitude[before], line.amplitude[after])),
-                )
-                if abs(near - motion.amplitude) < COVERED * motion.amplitude:
-                    return True
-    return False
+def _follow(
+    found: Continued,
+    start: Callable[[], tuple[Shooting, PeriodicMotion]],
+    speeds: tuple[float, float],
+    name: str,
+) -> None:
+    """Add the branch from a motion on, or a remark on why it ends."""
+    points: list[Point] = []
 
+    def within(now: PeriodicMotion) -> bool:
+        inside = speeds[0] < now.speed < speeds[1] and now.amplitude < LARGEST_AMPLITUDE
+        return inside and len(points) < MOST_MOTIONS
 
-def _at_end(motion: VehicleMotion, branch: Diagram) -> tuple[Branch, PeriodicMotion] | None:
-    """The periodic motion at the slowest point of a branch of runs; None near rest."""
-    alive = branch.alive
-    k = min(alive, key=lambda number: branch.speed[number]) if alive else 0
-    if not alive or branch.amplitude[k] < FIRST or not np.isfinite(branch.frequency[k]):
-        return None
-    speed, period = branch.speed[k], 1.0 / branch.frequency[k]
-    flow = VehicleFlow(motion, speed)
-    state = flow.reduced(branch.states[k])
-    scale = flow.scale(state, period, speed, branch.amplitude[k])
-    line = Branch(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
     try:
-        return line, line.nearest(state, period, speed)
+        shooting, before = start()
+    except (ModelError, LeftRange) as error:
+        found.remarks.append(f"continuation: {name} is not followed: {error}")
+        return
+    try:
+        for now in shooting.followed(before, ARC_STEP, within):
+            if before.tangent[-1] * now.tangent[-1] < 0.0 and before.amplitude > 0.0:
+                length = float(np.linalg.norm(now.tangent)) * ARC_STEP
+                found.folds.append(_point(shooting.fold(before, now, length)))
+            points.append(_point(now))
+            before = now
+    except ModelError as error:
+        found.remarks.append(
+            f"continuation: {name} is followed to {before.speed:.4g} m/s only: {error}"
+        )
+    if len(points) >= MOST_MOTIONS:
+        found.remarks.append(
+            f"continuation: {name} is followed for {MOST_MOTIONS} motions only, "
+            f"to {before.speed:.4g} m/s"
+        )
+    if points:
+        found.branches.append(Branch("continuation", points))
+
+
+def _point(motion: PeriodicMotion) -> Point:
+    return Point(motion.speed, motion.amplitude, motion.frequency, stable=motion.is_stable)
+
+
+def _is_covered(point: Point, lines: Sequence[Sequence[Point]]) -> bool:
+    """Whether a line passes a motion."""
+    return any(
+        abs(amplitude - point.amplitude) < COVERED * point.amplitude
+        for line in lines
+        for amplitude in _amplitudes_at(line, point.speed)
+    )
+
+
+def _amplitudes_at(line: Sequence[Point], speed: float) -> Iterator[float]:
+    """Amplitudes with which a line, which may turn back, passes a speed."""
+    for before, after in pairwise(line):
+        share = (speed - before.speed) / ((after.speed - before.speed) or np.inf)
+        if 0.0 <= share <= 1.0:
+            yield before.amplitude + share * (after.amplitude - before.amplitude)
+
+
+def _at(motion: VehicleMotion, seed: Point) -> tuple[Shooting, PeriodicMotion]:
+    """The periodic motion nearest to one of a run."""
+    if not np.isfinite(seed.frequency):
+        raise ModelError("the runs show no period")
+    period, flow = 1.0 / seed.frequency, VehicleFlow(motion, seed.speed)
+    state = flow.reduced(seed.state)
+    scale = flow.scale(state, period, seed.speed, seed.amplitude)
+    shooting = Shooting(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
+    try:
+        return shooting, shooting.nearest(state, period, seed.speed)
     except ModelError:
         raise ModelError(
-            f"the motion of {1e3 * branch.amplitude[k]:.2f} mm at {speed:.4g} m/s is not "
-            "periodic to the accuracy of shooting: its branch is that of the runs"
+            "its motion is not periodic to the accuracy of shooting; its ends are those of the runs"
         ) from None
 
 
-def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Branch, PeriodicMotion]:
+def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, PeriodicMotion]:
     """The branch at the bifurcation; its first shape is that of a small motion in the time loop."""
     speed = float(lost.parameter or 0.0)
     flow = VehicleFlow(motion, speed)
@@ -162,5 +180,5 @@ def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Branch, Period
     begin = flow.reduced(state) - rest
     quarter = flow.after((rest + begin)[None], np.array([0.25 * period]), np.array([speed]))[0]
     scale = flow.scale(rest + begin, period, speed, FIRST)
-    branch = Branch(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
-    return branch, branch.beginning(rest, begin - 1j * (quarter - rest), frequency, speed)
+    shooting = Shooting(flow, scale, period_scale=0.05 * period, speed_scale=1.0)
+    return shooting, shooting.beginning(rest, begin - 1j * (quarter - rest), frequency, speed)

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.creep_law import CREEP_LAWS
+from railsim.contact.geometry import ContactGeometry, geometry_of
 from railsim.definitions.loading import load_track
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
@@ -23,18 +23,16 @@ from railsim.linear.eigenmodes import (
     oscillations,
 )
 from railsim.linear.modes import SPEED_RANGE
-from railsim.linear.naming import mode_name, parts_of
-from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
-from railsim.plottable import Plottable
+from railsim.linear.naming import Parts, mode_name, parts_of
+from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
 from railsim.profiles import Profile
-from railsim.stability.conicity import conicity_over_amplitude
+from railsim.stability.branches import RESOLUTION, Branch, Point, first_beyond, jumps, lowest_of
 from railsim.stability.continuation import followed_branches
-from railsim.stability.diagram import DROP, diagram, jumps
+from railsim.stability.diagram import diagram
 from railsim.stability.motion import LeftRange, VehicleMotion
-from railsim.stability.over_amplitude import linear_over_amplitude
-from railsim.stability.ramp import EXCITATIONS, RESOLUTION, SMALL, Diagram, Sustained, ramp
+from railsim.stability.ramp import EXCITATIONS, SMALL, ramp
+from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 METHODS = ("linear", "ramp", "bifurcation", "continuation")
@@ -43,122 +41,8 @@ LARGEST_EXCITATION = 20e-3  # m
 MARGIN = 1.1  # over the admissible speed, to which a search should go
 NEAR = (0.8, 1.25)  # times the linear critical speed: where most speeds of a diagram stand ...
 SHARE = 0.75  # ... this share of them
-
-
-@dataclass
-class CriticalSpeed(Plottable):
-    """Critical speeds of a vehicle.
-
-    Attributes
-    ----------
-    contact : Contact
-        How the contact was linearised.
-    conditions : dict of str to str
-        ``rails``, creep ``law`` of the runs, ``linear_law`` of the linearisation, ``friction``.
-    low, high : float
-        Range of the search [m/s].
-    linear : dict or None
-        ``speed``, ``frequency``, ``mode`` of the loss of stability, ``speed_of_runs``, the same
-        with the coarser cells of the runs; None where there is none.
-    linear_over_amplitude : dict or None
-        See `railsim.stability.over_amplitude`.
-    nonlinear : dict of str to Sustained
-        Lowest speed of sustained hunting by method.
-    branches : list of Diagram
-        Amplitude over speed.
-    jumps : list of dict
-        Where the motion changes to another branch or to rest, see `railsim.stability.diagram`.
-    type : "subcritical", "supercritical", "none" or ""
-        Whether anything hunts below the speed at which rest loses its stability, in the runs' own
-        law; empty where it was not looked for.
-    onset : "subcritical", "supercritical" or ""
-        How the small motions begin there, whatever else is possible.
-    amplitude_limit, instability_limit : dict or None
-        Lowest ``speed`` at which an amplitude of 3 mm is exceeded, or half the limit of the
-        track-shifting force as rms, and that ``limit``; ``reached`` and ``searched_to``.
-    conicity_over_amplitude : dict or None
-        Equivalent conicity of the leading wheelset, see `railsim.stability.conicity`.
-    remarks : list of str
-        Remarks for the reader.
-    """
-
-    contact: Contact
-    conditions: dict[str, str] = field(default_factory=dict)
-    low: float = 0.0
-    high: float = 0.0
-    linear: dict[str, Any] | None = None
-    linear_over_amplitude: dict[str, Any] | None = None
-    nonlinear: dict[str, Sustained] = field(default_factory=dict)
-    branches: list[Diagram] = field(default_factory=list)
-    jumps: list[dict[str, Any]] = field(default_factory=list)
-    type: str = ""
-    onset: str = ""
-    amplitude_limit: dict[str, Any] | None = None
-    instability_limit: dict[str, Any] | None = None
-    conicity_over_amplitude: dict[str, Any] | None = None
-    remarks: list[str] = field(default_factory=list)
-
-    @property
-    def lowest(self) -> Sustained | None:
-        """Lowest speed of sustained hunting of all methods; None where there is none."""
-        known = [one for one in self.nonlinear.values() if one.speed is not None]
-        return min(known, key=lambda one: one.speed or 0.0, default=None)
-
-    def record(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        speeds = {name: found.record() for name, found in self.nonlinear.items()}
-        lowest = self.lowest
-        nonlinear = None
-        if self.nonlinear:
-            nonlinear = {
-                **((lowest.record() if lowest else None) or {"speed": None}),
-                "reached": lowest is not None,
-                "searched_to": self.high,
-            }
-        return {
-            "linearisation": self.contact.linearisation,
-            "amplitude": (
-                self.contact.amplitude if self.contact.linearisation == "harmonic" else None
-            ),
-            "conicity": self.contact.conicity,
-            "linear": self.linear,
-            "nonlinear": nonlinear,
-            "nonlinear_by_method": speeds,
-            "amplitude_limit": self.amplitude_limit,
-            "instability_limit": self.instability_limit,
-            "type": self.type,
-            "branches": [branch.record() for branch in self.branches],
-            "conicity_over_amplitude": self.conicity_over_amplitude,
-            "remarks": self.remarks,
-            "conditions": self.conditions,
-            "searched": [self.low, self.high],
-            "onset": self.onset,
-            "jumps": self.jumps,
-            "linear_over_amplitude": self.linear_over_amplitude,
-        }
-
-    def to_xarray(self) -> Any:
-        """Return the branches as an `xarray.Dataset` over ``branch`` and ``point``; needs xarray.
-
-        Branches of fewer points than the longest are filled with NaN.
-        """
-        import xarray
-
-        most = max((len(branch.speed) for branch in self.branches), default=0)
-        filled = {
-            name: np.array(
-                [
-                    getattr(branch, name) + [np.nan] * (most - len(branch.speed))
-                    for branch in self.branches
-                ],
-                dtype=float,
-            ).reshape(len(self.branches), most)
-            for name in ("speed", "amplitude", "frequency", "sum_Y_rms", "stable")
-        }
-        return xarray.Dataset(
-            {name: (("branch", "point"), values) for name, values in filled.items()},
-            {"branch": [branch.direction for branch in self.branches]},
-        )
+AMPLITUDES = (0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)  # m
+OF_CONICITY = 1e-3 * np.concatenate([np.arange(1, 10) * 0.1, np.arange(4, 33) * 0.25])  # m
 
 
 def critical_speed(
@@ -198,7 +82,7 @@ def critical_speed(
         Sizes of the disturbances from which hunting is sought: lateral displacement of a wheelset
         in the shape of the hunting mode [m].
     over_amplitude : bool
-        Find the linear critical speed over amplitude too, 3 s of CPU time.
+        Find the linear critical speed over amplitude and on rigid rails too, 4 s of CPU time.
     settings : Settings, optional
         Scheme, creep law, contact.
     profiles : mapping of str to Profile, optional
@@ -219,32 +103,35 @@ def critical_speed(
     """
     _check(methods, low, high, points, excitations)
     settings, track = settings or Settings(), track or load_track("straight")
+    contact, law = Contact(linearisation, amplitude, conicity), smooth_law(settings)
 
-    def prepared(settings: Settings, contact: Contact) -> LinearVehicle:
+    def prepared(settings: Settings, contact: Contact, track: Track = track) -> LinearVehicle:
         return LinearVehicle(vehicle, track, contact=contact, settings=settings, profiles=profiles)
 
-    contact, law = Contact(linearisation, amplitude, conicity), smooth_law(settings)
+    found = CriticalSpeed(contact, vehicle.name, conditions(track, settings), low, high)
     smooth = prepared(law, contact)
-    found = CriticalSpeed(contact, conditions(track, settings), low, high)
     found.remarks += smooth.remarks
-    found.conicity_over_amplitude = conicity_over_amplitude(smooth)
-    lost = loss_of_stability(smooth.linearised, low, high)
-    _linear(found, smooth, lost)
+    found.conicity_over_amplitude = _conicity(smooth)
+    found.linear = _linear(found, smooth)
     if over_amplitude:
-        found.linear_over_amplitude = linear_over_amplitude(
+        found.linear_over_amplitude = _over_amplitude(
             lambda size: prepared(law, Contact("harmonic", size, conicity)), low, high
         )
+        if found.linear is not None and smooth.system.support.elastic:
+            rigid = prepared(law, contact, track.replace(support={"preset": "rigid"}))
+            lost = _loss_of_hunting(rigid, low, high).parameter
+            found.linear = replace(found.linear, speed_on_rigid_rails=lost)
     tell = progress or (lambda _: None)
     tell(0.05)
     wanted = [method for method in METHODS if method in methods and method != "linear"]
     if not wanted:
         return found
-    own = prepared(settings, Contact(conicity=conicity))
-    begins = loss_of_stability(own.linearised, low, high)
+    of_runs = prepared(settings, Contact(conicity=conicity))
+    begins = _loss_of_hunting(of_runs, low, high)
     if found.linear is not None:
-        found.linear["speed_of_runs"] = begins.parameter
-    shape = _hunting_shape(own, begins.parameter or high)
-    motion = VehicleMotion(own, settings.scheme, shape)
+        found.linear = replace(found.linear, speed_of_runs=begins.parameter)
+    shape = _hunting_shape(of_runs, begins.parameter or high)
+    motion = VehicleMotion(of_runs, settings.scheme, shape)
     search = _Search(found, motion, begins, points, excitations)
     for number, method in enumerate(wanted):
 
@@ -255,91 +142,143 @@ def critical_speed(
             _ACTIONS[method](search, share)
         except (LeftRange, ModelError) as error:
             found.remarks.append(f"{method}: {error}")
-    _conclude(found, own, begins.parameter)
+    _conclude(found, of_runs, begins.parameter)
     _remark_range(found, vehicle)
     return found
-
-
-def conditions(track: Track, settings: Settings) -> dict[str, str]:
-    """Return in words on what rails, with which creep law and friction."""
-
-    def words(settings: Settings) -> str:
-        law = CREEP_LAWS[settings.creep_law]
-        cells = " {} x {} cells".format(*settings.fastsim_grid) if law.grid else ""
-        return f"{law.label}{cells}"
-
-    sides = np.unique(track.friction)
-    friction = "from a table" if track.friction_table else "/".join(f"{mu:g}" for mu in sides)
-    return {
-        "rails": track.support.preset,
-        "law": words(settings),
-        "linear_law": words(smooth_law(settings)),
-        "friction": friction,
-    }
 
 
 def _check(
     methods: Sequence[str], low: float, high: float, points: int, excitations: Sequence[float]
 ) -> None:
     faults = []
-    unknown = [method for method in methods if method not in METHODS]
-    if unknown:
-        faults.append(
-            argument_fault("methods", "", f"found '{unknown[0]}'", " or ".join(METHODS), "--method")
-        )
+
+    def check(right: bool, name: str, found: str, allowed: str, option: str | None = None) -> None:
+        if not right:
+            faults.append(argument_fault(name, "", found, allowed, option))
+
+    unknown = next((method for method in methods if method not in METHODS), None)
+    check(unknown is None, "methods", f"found '{unknown}'", " or ".join(METHODS), "--method")
     least, most = SPEED_RANGE
     for name, option, value in (("low", "--from", low), ("high", "--to", high)):
-        if not (math.isfinite(value) and least <= value <= most):
-            faults.append(
-                argument_fault(
-                    name, "", f"found {value:g} m/s", f"{least:g} to {most:g} m/s", option
-                )
-            )
-    if not faults and low >= high:
-        faults.append(
-            argument_fault(
-                "low", "", f"found {low:g} m/s", f"less than the highest, {high:g} m/s", "--from"
-            )
-        )
-    if not 2 <= points <= 200:
-        faults.append(argument_fault("points", "", f"found {points}", "2 to 200"))
-    most = LARGEST_EXCITATION
-    wrong = [size for size in excitations if not SMALL <= size <= most]
-    if wrong or not len(excitations):
-        told = f"found {wrong[0]:g} m" if wrong else "no size"
-        allowed = f"{SMALL:g} to {most:g} m"
-        faults.append(argument_fault("excitations", "", told, allowed, "--excitation"))
+        inside = math.isfinite(value) and least <= value <= most
+        check(inside, name, f"found {value:g} m/s", f"{least:g} to {most:g} m/s", option)
+    if not faults:
+        words = f"less than the highest, {high:g} m/s"
+        check(low < high, "low", f"found {low:g} m/s", words, "--from")
+    check(2 <= points <= 200, "points", f"found {points}", "2 to 200")
+    wrong = [size for size in excitations if not SMALL <= size <= LARGEST_EXCITATION]
+    check(
+        bool(len(excitations)) and not wrong,
+        "excitations",
+        f"found {wrong[0]:g} m" if wrong else "no size",
+        f"{SMALL:g} to {LARGEST_EXCITATION:g} m",
+        "--excitation",
+    )
     if faults:
         raise InputError(faults)
 
 
-def _linear(found: CriticalSpeed, prepared: LinearVehicle, lost: LossOfStability) -> None:
-    """Put the linear critical speed into the result, or why there is none."""
-    parts = parts_of(prepared.model, prepared.coordinates)
+# linear -------------------------------------------------------------------------------------------
 
-    def words(number: int) -> str:
-        modes = lost.modes[number]
-        value = complex(modes.eigenvalues[0])
-        name = mode_name(parts, modes.shapes[0], value, modes.linearisation.parameter)
+
+def _hunts(parts: Parts) -> Callable[[Eigenmodes], bool]:
+    """Whether a mode is hunting."""
+
+    def answer(mode: Eigenmodes) -> bool:
+        speed, value = mode.linearisation.parameter, complex(mode.eigenvalues[0])
+        return mode_name(parts, mode.shapes[0], value, speed).endswith("hunting")
+
+    return answer
+
+
+def _loss_of_hunting(prepared: LinearVehicle, low: float, high: float) -> LossOfStability:
+    """Where steady rolling loses its stability; of vehicles whose friction sticks to hunting only.
+
+    Friction that sticks damps nothing: the sway of such a vehicle is undamped at speeds at which
+    friction, once it slides, damps it.
+    """
+    counts = None
+    if prepared.sticking:
+        counts = _hunts(parts_of(prepared.model, prepared.coordinates))
+    return loss_of_stability(prepared.linearised, low, high, counts=counts)
+
+
+def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
+    """The linear critical speed; a remark where there is none, or where friction sticks."""
+    parts, low, high = parts_of(prepared.model, prepared.coordinates), found.low, found.high
+
+    def name(mode: Eigenmodes) -> str:
+        value = complex(mode.eigenvalues[0])
+        return mode_name(parts, mode.shapes[0], value, mode.linearisation.parameter)
+
+    def words(mode: Eigenmodes) -> str:
         return (
-            f"{name}, {modes.frequencies[0]:.3g} Hz, damping "
-            f"{100.0 * modes.damping_ratios[0]:.3g} % at {modes.linearisation.parameter:g} m/s"
+            f"{name(mode)}, {mode.frequencies[0]:.3g} Hz, damping "
+            f"{100.0 * mode.damping_ratios[0]:.3g} % at {mode.linearisation.parameter:g} m/s"
         )
 
+    lost = _loss_of_hunting(prepared, low, high)
+    if prepared.sticking:
+        other = loss_of_stability(prepared.linearised, low, lost.parameter or high)
+        if (other.parameter is not None and other.parameter != lost.parameter) or other.already:
+            mode = other.modes[0]
+            found.remarks.append(
+                f"{name(mode)}, {mode.frequencies[0]:.3g} Hz, is undamped from "
+                f"{mode.linearisation.parameter:.4g} m/s or less as long as all friction elements "
+                "stick; sliding damps it, so that it is not counted"
+            )
     if lost.parameter is not None:
         mode = lost.modes[0]
-        found.linear = {
-            "speed": lost.parameter,
-            "frequency": float(mode.frequencies[0]),
-            "mode": mode_name(parts, mode.shapes[0], complex(mode.eigenvalues[0]), lost.parameter),
-        }
-    elif lost.already:
-        found.remarks.append(f"unstable at the lower end of the range: {words(0)}")
+        return LinearLoss(lost.parameter, float(mode.frequencies[0]), name(mode))
+    if lost.already:
+        found.remarks.append(f"unstable at the lower end of the range: {words(lost.modes[0])}")
     else:
         found.remarks.append(
-            f"no linear critical speed from {found.low:g} to {found.high:g} m/s; least damped: "
-            f"{words(0)}; {words(1)}"
+            f"no linear critical speed from {low:g} to {high:g} m/s; least damped: "
+            f"{'; '.join(map(words, lost.modes))}"
         )
+    return None
+
+
+def _over_amplitude(
+    prepared: Callable[[float], LinearVehicle], low: float, high: float
+) -> OverAmplitude:
+    """Linear critical speeds with harmonic linearisation, up to the width of the contact table."""
+    found = OverAmplitude()
+    for amplitude in AMPLITUDES:
+        try:
+            lost = _loss_of_hunting(prepared(amplitude), low, high)
+        except InputError:
+            break
+        critical = lost.modes[0] if lost.parameter is not None else None
+        found.amplitude.append(amplitude)
+        found.speed.append(low if lost.already else lost.parameter)
+        found.frequency.append(float(critical.frequencies[0]) if critical else None)
+    return found
+
+
+def _conicity(prepared: LinearVehicle) -> Conicity | None:
+    """Equivalent conicity of the leading wheelset at the amplitudes that its profiles allow.
+
+    Where it falls with the amplitude below 3 mm, small limit cycles come first (Polach 2006).
+    """
+    body = prepared.model.flat.of_kind("wheelset")[0]
+    geometry = None
+    if body.wheelset is not None:
+        geometry = geometry_of(body.wheelset, prepared.track, prepared.model.profiles)
+    if geometry is None:
+        return None
+    values = _conicities(geometry)
+    known = np.isfinite(values)
+    return Conicity(body.name, OF_CONICITY[known].tolist(), values[known].tolist())
+
+
+@lru_cache(8)  # maps and optimisations ask for the same geometry over and over
+def _conicities(geometry: ContactGeometry) -> NDArray[np.float64]:
+    return geometry.equivalent_conicity(OF_CONICITY)
+
+
+# non-linear ---------------------------------------------------------------------------------------
 
 
 def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
@@ -348,14 +287,10 @@ def _hunting_shape(prepared: LinearVehicle, speed: float) -> Eigenmodes:
     Where none is a hunting mode, the one whose wheelsets move most against all else.
     """
     found = oscillations(eigenmodes(prepared.linearised(speed)), SEARCHED[1])
-    parts = parts_of(prepared.model, prepared.coordinates)
-    named = [
-        k
-        for k, value in enumerate(found.eigenvalues)
-        if mode_name(parts, found.shapes[k], complex(value), speed).endswith("hunting")
-    ]
-    if named:
-        return found.taken([min(named, key=lambda k: found.damping_ratios[k])])
+    hunts = _hunts(parts_of(prepared.model, prepared.coordinates))
+    hunting = [k for k in range(len(found.eigenvalues)) if hunts(found.taken([k]))]
+    if hunting:
+        return found.taken([min(hunting, key=lambda k: found.damping_ratios[k])])
     names = found.linearisation.names
     lateral = [names.index(f"{wheelset}.y") for wheelset in prepared.model.index.wheelsets]
     positions = [k for k, name in enumerate(names) if name.endswith(".y")]
@@ -380,59 +315,55 @@ def _by_ramp(search: _Search, progress: Progress) -> None:
     lowest, branch = ramp(search.motion, found.low, found.high, progress, search.excitations)
     found.nonlinear["ramp"] = lowest
     found.branches.append(branch)
-    if lowest.speed is None:
+    if lowest is None:
         found.remarks.append(f"ramp: nothing hunts from {found.low:g} to {found.high:g} m/s")
-    elif lowest.below:
+    elif lowest.speed <= found.low:
         found.remarks.append(f"ramp: hunts still at the lower end, {found.low:g} m/s")
-    if branch.top < found.high:
-        found.remarks.append(f"ramp: the vehicle derails above {branch.top:.4g} m/s")
+    if branch.points[0].speed < found.high:
+        top = branch.points[0].speed
+        found.remarks.append(f"ramp: the vehicle derails above {top:.4g} m/s")
 
 
 def _speeds(found: CriticalSpeed, begins: float | None, points: int) -> list[float]:
     """Speeds of a diagram: most of them where branches begin and end, the others above."""
     low, high = found.low, found.high
     if begins is None:
-        return [float(speed) for speed in np.linspace(low, high, points)]
+        return list(np.linspace(low, high, points).tolist())
     least, most = max(low, NEAR[0] * begins), min(high, NEAR[1] * begins)
     if most >= high or points < 4:
-        return [float(speed) for speed in np.linspace(least, high, points)]
+        return list(np.linspace(least, high, points).tolist())
     near = round(SHARE * points)
     above = np.linspace(most, high, points - near + 1)[1:]
     return [*np.linspace(least, most, near).tolist(), *above.tolist()]
 
 
 def _by_diagram(search: _Search, progress: Progress) -> None:
-    found, begins = search.found, search.begins.parameter
-    speeds = _speeds(found, begins, search.points)
-    branches, lowest = diagram(
-        search.motion, speeds, progress, excitations=search.excitations, closer=True
-    )
-    found.nonlinear["bifurcation"] = lowest
+    found = search.found
+    speeds = _speeds(found, search.begins.parameter, search.points)
+    branches = diagram(search.motion, speeds, progress, search.excitations)
+    found.nonlinear["bifurcation"] = lowest_of(branches)
     found.branches += branches
     found.jumps = jumps(branches)
-    reached = max(branches[0].speed, default=found.low)
-    if reached < speeds[-1]:
-        found.remarks.append(
-            f"bifurcation: the vehicle derails above {reached:.4g} m/s"
-            if branches[0].speed
-            else "bifurcation: the vehicle derails at the lower end"
-        )
+    reached = max((point.speed for point in branches[0].points), default=None)
+    if reached is None:
+        found.remarks.append("bifurcation: the vehicle derails at the lower end")
+    elif reached < speeds[-1]:
+        found.remarks.append(f"bifurcation: the vehicle derails above {reached:.4g} m/s")
 
 
 def _by_continuation(search: _Search, progress: Progress) -> None:
     found, begins = search.found, search.begins
-    lines, folds, remarks = followed_branches(
-        search.motion, begins, found.branches, (found.low, found.high), progress
-    )
-    found.branches += lines
-    found.remarks += remarks
-    born = begins.parameter
-    if born is not None and lines and lines[0].speed:
-        found.onset = "subcritical" if lines[0].speed[0] < born else "supercritical"
-        frequency = float(begins.modes[0].frequencies[0])
-        folds = [*folds, Sustained(born, 0.0, frequency)]
-    if folds:
-        found.nonlinear["continuation"] = min(folds, key=lambda fold: fold.speed or 0.0)
+    limits = found.low, found.high
+    followed = followed_branches(search.motion, begins, found.branches, limits, progress)
+    found.branches += followed.branches
+    found.remarks += followed.remarks
+    ends = list(followed.folds)
+    if begins.parameter is not None and followed.begins is not None:
+        rising = followed.begins.speed >= begins.parameter
+        found.onset = "supercritical" if rising else "subcritical"
+        ends.append(Point(begins.parameter, 0.0, float(begins.modes[0].frequencies[0])))
+    if ends:
+        found.nonlinear["continuation"] = min(ends, key=lambda point: point.speed)
 
 
 _ACTIONS = {"ramp": _by_ramp, "bifurcation": _by_diagram, "continuation": _by_continuation}
@@ -443,7 +374,7 @@ def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | Non
     lowest = found.lowest
     if not found.nonlinear:
         return  # every method failed, as the remarks say
-    if lowest is None or lowest.speed is None:
+    if lowest is None:
         found.type = "none"
     elif begins is None or lowest.speed < begins - RESOLUTION or found.onset == "subcritical":
         found.type = "subcritical"
@@ -451,31 +382,17 @@ def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | Non
         found.type = "supercritical"
     # EN 14363: sum_Y 10 kN + 2 Q0/3, of which the instability criterion takes half as rms
     force = 0.5 * (10e3 + 2.0 * float(np.min(prepared.Q0)) / 3.0)
-    found.amplitude_limit = _first_beyond(found, AMPLITUDE_LIMIT, "amplitude")
-    found.instability_limit = _first_beyond(found, force, "sum_Y_rms")
+    branches = [_above_its_end(branch, found.nonlinear.get("ramp")) for branch in found.branches]
+    found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.high)
+    found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.high)
 
 
-def _first_beyond(found: CriticalSpeed, limit: float, attribute: str) -> dict[str, Any]:
-    """The lowest speed of stable hunting beyond a limit, between the points of a branch too."""
-    beyond = []
-    for branch in found.branches:
-        points = branch
-        if branch.direction == "ramp":  # it undershoots the end of the branch
-            end = found.nonlinear["ramp"].speed or np.inf
-            points = branch.taken([k for k, v in enumerate(branch.speed) if v >= end])
-        values, alive = getattr(points, attribute), points.alive
-        for k in (k for k in alive if values[k] > limit):
-            beyond.append(points.speed[k])
-            for n in (k - 1, k + 1):  # a neighbour within the limit: the branch passes it between
-                if n in alive and DROP * values[k] < values[n] <= limit:
-                    share = (limit - values[n]) / (values[k] - values[n])
-                    beyond.append(points.speed[n] + share * (points.speed[k] - points.speed[n]))
-    return {
-        "speed": min(beyond, default=None),
-        "limit": limit,
-        "reached": bool(beyond),
-        "searched_to": found.high,
-    }
+def _above_its_end(branch: Branch, lowest: Point | None) -> Branch:
+    """A branch; of a ramp, which undershoots its end, what lies above that."""
+    if branch.direction != "ramp":
+        return branch
+    end = np.inf if lowest is None else lowest.speed
+    return Branch(branch.direction, [point for point in branch.points if point.speed >= end])
 
 
 def _remark_range(found: CriticalSpeed, vehicle: Vehicle) -> None:

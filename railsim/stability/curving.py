@@ -38,6 +38,7 @@ from railsim.model.work import work_arrays
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.simulation.outputs import against_rails
+from railsim.table import Column, Table
 from railsim.track.tables import track_tables
 
 Floats = NDArray[np.float64]
@@ -47,6 +48,20 @@ SMALLEST_RADIUS, LARGEST_CANT = 20.0, 0.3  # m
 SPEED_RANGE = (0.5, 150.0)  # m/s
 FAILED, NEWTON, TIME = range(3)
 SETTLING = 60.0  # s, longest time integration of a point
+COLUMNS = (
+    Column("radius", unit="m", format="g"),
+    Column("cant_deficiency", "I", "mm", "g"),
+    Column("friction", "mu", format="g"),
+    Column("speed", "V", "m/s", ".2f"),
+    Column("lateral", "y", "mm", ".2f"),
+    Column("attack", unit="mrad", format=".2f"),
+    Column("Q", unit="kN", format=".1f"),
+    Column("Y", unit="kN", format=".1f"),
+    Column("Y_over_Q", "Y/Q", format=".3f"),
+    Column("T_gamma", unit="N", format=".0f"),
+    Column("found", " "),
+)
+METHODS = ("no steady state", "", "by time integration")
 STILL = 1e-4  # share of the wheel loads by which forces still change after a second
 
 
@@ -80,6 +95,8 @@ class Curving(Plottable):
         Names.
     wheelset_position : tuple of float
         Positions of the wheelsets along the vehicle, against its reference body [m].
+    vehicle, place : str
+        Name of the vehicle; rails of the track.
     remarks : tuple of str
         Remarks for the reader.
     """
@@ -104,6 +121,8 @@ class Curving(Plottable):
     wheelsets: tuple[str, ...]
     bogies: tuple[str, ...]
     wheelset_position: tuple[float, ...]
+    vehicle: str = ""
+    place: str = ""
     remarks: tuple[str, ...] = ()
     DIMS: ClassVar = ("radius", "cant_deficiency", "friction")
     VALUES: ClassVar[dict[str, tuple[str, ...]]] = {
@@ -137,6 +156,29 @@ class Curving(Plottable):
             "dims": {name: [*self.DIMS, *dims] for name, dims in self.VALUES.items()},
         }
         return data | {name: getattr(self, name).tolist() for name in self.VALUES}
+
+    @property
+    def title(self) -> str:
+        """Vehicle, track and cant in words."""
+        return f"{self.vehicle}: steady curving, cant {1e3 * self.cant:g} mm, {self.place}"
+
+    def table(self) -> Table:
+        """Return leading wheelset, its outer wheel and the wear number of all at every point."""
+        rows = []
+        for index in np.ndindex(self.converged.shape):
+            r, i, m = index
+            outer = 0 if self.radius[r] > 0.0 else 1
+            wheel = [getattr(self, name)[index][0, outer] for name in ("Q", "Y", "Y_over_Q")]
+            rows.append(
+                [
+                    *(self.radius[r], self.cant_deficiency[i], self.friction[m], self.speed[r, i]),
+                    *(self.lateral[index][0], self.attack[index][0], *wheel),
+                    self.T_gamma[index].sum(),
+                    METHODS[int(self.converged[index])],
+                ]
+            )
+        caption = f"{self.title}; leading wheelset, its outer wheel, T_gamma of all wheels"
+        return Table(COLUMNS, rows, caption)
 
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset`; needs xarray."""
@@ -216,17 +258,17 @@ def curving(
     mus = list(friction) if friction is not None else [_friction(track)]
     _check(radius, cant, cant_deficiency, mus)
     search = _Search(vehicle, track, cant, settings or Settings(), profiles)
+    found = search.empty(radius, cant_deficiency, mus)
     # from wide to narrow, each point from its neighbour
     order = sorted(range(len(radius)), key=lambda k: -abs(radius[k]))
-    found: dict[tuple[int, int, int], dict[str, Any]] = {}
-    total = len(radius) * len(cant_deficiency) * len(mus)
     for m, mu in enumerate(mus):
         for i, deficiency in enumerate(cant_deficiency):
-            for r in order:
-                found[r, i, m] = search.point(radius[r], deficiency, mu)
+            for k, r in enumerate(order):
+                search.fill(found, (r, i, m), search.point(radius[r], deficiency, mu))
                 if progress is not None:
-                    progress(len(found) / total)
-    return _gathered(search, found, radius, cant, cant_deficiency, mus)
+                    done = (m * len(cant_deficiency) + i) * len(radius) + k + 1
+                    progress(done / found.converged.size)
+    return found
 
 
 def _friction(track: Track) -> float:
@@ -238,36 +280,29 @@ def _check(
     radius: Sequence[float], cant: float, deficiency: Sequence[float], friction: Sequence[float]
 ) -> None:
     faults = []
+
+    def check(right: bool, name: str, found: str, allowed: str) -> None:
+        if not right:
+            faults.append(argument_fault(name, "", found, allowed))
+
+    least = f"{SMALLEST_RADIUS:g} m at least, negative to the left"
     for value in radius:
-        if not (math.isfinite(value) and abs(value) >= SMALLEST_RADIUS):
-            faults.append(
-                argument_fault(
-                    "radius",
-                    "",
-                    f"found {value:g} m",
-                    f"{SMALLEST_RADIUS:g} m at least, negative to the left",
-                )
-            )
-    if not 0.0 <= cant <= LARGEST_CANT:
-        faults.append(argument_fault("cant", "", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m"))
+        right = math.isfinite(value) and abs(value) >= SMALLEST_RADIUS
+        check(right, "radius", f"found {value:g} m", least)
+    check(0.0 <= cant <= LARGEST_CANT, "cant", f"found {cant:g} m", f"0 to {LARGEST_CANT:g} m")
     for value in friction:
-        if not 0.0 < value <= 2.0:
-            faults.append(argument_fault("friction", "", f"found {value:g}", "above 0, at most 2"))
+        check(0.0 < value <= 2.0, "friction", f"found {value:g}", "above 0, at most 2")
     low, high = SPEED_RANGE
     for value in deficiency:
         speeds = [_speed(r, cant, value) for r in radius] if not faults else []
-        if not all(low <= v <= high for v in speeds) or not math.isfinite(value):
-            faults.append(
-                argument_fault(
-                    "cant_deficiency",
-                    "",
-                    f"found {value:g} m with a cant of {cant:g} m",
-                    f"a sum that gives speeds of {low:g} to {high:g} m/s",
-                )
-            )
+        check(
+            math.isfinite(value) and all(low <= v <= high for v in speeds),
+            "cant_deficiency",
+            f"found {value:g} m with a cant of {cant:g} m",
+            f"a sum that gives speeds of {low:g} to {high:g} m/s",
+        )
     for name, values in (("radius", radius), ("cant_deficiency", deficiency)):
-        if not len(values):
-            faults.append(argument_fault(name, "", "no value", "one at least"))
+        check(bool(len(values)), name, "no value", "one at least")
     if faults:
         raise InputError(faults)
 
@@ -285,6 +320,9 @@ class _Known:
     state: Floats
 
 
+Point = tuple[SteadyRolling, Floats, int]  # solver, state, how it was found
+
+
 class _Search:
     """Steady states of one vehicle, each sought from the nearest known one."""
 
@@ -296,7 +334,7 @@ class _Search:
         settings: Settings,
         profiles: Mapping[str, Profile] | None,
     ) -> None:
-        self.track, self.cant = track, cant
+        self.track, self.cant, self.vehicle = track, cant, vehicle.name
         assembled = assemble(vehicle, circle(track), settings, profiles)
         check_fixed(assembled.flat, circle(track, curvature=1e-3, cant=cant))
         balance = equilibrium(assembled, WALKING_PACE)
@@ -313,8 +351,8 @@ class _Search:
         there = circle(self.track, curvature=curvature, cant=cant, friction=friction)
         return self.model.system._replace(track=track_tables(there))
 
-    def point(self, radius: float, deficiency: float, friction: float) -> dict[str, Any]:
-        """Values at one point of the grid."""
+    def point(self, radius: float, deficiency: float, friction: float) -> Point:
+        """Steady state at one point of the grid."""
         speed = _speed(radius, self.cant, deficiency)
         goal = _Known(
             1.0 / radius, math.copysign(self.cant, radius), speed**2, friction, self._last.state
@@ -327,7 +365,7 @@ class _Search:
             except NotConverged:
                 continue
             self._last = replace(goal, state=state)
-            return self._values(solver, state, NEWTON)
+            return solver, state, NEWTON
         return self._in_time(goal)
 
     def _led(self, start: _Known, goal: _Known) -> tuple[Floats, SteadyRolling]:
@@ -345,7 +383,7 @@ class _Search:
         found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
         return found.state, solver
 
-    def _in_time(self, goal: _Known) -> dict[str, Any]:
+    def _in_time(self, goal: _Known) -> Point:
         """Run on the circle until nothing changes; failed where it does not come to that."""
         system = self._system(goal.curvature, goal.cant, goal.friction)
         speed = math.sqrt(goal.square)
@@ -361,7 +399,7 @@ class _Search:
                 self.model, straight, rolling, "fast", lambda _: (system, state)
             ).choose(5e-3)
         except ModelError:
-            return self._values(solver, state, FAILED)
+            return solver, state, FAILED
         work, derivative = work_arrays(system), np.zeros_like(state)
         stages, recorder = np.zeros((3, len(state))), empty_recorder(self.model, 1)
         before = np.zeros_like(self.Q0)
@@ -379,40 +417,64 @@ class _Search:
                 Chunk(1, round(1.0 / step), 1 << 40, fresh=int(second == 0)),
             )
             if status != RUNNING:
-                return self._values(solver, state, FAILED)
+                return solver, state, FAILED
             now = work.wheel[:, :, W_Y].copy()
             if np.max(np.abs(now - before)) < STILL * np.max(self.Q0):
-                return self._values(solver, state, TIME)
+                return solver, state, TIME
             before = now
-        return self._values(solver, state, FAILED)
+        return solver, state, FAILED
 
-    def _values(self, solver: SteadyRolling, state: Floats, how: int) -> dict[str, Any]:
-        wheelsets = np.array(self.parts.wheelsets)
-        frames, cars = list(self.parts.frames), list(self.parts.cars)
-        if how != FAILED:
-            solver.evaluate(state)
+    def empty(
+        self, radius: Sequence[float], deficiency: Sequence[float], friction: Sequence[float]
+    ) -> Curving:
+        """The result of a grid without any value yet."""
+        shape = len(radius), len(deficiency), len(friction)
+        index, bodies = self.model.index, self.model.system.bodies
+        frames = self.parts.frames
+        sizes = {"wheelset": len(index.wheelsets), "side": 2, "bogie": len(frames)}
+        arrays: dict[str, Any] = {
+            name: np.full((*shape, *(sizes[dim] for dim in dims)), np.nan)
+            for name, dims in Curving.VALUES.items()
+        }
+        positions = self.model.system.frame_offset[bodies.frame[list(self.parts.wheelsets)]]
+        return Curving(
+            np.array(radius, dtype=float),
+            np.array(deficiency, dtype=float),
+            np.array(friction, dtype=float),
+            self.cant,
+            np.array([[_speed(r, self.cant, i) for i in deficiency] for r in radius]),
+            np.zeros(shape, dtype=np.int64),
+            wheelsets=index.wheelsets,
+            bogies=tuple(index.bodies[b] for b in frames),
+            wheelset_position=tuple(positions.tolist()),
+            vehicle=self.vehicle,
+            place=f"rails {self.track.support.preset}",
+            remarks=self.remarks,
+            **arrays,
+        )
+
+    def fill(self, found: Curving, index: tuple[int, int, int], point: Point) -> None:
+        """Put the values of a point into the result; none where it failed."""
+        solver, state, how = point
+        found.converged[index] = how
+        if how == FAILED:
+            return
+        solver.evaluate(state)
+        wheelsets, frames = np.array(self.parts.wheelsets), list(self.parts.frames)
         wheel = solver.work.wheel
         Q, Y = wheel[:, :, W_Q], wheel[:, :, W_Y]
+        found.Q[index], found.Y[index] = Q, Y
         with np.errstate(divide="ignore", invalid="ignore"):
-            quotient = Y / Q * np.array([-1.0, 1.0])
-        values = {
-            "Q": Q,
-            "Y": Y,
-            "Y_over_Q": quotient,
-            "dQ_over_Q0": (Q - self.Q0) / self.Q0,
-            "T_gamma": wheel[:, :, W_T_GAMMA],
-            "contact_y": _contact_positions(solver, len(wheelsets)),
-            "lateral": against_rails(self.model, state[None])[0, :, 0],
-            "attack": state[6 * wheelsets + 5],
-            "sum_Y": Y.sum(axis=1),
-            "steering": state[[6 * b + 5 for b in frames]],
-            "car_roll": state[6 * cars[0] + 3] if cars else np.nan,
-        }
-        if how == FAILED:
-            values = {name: np.full(np.shape(value), np.nan) for name, value in values.items()}
-        return {name: np.array(value, dtype=float) for name, value in values.items()} | {
-            "converged": how
-        }
+            found.Y_over_Q[index] = Y / Q * np.array([-1.0, 1.0])
+        found.dQ_over_Q0[index] = (Q - self.Q0) / self.Q0
+        found.T_gamma[index] = wheel[:, :, W_T_GAMMA]
+        found.contact_y[index] = _contact_positions(solver, len(wheelsets))
+        found.lateral[index] = against_rails(self.model, state[None])[0, :, 0]
+        found.attack[index] = state[6 * wheelsets + 5]
+        found.sum_Y[index] = Y.sum(axis=1)
+        found.steering[index] = state[[6 * b + 5 for b in frames]]
+        if self.parts.cars:
+            found.car_roll[index] = state[6 * self.parts.cars[0] + 3]
 
 
 def _remarks(model: Model) -> tuple[str, ...]:
@@ -437,40 +499,3 @@ def _contact_positions(solver: SteadyRolling, wheelsets: int) -> Floats:
             load[w, side] = work.patch[NORMAL, k]
             found[w, side] = work.patch[C_Y, k]
     return found
-
-
-def _gathered(
-    search: _Search,
-    found: dict[tuple[int, int, int], dict[str, Any]],
-    radius: Sequence[float],
-    cant: float,
-    deficiency: Sequence[float],
-    friction: Sequence[float],
-) -> Curving:
-    shape = len(radius), len(deficiency), len(friction)
-    arrays = {}
-    for name in Curving.VALUES:
-        first = found[0, 0, 0][name]
-        arrays[name] = np.full((*shape, *first.shape), np.nan)
-        for entry, values in found.items():
-            arrays[name][entry] = values[name]
-    converged = np.zeros(shape, dtype=np.int64)
-    for entry, values in found.items():
-        converged[entry] = values["converged"]
-    index = search.model.index
-    return Curving(
-        np.array(radius, dtype=float),
-        np.array(deficiency, dtype=float),
-        np.array(friction, dtype=float),
-        cant,
-        np.array([[_speed(r, cant, i) for i in deficiency] for r in radius]),
-        converged,
-        wheelsets=index.wheelsets,
-        bogies=tuple(index.bodies[b] for b in search.parts.frames),
-        wheelset_position=tuple(
-            float(search.model.system.frame_offset[search.model.system.bodies.frame[b]])
-            for b in search.parts.wheelsets
-        ),
-        remarks=search.remarks,
-        **arrays,
-    )

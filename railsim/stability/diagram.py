@@ -8,61 +8,50 @@ begins near the unstable motion between them.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from railsim.stability.branches import (
+    DROP,
+    RESOLUTION,
+    THRESHOLD,
+    Branch,
+    Point,
+    far_apart,
+    seen_at,
+)
 from railsim.stability.motion import LeftRange, Motion, Stretch
 from railsim.stability.ramp import (
     CHANGE,
     EXCITATIONS,
-    RESOLUTION,
     SMALL,
-    THRESHOLD,
     WINDOW,
-    Diagram,
     Floats,
     Progress,
-    Sustained,
     hunting,
-    lowest_on,
     moved,
 )
 
-DROP = 0.75  # ratio of neighbouring amplitudes of a branch between which it may jump
-DEATH = 0.5  # the same of small amplitudes
 ALIKE = 0.1  # relative difference of two amplitudes at a speed that count as one motion
+NEAR = 0.03  # relative difference of amplitudes that need not settle further
 SETTLING = 2.0  # s between looks at a step of a diagram
 MOST_SETTLING = 60  # looks; 1 m/s above a critical speed a coach's hunting grows by 0.1/s
-SMALLEST_JUMP = 0.5e-3  # m; less is the growth of small motions from nothing
 THRESHOLDS = 4  # speeds between the ends of two branches at which the unstable motion is sought
 HALVINGS = 6  # of the disturbance there
 MOST_LINGERING = 20  # s of a run that decides for one of two motions
 ARRIVED = 0.9  # share of the way between the two at which it has
 
 
-def settled(motion: Motion, state: Floats, begin: float, speed: float) -> Stretch:
-    """Go from one speed to another, and there until the amplitude changes no more, or has died."""
-    state, before = moved(motion, state, begin, speed), np.inf
-    for _ in range(MOST_SETTLING):
-        seen = motion.stretch(state, speed, speed, SETTLING)
-        if abs(seen.amplitude - before) < 0.1 * CHANGE * seen.amplitude:
-            break
-        if seen.amplitude < 0.02 * THRESHOLD and seen.amplitude < before:
-            break
-        state, before = seen.state, seen.amplitude
-    return seen
-
-
 def diagram(
     motion: Motion,
     speeds: Sequence[float],
     progress: Progress | None = None,
-    *,
     excitations: Sequence[float] = EXCITATIONS,
-    closer: bool = False,
-) -> tuple[list[Diagram], Sustained]:
+) -> list[Branch]:
     """Bifurcation diagram by steps of speed upwards and then downwards with carried states.
+
+    Further motions are sought from all disturbances at all speeds; speeds are added to the branches
+    where they end or jump, to `RESOLUTION`.
 
     Parameters
     ----------
@@ -71,181 +60,170 @@ def diagram(
         Rising [m/s].
     excitations : sequence of float
         Sizes of the disturbances [m].
-    closer : bool
-        Look for further motions from all disturbances at all speeds, add speeds to the branches
-        where they end or jump, to `RESOLUTION`, and the unstable motions between two branches.
 
     Returns
     -------
-    list of Diagram, Sustained
-        Branches up and down, then the others, and the lowest speed at which an oscillation
-        sustains itself.  A branch upwards ends where the vehicle derails.
+    list of Branch
+        Branches up and down, then the others, at last the unstable motions between two branches.
+        A branch upwards ends where the vehicle derails.
     """
     tell = progress or (lambda _: None)
-    up, down = Diagram("up"), Diagram("down")
-    part = 0.25 if closer else 0.5
+    up, down = Branch("up"), Branch("down")
     for speed in speeds:
         try:
-            up.add(speed, _upwards(motion, up, speed))
+            up.points.append(_upwards(motion, up, speed))
         except LeftRange:
             break
-        tell(part * len(up.speed) / len(speeds))
-    if not up.speed:
-        return [up, down], Sustained(None)
-    state, before = hunting(motion, up.speed[-1], excitations).state, up.speed[-1]
-    for speed in reversed(up.speed):
-        down.add(speed, settled(motion, state, before, speed))
-        state, before = down.states[-1], speed
-        tell(part * (1.0 + len(down.speed) / len(speeds)))
-    if not closer:
-        return [up, down], lowest_on(motion, down, speeds[0])
+        tell(0.25 * len(up.points) / len(speeds))
+    if not up.points:
+        return [up, down]
+    reached = [point.speed for point in up.points]
+    state, before = hunting(motion, reached[-1], excitations).state, reached[-1]
+    for speed in reversed(reached):
+        down.points.append(seen_at(speed, settled(motion, state, before, speed)))
+        state, before = down.points[-1].state, speed
+        tell(0.25 * (1.0 + len(down.points) / len(speeds)))
     branches = [up, down]
-    for number, speed in enumerate(up.speed):
+    for number, speed in enumerate(reached):
         branches += _further(motion, branches, speed, excitations)
-        tell(0.5 + 0.25 * number / len(up.speed))
-    branches = [_closer(motion, branch) for branch in branches]
-    between = _thresholds(motion, branches, lambda share: tell(0.75 + 0.25 * share))
-    return branches + between, lowest_of(branches, speeds[0])
+        tell(0.5 + 0.25 * number / len(reached))
+    branches = [_refined(motion, branch) for branch in branches]
+    up, down = branches[:2]
+    between = _threshold(motion, up, down, lambda share: tell(0.75 + 0.25 * share))
+    return [*branches, *([between] if between.points else [])]
 
 
-def lowest_of(branches: Sequence[Diagram], low: float) -> Sustained:
-    """The lowest speed of all branches at which an oscillation sustains itself."""
-    found = [(branch.speed[k], branch, k) for branch in branches for k in branch.alive]
-    if not found:
-        return Sustained(None)
-    speed, branch, k = min(found, key=lambda one: one[0])
-    return Sustained(speed, branch.amplitude[k], branch.frequency[k], below=speed <= low)
+def settled(
+    motion: Motion, state: Floats, begin: float, speed: float, known: Sequence[float] = ()
+) -> Stretch:
+    """Go from one speed to another, and there until the amplitude changes no more, or has died.
+
+    Parameters
+    ----------
+    known : sequence of float
+        Amplitudes of motions at that speed, with 0 for rest: near these it need not settle [m].
+    """
+    state, before = moved(motion, state, begin, speed), np.inf
+    dead = THRESHOLD if 0.0 in known else 0.02 * THRESHOLD
+    for _ in range(MOST_SETTLING):
+        seen = motion.stretch(state, speed, speed, SETTLING)
+        change = abs(seen.amplitude - before) / max(seen.amplitude, 1e-12)
+        near = any(abs(a - seen.amplitude) < NEAR * a for a in known)
+        if change < 0.1 * CHANGE or (near and change < 0.5 * CHANGE):
+            break
+        if seen.amplitude < dead and seen.amplitude < before:
+            break
+        state, before = seen.state, seen.amplitude
+    return seen
 
 
-def _upwards(motion: Motion, up: Diagram, speed: float) -> Stretch:
+def _upwards(motion: Motion, up: Branch, speed: float) -> Point:
     """The next motion upwards; where the last one rests, from a small disturbance."""
-    if not up.speed or up.amplitude[-1] < SMALL:
-        return settled(motion, motion.rest(speed, SMALL), speed, speed)
-    return settled(motion, up.states[-1], up.speed[-1], speed)
+    last = up.points[-1] if up.points else None
+    if last is None or last.amplitude < SMALL:
+        return seen_at(speed, settled(motion, motion.rest(speed, SMALL), speed, speed))
+    return seen_at(speed, settled(motion, last.state, last.speed, speed))
 
 
-def _is_known(amplitude: float, branches: Sequence[Diagram], speed: float) -> bool:
-    """Whether one of the branches has a motion of this amplitude at a speed."""
-    for branch in branches:
-        for k, v in enumerate(branch.speed):
-            known = branch.amplitude[k]
-            if v == speed and abs(known - amplitude) <= ALIKE * max(known, amplitude):
-                return True
-    return amplitude < THRESHOLD
+def _is_known(point: Point, branches: Sequence[Branch]) -> bool:
+    """Whether it is rest, or one of the branches has a motion of its amplitude at its speed."""
+    return point.amplitude < THRESHOLD or any(
+        abs(known - point.amplitude) <= ALIKE * max(known, point.amplitude)
+        for known in _amplitudes(branches, point.speed)
+    )
+
+
+def _amplitudes(branches: Sequence[Branch], speed: float) -> list[float]:
+    """Amplitudes of all motions at a speed, 0 for rest."""
+    points = [point for branch in branches for point in branch.points if point.speed == speed]
+    return [0.0, *(point.amplitude for point in points)]
 
 
 def _further(
-    motion: Motion, branches: Sequence[Diagram], speed: float, excitations: Sequence[float]
-) -> list[Diagram]:
+    motion: Motion, branches: Sequence[Branch], speed: float, excitations: Sequence[float]
+) -> list[Branch]:
     """Branches of motions at a speed that no branch has, followed to both sides."""
-    speeds = branches[0].speed
-    found: list[Diagram] = []
+    speeds = [point.speed for point in branches[0].points]
+    below, above = [v for v in speeds[::-1] if v < speed], [v for v in speeds if v > speed]
+    found: list[Branch] = []
     for size in excitations:
+        known = _amplitudes([*branches, *found], speed)
         try:
-            seen = settled(motion, motion.rest(speed, size), speed, speed)
+            here = seen_at(speed, settled(motion, motion.rest(speed, size), speed, speed, known))
         except LeftRange:
             continue
-        if _is_known(seen.amplitude, [*branches, *found], speed):
-            continue
-        sides = []
-        for side in ([v for v in reversed(speeds) if v < speed], [v for v in speeds if v > speed]):
-            sides.append(_followed(motion, branches, seen.state, [speed, *side]))
-        here = Diagram("further")
-        here.add(speed, seen)
-        found.append(sides[0].taken(range(len(sides[0].speed))[::-1]) + here + sides[1])
+        if not _is_known(here, [*branches, *found]):
+            down, up = (_followed(motion, branches, here, side) for side in (below, above))
+            found.append(Branch("further", [*down[::-1], here, *up]))
     return found
 
 
 def _followed(
-    motion: Motion, branches: Sequence[Diagram], state: Floats, speeds: Sequence[float]
-) -> Diagram:
-    """A branch from the first of several speeds on, to its first motion that is known or dead."""
-    line = Diagram("further")
-    for before, speed in pairwise(speeds):
+    motion: Motion, branches: Sequence[Branch], start: Point, speeds: Sequence[float]
+) -> list[Point]:
+    """Motions from one on over several speeds, to the first that is known or dead."""
+    points = [start]
+    for speed in speeds:
         try:
-            seen = settled(motion, state, before, speed)
+            seen = settled(motion, points[-1].state, points[-1].speed, speed)
         except LeftRange:
             break
-        line.add(speed, seen)
-        state = seen.state
-        if _is_known(seen.amplitude, branches, speed):
+        points.append(seen_at(speed, seen))
+        if _is_known(points[-1], branches):
             break
-    return line
+    return points[1:]
 
 
-def _closer(motion: Motion, branch: Diagram) -> Diagram:
+def _refined(motion: Motion, branch: Branch) -> Branch:
     """The branch with more speeds where its amplitude changes much, as it does at its ends.
 
     Where rest loses its stability no more are needed: the eigenvalues tell that speed.
     """
-    line = Diagram(branch.direction)
-    for k in range(len(branch.speed)):
-        if k:
-            line = line + _between(motion, branch.taken([k - 1, k]))
-        line = line + branch.taken([k])
-    return line
+    points = branch.points[:1]
+    for before, after in pairwise(branch.points):
+        points += [*_between(motion, branch.direction, before, after), after]
+    return Branch(branch.direction, points)
 
 
-def _between(motion: Motion, ends: Diagram) -> Diagram:
-    """Points between two neighbouring ones, so many that no jump is wider than `RESOLUTION`."""
-    none = Diagram(ends.direction)
-    source = int(ends.direction == "further" and ends.amplitude[1] > ends.amplitude[0])
-    if abs(ends.speed[1] - ends.speed[0]) <= RESOLUTION or ends.amplitude[source] < THRESHOLD:
-        return none
-    if not _far_apart(*ends.amplitude):
-        return none
-    middle = 0.5 * (ends.speed[0] + ends.speed[1])
+def _between(motion: Motion, direction: str, before: Point, after: Point) -> list[Point]:
+    """Points between two neighbours, so many that no jump is wider than `RESOLUTION`."""
+    source = before
+    if direction == "further" and after.amplitude > before.amplitude:
+        source = after
+    near = abs(after.speed - before.speed) <= RESOLUTION
+    if near or source.amplitude < THRESHOLD or not far_apart(before.amplitude, after.amplitude):
+        return []
+    middle = 0.5 * (before.speed + after.speed)
     try:
-        seen = settled(motion, ends.states[source], ends.speed[source], middle)
+        here = seen_at(middle, settled(motion, source.state, source.speed, middle))
     except LeftRange:
-        return none
-    here = Diagram(ends.direction)
-    here.add(middle, seen)
-    before, after = ends.taken([0]) + here, here + ends.taken([1])
-    return _between(motion, before) + here + _between(motion, after)
+        return []
+    lower = _between(motion, direction, before, here)
+    return [*lower, here, *_between(motion, direction, here, after)]
 
 
-def _far_apart(one: float, other: float) -> bool:
-    """Whether two amplitudes may belong to different motions."""
-    share = DROP if abs(one - other) > SMALLEST_JUMP else DEATH
-    return min(one, other) < share * max(one, other)
-
-
-def _thresholds(motion: Motion, branches: Sequence[Diagram], tell: Progress) -> list[Diagram]:
-    """Unstable motions between the branch upwards and the one downwards where both go on."""
-    up, down = branches[:2]
+def _threshold(motion: Motion, up: Branch, down: Branch, tell: Progress) -> Branch:
+    """Unstable motions between the branch upwards and the one downwards where both are followed."""
+    line = Branch("threshold")
     differ = [
-        v
-        for v, a in zip(down.speed, down.amplitude, strict=True)
-        if a > THRESHOLD and _at(up, v)[1] < DROP * a
+        point.speed
+        for point in down.points
+        if point.amplitude > THRESHOLD and up.amplitude_at(point.speed) < DROP * point.amplitude
     ]
     if len(differ) < 2:
-        return []
-    line = Diagram("threshold")
-    ends = min(differ), max(differ)
-    for number, speed in enumerate(np.linspace(*ends, THRESHOLDS + 2)[1:-1].tolist()):
+        return line
+    inside = np.linspace(min(differ), max(differ), THRESHOLDS + 2)[1:-1].tolist()
+    for number, speed in enumerate(inside):
+        near = [branch.nearest(speed) for branch in (down, up)]
         try:
-            upper, lower = (
-                settled(motion, branch.states[k], branch.speed[k], speed)
-                for branch in (down, up)
-                for k in _at(branch, speed)[:1]
-            )
+            upper, lower = (settled(motion, one.state, one.speed, speed) for one in near)
         except LeftRange:
             continue
         if lower.amplitude < DROP * upper.amplitude:
             seen = _unstable(motion, speed, lower, upper)
-            line.add(speed, seen)
-            line.stable[-1] = False
+            line.points.append(seen_at(speed, seen, stable=False))
         tell((number + 1) / THRESHOLDS)
-    return [line] if line.speed else []
-
-
-def _at(branch: Diagram, speed: float) -> tuple[int, float]:
-    """Number of the nearest point of a branch, and its amplitude there, between its points."""
-    order = np.argsort(branch.speed)
-    speeds, amplitudes = np.array(branch.speed)[order], np.array(branch.amplitude)[order]
-    nearest = int(np.argmin(np.abs(np.array(branch.speed) - speed)))
-    return nearest, float(np.interp(speed, speeds, amplitudes))
+    return line
 
 
 def _unstable(motion: Motion, speed: float, lower: Stretch, upper: Stretch) -> Stretch:
@@ -274,31 +252,3 @@ def _unstable(motion: Motion, speed: float, lower: Stretch, upper: Stretch) -> S
         else:
             least, below = share, first or seen
     return below
-
-
-def jumps(branches: Sequence[Diagram]) -> list[dict[str, Any]]:
-    """Speeds at which a branch ends and the motion goes over to another, or to rest.
-
-    Returns
-    -------
-    list of dict
-        ``direction`` of the change of speed, ``speed`` of the last motion before [m/s],
-        ``amplitude`` there and ``to``, that of the motion after [m].
-    """
-    found: list[dict[str, Any]] = []
-    for branch in branches:
-        if branch.direction not in ("up", "down"):
-            continue
-        points = list(zip(branch.speed, branch.amplitude, strict=True))
-        for (speed, before), (other, after) in pairwise(points):
-            is_jump = abs(after - before) > SMALLEST_JUMP and abs(other - speed) <= RESOLUTION
-            if is_jump and _far_apart(before, after):
-                found.append(
-                    {
-                        "direction": branch.direction,
-                        "speed": speed,
-                        "amplitude": before,
-                        "to": after,
-                    }
-                )
-    return found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.status import RUNNING, STATUS
-from railsim.kernels.system import TABLE, Drive
+from railsim.kernels.system import TABLE, Drive, System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
 from railsim.linear.eigenmodes import Eigenmodes
@@ -113,13 +113,10 @@ class VehicleMotion:
     """
 
     def __init__(self, prepared: LinearVehicle, scheme: str, mode: Eigenmodes) -> None:
-        self.prepared = prepared
-        self.model = prepared.model
-        self.system = prepared.system
-        self.scheme = SCHEMES[scheme]
+        self.prepared, self.model, self.system = prepared, prepared.model, prepared.system
         self._scheme = scheme
         self._steps: dict[int, float] = {}
-        self.work = work_arrays(self.system)
+        self._work = work_arrays(self.system)
         size = self.model.n_state
         self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
         self._recorder = empty_recorder(self.model, int(LONGEST * OUTPUT_RATE) + 2)
@@ -132,15 +129,12 @@ class VehicleMotion:
         """Time step at a speed: the shorter one of those at both ends of its class [s]."""
         number = math.floor(math.log(speed) / math.log(SPEED_CLASS) + 1e-9)
         if number not in self._steps:
+            states = [self.prepared.steady(SPEED_CLASS**end).state for end in (number, number + 1)]
             self._steps[number] = min(
-                Stability(
-                    self.model,
-                    self.system,
-                    self.prepared.steady(end).state,
-                    self._scheme,
-                    lambda _: None,
-                ).choose(1.0 / OUTPUT_RATE)
-                for end in (SPEED_CLASS**number, SPEED_CLASS ** (number + 1))
+                Stability(self.model, self.system, state, self._scheme, lambda _: None).choose(
+                    1.0 / OUTPUT_RATE
+                )
+                for state in states
             )
         return self._steps[number]
 
@@ -160,12 +154,11 @@ class VehicleMotion:
             v0, v1 = (begin + (end - begin) * t / duration for t in (done, done + length))
             parts.append(self._part(parts[-1].state if parts else state, v0, v1, length, done))
             done += length
-        return Stretch(
-            parts[-1].state,
-            np.concatenate([part.time for part in parts]),
-            np.concatenate([part.lateral for part in parts]),
-            np.concatenate([part.sum_Y for part in parts]),
+        time, lateral, sum_Y = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("time", "lateral", "sum_Y")
         )
+        return Stretch(parts[-1].state, time, lateral, sum_Y)
 
     def _part(
         self, before: Floats, begin: float, end: float, duration: float, offset: float
@@ -178,25 +171,41 @@ class VehicleMotion:
         system = self.system._replace(drive=Drive(TABLE, table, np.zeros(3)))
         step = self.step_at(begin)
         every = round(1.0 / OUTPUT_RATE / step)
+        chunk = Chunk(0, max(1, round(duration / step)), every, fresh=fresh)
+        rows = self.advance(system, state, step, chunk)
+        wheel = self._recorder.wheel[:rows, :, :, W_Y]
+        time = offset + step * every * np.arange(rows, dtype=np.float64)
+        return Stretch(state, time, self.lateral(rows), wheel.sum(axis=2))
+
+    def advance(self, system: System, state: Floats, step: float, chunk: Chunk) -> int:
+        """Move a state of the time loop by a chunk of steps; number of records.
+
+        Raises
+        ------
+        LeftRange
+            The motion leaves the range of the model.
+        """
         status, where, _, rows = time_loop(
             system,
-            self.work,
+            self._work,
             state,
             self._derivative,
             self._stages,
             self._recorder,
-            self.scheme,
+            SCHEMES[self._scheme],
             step,
-            Chunk(0, max(1, round(duration / step)), every, fresh=fresh),
+            chunk,
         )
         if status != RUNNING or not np.isfinite(state).all():
             sentence = STATUS[status][1] if status != RUNNING else "the state is not finite"
             names = self.model.index.wheelsets
             raise LeftRange(sentence.format(where=names[where] if where < len(names) else where))
-        wheel = self._recorder.wheel[:rows, :, :, W_Y]
-        return Stretch(
-            state,
-            offset + step * every * np.arange(rows),
-            against_rails(self.model, self._recorder.state[:rows])[..., 0],
-            wheel.sum(axis=2),
-        )
+        return int(rows)
+
+    def records(self, rows: int) -> Floats:
+        """States recorded by the last chunk, float64[rows, n_state]."""
+        return np.asarray(self._recorder.state[:rows].copy())
+
+    def lateral(self, rows: int) -> Floats:
+        """Lateral displacements of the wheelsets in these records [m]."""
+        return np.asarray(against_rails(self.model, self._recorder.state[:rows])[..., 0])

@@ -93,8 +93,8 @@ class PeriodicMotion:
         return bool(np.all(np.abs(self.multipliers) < 1.0 + MULTIPLIER))
 
 
-class Branch:
-    """The branch of periodic motions that begins where an equilibrium loses its stability.
+class Shooting:
+    """Newton's method for the periodic motions of a system.
 
     Parameters
     ----------
@@ -262,9 +262,10 @@ class Branch:
                 found[share] = self.ahead(before, share)[0]
             return float(found[share].tangent[-1])
 
-        if before.tangent[-1] * forward(length) > 0.0:
+        first = 1e-6 * length
+        if forward(first) * forward(length) > 0.0:  # of a fold with a kink: the nearer motion
             return after
-        root = brentq(forward, 1e-6 * length, length, xtol=1e-5 * length)
+        root = float(brentq(forward, first, length, xtol=1e-5 * length))
         forward(root)
         return found[root]
 

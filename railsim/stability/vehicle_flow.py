@@ -8,21 +8,18 @@ rates are counted from steady rolling at the speed at hand.
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.kernels.status import RUNNING
 from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS
-from railsim.kernels.time_loop import Chunk, time_loop
+from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
-from railsim.model.time_step import empty_recorder
-from railsim.model.work import CONSTANT_SPEED, work_arrays
-from railsim.simulation.outputs import against_rails
-from railsim.stability.motion import VehicleMotion
+from railsim.model.work import CONSTANT_SPEED
+from railsim.stability.motion import LeftRange, VehicleMotion
 
 Floats = NDArray[np.float64]
 
-# least sizes by which components are scaled, of positions, velocities, internal states, memory of
-# accelerations and of drives: a difference quotient takes 1e-5 of them
-FLOORS = (1e-4, 1e-3, 100.0, 0.1, 1e-3)
+# least sizes by which components are scaled, a difference quotient takes 1e-5 of them
+LENGTH, RATE, FORCE, ACCELERATION, DRIVE = 1e-4, 1e-3, 100.0, 0.1, 1e-3
+OF_TRACK = (LENGTH, RATE, RATE, ACCELERATION, ACCELERATION)
 OBSERVED = 40  # records within a period
 
 
@@ -34,7 +31,7 @@ class VehicleFlow:
     motion : VehicleMotion
         Vehicle, scheme and step.
     speed : float
-        Speed of the bifurcation [m/s].
+        Near which motions are sought: it decides the step [m/s].
     """
 
     mirror = None
@@ -42,17 +39,11 @@ class VehicleFlow:
     def __init__(self, motion: VehicleMotion, speed: float) -> None:
         self._motion = motion
         self._system = motion.system._replace(drive=CONSTANT_SPEED)
-        self._work = work_arrays(self._system)
         self._step = motion.step_at(speed)
         self._rest = motion.prepared.steady(speed).state.copy()
         self._indices, self._floors = self._moving()
-        n = motion.model.index.n_bodies
-        spins = 6 * n + 6 * self._system.contact.body + 4
-        self._spins = spins
-        self._per_speed = self._rest[spins] / speed
-        size = motion.model.n_state
-        self._derivative, self._stages = np.zeros(size), np.zeros((3, size))
-        self._recorder = empty_recorder(motion.model, OBSERVED + 2)
+        spins = 6 * motion.model.index.n_bodies + 6 * self._system.contact.body + 4
+        self._spins, self._per_speed = spins, self._rest[spins] / speed
 
     def _moving(self) -> tuple[NDArray[np.int64], Floats]:
         """Indices of all entries that move, and the least size of each."""
@@ -60,28 +51,25 @@ class VehicleFlow:
         n, m = model.index.n_bodies, len(system.internal.kind)
         c = self._motion.prepared.coordinates
         reference = int(system.bodies.references[0])
-        indices: list[int] = []
-        floors: list[float] = []
+        found: list[tuple[int, float]] = []
         for k in range(c.n_positions + c.n_velocities):
             body, component = int(c.bodies[k]), int(c.components[k])
             if body == reference and component == 0:
                 continue
             is_velocity = k >= c.n_positions
-            indices.append(int(c.indices[k]))
-            floors.append(FLOORS[1] if is_velocity else FLOORS[0])
+            found.append((int(c.indices[k]), RATE if is_velocity else LENGTH))
             if is_velocity:
-                indices.append(12 * n + m + 6 * body + component)
-                floors.append(FLOORS[3])
-        indices += [12 * n + i for i in range(m)] + [18 * n + m + i for i in range(m)]
-        floors += [FLOORS[2]] * m + [FLOORS[4]] * m
+                found.append((12 * n + m + 6 * body + component, ACCELERATION))
+        found += [(12 * n + i, FORCE) for i in range(m)]
+        found += [(18 * n + m + i, DRIVE) for i in range(m)]
         if system.support.elastic:
             end = model.n_state - N_SCALARS
             first = end - SUPPORT_SIZE * len(system.contact.body)
-            # what slopes have learnt is no motion: each period begins without it
-            track = [k for k in range(first, end) if (k - first) % SUPPORT_SIZE < LEARNT]
-            indices += track
-            kinds = (FLOORS[0], FLOORS[1], FLOORS[1], FLOORS[3], FLOORS[3])
-            floors += [kinds[(k - first) % SUPPORT_SIZE // DOF] for k in track]
+            for k in range(first, end):
+                entry = (k - first) % SUPPORT_SIZE
+                if entry < LEARNT:  # what slopes have learnt is no motion: a period begins without
+                    found.append((k, OF_TRACK[entry // DOF]))
+        indices, floors = zip(*found, strict=True)
         return np.array(indices, dtype=np.int64), np.array(floors)
 
     def reduced(self, state: Floats) -> Floats:
@@ -98,58 +86,40 @@ class VehicleFlow:
         state[-3:] = 0.0, POSITION, speed
         return state
 
-    def steps(self, duration: float) -> int:
+    def _steps(self, duration: float) -> int:
         """Number of steps in a period of the length of the runs' steps, as nearly as it fits."""
-        steps: int = round(duration / self._step)
-        return max(8, steps)
+        return max(8, round(duration / self._step))
 
     def after(self, states: Floats, durations: Floats, speeds: Floats) -> Floats:
         """States after a while, one motion a row; all with the number of steps of the first."""
-        steps = self.steps(float(durations[0]))
-        ends = []
-        for state, duration, speed in zip(states, durations, speeds, strict=True):
+        steps = self._steps(float(durations[0]))
+        ends = np.full_like(states, np.nan)
+        for row, state, duration, speed in zip(ends, states, durations, speeds, strict=True):
             full = self.full(state, float(speed))
-            status, *_ = time_loop(
-                self._system,
-                self._work,
-                full,
-                self._derivative,
-                self._stages,
-                self._recorder,
-                self._motion.scheme,
-                float(duration) / steps,
-                Chunk(1, steps, 1 << 40),
-            )
-            if status != RUNNING:
-                full[:-N_SCALARS] = np.nan
-            ends.append(self.reduced(full))
-        return np.array(ends)
+            try:
+                self._motion.advance(
+                    self._system, full, float(duration) / steps, Chunk(1, steps, 1 << 40)
+                )
+            except LeftRange:
+                continue
+            row[:] = self.reduced(full)
+        return ends
 
     def amplitude(self, state: Floats, duration: float, speed: float) -> float:
         """Half the largest lateral travel of a wheelset within `duration` [m]."""
-        y = against_rails(self._motion.model, self._seen(state, duration, speed))[..., 0]
+        y = self._motion.lateral(self._observe(state, duration, speed))
         return float(0.5 * np.max(np.ptp(y, axis=0)))
 
     def scale(self, state: Floats, duration: float, speed: float, amplitude: float) -> Floats:
         """Size of each component in a motion of 1 mm, from a motion of a known amplitude."""
-        seen = np.array([self.reduced(row) for row in self._seen(state, duration, speed)])
-        size = 0.5 * np.ptp(seen, axis=0) * 1e-3 / amplitude
+        rows = self._motion.records(self._observe(state, duration, speed))
+        size = 0.5 * np.ptp([self.reduced(row) for row in rows], axis=0) * 1e-3 / amplitude
         return np.asarray(np.maximum(size, self._floors))
 
-    def _seen(self, state: Floats, duration: float, speed: float) -> Floats:
-        """Records of about one period."""
-        steps = self.steps(duration)
+    def _observe(self, state: Floats, duration: float, speed: float) -> int:
+        """Record about one period; number of records."""
+        steps = self._steps(duration)
         every = max(1, steps // OBSERVED)
         full = self.full(state, speed)
-        _, _, _, rows = time_loop(
-            self._system,
-            self._work,
-            full,
-            self._derivative,
-            self._stages,
-            self._recorder,
-            self._motion.scheme,
-            duration / steps,
-            Chunk(0, OBSERVED * every, every),
-        )
-        return np.asarray(self._recorder.state[:rows].copy())
+        chunk = Chunk(0, OBSERVED * every, every)
+        return self._motion.advance(self._system, full, duration / steps, chunk)

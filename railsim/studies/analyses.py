@@ -120,12 +120,12 @@ def _critical_speed(case: Case, analysis: CriticalSpeedAnalysis, result: Result 
         **_contact(analysis),
     )
     if found.linear is not None:
-        numbers = {"linear": found.linear["speed"], "frequency": found.linear["frequency"]}
+        numbers = {"linear": found.linear.speed, "frequency": found.linear.frequency}
     else:
         unstable = any(remark.startswith("unstable at") for remark in found.remarks)
         numbers = {"linear": analysis.low if unstable else analysis.high}
-    for method, sustained in found.nonlinear.items():
-        numbers[method] = analysis.high if sustained.speed is None else sustained.speed
+    for method, point in found.nonlinear.items():
+        numbers[method] = analysis.high if point is None else point.speed
     return numbers
 
 

@@ -15,13 +15,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, RailsimError
+from railsim.linear.vehicle import AMPLITUDE, Contact
 from railsim.processes import workers_begin
 from railsim.stability.critical_speed import critical_speed
 from railsim.studies.records import Record, read_record, write_record
+from railsim.table import Column, Table
 from railsim.version import __version__
 
 Progress = Callable[[float], None]
@@ -137,3 +141,43 @@ def _kept(folder: Path | None, job: tuple[MapPoint, dict[str, Any]]) -> Path | N
     files = [part.to_toml() for part in (point.vehicle, point.track, point.settings)]
     text = json.dumps([__version__, *files, point.at, options], sort_keys=True)
     return folder / "points" / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
+
+
+def map_speeds(records: Sequence[Record]) -> dict[str, np.ndarray]:
+    """Return the critical speeds of a map by method in words, NaN where there is none [m/s]."""
+    first = next((record for record in records if "linearisation" in record), {})
+    contact = Contact(first.get("linearisation", "tangent"), first.get("amplitude") or AMPLITUDE)
+    kinds = {"linear": f"linear, {contact.words()}"}
+    methods = dict.fromkeys(m for one in records for m in one.get("nonlinear_by_method") or ())
+    if methods:
+        kinds["nonlinear"] = f"non-linear, {', '.join(methods)}"
+    return {
+        words: np.array([(record[kind] or {}).get("speed") for record in records], dtype=float)
+        for kind, words in kinds.items()
+    }
+
+
+def map_table(records: Sequence[Record], parameters: Sequence[str]) -> Table:
+    """Return the critical speeds of a map over its parameters.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        See `stability_map`.
+    parameters : sequence of str
+        Keys that have several values.
+    """
+    speeds = map_speeds(records)
+    columns = [Column(name, format="g") for name in parameters]
+    columns += [Column(words, unit="m/s", format=".2f") for words in speeds]
+    rows = [
+        [*(record["at"][name] for name in parameters), *(column[k] for column in speeds.values())]
+        for k, record in enumerate(records)
+    ]
+    where: dict[str, str] = next(
+        (record["conditions"] for record in records if "conditions" in record), {}
+    )
+    words = [f"{key} {value}" for key, value in where.items() if key in ("rails", "law")]
+    if "friction" not in parameters and where:
+        words.append(f"friction {where['friction']}")
+    return Table(columns, rows, ", ".join(words))

@@ -198,7 +198,8 @@ def _write_rows(rows: Iterable[Row], stream: BinaryIO) -> None:
     with tempfile.TemporaryFile() as lines:  # all columns are known at the end only
         for row in rows:
             columns.update(dict.fromkeys(row))
-            line = _csv_line(spreadsheet_cell(row.get(name, "")) for name in columns)
+            cells = [row.get(name, "") for name in columns]
+            line = _csv_line([spreadsheet_cell(c) if isinstance(c, str) else c for c in cells])
             lines.write(line)
             sizes.append((len(line), len(columns)))
         units = {name: unit_of(name) for name in columns}

@@ -397,7 +397,7 @@ def test_scatter_says_which_dimension_matters(capsys):
     assert 0.0 < stroke["random"] < stroke["worst"]
     assert stroke["worst"] == pytest.approx(sum(abs(v) for v in stroke["single"].values()))
     assert cli.main(["mechanism", "atr95_lift_5", *FEW]) == 0
-    assert re.search(r"stroke +113\.6682 mm .* d \(", capsys.readouterr().out)
+    assert re.search(r"stroke \(mm\) +113\.6682 .* d \(", capsys.readouterr().out)
 
 
 WITHOUT_UNIT = ("ratio dy/dL", "ratio over the first's", "rate of the driver", "objective", "start")

@@ -12,7 +12,8 @@ from railsim.cli import main
 def test_modes_at_one_speed(capsys):
     assert main(["modes", "coach_manchester", "--speed", "30", "--quiet"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("30 m/s, contact tangent")
+    assert "30 m/s, straight track" in lines[0]
+    assert lines[0].endswith("contact tangent")
     assert any(line.startswith("lower sway") for line in lines)
     assert any(line.startswith("front hunting") for line in lines)
 

@@ -181,7 +181,7 @@ def test_analyses_are_columns_of_the_summary(tmp_path):
     assert not list(tmp_path.glob("*.h5"))
     vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("curve_r250")
     hunting = railsim.critical_speed(vehicle, track, methods=["linear"], low=20.0, high=60.0)
-    assert record["quantities"]["hunting.linear"] == hunting.linear["speed"]
+    assert record["quantities"]["hunting.linear"] == hunting.linear.speed
     least = railsim.modes(vehicle, track, speed=20.0, linearisation="harmonic").least_damped
     assert record["quantities"]["shape.damping"] == least.damping_ratio
     header = (tmp_path / "summary.csv").read_text().splitlines()[0]

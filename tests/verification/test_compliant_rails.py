@@ -99,7 +99,7 @@ def test_what_lateral_compliance_of_the_rails_costs(coach, loss, within):
     speeds = [
         critical_speed(
             load_vehicle(coach), track, methods=("linear",), low=20.0, over_amplitude=False
-        ).linear["speed"]
+        ).linear.speed
         for track in (RIGID, ELASTIC)
     ]
     assert speeds[0] == pytest.approx(closed(coach, 1e-6), rel=0.04)
@@ -111,9 +111,9 @@ def test_stiff_pads_and_ballast_across_the_track_are_rigid_rails():
     stiff = {"preset": "ballasted", "pad_lateral": [4e10, 1e7], "ballast_lateral": [4e10, 1e7]}
     coach = load_vehicle("coach_flexicoil")
     speeds = [
-        critical_speed(coach, track, methods=("linear",), low=20.0, over_amplitude=False).linear[
-            "speed"
-        ]
+        critical_speed(
+            coach, track, methods=("linear",), low=20.0, over_amplitude=False
+        ).linear.speed
         for track in (RIGID, ELASTIC.replace(support=stiff))
     ]
     assert speeds[1] == pytest.approx(speeds[0], abs=1.0)

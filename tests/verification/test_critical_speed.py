@@ -7,9 +7,10 @@ from dynamics import load_track, load_vehicle
 from selection import points
 
 from railsim.linear.modes import modes
+from railsim.stability.branches import THRESHOLD, lowest_of
 from railsim.stability.critical_speed import critical_speed
 from railsim.stability.diagram import diagram
-from railsim.stability.ramp import THRESHOLD, ramp
+from railsim.stability.ramp import ramp
 
 RIGID = load_track("straight").replace(support={"preset": "rigid"})
 
@@ -20,23 +21,26 @@ def test_ramp_finds_the_fold_of_cooperriders_bogie():
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
     assert 1e3 * lowest.amplitude == pytest.approx(9.36, abs=0.15)
     assert lowest.frequency == pytest.approx(3.80, rel=0.01)
-    died = min(v for v, a in zip(branch.speed, branch.amplitude, strict=True) if a > 5e-3)
+    died = min(point.speed for point in branch.points if point.amplitude > 5e-3)
     assert 65.0 < died < lowest.speed
-    assert np.all(np.diff(branch.speed) <= 0.0)
+    assert np.all(np.diff(branch.column("speed")) <= 0.0)
 
 
 def test_diagram_of_cooperriders_bogie_has_two_branches_between_fold_and_bifurcation():
     """N1 at 68 and 70 m/s; upwards nothing hunts below 68.67 m/s, downwards it does to 66.69."""
     speeds = [64.0, 66.0, 68.0, 70.0, 72.0]
-    (up, down), lowest = diagram(cooperrider.Rolling(), speeds)
-    assert up.speed == speeds
-    assert down.speed == speeds[::-1]
-    amplitude = dict(zip(up.speed, up.amplitude, strict=True))
+    branches = diagram(cooperrider.Rolling(), speeds)
+    up, down = branches[:2]
+    assert set(speeds) <= {point.speed for point in up.points}
+    assert np.all(np.diff(up.column("speed")) > 0.0)
+    assert np.all(np.diff(down.column("speed")) < 0.0)
+    amplitude = {point.speed: point.amplitude for point in up.points}
     assert max(amplitude[v] for v in (64.0, 66.0, 68.0)) < THRESHOLD
-    back = dict(zip(down.speed, down.amplitude, strict=True))
+    back = {point.speed: point.amplitude for point in down.points}
     assert 1e3 * back[68.0] == pytest.approx(9.735, rel=5e-3)
     assert 1e3 * back[70.0] == pytest.approx(10.185, rel=5e-3)
     assert back[66.0] < THRESHOLD
+    lowest = lowest_of(branches)
     assert lowest.speed == pytest.approx(66.69, abs=0.15)
 
 
@@ -76,7 +80,7 @@ def test_three_methods_agree_on_a_coach(name, kind, monkeypatch):
 @pytest.mark.further
 def test_a_diagram_alone_tells_how_hunting_begins(name, kind):
     """As continuation does; the hysteresis of the Flexicoil coach, 0.2 m/s, lies between steps."""
-    critical = critical_speed(load_vehicle(name), RIGID, methods=("linear",)).linear["speed"]
+    critical = critical_speed(load_vehicle(name), RIGID, methods=("linear",)).linear.speed
     found = critical_speed(
         load_vehicle(name),
         RIGID,
@@ -103,10 +107,10 @@ def test_without_critical_speed_in_the_range_the_least_damped_modes_are_told():
 def test_the_critical_mode_is_undamped_there():
     coach = load_vehicle("coach_flexicoil")
     found = critical_speed(coach, RIGID, methods=("linear",), linearisation="harmonic")
-    there = modes(coach, RIGID, speed=found.linear["speed"], linearisation="harmonic")
+    there = modes(coach, RIGID, speed=found.linear.speed, linearisation="harmonic")
     assert there.least_damped.damping_ratio == pytest.approx(0.0, abs=1e-5)
-    assert there.least_damped.frequency == pytest.approx(found.linear["frequency"], rel=1e-6)
-    assert "hunting" in found.linear["mode"]
+    assert there.least_damped.frequency == pytest.approx(found.linear.frequency, rel=1e-6)
+    assert "hunting" in found.linear.mode
 
 
 @points("support", ["rigid", "ballasted"], always=(0,))
@@ -121,7 +125,7 @@ def test_linear_critical_speed_has_no_jumps_over_friction(support):
             low=55.0,
             high=90.0,
             over_amplitude=False,
-        ).linear["speed"]
+        ).linear.speed
         for friction in np.arange(0.30, 0.601, 0.02)
     ]
     assert np.max(np.abs(np.diff(found))) < 0.5
@@ -143,17 +147,17 @@ def test_every_branch_of_the_manchester_coach_is_found():
     )
     lowest = found.nonlinear["bifurcation"].speed
     assert 38.5 < lowest <= 40.0
-    assert lowest < found.linear["speed_of_runs"]
+    assert lowest < found.linear.speed_of_runs
     assert found.type == "subcritical"
-    (up,) = [jump for jump in found.jumps if jump["direction"] == "up"]
-    assert 48.0 < up["speed"] < 49.0
-    assert up["to"] > 1.5 * up["amplitude"]
+    (up,) = [jump for jump in found.jumps if jump.direction == "up"]
+    assert 48.0 < up.speed < 49.0
+    assert up.to > 1.5 * up.amplitude
     record = found.record()
     for limit in ("amplitude_limit", "instability_limit"):
         assert record[limit]["reached"]
         assert lowest <= record[limit]["speed"] < 60.0
     (between,) = [branch for branch in found.branches if branch.direction == "threshold"]
-    assert not any(between.stable)
+    assert not any(point.stable for point in between.points)
 
 
 def test_a_limit_that_is_not_reached_is_said_so():
@@ -179,8 +183,8 @@ def test_critical_speed_over_amplitude_and_its_smallest():
     """Conicity falls with the amplitude from 0.3 mm on (EN 15302), so that the speed rises."""
     found = critical_speed(load_vehicle("coach_manchester"), RIGID, methods=("linear",))
     line = found.linear_over_amplitude
-    assert line["amplitude"][0] == 0.1e-3
-    assert line["amplitude"][-1] == 6e-3
-    assert np.all(np.diff(line["speed"]) > 0.0)
-    assert line["smallest"]["speed"] == min(line["speed"])
-    assert line["speed"][0] == pytest.approx(found.linear["speed"], rel=0.03)
+    assert line.amplitude[0] == 0.1e-3
+    assert line.amplitude[-1] == 6e-3
+    assert np.all(np.diff(line.speed) > 0.0)
+    assert line.smallest[0] == min(line.speed)
+    assert line.speed[0] == pytest.approx(found.linear.speed, rel=0.03)

@@ -6,7 +6,7 @@ import pytest
 
 from railsim.linear.eigenmodes import followed, loss_of_stability
 from railsim.linear.system import Linearisation, NamedSystem, linearise
-from railsim.stability.periodic import Branch
+from railsim.stability.periodic import Shooting
 
 
 def bogie(speed):
@@ -22,7 +22,7 @@ def birth():
     lost = loss_of_stability(bogie, 30.0, 120.0)
     shape = lost.modes[0].shapes[0]
     scale = np.abs(shape / shape[0]) * 1e-3  # of a motion of 1 mm of the leading wheelset
-    branch = Branch(cooperrider.Periods(), scale, period_scale=0.01, speed_scale=1.0)
+    branch = Shooting(cooperrider.Periods(), scale, period_scale=0.01, speed_scale=1.0)
     start = branch.beginning(np.zeros(14), shape, lost.modes[0].frequencies[0], lost.parameter)
     return branch, start
 

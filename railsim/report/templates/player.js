@@ -2,7 +2,7 @@
   "use strict";
   var data = JSON.parse(document.getElementById("data").textContent), ns = "http://www.w3.org/2000/svg";
   var group = document.getElementById("drawing"), slider = document.getElementById("position");
-  var told = document.getElementById("told"), button = document.getElementById("play");
+  var position = document.getElementById("state"), button = document.getElementById("play");
   var svg = document.getElementById("view"), at = 0, step = 1, timer = null, unit = 1;
   function made(name, attributes) {
     var node = document.createElementNS(ns, name);
@@ -10,15 +10,14 @@
     group.appendChild(node);
     return node;
   }
-  var lines = data.lines.map(function (line) { return made("polyline", {}); });
-  var marks = data.fixed.map(function (p) { return made("path", {fill: "#1d2429", stroke: "none"}); });
+  var lines = data.lines.map(function (line) { return made("polyline", {"class": line.kind}); });
+  var marks = data.fixed.map(function (p) { return made("path", {}); });
   function look(box) {
     svg.setAttribute("viewBox", box.join(" "));
     unit = Math.max(box[2], box[3]) / 420;
     lines.forEach(function (node, i) {
       var line = data.lines[i];
       node.setAttribute("stroke-width", line.width * unit);
-      node.setAttribute("stroke", line.colour);
       if (line.dash) { node.setAttribute("stroke-dasharray", line.dash.map(function (d) { return d * unit; }).join(" ")); }
     });
     marks.forEach(function (node, i) {
@@ -29,11 +28,11 @@
   function show(k) {
     at = k;
     slider.value = k;
-    told.textContent = data.told[k];
+    position.textContent = data.texts[k];
     lines.forEach(function (node, i) { node.setAttribute("points", data.lines[i].points[k]); });
   }
   function tick() {
-    if (at + step < 0 || at + step >= data.told.length) { step = -step; }
+    if (at + step < 0 || at + step >= data.texts.length) { step = -step; }
     show(at + step);
   }
   button.addEventListener("click", function () {

@@ -1,0 +1,81 @@
+"""Pages of the design tools: sections of texts, tables and pictures under a verdict."""
+
+from base64 import b64encode
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from railsim.design_checks import Check, verdict
+from railsim.page import rendered
+from railsim.plot.style import styled
+from railsim.table import Table
+from railsim.version import __version__
+
+DPI = 130
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A picture of the page: PNG in base64, its width on the screen, its caption."""
+
+    png: str
+    width: int
+    caption: str
+
+
+@dataclass
+class Section:
+    """A section of the page; one without content is left out."""
+
+    title: str
+    texts: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    figures: list[Drawn] = field(default_factory=list)
+
+
+def as_png(figure: Figure) -> bytes:
+    """Draw a figure as the bytes of a PNG file."""
+    buffer = BytesIO()
+    with styled():
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def pictures(
+    drawn: Mapping[str, bytes], captions: Mapping[str, str], names: Iterable[str]
+) -> list[Drawn]:
+    """Return those of some pictures that were drawn, with their captions."""
+    found = []
+    for name in names:
+        if name in drawn:
+            width = int.from_bytes(drawn[name][16:20], "big")  # the header of a PNG file
+            caption = captions[name.rstrip("_0123456789")]
+            code = b64encode(drawn[name]).decode()
+            found.append(Drawn(code, round(width * 96 / DPI), caption))
+    return found
+
+
+def document(
+    title: str,
+    source: str | None,
+    checks: Sequence[Check],
+    sections: Iterable[Section],
+    method: Sequence[str],
+    **values: Any,
+) -> str:
+    """Return the page as HTML; `values` go to the template."""
+    return rendered(
+        "railsim.report",
+        "templates/document.html",
+        title=title,
+        styles=["templates/document.css"],
+        schemes="light dark",
+        lead=f"{source or 'no source given'}. Written by railsim {__version__}.",
+        verdict=verdict(checks),
+        sections=[s for s in sections if s.texts or s.tables or s.figures],
+        method=method,
+        **values,
+    )

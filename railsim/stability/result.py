@@ -1,0 +1,246 @@
+"""What `critical_speed` returns: linear and non-linear critical speeds, branches, limits."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from railsim.linear.vehicle import Contact
+from railsim.plottable import Plottable
+from railsim.stability.branches import COLUMNS, Branch, Jump, Limit, Point
+from railsim.table import Column, Table
+
+TABLE = (
+    Column("critical speed"),
+    Column("speed", unit="m/s", format=".2f"),
+    Column("frequency", unit="Hz", format=".2f"),
+    Column("amplitude", unit="mm", format=".2f"),
+    Column("mode", " "),
+)
+
+
+@dataclass(frozen=True)
+class LinearLoss:
+    """Where steady rolling loses its stability.
+
+    Attributes
+    ----------
+    speed, frequency : float
+        [m/s], [Hz].
+    mode : str
+        Name of the mode that is undamped there.
+    speed_of_runs : float or None
+        The speed with the creep law of runs as it is, cells included [m/s].
+    speed_on_rigid_rails : float or None
+        The speed on rigid rails, where those of the track are elastic [m/s].
+    """
+
+    speed: float
+    frequency: float
+    mode: str
+    speed_of_runs: float | None = None
+    speed_on_rigid_rails: float | None = None
+
+
+@dataclass(frozen=True)
+class OverAmplitude:
+    """Linear critical speed over the amplitude for which the contact is linearised.
+
+    Attributes
+    ----------
+    amplitude : list of float
+        [m].
+    speed, frequency : list of float or None
+        [m/s], [Hz]; None where the vehicle is stable throughout the range.
+    """
+
+    amplitude: list[float] = field(default_factory=list)
+    speed: list[float | None] = field(default_factory=list)
+    frequency: list[float | None] = field(default_factory=list)
+
+    @property
+    def smallest(self) -> tuple[float, float] | None:
+        """The lowest speed and its amplitude [m/s], [m]."""
+        pairs = zip(self.speed, self.amplitude, strict=True)
+        return min(((v, a) for v, a in pairs if v is not None), default=None)
+
+    def record(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        named = zip(("speed", "amplitude"), self.smallest or (), strict=False)
+        return {**asdict(self), "smallest": dict(named) or None}
+
+
+@dataclass(frozen=True)
+class Conicity:
+    """Equivalent conicity over amplitude on rigid rails (EN 15302).
+
+    Attributes
+    ----------
+    wheelset : str
+    amplitude, conicity : list of float
+        [m], [1].
+    """
+
+    wheelset: str
+    amplitude: list[float]
+    conicity: list[float]
+
+
+@dataclass
+class CriticalSpeed(Plottable):
+    """Critical speeds of a vehicle.
+
+    Attributes
+    ----------
+    contact : Contact
+        How the contact was linearised.
+    vehicle : str
+        Name of the vehicle.
+    conditions : dict of str to str
+        ``rails``, creep ``law`` of the runs, ``linear_law`` of the linearisation, ``friction``.
+    low, high : float
+        Range of the search [m/s].
+    linear : LinearLoss or None
+    linear_over_amplitude : OverAmplitude or None
+    nonlinear : dict of str to Point or None
+        Slowest motion of sustained hunting by method, None where there is none.
+    branches : list of Branch
+        Amplitude over speed.
+    jumps : list of Jump
+    type : "subcritical", "supercritical", "none" or ""
+        Whether anything hunts below the speed at which rest loses its stability, in the runs' own
+        law; empty where it was not looked for.
+    onset : "subcritical", "supercritical" or ""
+        How the small motions begin there, whatever else is possible.
+    amplitude_limit, instability_limit : Limit or None
+        Amplitude of 3 mm, and half the limit of the track-shifting force as rms.
+    conicity_over_amplitude : Conicity or None
+        Of the leading wheelset; None where it does not fit between the rails.
+    remarks : list of str
+        Remarks for the reader.
+    """
+
+    contact: Contact
+    vehicle: str = ""
+    conditions: dict[str, str] = field(default_factory=dict)
+    low: float = 0.0
+    high: float = 0.0
+    linear: LinearLoss | None = None
+    linear_over_amplitude: OverAmplitude | None = None
+    nonlinear: dict[str, Point | None] = field(default_factory=dict)
+    branches: list[Branch] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
+    type: str = ""
+    onset: str = ""
+    amplitude_limit: Limit | None = None
+    instability_limit: Limit | None = None
+    conicity_over_amplitude: Conicity | None = None
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def lowest(self) -> Point | None:
+        """Slowest sustained hunting of all methods; None where there is none."""
+        known = [point for point in self.nonlinear.values() if point is not None]
+        return min(known, key=lambda point: point.speed, default=None)
+
+    def record(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        lowest, nonlinear = self.lowest, None
+        if self.nonlinear:
+            nonlinear = {
+                **(lowest.record() if lowest else {"speed": None}),
+                "reached": lowest is not None,
+                "searched_to": self.high,
+            }
+        line = self.linear_over_amplitude
+        by_method = {name: point and point.record() for name, point in self.nonlinear.items()}
+        return {
+            **self.contact.record(),
+            "linear": self.linear and asdict(self.linear),
+            "nonlinear": nonlinear,
+            "nonlinear_by_method": by_method,
+            "amplitude_limit": self.amplitude_limit and asdict(self.amplitude_limit),
+            "instability_limit": self.instability_limit and asdict(self.instability_limit),
+            "type": self.type,
+            "branches": [branch.record() for branch in self.branches],
+            "conicity_over_amplitude": self.conicity_over_amplitude
+            and asdict(self.conicity_over_amplitude),
+            "remarks": self.remarks,
+            "conditions": self.conditions,
+            "searched": [self.low, self.high],
+            "onset": self.onset,
+            "jumps": [asdict(jump) for jump in self.jumps],
+            "linear_over_amplitude": line and line.record(),
+        }
+
+    def to_xarray(self) -> Any:
+        """Return the branches as an `xarray.Dataset` over ``branch`` and ``point``; needs xarray.
+
+        Branches of fewer points than the longest are filled with NaN.
+        """
+        import xarray
+
+        most = max((len(branch.points) for branch in self.branches), default=0)
+        filled = {name: np.full((len(self.branches), most), np.nan) for name in COLUMNS}
+        for row, branch in enumerate(self.branches):
+            for name, values in filled.items():
+                values[row, : len(branch.points)] = branch.column(name)
+        return xarray.Dataset(
+            {name: (("branch", "point"), values) for name, values in filled.items()},
+            {"branch": [branch.direction for branch in self.branches]},
+        )
+
+    def table(self) -> Table:
+        """Return all critical speeds with their method, jumps and limits."""
+        where = self.conditions
+        caption = (
+            f"{self.vehicle}, rails {where['rails']}, friction {where['friction']}, creep law "
+            f"{where['law']} (linear: {where['linear_law']}), searched from {self.low:g} to "
+            f"{self.high:g} m/s"
+        )
+        return Table(TABLE, self._rows(), caption)
+
+    def _rows(self) -> Iterator[tuple[str, float | None, float | None, float | None, str]]:
+        how, lost, line = self.contact.words(), self.linear, self.linear_over_amplitude
+        none = f"none up to {self.high:g} m/s"
+        if lost is None:
+            yield f"linear, {how}", None, None, None, "none in this range"
+        else:
+            yield f"linear, {how}", lost.speed, lost.frequency, None, lost.mode
+            for words, speed in (
+                ("the same on rigid rails", lost.speed_on_rigid_rails),
+                ("the same with the cells of the runs", lost.speed_of_runs),
+            ):
+                if speed is not None:
+                    yield words, speed, None, None, ""
+        if line is not None and line.smallest is not None:
+            speed, amplitude = line.smallest
+            yield "linear, harmonic, smallest over amplitude", speed, None, amplitude, ""
+        for method, point in self.nonlinear.items():
+            if point is None:
+                yield f"non-linear, {method}", None, None, None, none
+            else:
+                frequency = point.frequency if math.isfinite(point.frequency) else None
+                yield f"non-linear, {method}", point.speed, frequency, point.amplitude, ""
+        for jump in self.jumps:
+            words = "rising" if jump.direction == "up" else "falling"
+            to = f"to {1e3 * jump.to:.2f} mm"
+            yield f"jump, speed {words}", jump.speed, None, jump.amplitude, to
+        for words, scale, limit in (
+            ("amplitude above {:.3g} mm", 1e3, self.amplitude_limit),
+            ("rms of sum_Y above {:.3g} kN", 1e-3, self.instability_limit),
+        ):
+            if limit is not None:
+                more = "" if limit.reached else f"not reached up to {self.high:g} m/s"
+                yield words.format(scale * limit.limit), limit.speed, None, None, more
+
+    def verdict(self) -> str:
+        """Return in words how hunting begins; empty where it was not looked for."""
+        if self.type in ("", "none"):
+            return ""
+        words = f"the bifurcation is {self.type}"
+        if self.onset and self.onset != self.type:
+            words += f"; small motions begin as in a {self.onset} one"
+        return words
