@@ -9,11 +9,11 @@ import json
 from typing import Any
 
 import numpy as np
+from loops import many_fastsim_patches
 from numpy_fastsim import numpy_patches, plain_python
+from parts import PATCHES, least_time, patch_inputs
 
-from railsim.bench.loops import many_fastsim_patches
 from railsim.bench.machine import hardware, vector_instructions, versions
-from railsim.bench.parts import PATCHES, least_time, patch_inputs
 from railsim.kernels import compiled
 from railsim.kernels import fastsim as module
 from railsim.kernels.fastsim import fastsim_workspace

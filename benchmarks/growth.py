@@ -14,14 +14,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import loops
 import numpy as np
 import tomli_w
+from commands import run_command
+from parts import CALLS, least_time
 
 from railsim import simulate
-from railsim.bench import loops
-from railsim.bench.commands import run_command
 from railsim.bench.machine import hardware, versions
-from railsim.bench.parts import CALLS, least_time
 from railsim.definitions.loading import load_track, load_vehicle, load_vehicle_text
 from railsim.definitions.settings import Settings
 from railsim.definitions.vehicle import Vehicle

@@ -34,7 +34,7 @@ from scipy_peer import Peer
 
 from railsim import simulate
 from railsim.bench.machine import hardware, versions
-from railsim.bench.report import ALLOWED
+from railsim.bench.runs import ALLOWED
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 

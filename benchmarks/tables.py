@@ -2,8 +2,8 @@
 
     python benchmarks/tables.py
 
-`bench.json` is the output of `railsim bench --json`, `peers.json` and `growth.json` those of the
-scripts of the same names.
+`bench.json` is the output of `whole.py`, `peers.json` and `growth.json` those of the scripts of the
+same names.
 """
 
 import json
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from railsim.bench.report import tables
+from whole import tables
 
 RESULTS = Path(__file__).parent / "results"
 DOCS = Path(__file__).parents[1] / "docs"

@@ -7,29 +7,26 @@ from railsim.cli.progress import progress_bar
 
 
 @click.command()
-@click.option(
-    "--quick", is_flag=True, help="Three runs instead of seven, no start with empty caches."
-)
+@click.option("--quick", is_flag=True, help="No errors, which take most of the time.")
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress bar.")
 def command(quick: bool, as_json: bool, quiet: bool) -> None:
     """Measure the speed of railsim on this machine, and the error at that speed.
 
-    The study's runs in multiples of real time with their errors against RK4 at 0.125 ms; the parts
-    of the right-hand side; FASTSIM over its grid; many runs per call; one core and two; start-up,
-    whole commands and memory.  Takes a few minutes.  Other programs that run at the same time
-    falsify the wall times.
+    Two coaches through a curve and one on irregular rails, in multiples of real time of the time
+    loop, with their errors against RK4 at 0.125 ms: of the largest and smallest wheel load change,
+    of the largest guiding force and that at mid-curve, of the largest yaw, and the largest of all
+    peaks.  Takes about a minute.  More is measured by the scripts in `benchmarks/` of the sources.
 
     \b
     Example:
       railsim bench
       railsim bench --quick --json > bench.json
     """  # noqa: D301 - click reads the escape
-    from railsim.bench.report import FULL, QUICK, benchmark, tables
-    from railsim.table import Column, Table
+    from railsim.bench.runs import benchmark, table
 
     with progress_bar("bench", quiet=quiet) as progress:
-        found = benchmark(QUICK if quick else FULL, progress)
+        found = benchmark(errors=not quick, progress=progress)
     if as_json:
         print_json(found)
         return
@@ -39,5 +36,4 @@ def command(quick: bool, as_json: bool, quiet: bool) -> None:
         f"FASTSIM's vectors: {facts['vectors']}"
     )
     echo(", ".join(f"{name} {number}" for name, number in found["versions"].items()))
-    for (first, *others), rows in tables(found):
-        show("", Table([Column(first), *(Column(name, format=">") for name in others)], rows))
+    show("", table(found["runs"]))

@@ -25,8 +25,10 @@ SMALL = {
     "springs.py": ["--repeats", "1"],
     "study_cost.py": ["out", "--vehicles", "coach_manchester", "--tracks", "straight",
                       "--speeds", "1", "--frictions", "2", "--duration", "1", "--workers", "1"],
+    "whole.py": ["--small"],
 }  # fmt: skip
-IMPORTED = {"exudyn_coach.py", "exudyn_contact.py", "numpy_fastsim.py", "scipy_peer.py"}
+IMPORTED = {"commands.py", "cores.py", "ensembles.py", "exudyn_coach.py", "exudyn_contact.py",
+            "loops.py", "numpy_fastsim.py", "parts.py", "scipy_peer.py"}  # fmt: skip
 WRITES_THE_MANUAL = {"tables.py"}  # from the figures in `benchmarks/results`
 STUDY = """
 format = "railsim-study/1"
@@ -65,6 +67,43 @@ def test_script_runs_in_its_small_form(script, tmp_path):
     assert done.stdout
     if script == "peers.py" and not find_spec("exudyn"):
         assert "exudyn is not installed: left out" in done.stdout
+
+
+@pytest.fixture
+def whole(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    return import_module("whole")
+
+
+@pytest.mark.further
+def test_parts_of_a_step_and_runs_in_one_call_are_measured(whole):
+    found = whole.measure(small=True)
+    parts = found["parts"]
+    assert parts["patches"] == 8  # one tread contact a wheel on straight track
+    assert all(time > 0.0 for time in parts["parts"].values())
+    assert max(parts["parts"].values()) < parts["right_hand_side"]
+    assert [row["grid"] for row in found["fastsim"]] == [5, 10]
+    assert [record["members"] for record in found["ensembles"]] == [1, 3]
+    for record in found["ensembles"]:
+        assert len(record["real_time_all"]) == 2
+        assert record["real_time_best"] >= record["real_time"] > 0.0
+    headers = [header[0] for header, _ in whole.tables(found)]
+    assert headers == ["time loop", "right-hand side, 8 patches", "FASTSIM", "runs in one call"]
+    for header, rows in whole.tables(found):
+        assert all(len(row) == len(header) for row in rows)
+
+
+def test_a_command_is_timed_with_its_memory(whole, tmp_path):
+    run = import_module("commands").run_command("--help", folder=tmp_path)
+    assert run["status"] == 0
+    assert run["wall"] > 0.0
+    assert 5e6 < run["memory"] < 400e6
+
+
+def test_the_quietness_loop_takes_time(whole):
+    wall, cpu = import_module("cores").spin(10_000)
+    assert wall > 0.0
+    assert cpu > 0.0
 
 
 @points("name", list(KEPT), always=(0, 2))

@@ -4,10 +4,10 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import loops
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.bench import loops
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
 from railsim.kernels.fastsim import fastsim_workspace
