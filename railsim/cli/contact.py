@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, show
+from railsim.cli.progress import progress_bar
 from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
@@ -182,18 +183,19 @@ def command(
     folder = Path(out) if out else None
     if folder:
         check_folder(folder, written, overwrite=overwrite)
-    found = contact_summary(
-        _profiles(wheels, "wheel"),
-        _profiles(rails, "rail"),
-        radii=(radii[0], radii[-1]),
-        gauge=gauge,
-        inclination=inclination,
-        back_to_back=back_to_back,
-        load=load,
-        max_shift=max_shift,
-        normal=normal,  # type: ignore[arg-type]
-        exact=exact,
-    )
+    with progress_bar("contact", quiet=quiet):
+        found = contact_summary(
+            _profiles(wheels, "wheel"),
+            _profiles(rails, "rail"),
+            radii=(radii[0], radii[-1]),
+            gauge=gauge,
+            inclination=inclination,
+            back_to_back=back_to_back,
+            load=load,
+            max_shift=max_shift,
+            normal=normal,  # type: ignore[arg-type]
+            exact=exact,
+        )
     patch = found.main_patch(friction) if creep else None
     creep_rows = forces_by_law(patch) if patch else []
     by_gauge = conicity_over_gauge(found, over) if over else None

@@ -18,10 +18,10 @@ from railsim.cli.interrupts import obey
 PATIENCE = 2.0  # seconds between looks at what the program is doing
 COMPILING = "preparing: compiling (after an installation; one to three minutes, kept for later)"
 CAUSES = {
-    "numba": COMPILING,
+    "numba.core.compiler_machinery": COMPILING,  # runs the passes; loading is elsewhere
     "railsim.contact.table": "preparing: the contact table of new profiles (kept for later)",
 }
-"""What takes long before a run, by the package or module that is at work."""
+"""What takes long before a run, by the module that is at work."""
 
 _reported: set[str] = set()
 
@@ -31,9 +31,8 @@ def _cause() -> str:
     frame = sys._current_frames().get(main_thread().ident or 0)
     while frame is not None:
         module = frame.f_globals.get("__name__", "")
-        for name, words in CAUSES.items():
-            if module == name or module.startswith(f"{name}.core"):
-                return words
+        if module in CAUSES:
+            return CAUSES[module]
         frame = frame.f_back
     studies = sys.modules.get("railsim.studies.execute")
     return COMPILING if studies is not None and not studies.is_compiled() else ""

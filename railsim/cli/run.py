@@ -1,7 +1,5 @@
 """``railsim run``: one vehicle on one track at one speed."""
 
-import logging
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +8,6 @@ import click
 
 from railsim.cli.common import (
     Speed,
-    echo,
     json_option,
     load_option,
     names_of,
@@ -24,11 +21,9 @@ from railsim.cli.common import (
 from railsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from railsim.compare import Comparison
-    from railsim.definitions.settings import Settings
-    from railsim.definitions.track import Track
     from railsim.result import Result
     from railsim.studies.case import Case
     from railsim.table import Table
@@ -93,6 +88,7 @@ def command(
     from railsim.cli import DONE, ENDED_EARLY
     from railsim.definitions.layout import track_remarks
     from railsim.result.facts import run_facts
+    from railsim.simulation.assumptions import assumptions
     from railsim.studies.run import run_case
 
     assignments = with_load(assignments, load, "vehicle.")
@@ -103,15 +99,12 @@ def command(
         speed, start = float(end[-1]), float(end[-2])
     how["start"] = start or 0.0
     case, path = _checked((vehicle, track, speed), how, out, plots, overwrite)
-    if not quiet:
-        for remark in track_remarks(case.track):
-            echo(f"{track}: {remark}", err=True)
     if not (quiet or as_json):
-        echo("\n".join(_assumption_lines(case)))
-    with progress_bar(case.name, quiet=quiet) as progress, _start_remarks(case, quiet=quiet):
+        show(*assumptions(case.vehicle, case.track, case.settings, case.speed))
+    with progress_bar(case.name, quiet=quiet) as progress:
         result = run_case(case, path, overwrite=overwrite, progress=progress, resume=resume)
     record = {"file": str(path), **run_facts(result)}
-    parts = _report(result, path)
+    parts = _report(result, path, [f"{track}: {remark}" for remark in track_remarks(case.track)])
     if plots and len(result["time"]):
         from railsim.plot.histories import histories
         from railsim.plot.style import save
@@ -130,31 +123,6 @@ def command(
     else:
         show(*parts)
     return DONE if result.status == "complete" else ENDED_EARLY
-
-
-@contextmanager
-def _start_remarks(case: "Case", *, quiet: bool) -> "Iterator[None]":
-    """Show what is remarked when the run begins, not only at its end."""
-    handler = _Shown(case.name)
-    start = logging.getLogger("railsim.start")
-    if not quiet:
-        start.addHandler(handler)
-    try:
-        yield
-    finally:
-        start.removeHandler(handler)
-
-
-class _Shown(logging.Handler):
-    """Prints log records on stderr as remarks."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__()
-        self._name = name
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print a record."""
-        echo(f"{self._name}: {record.getMessage()}", err=True)
 
 
 def _opened(before: str, given: "Mapping[str, float | None]") -> "Result":
@@ -214,74 +182,7 @@ def _checked(
     return case, Path(name)
 
 
-def _assumption_lines(case: "Case") -> list[str]:
-    """Return what the run rests on, in customary units."""
-    from railsim.definitions.flatten import flatten
-    from railsim.simulation.sampling import output_words
-
-    track, settings = case.track, case.settings
-    wheelsets = (body.wheelset for body in flatten(case.vehicle).bodies)
-    wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
-    inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
-    step = "chosen" if settings.step is None else f"{settings.step * 1e3:.4g} ms"
-    return [
-        f"{case.vehicle.name} on {track.name} at {case.speed:g} m/s ({3.6 * case.speed:.4g} km/h)"
-        f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
-        f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
-        f"{track.gauge * 1e3:g} mm, friction {_friction(track)}",
-        f"  forces    {_creep_law(settings)}, G {settings.shear_modulus / 1e9:g} GPa, "
-        f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
-        f"  track     transitions rounded over {track.rounding:g} m, cant about the "
-        f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
-        f"  support   rails {_support(track)}",
-        *_irregularity_lines(track),
-        f"  time      scheme {settings.scheme}, step {step}, output {output_words(settings)}",
-    ]
-
-
-def _support(track: "Track") -> str:
-    """Say what carries the rails."""
-    preset = track.support.preset
-    if preset == "rigid":
-        return "rigid"
-    changed = track.support.model_dump(exclude={"preset"}, exclude_none=True)
-    return f"elastic, {preset}{' with own values' if changed else ''}"
-
-
-def _irregularity_lines(track: "Track") -> list[str]:
-    """Say what displaces the rails, in one line; nothing where they are smooth."""
-    words = [part.summary() for part in track.irregularities]
-    if len(words) > 3:
-        words[2:] = [f"{len(words) - 2} more"]
-    return [f"  rails     {'; '.join(words)}"] if words else []
-
-
-def _friction(track: "Track") -> str:
-    """Coefficients of friction, how they fall with slip, and the third body, where it is given."""
-    text = _listed(f"{mu:g}" for mu in track.friction)
-    if track.friction_table is not None:
-        text = "by table"
-    if track.friction_falling is not None:
-        falling = track.friction_falling
-        text += f" (with slip down to {falling.rest:g} of it, {falling.decay:g} s/m)"
-    if track.third_body != (1.0, 1.0):
-        text += f", third body {_listed(f'{k:g}' for k in track.third_body)}"
-    return text
-
-
-def _creep_law(settings: "Settings") -> str:
-    from railsim.definitions.creep_law import CREEP_LAWS
-
-    law = CREEP_LAWS[settings.creep_law]
-    nx, ny = settings.fastsim_grid
-    return f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
-
-
-def _listed(names: "Any") -> str:
-    return " / ".join(dict.fromkeys(str(name) for name in names))
-
-
-def _report(result: "Result", path: Path) -> "list[str | Table]":
+def _report(result: "Result", path: Path, remarks: list[str]) -> "list[str | Table]":
     """Return how the run ended, its peaks and its values in curves."""
     from railsim.result import mid_curves
     from railsim.result.tables import full_curve_table, full_curves_table, peak_table
@@ -296,7 +197,7 @@ def _report(result: "Result", path: Path) -> "list[str | Table]":
         f"  {end}",
         f"  step {1e3 * float(facts['step']):.4g} ms; {facts['cpu_time']:.2f} s of CPU time in the "
         f"loop, {facts['real_time_factor']:.0f} x real time; {facts['wall_time']:.1f} s altogether",
-        *(f"  remark: {remark}" for remark in result.remarks),
+        *(f"  remark: {remark}" for remark in (*remarks, *result.remarks)),
         "",
     ]
     if len(result["time"]):

@@ -12,6 +12,7 @@
 - `outputs`: from raw records to the quantities of a result
 - `sampling`: low-pass filter before storage
 - `remarks`: remarks for the reader of a result
+- `assumptions`: what an engineer reads before a run begins
 - `check_step`: a run compared with itself at half its step
 """
 

@@ -214,7 +214,7 @@ def test_what_is_unusual_in_the_track_is_remarked(tmp_path, capsys):
     steep = ["--set", "track.cant.1.length=10", "--set", "track.plan.1.length=5"]
     arguments = [*SHORT, *steep, "--out", str(tmp_path / "run.h5")]
     assert main(arguments) == 0
-    assert "curve_r250: " in capsys.readouterr().err
+    assert "remark: curve_r250: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,79 @@
+"""The assumptions of a run, as an engineer reads them before it begins."""
+
+from collections.abc import Iterable
+
+from railsim.definitions.creep_law import CREEP_LAWS
+from railsim.definitions.flatten import flatten
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.simulation.sampling import output_words
+
+
+def assumptions(vehicle: Vehicle, track: Track, settings: Settings, speed: float) -> list[str]:
+    """Return the assumptions of a run in customary units, one a line after the title.
+
+    Parameters
+    ----------
+    vehicle, track, settings
+        Inputs of the run.
+    speed : float
+        At its start [m/s].
+    """
+    wheelsets = (body.wheelset for body in flatten(vehicle).bodies)
+    wheels = _listed(name for wheelset in wheelsets if wheelset for name in wheelset.profile)
+    inclination = f"1:{1.0 / track.inclination:.4g}" if track.inclination else "upright"
+    step = "chosen" if settings.step is None else f"{settings.step * 1e3:.4g} ms"
+    return [
+        f"{vehicle.name} on {track.name} at {speed:g} m/s ({3.6 * speed:.4g} km/h)"
+        f"{'' if settings.drive.mode == 'constant' else ' at the start'}",
+        f"  contact   {wheels} on {_listed(track.rail)} inclined {inclination}, gauge "
+        f"{track.gauge * 1e3:g} mm, friction {_friction(track)}",
+        f"  forces    {_creep_law(settings)}, G {settings.shear_modulus / 1e9:g} GPa, "
+        f"contact damping {settings.contact_damping / 1e3:g} kNs/m",
+        f"  track     transitions rounded over {track.rounding:g} m, cant about the "
+        f"{'centre line' if track.cant_rotation == 'centre' else 'inner rail'}",
+        f"  support   rails {_support(track)}",
+        *_irregularity_lines(track),
+        f"  time      scheme {settings.scheme}, step {step}, output {output_words(settings)}",
+    ]
+
+
+def _support(track: Track) -> str:
+    """Say what carries the rails."""
+    preset = track.support.preset
+    if preset == "rigid":
+        return "rigid"
+    changed = track.support.model_dump(exclude={"preset"}, exclude_none=True)
+    return f"elastic, {preset}{' with own values' if changed else ''}"
+
+
+def _irregularity_lines(track: Track) -> list[str]:
+    """Say what displaces the rails, in one line; nothing where they are smooth."""
+    words = [part.summary() for part in track.irregularities]
+    if len(words) > 3:
+        words[2:] = [f"{len(words) - 2} more"]
+    return [f"  rails     {'; '.join(words)}"] if words else []
+
+
+def _friction(track: Track) -> str:
+    """Coefficients of friction, how they fall with slip, and the third body, where it is given."""
+    text = _listed(f"{mu:g}" for mu in track.friction)
+    if track.friction_table is not None:
+        text = "by table"
+    if track.friction_falling is not None:
+        falling = track.friction_falling
+        text += f" (with slip down to {falling.rest:g} of it, {falling.decay:g} s/m)"
+    if track.third_body != (1.0, 1.0):
+        text += f", third body {_listed(f'{k:g}' for k in track.third_body)}"
+    return text
+
+
+def _creep_law(settings: Settings) -> str:
+    law = CREEP_LAWS[settings.creep_law]
+    nx, ny = settings.fastsim_grid
+    return f"{law.label} {nx} x {ny}" if law.grid else f"creep law {law.label}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return " / ".join(dict.fromkeys(str(name) for name in names))
