@@ -290,6 +290,8 @@ def _rounds(
         after = problem(new)
         if after is None:
             break
+        if after.violation > max(here.violation, FEASIBLE):  # SLSQP ends a trifle outside
+            new, after = _least_breach(problem, new, after)
         worse = after.violation > max(here.violation, FEASIBLE)
         gain = here.objective - after.objective
         if worse or (here.violation <= FEASIBLE and gain <= 0.0):
