@@ -25,6 +25,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from math import isfinite, isnan
+from numbers import Real
 from typing import Any, NamedTuple
 
 from railsim.notation import DECIMALS, SHOWN_UNITS, Quantity
@@ -103,8 +104,8 @@ class Column:
             return value.column.text(value.value)
         if value is None:
             return ""
-        if isinstance(value, str):
-            return value
+        if isinstance(value, bool) or not isinstance(value, Real):
+            return str(value)
         if isnan(value):
             return "-"
         without_minus_zero = self.format.replace(".", "z.", 1 if self.format.endswith("f") else 0)

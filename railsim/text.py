@@ -4,9 +4,6 @@ A vehicle may be called ``$x^$``, ``=1+1`` or hold escape sequences; wherever it
 these characters and does nothing.  For pages see `railsim.page`.
 """
 
-from collections.abc import Iterable, Sequence
-from html import escape
-
 LONGEST_VALUE, LONGEST_FILE = 60, 300  # characters of a value, of a file's name, in a message
 
 
@@ -64,22 +61,3 @@ def spreadsheet_cell(value: object) -> object:
     except ValueError:
         return f"'{value}"
     return value
-
-
-def html_table(caption: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table as HTML, for notebooks; every text in it is shown literally.
-
-    Examples
-    --------
-    >>> html_table("", [], [["<b>"]])
-    '<table><tbody><tr><td>&lt;b&gt;</td></tr></tbody></table>'
-    """
-
-    def line(cells: Iterable[object], kind: str) -> str:
-        texts = (escape(printable(str(cell))) for cell in cells)
-        return "<tr>" + "".join(f"<{kind}>{text}</{kind}>" for text in texts) + "</tr>"
-
-    head = f"<thead>{line(header, 'th')}</thead>" if header else ""
-    body = "".join(line(row, "td") for row in rows)
-    title = f"<caption>{escape(printable(caption))}</caption>" if caption else ""
-    return f"<table>{title}{head}<tbody>{body}</tbody></table>"

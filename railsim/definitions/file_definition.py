@@ -14,7 +14,8 @@ from railsim.definitions.overrides import apply_overrides, with_values
 from railsim.definitions.sources import Source, text_source
 from railsim.errors import Fault, InputError
 from railsim.files import check_file, whole_file
-from railsim.text import html_table, printable, shortened
+from railsim.table import Table
+from railsim.text import printable, shortened
 
 LONGEST_VALUE = 60  # characters of a value in the table of a notebook
 D = TypeVar("D", bound="FileDefinition")
@@ -113,19 +114,20 @@ class FileDefinition(Definition):
         kind, name = type(self).__name__, getattr(self, "name", None)
         return f"<{kind} {printable(name)!r}>" if name else f"<{kind}>"
 
-    def _table(self) -> tuple[list[str], list[list[object]]]:
-        """Return header and rows of the table that a notebook shows: keys and their values."""
+    def _table(self) -> Table:
+        """Return the table that a notebook shows: keys and their values."""
         shown = self.model_dump(exclude_none=True, exclude={"format", "name"})
         rows: list[list[object]] = []
         for key, value in shown.items():
             if isinstance(value, dict | list | tuple) and len(str(value)) > LONGEST_VALUE:
                 value = f"{len(value)} entries"
             rows.append([key, value])
-        return ["key", "value"], rows
+        return Table(["key", "value"], rows)
 
     def _repr_html_(self) -> str:
-        header, rows = self._table()
-        return html_table(str(getattr(self, "name", type(self).__name__)), header, rows)
+        table = self._table()
+        table.caption = str(getattr(self, "name", type(self).__name__))
+        return table.html()
 
 
 def loaded(model: type[D], source: Source, overrides: Iterable[str] | str) -> D:

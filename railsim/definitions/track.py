@@ -8,6 +8,7 @@ from railsim.definitions.layout import curvature_sections, track_faults, track_r
 from railsim.definitions.track_tables import TrackTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable
+from railsim.table import Column, Table
 
 
 class Track(TrackTables, Plottable):
@@ -29,13 +30,12 @@ class Track(TrackTables, Plottable):
         """Return what an engineer would object to."""
         return track_remarks(self)
 
-    def _table(self) -> tuple[list[str], list[list[object]]]:
+    def _table(self) -> Table:
         """Return the table of the plan's elements that a notebook shows."""
-        rows: list[list[object]] = []
+        rows = []
         for section in curvature_sections(self):
-            ends = " to ".join(
-                f"{1.0 / value:.6g}" if value else "inf"
-                for value in dict.fromkeys((section.start_value, section.end_value))
-            )
-            rows.append([section.type, f"{section.begin:.6g}", f"{section.end:.6g}", ends])
-        return ["plan", "from (m)", "to (m)", "radius (m)"], rows
+            curvatures = dict.fromkeys((section.start_value, section.end_value))
+            radii = " to ".join(f"{1.0 / kappa:.6g}" if kappa else "inf" for kappa in curvatures)
+            rows.append([section.type, section.begin, section.end, radii])
+        ends = [Column("from", unit="m", format=".6g"), Column("to", unit="m", format=".6g")]
+        return Table([Column("plan"), *ends, Column("radius (m)", format=">")], rows)

@@ -8,6 +8,7 @@ from railsim.definitions.names import name_faults
 from railsim.definitions.vehicle_tables import VehicleTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable
+from railsim.table import Column, Table
 
 
 class Vehicle(VehicleTables, Plottable):
@@ -29,11 +30,13 @@ class Vehicle(VehicleTables, Plottable):
         """Return which parts stand where they cannot."""
         return position_faults(self)
 
-    def _table(self) -> tuple[list[str], list[list[object]]]:
+    def _table(self) -> Table:
         """Return the table of bodies that a notebook shows."""
-        rows: list[list[object]] = []
-        for body in flatten(self).bodies:
-            position = " ".join(f"{value:.3f}" for value in body.position)
-            inertia = " ".join(f"{value:.0f}" for value in body.inertia)
-            rows.append([body.name, body.kind, f"{body.mass:.0f}", inertia, position])
-        return ["body", "kind", "mass (kg)", "Ixx Iyy Izz (kg m²)", "x y z (m)"], rows
+        inertia = [Column(f"I{axis}{axis}", unit="kg m2", format=".0f") for axis in "xyz"]
+        position = [Column(axis, unit="m", format=".3f") for axis in "xyz"]
+        columns = [Column("body"), Column("kind"), Column("mass", unit="kg", format=".0f")]
+        rows = (
+            [body.name, body.kind, body.mass, *body.inertia, *body.position]
+            for body in flatten(self).bodies
+        )
+        return Table([*columns, *inertia, *position], rows)

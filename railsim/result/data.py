@@ -4,6 +4,9 @@ A `Result` never changes: its arrays are read-only, and what is derived from the
 functions beside it.  Arrays that come from a file are read when they are first asked for.
 """
 
+import io
+import re
+from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
@@ -18,7 +21,8 @@ from railsim.errors import InputError, nearest
 from railsim.notation import Quantity
 from railsim.plottable import picture_of
 from railsim.profiles.profile import Profile
-from railsim.text import html_table
+from railsim.table import Table
+from railsim.text import printable
 
 if TYPE_CHECKING:
     import pandas
@@ -140,23 +144,45 @@ class Result:
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self._arrays})
 
+    @property
+    def title(self) -> str:
+        """Vehicle, track and speed, as far as they are known."""
+        names = []
+        for key in ("vehicle_toml", "track_toml"):
+            found = re.search(r"^name = (.*)$", str(self._attributes.get(key, "")), re.MULTILINE)
+            if found:
+                names.append(printable(found[1].strip("\"'")))
+        speed = self._attributes.get("speed")
+        words = "" if speed is None else f" at {speed:g} m/s ({3.6 * float(speed):.4g} km/h)"
+        return f"{' on '.join(names)}{words}".strip()
+
     def __repr__(self) -> str:
         steps = self["time"].shape[0] if "time" in self else 0
-        return f"<Result: {self.status}, {steps} instants, {len(self._arrays)} quantities>"
+        parts = [self.title, self.status, f"{steps} instants", f"{len(self._arrays)} quantities"]
+        return f"<Result: {', '.join(filter(None, parts))}>"
 
     def _repr_html_(self) -> str:
-        """Return the tables that a notebook shows: the run, and what the result holds."""
-        facts = ("status", "status_reason", "speed", "start", "duration", "step", "cpu_time")
-        units = {"speed": "m/s", "start": "m", "duration": "s", "step": "s", "cpu_time": "s"}
+        """Return what a notebook shows: the run, its wheel forces, and what the result holds."""
+        facts = {"status": "", "status_reason": "", "speed": "m/s", "start": "m", "duration": "s",
+                 "step": "s", "cpu_time": "s"}  # fmt: skip
         rows = [
-            [name, f"{value:.6g} {units[name]}" if name in units else value]
-            for name in facts
+            [name, f"{value:.6g} {unit}" if unit else value]
+            for name, unit in facts.items()
             if (value := self._attributes.get(name, "")) != ""
         ]
         rows += [["remark", remark] for remark in self.remarks]
         held = [[q.name, q.long_name, q.unit, ", ".join(q.dims)] for q in self._quantities.values()]
-        header = ["name", "quantity", "unit", "dimensions"]
-        return html_table("Result", [], rows) + html_table("", header, held)
+        columns = ["name", "quantity", "unit", "dimensions"]
+        run = Table(["fact", "value"], rows, self.title or "Result")
+        return f"{run.html()}{self._picture()}{Table(columns, held).html()}"
+
+    def _picture(self) -> str:
+        """Return the forces of the wheels as a picture in a page, where there are any."""
+        if not {"Q", "Y", "distance"} <= set(self) or len(self["time"]) < 2:
+            return ""
+        stream = io.BytesIO()
+        self.plot("Q", "Y").savefig(stream, format="png", dpi=80)
+        return f'<img src="data:image/png;base64,{b64encode(stream.getvalue()).decode()}">'
 
     def _names(self) -> tuple[str, ...]:
         return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")

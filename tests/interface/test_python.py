@@ -1,5 +1,6 @@
 """What a notebook gets: public names, tables, pictures, changed values, frames of pandas."""
 
+import base64
 import copy
 import math
 import pickle
@@ -70,14 +71,24 @@ def test_all_wrong_values_are_told_with_their_keys(coach):
 
 
 def test_tables_of_a_notebook_show_names_literally(coach, result):
-    assert "<td>carbody</td>" in coach._repr_html_()
+    assert '<td class="words">carbody</td>' in coach._repr_html_()
     assert "<b>" not in coach.replace(name="<b>")._repr_html_()
     assert repr(coach) == f"<Vehicle {coach.name!r}>"
     assert "CIR" in railsim.load_track("curve_r250")._repr_html_()
     assert "creep_law" in railsim.Settings()._repr_html_()
     assert "<svg" in railsim.load_profile("S1002")._repr_html_()
     assert repr(railsim.load_profile("S1002")).startswith("<Profile 'S1002': wheel, ")
-    assert "<td>Q</td>" in result._repr_html_()
+    assert '<td class="words">Q</td>' in result._repr_html_()
+
+
+def test_a_result_says_what_it_is_of_and_draws_its_forces(result):
+    vehicle, track = result.vehicle().name, result.track().name
+    title = f"{vehicle} on {track} at {result.speed:g} m/s"
+    assert repr(result).startswith(f"<Result: {title}")
+    page = result._repr_html_()
+    assert title in page
+    picture = page.split('src="data:image/png;base64,')[1].split('"')[0]
+    assert base64.b64decode(picture).startswith(b"\x89PNG")
 
 
 def test_frames_have_a_column_for_each_set_of_labels(result):
