@@ -48,6 +48,25 @@ def one_or_two(member: dict[str, Any]) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [member, both]})
 
 
+def both_sides(share: float = 1.0) -> BeforeValidator:
+    """Return the step that makes rows [s, value] to [s, left, right], each with a share of it."""
+
+    def completed(rows: Any) -> Any:
+        if not isinstance(rows, list | tuple):
+            return rows
+        return [
+            (row[0], share * row[1], share * row[1])
+            if isinstance(row, list | tuple) and len(row) == 2 and isinstance(row[1], int | float)
+            else row
+            for row in rows
+        ]
+
+    return BeforeValidator(completed)
+
+
+NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 2}
+SIDED_ROWS = WithJsonSchema({"type": "array", "minItems": 1, "items": {**NUMBERS, "maxItems": 3}})
+
 PositivePair = Annotated[
     tuple[Positive, Positive],
     BeforeValidator(pair),

@@ -4,38 +4,34 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from railsim.definitions.base import Definition, Finite, Flag, NonNegative, Positive, Text, rising
+from railsim.definitions.base import Definition, Finite, Flag, NonNegative, Positive, Text, rises
 from railsim.definitions.creep_law import CreepLawName
 from railsim.definitions.file_definition import FileDefinition
 
-
-def _forward(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    if not rising(rows):
-        raise ValueError("the first column must increase from row to row")
-    return rows
-
-
 SpeedRows = Annotated[
-    tuple[tuple[Finite, Positive], ...], Field(min_length=1), AfterValidator(_forward)
+    tuple[tuple[Finite, Positive], ...], Field(min_length=1), rises("first column")
 ]
-Step = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-6, le=0.1)]
-Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-3, le=1e5)]
-Spacing = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-3, le=1e5)]
+Step = Annotated[Finite, Field(ge=1e-6, le=0.1)]
+Rate = Annotated[Finite, Field(ge=1e-3, le=1e5)]
+Spacing = Annotated[Finite, Field(ge=1e-3, le=1e5)]
 Cells = Annotated[int, Field(strict=True, ge=1, le=500)]
-Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=1.0)]
+Share = Annotated[Finite, Field(ge=0.0, le=1.0)]
 
 
 def _from_zero(rows: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     if rows[0] != (0.0, 0.0):
         raise ValueError("the first row must be [0.0, 0.0]: no creepage, no force")
-    return _forward(rows)
+    return rows
 
 
 AdhesionRows = Annotated[
-    tuple[tuple[NonNegative, Share], ...], Field(min_length=2), AfterValidator(_from_zero)
+    tuple[tuple[NonNegative, Share], ...],
+    Field(min_length=2),
+    AfterValidator(_from_zero),
+    rises("first column"),
 ]
 TractionRows = Annotated[
-    tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), AfterValidator(_forward)
+    tuple[tuple[NonNegative, Finite], ...], Field(min_length=1), rises("first column")
 ]
 
 

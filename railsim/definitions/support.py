@@ -18,46 +18,31 @@ slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import Field, WithJsonSchema, model_validator
 
-from railsim.definitions.base import Definition, Finite, NonNegative, Positive, rising
+from railsim.definitions.base import (
+    NUMBERS,
+    SIDED_ROWS,
+    Definition,
+    Finite,
+    NonNegative,
+    Positive,
+    both_sides,
+    rises,
+)
 
-SpringDamper = Annotated[
-    tuple[Positive, NonNegative],
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
-]
+SpringDamper = Annotated[tuple[Positive, NonNegative], WithJsonSchema({**NUMBERS, "maxItems": 2})]
 Preset = Literal["rigid", "ballasted", "co-running", "p2", "slab"]
 
 
-def _both_factors(value: Any) -> Any:
-    """Return rows [s, factor] as [s, pads, ballast]."""
-    if not isinstance(value, list | tuple):
-        return value
-    return [
-        (row[0], row[1], row[1]) if isinstance(row, list | tuple) and len(row) == 2 else row
-        for row in value
-    ]
-
-
-def _forward(rows: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not rising(rows):
-        raise ValueError("the arc length must increase from row to row")
-    return rows
-
-
 FactorRows = Annotated[
-    Annotated[tuple[tuple[Finite, Positive, Positive], ...], Field(min_length=1)],
-    AfterValidator(_forward),
-    BeforeValidator(_both_factors),
-    WithJsonSchema(
-        {
-            "type": "array",
-            "minItems": 1,
-            "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
-        }
-    ),
+    tuple[tuple[Finite, Positive, Positive], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(),
+    SIDED_ROWS,
 ]
 
 

@@ -7,9 +7,10 @@ cant and gradient are piecewise linear in the arc length and rounded over `round
 
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from railsim.definitions.base import (
+    SIDED_ROWS,
     Definition,
     Finite,
     Flag,
@@ -18,9 +19,10 @@ from railsim.definitions.base import (
     Positive,
     Text,
     TextPair,
+    both_sides,
     one_or_two,
     pair,
-    rising,
+    rises,
 )
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.file_definition import FileDefinition
@@ -36,53 +38,21 @@ def _curved(radius: float) -> float:
     return radius
 
 
-def _forward(rows: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not rising(rows):
-        raise ValueError("the arc length must increase from row to row")
-    return rows
-
-
 def _softer_in_slip(factors: tuple[float, float]) -> tuple[float, float]:
     if factors[1] > factors[0]:
         raise ValueError("the factor of the slip area is at most that of the adhesion area")
     return factors
 
 
-def _same_on_both_sides(value: Any) -> Any:
-    return _completed(value, 1.0)
-
-
-def _shared_by_both_sides(value: Any) -> Any:
-    return _completed(value, 0.5)
-
-
-def _completed(value: Any, share: float) -> Any:
-    """Return rows [s, value] as [s, left, right]."""
-    if not isinstance(value, list | tuple):
-        return value
-    return [
-        (row[0], share * row[1], share * row[1])
-        if isinstance(row, list | tuple) and len(row) == 2 and isinstance(row[1], int | float)
-        else row
-        for row in value
-    ]
-
-
-_ROWS = WithJsonSchema(
-    {
-        "type": "array",
-        "minItems": 1,
-        "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3},
-    }
-)
-Widening = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.05, le=0.1)]
+Widening = Annotated[Finite, Field(ge=-0.05, le=0.1)]
 FrictionRows = Annotated[
-    Annotated[tuple[tuple[Finite, NonNegative, NonNegative], ...], Field(min_length=1)],
-    AfterValidator(_forward),
-    BeforeValidator(_same_on_both_sides),
-    _ROWS,
+    tuple[tuple[Finite, NonNegative, NonNegative], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(),
+    SIDED_ROWS,
 ]
-Share = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
+Share = Annotated[Finite, Field(gt=0, le=1)]
 ThirdBody = Annotated[
     tuple[Share, Share],
     AfterValidator(_softer_in_slip),
@@ -90,15 +60,16 @@ ThirdBody = Annotated[
     one_or_two({"type": "number", "exclusiveMinimum": 0, "maximum": 1}),
 ]
 WideningRows = Annotated[
-    Annotated[tuple[tuple[Finite, Widening, Widening], ...], Field(min_length=1)],
-    AfterValidator(_forward),
-    BeforeValidator(_shared_by_both_sides),
-    _ROWS,
+    tuple[tuple[Finite, Widening, Widening], ...],
+    Field(min_length=1),
+    rises("arc length"),
+    both_sides(0.5),
+    SIDED_ROWS,
 ]
 Radius = Annotated[float, Field(strict=True), AfterValidator(_curved)]
-Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e7)]
-Cant = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.5, le=0.5)]
-Gradient = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-0.3, le=0.3)]
+Length = Annotated[Finite, Field(gt=0, le=1e7)]
+Cant = Annotated[Finite, Field(ge=-0.5, le=0.5)]
+Gradient = Annotated[Finite, Field(ge=-0.3, le=0.3)]
 
 
 class Straight(Definition):
@@ -208,11 +179,11 @@ class TrackTables(FileDefinition):
     """Mileage of s = 0 [m]; results hold the mileage of the reference body"""
     falling_mileage: Flag = False
     """The mileage falls in the direction of travel"""
-    gauge: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.3, le=2.5)] = 1.435
+    gauge: Annotated[Finite, Field(ge=0.3, le=2.5)] = 1.435
     """Distance between the gauge faces, 14 mm below the rail tops [m]"""
     rail: TextPair = ("60E1", "60E1")
     """Rail profile, a built-in name or a file, or [left, right]"""
-    inclination: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.2)] = 0.025
+    inclination: Annotated[Finite, Field(ge=0, le=0.2)] = 0.025
     """Inclination of the rails towards the track's middle, 0.025 = 1:40 [1]"""
     friction: NonNegativePair = (0.4, 0.4)
     """Coefficient of friction, one number, or left and right [1]"""
@@ -226,7 +197,7 @@ class TrackTables(FileDefinition):
     gauge_widening: WideningRows | None = None
     """Rows [s, widening] or [s, left, right], linear in between and rounded as the plan [m]: by how
     much each rail stands further out than the gauge says, one number being shared by both rails"""
-    rounding: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=200)] = 10.0
+    rounding: Annotated[Finite, Field(ge=0.1, le=200)] = 10.0
     """Length over which kinks of curvature, cant and gradient are rounded (box filter) [m]"""
     cant_rotation: Literal["centre", "inner_rail"] = "centre"
     """Cant turns the track about its centre line, or about the inner (lower) rail"""
