@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.definitions.creep_law import CREEP_LAWS
+from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -183,6 +184,7 @@ class LinearVehicle:
             faults.append(argument_fault("cant", "", f"found {cant:g} m", "0.5 m at most"))
         if faults:
             raise InputError(faults)
+        check_types([vehicle], track)
         self.held, self.name = held, vehicle.name
         self.curvature, self.cant = 1.0 / radius if math.isfinite(radius) else 0.0, cant
         known = dict(profiles or {})
