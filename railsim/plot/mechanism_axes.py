@@ -1,5 +1,6 @@
-"""Axes of the pictures of mechanisms: lines, labels, values in shown units, the shaded zone."""
+"""Axes of the pictures of mechanisms: curves, labels, values in shown units, the shaded zone."""
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,9 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from railsim.mechanisms.analysis import Analysis
+from railsim.mechanisms.links import Course
 from railsim.mechanisms.quantities import quantity
-from railsim.plot.style import DISTINCT
+from railsim.plot.style import DISTINCT, Picture
 
 Floats = NDArray[np.float64]
 DASHES: tuple[Any, ...] = (
@@ -27,7 +29,7 @@ def label_of(name: str, result: Analysis, words: str = "") -> str:
     """Label of an axis for a named result."""
     unit = quantity(name, result.definition).unit
     text = words or name.replace("_", " ")
-    return f"{text} / {unit.replace('deg', '°')}" if unit else text
+    return f"{text} ({unit.replace('deg', '°')})" if unit else text
 
 
 def values_of(name: str, result: Analysis) -> Floats:
@@ -49,3 +51,36 @@ def mark_zone(axes: Axes, result: Analysis, over: str) -> None:
 def way(result: Analysis) -> str:
     """Name of the result that says how far the output has moved along its axis."""
     return "x" if result.model.axis == 0 else "height"
+
+
+def single(width: float, height: float) -> tuple[Picture, Axes]:
+    """A figure with one pair of axes."""
+    figure = Picture(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots()
+
+
+def curves(
+    axes: Axes, result: Analysis, over: str, lines: Iterable[tuple[Any, str]], label: str
+) -> None:
+    """Draw lines (values, name) over a result, with labels, legend and the zone."""
+    for i, (values, name) in enumerate(lines):
+        axes.plot(values_of(over, result), values, label=name, **line_style(i))
+    mark_zone(axes, result, over)
+    axes.set_xlabel(label_of(over, result, "driver" if over == "travel" else ""))
+    axes.set_ylabel(label)
+    axes.legend(ncols=3)
+
+
+def three_rows(
+    over: Any, courses: Mapping[str, Course], scale: float, labels: Iterable[str]
+) -> tuple[Picture, Any]:
+    """A figure of courses, their first and their second derivatives."""
+    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
+    rows = figure.subplots(3, 1, sharex=True)
+    for i, (name, course) in enumerate(courses.items()):
+        for axes, values in zip(rows, vars(course).values(), strict=True):
+            axes.plot(over, np.round(values * scale, 9), label=name, **line_style(i))  # no noise
+    for axes, label in zip(rows, labels, strict=True):
+        axes.set_ylabel(label)
+    rows[0].legend(ncols=3)
+    return figure, rows

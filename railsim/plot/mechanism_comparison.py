@@ -1,6 +1,7 @@
 """Pictures of several mechanisms side by side: cases, files, the starts of a search."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from railsim.plot.mechanism_axes import (
     label_of,
     line_style,
     mark_zone,
+    single,
     values_of,
     way,
 )
@@ -27,17 +29,15 @@ if TYPE_CHECKING:
 
 def cases_figure(results: Mapping[str, Analysis]) -> Figure:
     """Unknown force over the driver, for all cases of a mechanism."""
-    figure = Picture(figsize=(6.6, 3.6), layout="constrained")
-    axes = figure.subplots()
-    for i, (name, result) in enumerate(results.items()):
-        axes.plot(
-            values_of("travel", result), values_of("force", result), label=name, **line_style(i)
-        )
+    figure, axes = single(6.6, 3.6)
     first = next(iter(results.values()))
+    assert first.definition.solve is not None
+    for i, (name, result) in enumerate(results.items()):
+        travel, force = values_of("travel", result), values_of("force", result)
+        axes.plot(travel, force, label=name, **line_style(i))
     axes.axhline(0.0, color="0.4", lw=0.8)
     axes.set_xlabel(label_of("travel", first, "driver"))
-    unknown = first.definition.solve.unknown if first.definition.solve is not None else ""
-    axes.set_ylabel(label_of("force", first, f"force of '{unknown}'"))
+    axes.set_ylabel(label_of("force", first, f"force of '{first.definition.solve.unknown}'"))
     axes.legend()
     return figure
 
@@ -63,10 +63,10 @@ def comparison_figure(results: Mapping[str, Analysis], *, zoom: bool = False) ->
             mark_zone(panels[0, column], first, way(first))
         panels[-1, column].set_xlabel(label_of(way(first), first))
     panels[0, 0].set_ylabel("ratio dy/dL")
-    panels[0, 1].set_ylabel("force / N")
+    panels[0, 1].set_ylabel("force (N)")
     if zoom:
         panels[1, 0].set_ylabel("ratio over the first's")
-        panels[1, 1].set_ylabel("force over the first's / N")
+        panels[1, 1].set_ylabel("force over the first's (N)")
     panels[0, 0].legend(fontsize=7.5)
     return figure
 
@@ -85,7 +85,7 @@ def held_figure(results: Mapping[str, Analysis]) -> Figure:
             right.plot(height, result.contact.curve, label=held, **line_style(i))
     right.axhline(0.0, color="0.4", lw=0.8)
     first = next(iter(results.values()))
-    for axes, text in ((left, "pressure needed / MPa"), (right, "static contact force / N")):
+    for axes, text in ((left, "pressure needed (MPa)"), (right, "static contact force (N)")):
         mark_zone(axes, first, way(first))
         axes.set_xlabel(label_of(way(first), first))
         axes.set_ylabel(text)
@@ -108,21 +108,18 @@ def _over_height(result: Analysis, name: str, zoom: bool) -> tuple[Floats, Float
 
 def search_figure(optimum: "Optimum") -> Figure:
     """Objective at the end of every start, feasible or not, and the best."""
-    figure = Picture(figsize=(6.4, 3.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = single(6.4, 3.6)
     starts = [s for s in optimum.starts if np.isfinite(s.objective) and s.objective > 0.0]
-    for kept, marker, fill, label in (
-        (True, "o", "k", "all constraints kept"),
-        (False, "x", "k", "a constraint broken"),
+    top = max((s.objective for s in starts), default=1.0)
+    lost = [replace(s, objective=top) for s in optimum.starts if not np.isfinite(s.objective)]
+    for shown, marker, fill, label in (
+        ([s for s in starts if s.feasible], "o", "k", "all constraints kept"),
+        ([s for s in starts if not s.feasible], "x", "k", "a constraint broken"),
+        (lost, "s", "w", "not assembled"),
     ):
-        chosen = [s for s in starts if s.feasible is kept]
-        if chosen:
-            axes.plot([s.number for s in chosen], [s.objective for s in chosen], marker, mfc=fill,
+        if shown:
+            axes.plot([s.number for s in shown], [s.objective for s in shown], marker, mfc=fill,
                       color="0.3", ms=5, label=label)  # fmt: skip
-    lost = [s.number for s in optimum.starts if not np.isfinite(s.objective)]
-    if lost:
-        axes.plot(lost, [max(s.objective for s in starts)] * len(lost), "s", mfc="w", color="0.5",
-                  ms=5, label="not assembled")  # fmt: skip
     if optimum.objective > 0.0:
         axes.axhline(optimum.objective, color=MAIN, label=f"best {optimum.objective:.4g}")
     if optimum.objective_before > 0.0:
@@ -130,7 +127,6 @@ def search_figure(optimum: "Optimum") -> Figure:
         axes.axhline(optimum.objective_before, color=SECOND, ls=DASHES[1], label=before)
     axes.set_yscale("log")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("start")
-    axes.set_ylabel("objective")
+    axes.set(xlabel="start", ylabel="objective")
     axes.legend()
     return figure

@@ -5,6 +5,7 @@ degrees, N, MPa.  Lines can be distinguished without colour too.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,12 @@ from railsim.mechanisms.quantities import force_unit, quantity
 from railsim.plot.mechanism_axes import (
     DASHES,
     MAIN,
-    SECOND,
+    curves,
     label_of,
     line_style,
     mark_zone,
+    single,
+    three_rows,
     values_of,
     way,
 )
@@ -75,7 +78,7 @@ def drawing_figure(result: Analysis) -> Figure:
         axes = [figure.subplots()]
     scale = quantity("travel", result.definition)
     for k in range(4):
-        label = f"{s[k] * scale.scale:.1f} {scale.unit.replace('deg', '°')}"
+        label = f"{s[k] * scale.scale:.1f} {scale.unit}".replace(" deg", "°")
         draw(axes[0], lines(motion), k, SHADES[k], label)
     named = axes[-1]
     if small:
@@ -86,8 +89,8 @@ def drawing_figure(result: Analysis) -> Figure:
         named.set_title("working parts at the start (grey: at the end)")
     for one in axes:
         one.set_aspect("equal")
-        one.set_xlabel("x / mm")
-        one.set_ylabel("y / mm")
+        one.set_xlabel("x (mm)")
+        one.set_ylabel("y (mm)")
     for xy in centres(motion).values():
         axes[0].plot(*(xy[0] * 1e3), **CENTRE)
         if named is not axes[0]:
@@ -134,29 +137,16 @@ def mark_points(axes: Axes, motion: Motion, box: Any) -> None:
 
 def kinematics_figure(result: Analysis) -> Figure:
     """Angles of bodies and rods over the driver, their rates and accelerations."""
-    motion = result.motion
-    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
-    rows = figure.subplots(3, 1, sharex=True)
-    travel = values_of("travel", result)
-    s1: Any = 1.0
-    s2: Any = 0.0
-    timed = result.timed
-    if timed is not None:
-        motion, s1, s2 = timed.motion, timed.speed, timed.acceleration
-        travel = motion.s * quantity("travel", result.definition).scale
-    for i, (name, course) in enumerate(links(motion).items()):
-        moving = course.in_time(s1, s2)
-        turned = moving.value - moving.value[0]
-        for axes, values in zip(rows, (turned, moving.first, moving.second), strict=True):
-            axes.plot(travel, np.degrees(values), label=name, **line_style(i))
-    words = ("rate / (°/s)", "acceleration / (°/s²)")
-    if timed is None:
-        words = ("d angle/d driver / (°/unit)", "second derivative")
-    rows[0].set_ylabel("angle since start / °")
-    rows[1].set_ylabel(words[0])
-    rows[2].set_ylabel(words[1])
+    motion, travel = result.motion, quantity("travel", result.definition)
+    courses = links(motion)
+    labels = ["rate (°/driver)", "second derivative"]
+    if (timed := result.timed) is not None:
+        motion, courses = timed.motion, timed.in_time(links(timed.motion))
+        labels = ["rate (°/s)", "acceleration (°/s²)"]
+    turned = {n: replace(c, value=c.value - c.value[0]) for n, c in courses.items()}
+    words = ["angle since start (°)", *labels]
+    figure, rows = three_rows(motion.s * travel.scale, turned, float(np.degrees(1.0)), words)
     rows[2].set_xlabel(label_of("travel", result, "driver"))
-    rows[0].legend(ncols=3)
     for axes in rows:
         mark_zone(axes, result, "travel")
     return figure
@@ -164,69 +154,42 @@ def kinematics_figure(result: Analysis) -> Figure:
 
 def actuators_figure(result: Analysis) -> Figure:
     """Lengths of the actuators, their speeds and accelerations; in time where there is a law."""
-    motion, timed = result.motion, result.timed
-    s1: Any = 1.0
-    s2: Any = 0.0
-    over, words = values_of("travel", result), label_of("travel", result, "driver")
-    labels = ["length / mm", "d length/d driver / (mm/unit)", "second derivative"]
-    if timed is not None:
-        motion, s1, s2, over, words = (
-            timed.motion, timed.speed, timed.acceleration, timed.time, "time / s",
-        )  # fmt: skip
-        labels = ["length / mm", "speed / (mm/s)", "acceleration / (mm/s²)"]
-    figure = Picture(figsize=(7.6, 5.6), layout="constrained")
-    rows = figure.subplots(3, 1, sharex=True)
-    for i, (name, course) in enumerate(actuators(motion).items()):
-        moving = course.in_time(s1, s2)
-        for axes, values in zip(rows, (moving.value, moving.first, moving.second), strict=True):
-            axes.plot(over, np.round(values * 1e3, 9), label=name, **line_style(i))  # no noise
-    for axes, label in zip(rows, labels, strict=True):
-        axes.set_ylabel(label)
-    rows[2].set_xlabel(words)
-    rows[0].legend(ncols=3)
+    courses, over = actuators(result.motion), values_of("travel", result)
+    labels = ["length (mm)", "rate (mm/driver)", "second derivative"]
+    if (timed := result.timed) is not None:
+        courses, over = timed.in_time(actuators(timed.motion)), timed.time
+        labels = ["length (mm)", "speed (mm/s)", "acceleration (mm/s²)"]
+    figure, rows = three_rows(over, courses, 1e3, labels)
+    rows[2].set_xlabel("time (s)" if timed is not None else label_of("travel", result, "driver"))
     return figure
 
 
 def path_figure(result: Analysis) -> Figure:
     """Path of the output, with the zone."""
-    figure = Picture(figsize=(4.6, 5.2), layout="constrained")
-    axes = figure.subplots()
-    x, y = values_of("x", result), values_of("height", result)
-    axes.plot(x, y, color=MAIN)
+    figure, axes = single(4.6, 5.2)
+    axes.plot(values_of("x", result), values_of("height", result), color=MAIN)
     for name, values in result.zone.items():
-        axes.plot(values["x"] * 1e3, values["height"] * 1e3, "o", color="k", ms=4)
         point = (values["x"] * 1e3, values["height"] * 1e3)
+        axes.plot(*point, "o", color="k", ms=4)
         axes.annotate(name, point, xytext=(6, -3), textcoords="offset points", fontsize=8)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x since start / mm")
-    axes.set_ylabel("height over start / mm")
+    axes.set(xlabel="x since start (mm)", ylabel="height over start (mm)")
     return figure
 
 
 def angles_figure(result: Analysis) -> Figure:
     """Transmission angles, folded, with their limit, and pressure angles of cams."""
-    figure = Picture(figsize=(7.0, 3.6), layout="constrained")
-    axes = figure.subplots()
-    travel = values_of("travel", result)
-    names = list(result.definition.angles)
-    for i, name in enumerate(names):
-        values = np.degrees(folded(result.output[name]))
-        axes.plot(travel, values, label=name, **line_style(i))
-    for i, name in enumerate(n for n in result.output if n.endswith("_pressure_angle")):
-        label = name.replace("_", " ")
-        axes.plot(
-            travel, values_of(name, result), label=label, lw=1.8, **line_style(len(names) + i)
-        )
+    figure, axes = single(7.0, 3.6)
+    lines = [(np.degrees(folded(result.output[n])), n) for n in result.definition.angles]
+    cams = (n for n in result.output if n.endswith("_pressure_angle"))
+    lines += [(values_of(name, result), name.replace("_", " ")) for name in cams]
+    curves(axes, result, "travel", lines, "angle (°)")
     limits = result.definition.optimise
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
         axes.axhline(limit, color=LIMIT, lw=0.9)
         axes.annotate("limit", (1.0, limit), xycoords=("axes fraction", "data"), fontsize=8,
                       color=LIMIT, ha="right", va="bottom")  # fmt: skip
-    mark_zone(axes, result, "travel")
-    axes.set_xlabel(label_of("travel", result, "driver"))
-    axes.set_ylabel("angle / °")
-    axes.legend(ncols=3)
     return figure
 
 
@@ -240,12 +203,11 @@ def cam_figure(result: Analysis) -> Figure:
     first = int(result.model.linkage.joint[row, 4])
     scale = quantity("travel", result.definition).scale
     beyond = 0.12 * abs(result.travel)
-    figure = Picture(figsize=(7.0, 3.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = single(7.0, 3.6)
     travel = values_of("travel", result)
     rate = motion.q1[:, body, 2]
     roller = cam.cam.partition(".")[0]
-    unit = "" if result.definition.driver.angle is not None else " / (m/rad)"
+    unit = "" if result.definition.driver.angle is not None else " (m/rad)"
     words = f"rate of the driver over that of '{roller}'{unit}"
     for i, arc in enumerate(np.unique(motion.arcs[:, row])):
         on = motion.arcs[:, row] == arc
@@ -270,47 +232,33 @@ def cam_figure(result: Analysis) -> Figure:
 def force_figure(result: Analysis) -> Figure:
     """Ratios and force of the actuator over its length and over the height."""
     over = [name for name in ("length", way(result)) if name in result.output]
-    shown = [name for name in ("ratio", "force") if name in result.output]
+    rows = {
+        "ratio": [("ratio", "along y"), ("ratio_x", "along x")],
+        "force": [("force", "on the way"), ("force_back", "on the way back")],
+    }
+    words = {"ratio": "ratio dy/dL, dx/dL", "force": "force of the unknown"}
+    shown = [name for name in rows if name in result.output]
     figure = Picture(figsize=(7.8, 5.4), layout="constrained")
     grid = figure.subplots(len(shown), len(over), sharex="col", sharey="row", squeeze=False)
-    for i, name in enumerate(shown):
-        for j, x in enumerate(over):
-            axes = grid[i, j]
-            axes.plot(values_of(x, result), values_of(name, result), color=MAIN, label="along y")
-            if name == "ratio":
-                axes.plot(values_of(x, result), values_of("ratio_x", result), color=SECOND,
-                          ls=DASHES[1], label="along x")  # fmt: skip
-            elif "force_back" in result.output:
-                axes.plot(values_of(x, result), values_of("force_back", result), color=SECOND,
-                          ls=DASHES[1], label="on the way back")  # fmt: skip
-            mark_zone(axes, result, x)
-            if i == len(shown) - 1:
-                axes.set_xlabel(label_of(x, result))
-        words = {"ratio": "ratio dy/dL, dx/dL", "force": "force of the unknown"}[name]
-        grid[i, 0].set_ylabel(label_of(name, result, words))
-        if name == "ratio" or "force_back" in result.output:
-            grid[i, 0].legend()
+    for name, row in zip(shown, grid, strict=True):
+        lines = [(values_of(n, result), label) for n, label in rows[name] if n in result.output]
+        for axes, x in zip(row, over, strict=True):
+            curves(axes, result, x, lines, label_of(name, result, words[name]))
+            axes.label_outer()
+            if axes is not row[0] or len(lines) == 1:
+                axes.get_legend().remove()
     return figure
 
 
 def pressure_figure(result: Analysis) -> Figure:
     """Pressure that the mechanism needs, over the height."""
-    figure = Picture(figsize=(6.4, 3.4), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(
-        values_of(way(result), result), values_of("pressure", result), color=MAIN, label="needed"
-    )
-    if "pressure_back" in result.output:
-        axes.plot(values_of(way(result), result), values_of("pressure_back", result), color=MAIN,
-                  ls=DASHES[2], label="needed on the way back")  # fmt: skip
-        axes.legend()
+    figure, axes = single(6.4, 3.4)
+    names = (("pressure", "needed"), ("pressure_back", "needed on the way back"))
+    lines = [(values_of(n, result), label) for n, label in names if n in result.output]
     if result.contact is not None:
-        axes.axhline(result.contact.pressure / 1e6, color=SECOND, ls=DASHES[1], label="held")
-        axes.legend()
-    mark_zone(axes, result, way(result))
+        lines.append((np.full(len(lines[0][0]), result.contact.pressure / 1e6), "held"))
+    curves(axes, result, way(result), lines, "pressure (MPa)")
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel(label_of(way(result), result))
-    axes.set_ylabel("pressure / MPa")
     return figure
 
 
@@ -318,22 +266,14 @@ def contact_figure(result: Analysis) -> Figure:
     """Static contact force at constant pressure, over the height."""
     contact = result.contact
     assert contact is not None
-    figure = Picture(figsize=(6.4, 3.4), layout="constrained")
-    axes = figure.subplots()
-    label = f"at {contact.pressure / 1e6:.4f} MPa"
-    axes.plot(values_of(way(result), result), contact.curve, color=MAIN, label=label)
+    figure, axes = single(6.4, 3.4)
+    lines = [(contact.curve, f"at {contact.pressure / 1e6:.4f} MPa")]
     if contact.rising != contact.falling:
-        for curve, words, dashes in zip(
-            contact.bounds, ("rising", "falling"), DASHES[1:3], strict=True
-        ):
-            axes.plot(values_of(way(result), result), curve, color=SECOND, ls=dashes, label=words)
+        lines += zip(contact.bounds, ("rising", "falling"), strict=True)
+    curves(axes, result, way(result), lines, "static contact force (N)")
     axes.axhline(0.0, color="0.4", lw=0.8)
     for y, stable in contact.equilibria:
         axes.plot(y * 1e3, 0.0, "o", mfc="k" if stable else "w", color="k", ms=6, clip_on=False)
-    mark_zone(axes, result, way(result))
-    axes.set_xlabel(label_of(way(result), result))
-    axes.set_ylabel("static contact force / N")
-    axes.legend()
     return figure
 
 
@@ -343,8 +283,7 @@ def carpet_figure(result: Analysis) -> Figure:
     spring = result.definition.actuators[result.definition.solve.unknown]
     assert isinstance(spring, AirSpring)
     table = table_of(result.motion, spring)
-    figure = Picture(figsize=(6.6, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = single(6.6, 4.2)
     heights = table.heights * 1e3
     for i, pressure in enumerate(table.pressures):
         axes.plot(heights, table.forces[:, i] / 1e3, color="0.55", lw=0.9, marker=".", ms=3)
@@ -356,8 +295,8 @@ def carpet_figure(result: Analysis) -> Figure:
     if result.zone:
         mark_zone(axes, result, "length")
     axes.set_xlim(left=heights[0] - 0.14 * (heights[-1] - heights[0]))
-    axes.set_xlabel("height of the air spring / mm")
-    axes.set_ylabel("force / kN")
+    axes.set_xlabel("height of the air spring (mm)")
+    axes.set_ylabel("force (kN)")
     axes.legend()
     return figure
 
@@ -366,16 +305,11 @@ def gas_spring_figure(result: Analysis) -> Figure:
     """Length and force of the gas springs over the driver."""
     names = [n.removesuffix("_length") for n in result.output if n.endswith("_length")]
     figure = Picture(figsize=(7.2, 3.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    travel = values_of("travel", result)
-    for i, name in enumerate(names):
-        left.plot(travel, values_of(f"{name}_length", result), label=name, **line_style(i))
-        right.plot(travel, values_of(f"{name}_force", result), label=name, **line_style(i))
-    left.set_ylabel("length / mm")
-    right.set_ylabel("push / N")
-    for axes in (left, right):
-        axes.set_xlabel(label_of("travel", result, "driver"))
-    left.legend()
+    for axes, kind, words in zip(
+        figure.subplots(1, 2), ("length", "force"), ("length (mm)", "push (N)"), strict=True
+    ):
+        lines = [(values_of(f"{name}_{kind}", result), name) for name in names]
+        curves(axes, result, "travel", lines, words)
     return figure
 
 
@@ -385,23 +319,19 @@ def time_figure(result: Analysis) -> Figure:
     assert timed is not None
     figure = Picture(figsize=(7.6, 5.6), layout="constrained")
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
-    travel = quantity("travel", result.definition)
-    a.plot(timed.time, timed.motion.s * travel.scale, color=MAIN)
+    a.plot(timed.time, timed.motion.s * quantity("travel", result.definition).scale, color=MAIN)
     a.set_ylabel(label_of("travel", result, "driver"))
     name = driving(result.definition)
     unit = force_unit(name, result.definition)
     b.plot(timed.time, timed.force, color=MAIN)
-    b.set_ylabel(f"{'torque' if unit == 'N m' else 'force'} of '{name}' / {unit}")
+    b.set_ylabel(f"{'torque' if unit == 'N m' else 'force'} of '{name}' ({unit})")
     if result.definition.output is not None:
-        v, acceleration = timed.point(result.definition.output.point)
-        for axes, values in ((c, v), (d, acceleration)):
-            axes.plot(timed.time, values[:, 0] * 1e3, label="x", **line_style(0))
-            axes.plot(timed.time, values[:, 1] * 1e3, label="y", **line_style(1))
-            absolute = np.hypot(values[:, 0], values[:, 1]) * 1e3
-            axes.plot(timed.time, absolute, label="absolute", **line_style(2))
-    c.set_ylabel("speed of the output / (mm/s)")
-    d.set_ylabel("acceleration / (mm/s²)")
-    c.legend()
-    for axes in (c, d):
-        axes.set_xlabel("time / s")
+        for axes, values in zip((c, d), timed.point(result.definition.output.point), strict=True):
+            absolute = np.hypot(values[:, 0], values[:, 1])
+            lines = zip((*values.T, absolute), ("x", "y", "absolute"), strict=True)
+            for i, (line, label) in enumerate(lines):
+                axes.plot(timed.time, line * 1e3, label=label, **line_style(i))
+        c.legend()
+    c.set(xlabel="time (s)", ylabel="speed of the output (mm/s)")
+    d.set(xlabel="time (s)", ylabel="acceleration (mm/s²)")
     return figure

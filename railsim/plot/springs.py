@@ -43,15 +43,15 @@ def stiffness_figure(result: Verification) -> Figure:
     loads = [case.load * 1e-3 for case in result.cases]
     deflections = [case.deflection * 1e3 for case in result.cases]
     for axes, x, marks, label in (
-        (over_load, curve["load"] * 1e-3, loads, "load $P$ / kN"),
-        (over_deflection, curve["deflection"] * 1e3, deflections, "deflection $\\Delta z$ / mm"),
+        (over_load, curve["load"] * 1e-3, loads, "load $P$ (kN)"),
+        (over_deflection, curve["deflection"] * 1e3, deflections, "deflection $\\Delta z$ (mm)"),
     ):
         axes.plot(x, curve["K_sys"] * 1e-3, color=MAIN, label="system stiffness $P/\\Delta z$")
-        axes.plot(x, curve["rate"] * 1e-3, color=SECOND, ls="--", label="rate of small movements")
+        axes.plot(x, curve["rate"] * 1e-3, color=SECOND, ls="--", label="tangent stiffness")
         stiffnesses = [(case.K_sys * 1e-3, case.name) for case in result.cases]
         _mark(axes, [(mark, *point) for mark, point in zip(marks, stiffnesses, strict=True)])
         axes.set_xlabel(label)
-    over_load.set_ylabel("stiffness / (N/mm)")
+    over_load.set_ylabel("stiffness (N/mm)")
     over_load.set_ylim(bottom=0.0)
     over_load.legend(loc="lower right")
     return figure
@@ -71,14 +71,14 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
     _mark(
         deflection, [(case.load * 1e-3, case.deflection * 1e3, case.name) for case in result.cases]
     )
-    deflection.set_ylabel("deflection $\\Delta z$ / mm")
+    deflection.set_ylabel("deflection $\\Delta z$ (mm)")
     rotation.plot(load, np.degrees(curve["rotation"]), color=MAIN)
     _mark(
         rotation,
         [(case.load * 1e-3, np.degrees(case.rotation), case.name) for case in result.cases],
     )
     rotation.axhline(0.0, color=FAINT, lw=0.8)
-    rotation.set_ylabel("rotation of the arm / °")
+    rotation.set_ylabel("rotation of the arm (°)")
     solid = solid_heights(suspension)
     for i, name in enumerate(suspension.springs):
         colour = SPRING_COLOURS[name]
@@ -98,10 +98,10 @@ def deflection_figure(suspension: TrailingArmSuspension, result: Verification) -
             fontsize=7.5,
             color="0.25",
         )
-    heights.set_ylabel("height under load / mm")
+    heights.set_ylabel("height under load (mm)")
     heights.legend(ncols=3, loc="upper right")
     for axes in (deflection, rotation, heights):
-        axes.set_xlabel("load $P$ / kN")
+        axes.set_xlabel("load $P$ (kN)")
     return figure
 
 
@@ -127,7 +127,7 @@ def coils_figure(suspension: TrailingArmSuspension, result: Design) -> Figure:
             )
     axes.plot([], [], "o", mfc="w", mec="0.3", ms=8, label="built")
     axes.axhline(3.0, color=LIMIT, lw=0.9, ls=":", label="3 coils (EN 13906-1, hot coiled)")
-    axes.set(xlabel="wire diameter $d$ / mm", ylabel="active coils $n$", ylim=(0.0, 12.5))
+    axes.set(xlabel="wire diameter $d$ (mm)", ylabel="active coils $n$", ylim=(0.0, 12.5))
     figure.legend(loc="upper left", ncols=2, fontsize=8, borderaxespad=0.2)
     return figure
 
@@ -151,8 +151,8 @@ def goodman_figure(suspension: TrailingArmSuspension, result: Mapping[str, Fatig
         axes.plot(low, high, "o", color=colour, ms=6, label=f"{name}, margin {spring.margin:.2f}")
         axes.plot(low, low, "o", mfc="w", mec=colour, ms=5)
     axes.set(
-        xlabel="lower stress $\\tau_{min}$ / MPa",
-        ylabel="stress $\\tau$ / MPa",
+        xlabel="lower stress $\\tau_{min}$ (MPa)",
+        ylabel="stress $\\tau$ (MPa)",
         xlim=(0.0, 1.05 * end),
         ylim=(0.0, 1.12 * end),
         aspect="equal",
@@ -200,7 +200,7 @@ def search_figure(result: "SearchResult") -> Figure:
         axes.annotate(
             str(rank), point, xytext=(4, 3), textcoords="offset points", fontsize=8, color=MAIN
         )
-    axes.set(xlabel="mass of the nest / kg", ylabel="fatigue margin")
+    axes.set(xlabel="mass of the nest (kg)", ylabel="fatigue margin")
     axes.legend(loc="best")
     return figure
 
@@ -216,13 +216,13 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
     low = np.array([end[0] for _, end in ends]) * 1e3
     high = np.array([end[1] for _, end in ends]) * 1e3
     rows = np.arange(len(ends))
-    single.barh(rows, low, color=DISTINCT[4], height=0.6, label="at the lower limit")
-    single.barh(rows, high, color=DISTINCT[0], height=0.6, label="at the upper limit")
+    single.barh(rows, low, color=DISTINCT[4], height=0.6, label="lower limit")
+    single.barh(rows, high, color=DISTINCT[0], height=0.6, label="upper limit")
     single.set_yticks(rows, names)
     single.set_ylim(-0.6, max(len(rows), 4) - 0.4)
     single.grid(axis="y", visible=False)
     single.axvline(0.0, color="0.35", lw=0.8)
-    single.set_xlabel(f"change of the ride height at {unformatted(shown.name)} / mm")
+    single.set_xlabel(f"change of the ride height at {unformatted(shown.name)} (mm)")
     single.legend(loc="lower right", fontsize=7.5)
     ordered = sorted(results, key=lambda result: result.load)
     columns = np.arange(len(ordered))
@@ -242,12 +242,12 @@ def ride_height_figure(results: Sequence[RideHeight], tare: str | None = None) -
             solid_capstyle="butt",
         )
     every.plot([], [], color=FAINT, lw=5, label="worst case")
-    every.plot([], [], color=MAIN, lw=5, label="random")
+    every.plot([], [], color=MAIN, lw=5, label="statistical (RSS)")
     names = [unformatted(result.name) for result in ordered]
     every.set_xticks(columns, names, rotation=30, ha="right")
     every.set_xlim(-0.6, len(ordered) - 0.4)
     every.axhline(0.0, color="0.35", lw=0.8)
-    every.set_ylabel("ride height / mm")
+    every.set_ylabel("ride height (mm)")
     top = max(result.highest for result in ordered) * 1e3
     every.set_ylim(top=1.45 * top)
     every.legend(loc="upper right", fontsize=7.5)

@@ -225,8 +225,8 @@ def animation(result: Analysis) -> bytes:
         axes.set_xlim(x0 - margin, x1 + margin)
         axes.set_ylim(y0 - margin, y1 + margin)
         axes.set_aspect("equal")
-        axes.set_xlabel("x / mm")
-        axes.set_ylabel("y / mm")
+        axes.set_xlabel("x (mm)")
+        axes.set_ylabel("y (mm)")
         title = axes.set_title(_position(result, motion.s[0]))
         moving: list[Any] = [*made, title]
         for artist in moving:
@@ -251,7 +251,7 @@ def animation(result: Analysis) -> bytes:
 def _position(result: Analysis, s: float) -> str:
     """The driver's value as the animations show it."""
     driver = quantity("travel", result.definition)
-    return f"driver at {s * driver.scale:.1f} {driver.unit.replace('deg', '°')}"
+    return f"driver at {s * driver.scale:.1f} {driver.unit}".replace(" deg", "°")
 
 
 def player(result: Analysis) -> tuple[str, dict[str, Any]]:
