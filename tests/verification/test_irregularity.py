@@ -327,6 +327,25 @@ def test_measured_track_geometry_becomes_displacements_of_the_rails(measured):
     np.testing.assert_allclose(value[:, 0], expected, atol=1e-15)
 
 
+def test_absolute_gauge_and_another_encoding_are_read_when_the_file_says_so(tmp_path):
+    rows = "\n".join(f"{x};{1435 + x}" for x in range(6))
+    (tmp_path / "track.csv").write_bytes(f"Länge;Spurweite\n{rows}".encode("latin-1"))
+    how = (
+        'columns = { s = "Länge", gauge = "Spurweite" }\nunits = { gauge = "mm" }\n'
+        'offset = { gauge = 1435.0 }\nencoding = "latin-1"\n'
+    )
+    path = tmp_path / "track.toml"
+    path.write_text(HEAD + USE + how, encoding="utf-8")
+    value, _ = rails(load_track(path), [4.0])
+    np.testing.assert_allclose(value[:, 0], [-0.002, 0.0, 0.002, 0.0], atol=1e-15)
+    path.write_text(HEAD + USE + how.replace('"latin-1"', '"latin-9x"'), encoding="utf-8")
+    with pytest.raises(InputError, match="unknown encoding 'latin-9x'"):
+        load_track(path)
+    path.write_text(HEAD + USE + how.replace('encoding = "latin-1"\n', ""), encoding="utf-8")
+    with pytest.raises(InputError, match='its encoding, such as encoding = "latin-1"'):
+        load_track(path)
+
+
 @pytest.mark.parametrize(
     ("csv", "expected"),
     [
@@ -339,7 +358,9 @@ def test_measured_track_geometry_becomes_displacements_of_the_rails(measured):
         ("s,z\n0,0\n1\n2,0\n3,0\n4,0", "line 3: 1 values"),
         ("s,z\n0,0\n1,0", "four rows at least"),
         ("s,z\n0,0\n1,0\n1,0\n2,0\n3,0", "line 4: s = 1 m does not increase"),
+        ("s,z\n3,0\n2,0\n1,0\n0,0", "falling_mileage = true"),
         ("s,z\n0,0\n1,0\n2,5\n3,0", "line 4: a displacement of 5 m"),
+        ("s,gauge_mm\n0,1435\n1,1436\n2,1437\n3,1436", "offset = { gauge = 1435.0 }"),
     ],
 )
 def test_wrong_measured_file_is_refused(measured, csv, expected):

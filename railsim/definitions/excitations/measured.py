@@ -19,7 +19,7 @@ from railsim.definitions.excitations.base import (
 )
 
 # Keys that say how the file of a measured irregularity is read; its rows are what came of it.
-READING = ("columns", "units", "reverse", "falling_mileage", "chord", "band")
+READING = ("encoding", "columns", "units", "offset", "reverse", "falling_mileage", "chord", "band")
 # Share of the range of the rows around by which a spline between measured rows may leave it.
 OVERSHOOT = 0.25
 _INNER = np.arange(1, 8) / 8.0  # positions within an interval, over its length
@@ -36,12 +36,17 @@ class Measured(Irregular):
     file: Text | None = None
     """CSV with a header: `s` and any of `y_left`, `z_left`, `y_right`, `z_right` in m (`s_m`) or
     mm (`y_left_mm`), or `y`, `z`, `cross_level`, `gauge`; read when the track is loaded"""
+    encoding: Text | None = None
+    """Encoding of the file, such as `latin-1`; by default UTF-8"""
     columns: dict[Text, Text] | None = None
     """Names of the file's columns by ours, where they differ: `{ s = "Mileage", z_left = "LL" }`;
     columns that are not named are not read"""
     units: dict[Text, Literal["m", "mm", "km"]] | None = None
     """Units by our names of the columns, `{ s = "km", z_left = "mm" }`; by default as the names
     say"""
+    offset: dict[Text, Finite] | None = None
+    """What the file gives where the rails are not displaced, by our names of the columns and in
+    the units of the file: `{ gauge = 1435.0 }` for an absolute gauge in mm"""
     reverse: tuple[Text, ...] = ()
     """Our names of the columns whose sign is the opposite of ours"""
     falling_mileage: Flag = False

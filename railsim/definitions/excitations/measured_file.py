@@ -17,7 +17,7 @@ from railsim.definitions.excitations.base import COLUMNS
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, InputError, counted, nearest
-from railsim.files import TABLE_BYTES, is_file, read_text
+from railsim.files import TABLE_BYTES, is_file, read_bytes
 from railsim.text import LONGEST_FILE, shortened
 
 UNITS = {"": 1.0, "_m": 1.0, "_mm": 1e-3, "_km": 1e3}
@@ -85,8 +85,10 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
 class Reading:
     """How the file of a measured irregularity is read; see `Measured`."""
 
+    encoding: str = "utf-8-sig"
     columns: dict[str, str] | None = None
     units: dict[str, str] | None = None
+    offset: dict[str, float] | None = None
     reverse: tuple[str, ...] = ()
     falling_mileage: bool = False
     chord: tuple[float, float] | None = None
@@ -102,8 +104,10 @@ class Reading:
             return None
         band = BANDS[part.band] if isinstance(part.band, str) else part.band
         return cls(
+            part.encoding or "utf-8-sig",
             part.columns,
             dict(part.units or {}),
+            dict(part.offset or {}),
             part.reverse,
             part.falling_mileage,
             part.chord,
@@ -114,7 +118,13 @@ class Reading:
 def read_measured(path: Path, how: Reading = Reading()) -> tuple[Rows, list[Fault]]:
     """Read rows [s, y_left, z_left, y_right, z_right] in m, and the faults of the file."""
     try:
-        return _rows_of(path, read_text(path, TABLE_BYTES), how)
+        return _rows_of(path, read_bytes(path, TABLE_BYTES).decode(how.encoding), how)
+    except LookupError:
+        allowed = "a name such as utf-8, latin-1 or utf-16"
+        return [], [Fault("", "encoding", f"unknown encoding '{how.encoding}'", allowed)]
+    except UnicodeDecodeError as error:
+        found = f"byte {error.start} is not {error.encoding}"
+        return [], [Fault(str(path), "", found, 'its encoding, such as encoding = "latin-1"')]
     except InputError as error:
         return [], list(error.faults)
     except csv.Error as error:
@@ -149,7 +159,7 @@ def _rows_of(path: Path, text: str, how: Reading) -> tuple[Rows, list[Fault]]:
         if how.falling_mileage:
             begin = row[0] if not rows else begin
             row = (begin - row[0], *row[1:])
-        faults += _row_faults(path, number, row, rows)
+        faults += _row_faults(path, number, row, rows, _absolute_gauge(header, cells))
         rows.append(row)
     if not faults and len(rows) < 4:
         faults.append(Fault(str(path), "", f"{len(rows)} rows", "four rows at least"))
@@ -173,14 +183,15 @@ def _filtered(path: Path, rows: Rows, how: Reading) -> tuple[Rows, list[Fault]]:
     return [(s, *row) for s, row in zip(table[:, 0].tolist(), values.T.tolist(), strict=True)], []
 
 
-Column = tuple[str, float]
+Column = tuple[str, float, float]  # our name, unit [m], value of the undisplaced rails
 
 
 def _with_unit(column: Column, how: Reading) -> Column:
-    name, unit = column
+    name, unit, _ = column
     if how.units and name in how.units:
         unit = UNITS[f"_{how.units[name]}"]
-    return name, -unit if name in how.reverse else unit
+    offset = (how.offset or {}).get(name, 0.0)
+    return name, -unit if name in how.reverse else unit, offset
 
 
 def _mapped(path: Path, head: list[str], how: Reading) -> tuple[list[Column | None], list[Fault]]:
@@ -196,7 +207,7 @@ def _mapped(path: Path, head: list[str], how: Reading) -> tuple[list[Column | No
             found = f"no column '{theirs}'"
             faults.append(Fault(str(path), "header", found, nearest(theirs, head)))
         else:
-            columns[head.index(theirs)] = (name, 1.0)
+            columns[head.index(theirs)] = (name, 1.0, 0.0)
     if "s" not in how.columns:
         faults.append(Fault("", "columns", "no column for s", "the arc length or mileage s"))
     return columns, faults
@@ -207,7 +218,7 @@ def _header(path: Path, cells: list[str]) -> tuple[list[Column | None], list[Fau
     columns: list[Column | None] = []
     faults = []
     for cell in cells:
-        found = [(name, unit) for name, unit in _names(cell) if name in ("s", *SHARES)]
+        found = [(name, unit, 0.0) for name, unit in _names(cell) if name in ("s", *SHARES)]
         if not found:
             allowed = nearest(cell, ["s", *SHARES]) + "; or name it in 'columns'"
             faults.append(Fault(str(path), "header", f"unknown column '{cell}'", allowed))
@@ -238,12 +249,31 @@ def _problem(cells: list[str], header: list[Column | None]) -> tuple[str, str] |
     return None
 
 
-def _row_faults(path: Path, number: int, row: tuple[float, ...], before: Rows) -> list[Fault]:
+def _absolute_gauge(header: list[Column | None], cells: list[str]) -> bool:
+    """Whether a column of gauge holds the distance of the rails instead of its deviation."""
+    return any(
+        column is not None
+        and column[0] == "gauge"
+        and 0.6 < abs(column[1]) * (float(cell) - column[2]) < 2.0
+        for column, cell in zip(header, cells, strict=True)
+    )
+
+
+def _row_faults(
+    path: Path, number: int, row: tuple[float, ...], before: Rows, absolute_gauge: bool
+) -> list[Fault]:
     line = f"line {number}"
     faults = []
     if before and row[0] <= before[-1][0]:
         found = f"s = {row[0]:g} m does not increase"
-        faults.append(Fault(str(path), line, found, "arc lengths that increase from row to row"))
+        faults.append(
+            Fault(
+                str(path),
+                line,
+                found,
+                "arc lengths that increase from row to row; or falling_mileage = true",
+            )
+        )
     elif before:
         steepest = max(abs(new - old) for new, old in zip(row[1:], before[-1][1:], strict=True))
         if steepest > STEEPEST * (row[0] - before[-1][0]):
@@ -251,7 +281,10 @@ def _row_faults(path: Path, number: int, row: tuple[float, ...], before: Rows) -
             allowed = f"{STEEPEST * 1e3:g} mm/m at most: no table can hold a step of the rail"
             faults.append(Fault(str(path), line, found, allowed))
     largest = max(abs(value) for value in row[1:])
-    if largest > LARGEST:
+    if absolute_gauge:
+        allowed = "its deviation; give the nominal one by offset = { gauge = 1435.0 }"
+        faults.append(Fault(str(path), line, "an absolute gauge", allowed))
+    elif largest > LARGEST:
         allowed = f"{LARGEST:g} m at most; is the column in mm? then its name ends in _mm"
         faults.append(Fault(str(path), line, f"a displacement of {largest:g} m", allowed))
     return faults
@@ -263,7 +296,8 @@ def _row(header: list[Column | None], cells: list[str]) -> tuple[float, ...]:
     for column, cell in zip(header, cells, strict=True):
         if column is None:
             continue
-        (name, unit), value = column, float(cell)
+        name, unit, offset = column
+        value = float(cell) - offset
         if name == "s":
             s = unit * value
             continue
