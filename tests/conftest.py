@@ -27,7 +27,7 @@ def reference_dir():
 @pytest.fixture(autouse=True)
 def no_stored_solutions(monkeypatch):
     """Equilibria and steps are found anew: a test may replace what finds them."""
-    monkeypatch.setattr(railsim.model.solutions, "own_folder", lambda *_: None)
+    monkeypatch.setattr(railsim.model.solutions, "solutions_folder", lambda _: None)
 
 
 @pytest.fixture

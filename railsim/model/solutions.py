@@ -7,6 +7,7 @@ versions of the libraries that compute, and the processor.
 
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -38,7 +39,7 @@ def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dic
     solve : callable
         Finds it: numbers, texts and lists of them by name.  What it raises is not stored.
     """
-    folder = own_folder("solutions")
+    folder = solutions_folder(os.environ.get("RAILSIM_CACHE_DIR"))
     if folder is None:
         return solve()
     key = hashlib.sha256(f"{program_hash()} {kind} {inputs}".encode()).hexdigest()[:32]
@@ -53,6 +54,12 @@ def solution(kind: str, inputs: str, solve: Callable[[], dict[str, Any]]) -> dic
         _drop_old(folder)
         store(path, json.dumps(found).encode())
     return found
+
+
+@cache
+def solutions_folder(cache_folder: str | None) -> Path | None:
+    """Folder of the solutions in the cache, looked at once a process."""
+    return own_folder("solutions")
 
 
 @cache
@@ -71,9 +78,8 @@ def program_hash() -> str:
 
 def _drop_old(folder: Path) -> None:
     """Remove the older half of the solutions where there are too many."""
-    paths = list(folder.glob("*.json"))
-    if len(paths) < MOST_STORED:
+    if len(os.listdir(folder)) <= MOST_STORED:  # with the mark
         return
-    ages = {path: path.stat().st_mtime for path in paths if path.exists()}
+    ages = {path: path.stat().st_mtime for path in folder.glob("*.json") if path.exists()}
     for path in sorted(ages, key=ages.__getitem__)[: len(ages) // 2]:
         path.unlink(missing_ok=True)

@@ -12,9 +12,10 @@ from railsim.simulation import step_choice
 @pytest.fixture
 def folder(monkeypatch, tmp_path):
     """Folder of the solutions of this test."""
-    monkeypatch.setattr(solutions, "own_folder", lambda name: cache.own_folder(name, base=tmp_path))
+    place = cache.own_folder("solutions", base=tmp_path)
+    monkeypatch.setattr(solutions, "solutions_folder", lambda _: place)
     monkeypatch.setattr(solutions, "_new", [])
-    return tmp_path / "railsim" / "solutions"
+    return place
 
 
 @pytest.fixture
