@@ -404,7 +404,7 @@ WITHOUT_UNIT = ("ratio dy/dL", "ratio over the first's", "rate of the driver", "
 
 
 def unit_stated(label):
-    return "/ " in label or label.startswith(WITHOUT_UNIT)
+    return label.endswith(")") or label.startswith(WITHOUT_UNIT)
 
 
 def test_every_axis_of_every_picture_says_its_unit():
@@ -426,7 +426,7 @@ def test_every_axis_of_every_picture_says_its_unit():
         for name, figure in figures(collected).items():
             seen.add(name)
             for axes in figure.axes:
-                labels = [axes.get_xlabel() or "/ shared", axes.get_ylabel() or "/ shared"]
+                labels = [axes.get_xlabel() or "(shared)", axes.get_ylabel() or "(shared)"]
                 assert all(unit_stated(label) for label in labels), (name, labels)
             assert any(axes.get_xlabel() for axes in figure.axes)
     wanted = "drawing kinematics path angles cam ratio_force pressure contact carpet time"
