@@ -369,8 +369,8 @@ class Result:
         InputError
             A quantity or label that the result does not have; the file exists.
         """
-        chosen = {"selections": quantities} if quantities else {}
-        return picture_of(self, path, overwrite, over=over, by=by, between=between, **chosen)
+        selection = {"selections": quantities} if quantities else {}
+        return picture_of(self, path, overwrite, over=over, by=by, between=between, **selection)
 
     # -- elsewhere ----------------------------------------------------------------------------
 
@@ -438,8 +438,15 @@ class Result:
             raise ImportError(
                 "to_pandas needs pandas; install it with: pip install 'railsim[pandas]'"
             ) from None
+        found = list(self.columns(*names))
+        columns = {column: values for column, _, values in found}
+        frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))
+        frame.attrs["units"] = {column: unit for column, unit, _ in found}
+        return frame
+
+    def columns(self, *names: str) -> Iterator[tuple[str, str, Array]]:
+        """Yield name, unit and values of every column of quantities over time, see `to_pandas`."""
         over_time = [n for n, q in self._quantities.items() if q.dims[0] == "time" != n]
-        columns, units = {}, {}
         for name in names or over_time:
             array = self[name]
             if name not in over_time:
@@ -447,13 +454,9 @@ class Result:
             quantity = self._quantities[name]
             combinations = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
             for labels, values in zip(combinations, array.reshape(len(array), -1).T, strict=True):
-                column = ":".join((name, *labels))
-                columns[column] = values
-                own = quantity.component(labels[-1]) if "component" in quantity.dims else quantity
-                units[column] = own.unit
-        frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))
-        frame.attrs["units"] = units
-        return frame
+                along = "component" in quantity.dims
+                unit = quantity.component(labels[-1]).unit if along else quantity.unit
+                yield ":".join((name, *labels)), unit, values
 
 
 def _remade(*parts: Any) -> Result:

@@ -6,8 +6,6 @@ their names with their dimensions, and ``units``, names and facts of the run as 
 """
 
 import csv
-from collections.abc import Iterator
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -37,25 +35,13 @@ def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path
     return path
 
 
-def columns(result: Result) -> Iterator[tuple[str, str, Array]]:
-    """Yield name, unit and values of every column of every quantity over time."""
-    for name, quantity in result.quantities.items():
-        if quantity.dims[0] != "time":
-            continue
-        array = result[name]
-        coordinates = [result.coordinates[dim] for dim in quantity.dims[1:]]
-        for labels in product(*coordinates):
-            at: tuple[Any, ...] = tuple(
-                names.index(label) for names, label in zip(coordinates, labels, strict=True)
-            )
-            unit = quantity.unit
-            if "component" in quantity.dims:
-                unit = quantity.component(labels[-1]).unit
-            yield ":".join((name, *labels)), unit, array[(..., *at)]
+def _columns(result: Result) -> list[tuple[str, str, Array]]:
+    """Return name, unit and values of every column, time first."""
+    return [("time", "s", result["time"]), *result.columns()]
 
 
 def _csv(result: Result, path: Path) -> None:
-    found = list(columns(result))
+    found = _columns(result)
     table = np.stack([values for _, _, values in found], axis=1)
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -87,7 +73,7 @@ def _parquet(result: Result, path: Path) -> None:
         found = f"the package '{error.name}' is not installed"
         allowed = "install it with: pip install pandas pyarrow"
         raise InputError([argument_fault("path", "", found, allowed, "--out")]) from None
-    frame = pandas.DataFrame({name: values for name, _, values in columns(result)})
-    frame.attrs = {"units": {name: unit for name, unit, _ in columns(result)}}
+    frame = pandas.DataFrame({name: values for name, _, values in _columns(result)})
+    frame.attrs = {"units": {name: unit for name, unit, _ in _columns(result)}}
     with open(path, "wb") as file:
         frame.to_parquet(file)

@@ -114,17 +114,23 @@ def peak(result: Result, name: str, kind: str = "abs") -> Peak:
     Of the quantities in the group ``peaks`` over all steps of the run, of others over its outputs;
     from the attribute ``evaluation_start`` on, in files without it over the whole run.
     """
-    if name in result.groups.get("peaks", {}):
-        return _peak_of_steps(result, name, kind)
-    rows = evaluated(result)
-    array = result.part(name, rows)
-    index = _extreme(array, kind)
+    of_steps = result.groups.get("peaks", {})
+    if name in of_steps:
+        rows = {"abs": slice(0, 2), "max": slice(0, 1), "min": slice(1, 2)}[kind]
+        values, times, distances = (of_steps[name + e][rows] for e in ("", "_time", "_distance"))
+        index = at = _extreme(values, kind)
+    else:
+        rows = evaluated(result)
+        values = result.part(name, rows)
+        times, distances = result["time"][rows], result["distance"][rows]
+        index = _extreme(values, kind)
+        at = index[:1]
     return Peak(
         result.quantities[name],
-        float(array[index]),
+        float(values[index]),
         _labels(result, name, index[1:]),
-        float(result["time"][rows][index[0]]),
-        float(result["distance"][rows][index[0]]),
+        float(times[at]),
+        float(distances[at]),
         kind,
     )
 
@@ -140,21 +146,6 @@ def _extreme(array: Array, kind: str) -> tuple[Any, ...]:
     """Index of the extreme value of an array; values that are not a number are left out."""
     key = {"abs": np.abs(array), "max": array, "min": -array}[kind]
     return np.unravel_index(np.argmax(np.where(np.isnan(key), -np.inf, key)), key.shape)
-
-
-def _peak_of_steps(result: Result, name: str, kind: str) -> Peak:
-    found = result.groups["peaks"]
-    rows = {"abs": slice(0, 2), "max": slice(0, 1), "min": slice(1, 2)}[kind]
-    values = found[name][rows]
-    index = _extreme(values, kind)
-    return Peak(
-        result.quantities[name],
-        float(values[index]),
-        _labels(result, name, index[1:]),
-        float(found[f"{name}_time"][rows][index]),
-        float(found[f"{name}_distance"][rows][index]),
-        kind,
-    )
 
 
 def low_pass_of(result: Result, name: str, known: dict[str, Array] | None = None) -> Array | None:
@@ -219,15 +210,13 @@ def peaks(result: Result, names: Iterable[str] | None = None) -> tuple[Peak, ...
         return ()
     if names is None:
         names = [name for name in PEAK_QUANTITIES if name in result]
+    known: dict[str, Array] = {}
     found: list[Peak] = []
     for name in names:
-        kinds = ("max", "min") if name in BY_SIGN else ("abs",)
-        found.extend(peak(result, name, kind) for kind in kinds)
-    known: dict[str, Array] = {}
-    return tuple(
-        _with_low_pass(result, each, known) if each.quantity.name in FORCES else each
-        for each in found
-    )
+        for kind in ("max", "min") if name in BY_SIGN else ("abs",):
+            one = peak(result, name, kind)
+            found.append(_with_low_pass(result, one, known) if name in FORCES else one)
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -101,9 +101,9 @@ def filtered(x: Floats, rate: float, response: Response, margin: float) -> Float
     factor = np.asarray(response(frequencies))
     factor = factor.reshape(-1, *(1 for _ in x.shape[1:]))
     out = np.empty_like(x, dtype=np.float64)
-    kept = size - 2 * edge
-    for begin in range(0, n, kept):
-        end = min(begin + kept, n)
+    inner = size - 2 * edge
+    for begin in range(0, n, inner):
+        end = min(begin + inner, n)
         block = _continued(x, begin - edge, begin - edge + size)
         spectrum = fft.rfft(block, axis=0)
         spectrum *= factor

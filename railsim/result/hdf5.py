@@ -175,11 +175,8 @@ class Hdf5Sink(SinkContext):
             done += count
             self._waiting += count
             if self._waiting == ROWS_AT_ONCE:
-                self._write_waiting()
-
-    def _write_waiting(self) -> None:
-        with _told_of_file(self.path):
-            self._write_rows()
+                with _disk_errors(self.path):
+                    self._write_rows()
 
     def _write_rows(self) -> None:
         if not self._datasets:
@@ -201,13 +198,20 @@ class Hdf5Sink(SinkContext):
         groups: Mapping[str, Mapping[str, Any]] = NOTHING,
     ) -> Result:
         """See `Sink.close`; the file now has its name."""
-        with _told_of_file(self.path):
-            self._finish(attributes, statics, profiles, groups)
+        with _disk_errors(self.path):
+            self._write_rest(statics, profiles, groups)
+            self._file.attrs.update(root_attributes(self._attributes, attributes))
+            self._file.attrs[DIGEST] = content_digest(self._file, self._crc)
+            self._file.flush()  # where the disk is full, before the file is closed
+            self._file.close()
+            seal(self._partial.path)
+            wanted, self.path = self.path, self._partial.finish(overwrite=self._overwrite)
+        if self.path != wanted:
+            _LOG.warning(f"{wanted} has appeared in the meantime; the result is {self.path}")
         return open_result(self.path)
 
-    def _finish(
+    def _write_rest(
         self,
-        attributes: Attributes,
         statics: Mapping[str, Any],
         profiles: Mapping[str, Profile],
         groups: Mapping[str, Mapping[str, Any]],
@@ -226,14 +230,6 @@ class Hdf5Sink(SinkContext):
                 _stored(self._file, f"{group}/{name}", frozen(array))
             if group == PEAKS:
                 _describe_peaks(self._file[group], self._file)
-        self._file.attrs.update(root_attributes(self._attributes, attributes))
-        self._file.attrs[DIGEST] = content_digest(self._file, self._crc)
-        self._file.flush()  # where the disk is full, before the file is closed
-        self._file.close()
-        seal(self._partial.path)
-        asked, self.path = self.path, self._partial.finish(overwrite=self._overwrite)
-        if self.path != asked:
-            _LOG.warning(f"{asked} has appeared in the meantime; the result is {self.path}")
 
     def abort(self) -> None:
         """Remove what was written so far; harmless after `close`."""
@@ -243,28 +239,21 @@ class Hdf5Sink(SinkContext):
 
 
 @contextmanager
-def _told_of_file(path: Path) -> Iterator[None]:
-    """Report a disk error in one line; HDF5 reports it in many."""
+def _disk_errors(path: Path) -> Iterator[None]:
+    """Report what the system refused in one line, with the name of the file.
+
+    HDF5 says it in the midst of many lines, and while it flushes or closes a file not even by the
+    right kind of exception.
+    """
     try:
         yield
     except (OSError, RuntimeError) as error:
-        found = _of_file(error, path)
-        if found is None:
+        said = re.search(r"errno = (\d+)", str(error))
+        number = getattr(error, "errno", None) or (int(said[1]) if said else 0)
+        if not number and not isinstance(error, OSError):
             raise
-        raise found from None
-
-
-def _of_file(error: OSError | RuntimeError, path: Path) -> OSError | None:
-    """Return what the system refused, with the name of the file; None for another error.
-
-    HDF5 says it in the midst of its words, and while it flushes or closes a file not even by the
-    right kind of exception.
-    """
-    said = re.search(r"errno = (\d+)", str(error))
-    number = getattr(error, "errno", None) or (int(said[1]) if said else 0)
-    if not number and isinstance(error, OSError):
-        number = errno.EIO
-    return OSError(number, os.strerror(number), str(path)) if number else None
+        number = number or errno.EIO
+        raise OSError(number, os.strerror(number), str(path)) from None
 
 
 def write(
@@ -277,26 +266,26 @@ def write(
 ) -> Path:
     """Write a result to a file, or some of its quantities; see `Result.to_hdf5`."""
     wanted = set(result if names is None else names)
-    chosen = {name: q for name, q in result.quantities.items() if name in wanted}
+    selected = {name: q for name, q in result.quantities.items() if name in wanted}
     with Hdf5Sink(path, overwrite=overwrite, option=str(path), storage=storage) as sink:
-        sink.begin(result.coordinates, chosen.values())
-        sink.append({name: result[name] for name in timed(chosen)})
-        statics = {name: result[name] for name in chosen if "time" not in chosen[name].dims}
-        sink.close(result.attributes, statics, result.profiles, _groups_of(result, chosen))
+        sink.begin(result.coordinates, selected.values())
+        sink.append({name: result[name] for name in timed(selected)})
+        statics = {name: result[name] for name in selected if "time" not in selected[name].dims}
+        sink.close(result.attributes, statics, result.profiles, _groups_of(result, selected))
     return sink.path
 
 
 register_writer("hdf5", lambda result, path, overwrite: write(result, path, overwrite=overwrite))
 
 
-def _groups_of(result: Result, chosen: Mapping[str, Quantity]) -> dict[str, Mapping[str, Any]]:
-    """Return the groups of a result, with the peaks of chosen quantities only."""
+def _groups_of(result: Result, selected: Mapping[str, Quantity]) -> dict[str, Mapping[str, Any]]:
+    """Return the groups of a result, with the peaks of selected quantities only."""
     groups: dict[str, Mapping[str, Any]] = dict(result.groups)
     if PEAKS in groups:
         groups[PEAKS] = {
             name: array
             for name, array in groups[PEAKS].items()
-            if name.removesuffix("_time").removesuffix("_distance") in chosen
+            if name.removesuffix("_time").removesuffix("_distance") in selected
         }
     return {group: arrays for group, arrays in groups.items() if arrays}
 

@@ -10,20 +10,18 @@ Time and distance are taken as they are.  `Y_over_Q` is made of the filtered Y a
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 from railsim.notation import Quantity
-from railsim.profiles.profile import Profile
-from railsim.result.data import Array, Attributes, Result
-from railsim.result.sinks import ALWAYS, NOTHING, Sink, SinkContext
+from railsim.result.data import Array, Attributes
+from railsim.result.sinks import ALWAYS, Sink, SinkBefore
 
 ATTENUATION = 80.0  # dB
 UNFILTERED = ("time", "distance", "mileage", "curvature", "cant")
 
 
-class LowPassSink(SinkContext):
+class LowPassSink(SinkBefore):
     """Filters chunks at equal time steps and hands on every n-th instant.
 
     Parameters
@@ -43,7 +41,7 @@ class LowPassSink(SinkContext):
     def __init__(
         self, sink: Sink, every: int, output_rate: float, frequency: float, *, causal: bool
     ) -> None:
-        self._sink, self._every = sink, every
+        super().__init__(sink)
         self._rate = every * output_rate
         self._filter: _Symmetric | _Causal
         if causal:
@@ -59,7 +57,7 @@ class LowPassSink(SinkContext):
         """See `Sink.begin`."""
         wanted = tuple(quantities)
         self._names = tuple(q.name for q in wanted if "time" in q.dims)
-        self._sink.begin(coordinates, wanted)
+        super().begin(coordinates, wanted)
 
     def append(self, chunk: Mapping[str, Array]) -> None:
         """See `Sink.append`."""
@@ -74,20 +72,9 @@ class LowPassSink(SinkContext):
         self._last = float(chunk["time"][-1])
         self._hand_on(self._filter.take(self._needed(chunk)))
 
-    def close(
-        self,
-        attributes: Attributes,
-        statics: Mapping[str, Any] = NOTHING,
-        profiles: Mapping[str, Profile] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
-    ) -> Result:
-        """See `Sink.close`."""
+    def _ended(self, attributes: Attributes) -> Attributes:
         self._hand_on(self._filter.end())
-        return self._sink.close(attributes, statics, profiles, groups)
-
-    def abort(self) -> None:
-        """See `Sink.abort`."""
-        self._sink.abort()
+        return attributes
 
     def _needed(self, chunk: Mapping[str, Array]) -> dict[str, Array]:
         names = set(self._names)
@@ -117,47 +104,47 @@ class _Symmetric:
         taps = signal.firwin(2 * self._half + 1, corner, window=("kaiser", beta), fs=rate)
         self._taps = np.asarray(taps)
         self._every = every
-        self._kept: dict[str, Array] = {}
+        self._window: dict[str, Array] = {}
         self._started = False
         self._skip = 0  # rows before the middle of the next window
 
     def take(self, chunk: dict[str, Array]) -> dict[str, Array]:
         """Filtered instants that are known with a further chunk."""
-        self._kept = {
-            name: np.concatenate([self._kept[name], array]) if self._kept else array
+        self._window = {
+            name: np.concatenate([self._window[name], array]) if self._window else array
             for name, array in chunk.items()
         }
         if not self._started:
-            if len(self._kept["time"]) <= self._half:
+            if len(self._window["time"]) <= self._half:
                 return {}
-            self._kept = {name: self._before(array) for name, array in self._kept.items()}
+            self._window = {name: self._before(array) for name, array in self._window.items()}
             self._started = True
-        return self._windows()
+        return self._filtered_windows()
 
     def end(self) -> dict[str, Array]:
         """Filtered instants up to the end of the stream."""
-        if not self._kept or len(self._kept["time"]) < 2:
+        if not self._window or len(self._window["time"]) < 2:
             return {}
         if not self._started:
-            self._kept = {name: self._before(array) for name, array in self._kept.items()}
-        last = self._kept
-        self._kept = {name: self._before(array[::-1])[::-1] for name, array in last.items()}
-        return self._windows()
+            self._window = {name: self._before(array) for name, array in self._window.items()}
+        last = self._window
+        self._window = {name: self._before(array[::-1])[::-1] for name, array in last.items()}
+        return self._filtered_windows()
 
     def _before(self, array: Array) -> Array:
         rows = np.minimum(np.arange(self._half, 0, -1), len(array) - 1)
         return np.concatenate([2.0 * array[0] - array[rows], array])
 
-    def _windows(self) -> dict[str, Array]:
+    def _filtered_windows(self) -> dict[str, Array]:
         """Filter all whole windows and forget what no later one needs."""
-        length = len(self._kept["time"])
+        length = len(self._window["time"])
         count = (length - self._skip - 2 * self._half - 1) // self._every + 1
         if count <= 0:
             return {}
         matrix = _banded(self._taps.tobytes(), count, self._every)
         span = slice(self._skip, self._skip + matrix.shape[1])
         found = {}
-        for name, array in self._kept.items():
+        for name, array in self._window.items():
             part = array[span]
             if name in UNFILTERED:
                 found[name] = part[self._half :: self._every][:count]
@@ -166,7 +153,7 @@ class _Symmetric:
                 found[name] = flat.reshape(count, *part.shape[1:])
         used = self._skip + count * self._every
         drop = min(used, length)
-        self._kept = {name: array[drop:] for name, array in self._kept.items()}
+        self._window = {name: array[drop:] for name, array in self._window.items()}
         self._skip = used - drop
         return found
 

@@ -6,13 +6,13 @@ its y axis so reads a_y - g sin(cant angle + roll): the uncompensated lateral ac
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from railsim.constants import GRAVITY
-from railsim.definitions.flatten import flatten
+from railsim.definitions.flatten import FlatBody, flatten
 from railsim.definitions.vehicle import Vehicle
 from railsim.track.alignment import Alignment
 
@@ -75,12 +75,14 @@ def sensors(vehicle: Vehicle) -> dict[str, Sensor]:
     for name, point in (vehicle.service.points if vehicle.service else {}).items():
         found[name] = (point.body, point.position)
     origin = reference.position[0]
-    placed: dict[str, Sensor] = {}
-    for name, (body, position) in found.items():
-        cg = bodies[body].position
-        arm = (position[0] - cg[0], position[1] - cg[1], position[2] - cg[2])
-        placed[name] = Sensor(body, cg[0] - origin, arm)
-    return placed
+    return {name: _placed(bodies[body], point, origin) for name, (body, point) in found.items()}
+
+
+def _placed(body: FlatBody, point: tuple[float, float, float], origin: float) -> Sensor:
+    """Return the sensor at a point in vehicle axes; `origin` is that of the distance [m]."""
+    x, y, z = body.position
+    arm = (point[0] - x, point[1] - y, point[2] - z)
+    return Sensor(body.name, x - origin, arm)
 
 
 def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
@@ -101,27 +103,25 @@ def all_sensors(vehicle: Vehicle) -> dict[str, Sensor]:
             arm = (0.0, sign * across, 0.0)
             found[f"axlebox_{number}_{side}"] = Sensor(wheelset.name, x - origin, arm, axlebox=True)
     for name, point in vehicle.sensors.items():
-        cg = bodies[point.body].position
-        arm = (point.position[0] - cg[0], point.position[1] - cg[1], point.position[2] - cg[2])
-        on_axle = bodies[point.body].kind == "wheelset"
-        found[name] = Sensor(point.body, cg[0] - origin, arm, on_axle)
+        sensor = _placed(bodies[point.body], point.position, origin)
+        found[name] = replace(sensor, axlebox=bodies[point.body].kind == "wheelset")
     return found
 
 
 def motions(
-    chosen: Mapping[str, Sensor], motion: Mapping[str, Floats], bodies: tuple[str, ...]
+    placed: Mapping[str, Sensor], motion: Mapping[str, Floats], bodies: tuple[str, ...]
 ) -> dict[str, Floats]:
     """Displacements, velocities and absolute accelerations of sensors, float64[time, sensor, 3].
 
     Displacements and velocities are those against the moving track frame of the body, in its axes;
     accelerations in the axes of the body.
     """
-    shape = (len(motion["distance"]), len(chosen), 3)
+    shape = (len(motion["distance"]), len(placed), 3)
     found = {
         f"sensor_{name}": np.zeros(shape)
         for name in ("displacement", "velocity", "absolute_acceleration")
     }
-    for number, sensor in enumerate(chosen.values()):
+    for number, sensor in enumerate(placed.values()):
         b = bodies.index(sensor.body)
         position, rates = motion["body_position"][:, b], motion["body_velocity"][:, b]
         absolute, arm = motion["body_acceleration"][:, b], np.array(sensor.arm)
@@ -140,7 +140,7 @@ def motions(
 
 
 def readings(
-    chosen: Mapping[str, Sensor],
+    placed: Mapping[str, Sensor],
     motion: Mapping[str, Floats],
     bodies: tuple[str, ...],
     alignment: Alignment,
@@ -150,8 +150,8 @@ def readings(
 
     Parameters
     ----------
-    chosen : mapping of str to Sensor
-        Which sensors.
+    placed : mapping of str to Sensor
+        Sensors.
     motion : mapping of str to float64[time, ...]
         ``distance``, ``body_position``, ``body_velocity``, ``body_acceleration`` of a result.
     bodies : tuple of str
@@ -169,10 +169,10 @@ def readings(
         Absolute roll velocity of the body [rad/s].
     """
     n = len(motion["distance"])
-    acceleration = np.zeros((n, len(chosen), 3))
-    roll_rate = np.zeros((n, len(chosen)))
+    acceleration = np.zeros((n, len(placed), 3))
+    roll_rate = np.zeros((n, len(placed)))
     known: dict[str, tuple[Floats, Floats, Floats]] = {}
-    for number, sensor in enumerate(chosen.values()):
+    for number, sensor in enumerate(placed.values()):
         if sensor.body not in known:
             known[sensor.body] = _of_body(sensor, motion, bodies, alignment, speed)
         linear, omega, angular = known[sensor.body]
@@ -233,16 +233,22 @@ def _turning(sensor: Sensor, rates: Floats) -> Floats:
 def _out_of_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
     """Components in track axes of a vector in body axes: C v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
     x, y, z = vector.T
-    x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
-    y, z = np.cos(roll) * y - np.sin(roll) * z, np.cos(roll) * z + np.sin(roll) * y
-    x, y = np.cos(yaw) * x - np.sin(yaw) * y, np.cos(yaw) * y + np.sin(yaw) * x
+    z, x = _turned(z, x, pitch)
+    y, z = _turned(y, z, roll)
+    x, y = _turned(x, y, yaw)
     return np.stack([x, y, z], axis=-1)
 
 
 def _into_body(vector: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
     """Components in body axes of a vector in track axes: C^T v, C = Rz(yaw) Rx(roll) Ry(pitch)."""
     x, y, z = vector.T
-    x, y = np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
-    y, z = np.cos(roll) * y + np.sin(roll) * z, np.cos(roll) * z - np.sin(roll) * y
-    x, z = np.cos(pitch) * x - np.sin(pitch) * z, np.cos(pitch) * z + np.sin(pitch) * x
+    x, y = _turned(x, y, -yaw)
+    y, z = _turned(y, z, -roll)
+    z, x = _turned(z, x, -pitch)
     return np.stack([x, y, z], axis=-1)
+
+
+def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Components of a vector turned by an angle from the first axis towards the second."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * first - sin * second, cos * second + sin * first

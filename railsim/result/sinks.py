@@ -14,7 +14,7 @@ it leaves nothing behind.
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -85,13 +85,39 @@ class SinkContext:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.abort()
+
+
+class SinkBefore(SinkContext):
+    """A sink that looks at chunks or changes them, and hands them on to another one."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+
+    def begin(
+        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
+    ) -> None:
+        """See `Sink.begin`."""
+        self._sink.begin(coordinates, quantities)
+
+    def close(
+        self,
+        attributes: Attributes,
+        statics: Mapping[str, Any] = NOTHING,
+        profiles: Mapping[str, Profile] = NOTHING,
+        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
+    ) -> Result:
+        """See `Sink.close`."""
+        return self._sink.close(self._ended(attributes), statics, profiles, groups)
+
+    def _ended(self, attributes: Attributes) -> Attributes:
+        """Hand on what was held back, and return the attributes of the run."""
+        return attributes
+
+    def abort(self) -> None:
+        """See `Sink.abort`."""
+        self._sink.abort()
 
 
 class MemorySink(SinkContext):
@@ -128,8 +154,8 @@ class MemorySink(SinkContext):
 
     def append(self, chunk: Mapping[str, Array]) -> None:
         """See `Sink.append`."""
-        for name, kept in self._chunks.items():
-            kept.append(np.array(chunk[name], dtype=np.float64))
+        for name, chunks in self._chunks.items():
+            chunks.append(np.array(chunk[name], dtype=np.float64))
 
     def close(
         self,
@@ -140,8 +166,8 @@ class MemorySink(SinkContext):
     ) -> Result:
         """See `Sink.close`."""
         arrays = {
-            name: np.concatenate(kept) if kept else np.zeros((0, *self._shape(name)))
-            for name, kept in self._chunks.items()
+            name: np.concatenate(chunks) if chunks else np.zeros((0, *self._shape(name)))
+            for name, chunks in self._chunks.items()
         }
         arrays |= {name: statics[name] for name in self._quantities if name not in self._chunks}
         return Result(
@@ -168,13 +194,13 @@ def timed(quantities: Mapping[str, Quantity]) -> tuple[str, ...]:
     return tuple(name for name, quantity in quantities.items() if "time" in quantity.dims)
 
 
-def root_attributes(*given: Attributes) -> dict[str, str | float | int]:
-    """Return the root attributes of a result: the given ones and those that are always there."""
+def root_attributes(*parts: Attributes) -> dict[str, str | float | int]:
+    """Return the root attributes of a result: those of `parts` and those that are always there."""
     attributes: dict[str, str | float | int] = {
         "format": FORMAT,
         "railsim_version": __version__,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    for some in given:
-        attributes |= some
+    for part in parts:
+        attributes |= part
     return attributes

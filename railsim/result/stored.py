@@ -4,27 +4,20 @@ The time loop looks at every step; a result holds some of them, perhaps filtered
 a good part of a peak, a remark says how much.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from railsim.notation import QUANTITIES, Quantity
-from railsim.profiles.profile import Profile
-from railsim.result.data import Array, Attributes, Result
-from railsim.result.sinks import ALWAYS, NOTHING, Sink, SinkContext
+from railsim.notation import QUANTITIES
+from railsim.result.data import Array, Attributes
+from railsim.result.sinks import Sink, SinkBefore
 
 LOOKED_AT = ("Q", "Y", "sum_Y")
 LOST, LEAST = 0.05, 1e3  # share of a peak, and force [N], that are worth a remark
 
 
-class StoredPeaks(SinkContext):
+class StoredPeaks(SinkBefore):
     """Hands everything on, and remembers the largest magnitudes.
-
-    Parameters
-    ----------
-    sink : Sink
-        Where the chunks go.
 
     Attributes
     ----------
@@ -35,15 +28,9 @@ class StoredPeaks(SinkContext):
     """
 
     def __init__(self, sink: Sink) -> None:
-        self._sink = sink
+        super().__init__(sink)
         self.largest: dict[str, float] = {}
         self.remark: Callable[[], str] = str
-
-    def begin(
-        self, coordinates: Mapping[str, Sequence[str]], quantities: Iterable[Quantity] = ALWAYS
-    ) -> None:
-        """See `Sink.begin`."""
-        self._sink.begin(coordinates, quantities)
 
     def append(self, chunk: Mapping[str, Array]) -> None:
         """See `Sink.append`."""
@@ -53,20 +40,9 @@ class StoredPeaks(SinkContext):
                 self.largest[name] = max(self.largest.get(name, 0.0), most)
         self._sink.append(chunk)
 
-    def close(
-        self,
-        attributes: Attributes,
-        statics: Mapping[str, Any] = NOTHING,
-        profiles: Mapping[str, Profile] = NOTHING,
-        groups: Mapping[str, Mapping[str, Any]] = NOTHING,
-    ) -> Result:
-        """See `Sink.close`."""
+    def _ended(self, attributes: Attributes) -> Attributes:
         remarks = "\n".join(filter(None, [str(attributes.get("remarks", "")), self.remark()]))
-        return self._sink.close({**attributes, "remarks": remarks}, statics, profiles, groups)
-
-    def abort(self) -> None:
-        """See `Sink.abort`."""
-        self._sink.abort()
+        return {**attributes, "remarks": remarks}
 
 
 def lost_peak(
@@ -101,13 +77,13 @@ def lost_peak(
     if not name or shares[name] <= LOST:
         return ""
     quantity, percent = QUANTITIES[name], f"{100.0 * shares[name]:.0f} %"
-    steps, kept = (f"{quantity.text(v)} {quantity.shown_unit}" for v in (whole[name], stored[name]))
+    steps, left = (f"{quantity.text(v)} {quantity.shown_unit}" for v in (whole[name], stored[name]))
     if filtered:
         return (
-            f"The low pass takes {percent} off the largest {name}: {steps} over all steps, {kept} "
+            f"The low pass takes {percent} off the largest {name}: {steps} over all steps, {left} "
             "in what is stored; tables of peaks list the latter."
         )
     return (
         f"Between two outputs ({outputs}) forces peak: the largest {name} is {steps} over all "
-        f"steps, {kept} in the stored histories, {percent} less; tables of peaks list the former."
+        f"steps, {left} in the stored histories, {percent} less; tables of peaks list the former."
     )

@@ -316,9 +316,9 @@ def _shares(batches: Sequence[Batch]) -> list[float]:
 
 
 def is_compiled() -> bool:
-    """Whether the compiled time loop is available; true also if compiled code is not kept."""
-    kept = getattr(time_loop, "stats", None)  # None: the compiler is switched off
-    folder = kept.cache_path if kept else None
+    """Whether the compiled time loop is available; true also if none is stored."""
+    statistics = getattr(time_loop, "stats", None)  # None: the compiler is switched off
+    folder = statistics.cache_path if statistics else None
     return folder is None or any(Path(folder).glob("time_loop.time_loop-*.nbc"))
 
 

@@ -112,13 +112,13 @@ def repeated(case: Case, limits: RunningLimits, service: Service, condition: int
         seed = parts[0].seed + SEEDS * condition + 10 * number
         part = parts[0].model_copy(update={"seed": seed})
         track = case.track.model_copy(update={"irregularities": (part,)})
-        own = counting_sections(track, case, limits, service)
+        sections = counting_sections(track, case, limits, service)
         label = f"{case.name}_seed{seed}"
-        scaled = to_target(track, part, own, limits, service)
+        scaled = to_target(track, part, sections, limits, service)
         labels = {**case.labels, "seed": seed}
         found.append(replace(case, name=label, track=scaled, labels=labels))
-        counted += len(own)
-        if not own or counted >= limits.zones[own[0].zone].sections:
+        counted += len(sections)
+        if not sections or counted >= limits.zones[sections[0].zone].sections:
             break
     return found
 

@@ -165,8 +165,8 @@ def optimise(
         fault = Fault(str(file), "optimise", "missing", "needed: variables and objectives")
         raise InputError([fault])
     changes = {"method": method, "evaluations": evaluations, "seed": seed}
-    given = {name: value for name, value in changes.items() if value is not None}
-    wanted = _changed(definition.optimise, given)
+    replaced = {name: value for name, value in changes.items() if value is not None}
+    wanted = _changed(definition.optimise, replaced)
     runs = (range(wanted.evaluations), range(definition.runs))
     check_number(runs, workers or cores(), lambda: ROUGH_DURATION)
     folder = Path(out)
@@ -230,8 +230,8 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
     chosen = None
     if feasible:
         values = signs * np.array([design.objectives for design in feasible])
-        kept = np.flatnonzero(non_dominated(values))
-        order = kept[np.argsort(values[kept, 0], kind="stable")]
+        rows = np.flatnonzero(non_dominated(values))
+        order = rows[np.argsort(values[rows, 0], kind="stable")]
         front = [feasible[number] for number in order]
         chosen = front[knee(values[order])]
     if choose is not None:

@@ -44,12 +44,12 @@ def made_rows(grid: Grid, linked: Sequence[Grid] = (), sample: Sample | None = N
         combined = [{**row, **more} for row in combined for more in together]
     if sample is None:
         return [_row(values, suffix(_without_speed(values))) for values in combined]
-    drawn = sampled(sample)
-    width = len(str(len(drawn)))
+    members = sampled(sample)
+    width = len(str(len(members)))
     return [
         _row({**row, **values}, f"{suffix(_without_speed(row))}_sample={number:0{width}d}")
         for row in combined
-        for number, values in enumerate(drawn, start=1)
+        for number, values in enumerate(members, start=1)
     ]
 
 

@@ -43,8 +43,8 @@ class Values:
     def feasible(self) -> NDArray[np.bool_]:
         """Whether each design has values and meets all constraints."""
         known = np.isfinite(self.objectives).all(axis=1)
-        kept = (self.constraints <= 0.0).all(axis=1)
-        return np.logical_and(known, kept)
+        within = (self.constraints <= 0.0).all(axis=1)
+        return np.logical_and(known, within)
 
 
 Evaluate = Callable[[Floats], Values]

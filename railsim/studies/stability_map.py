@@ -83,9 +83,9 @@ def stability_map(
     The record of a point that fails has the reason among its remarks.
     """
     jobs = [(point, options) for point in points]
-    kept = [_kept(folder, job) for job in jobs]
+    paths = [_stored_path(folder, job) for job in jobs]
     found: dict[int, Record] = {}
-    for number, path in enumerate(kept):
+    for number, path in enumerate(paths):
         if path is not None and path.exists() and not overwrite:
             try:
                 found[number] = read_record(path)
@@ -97,7 +97,7 @@ def stability_map(
     count = min(workers or os.cpu_count() or 1, max(1, len(waiting)))
     for number, record in _computed(jobs, waiting, count):
         found[number] = record
-        path = kept[number]
+        path = paths[number]
         if path is not None:
             write_record(path, record)
         tell(len(found) / len(jobs))
@@ -124,17 +124,17 @@ def _computed(jobs: Sequence[Any], waiting: Sequence[int], workers: int) -> Any:
 
 def point_record(point: MapPoint, options: dict[str, Any]) -> Record:
     """Record of one point."""
-    given = {"conicity": point.at["conicity"]} if "conicity" in point.at else {}
+    conicity = {"conicity": point.at["conicity"]} if "conicity" in point.at else {}
     try:
         found = critical_speed(
-            point.vehicle, point.track, settings=point.settings, **{**options, **given}
+            point.vehicle, point.track, settings=point.settings, **{**options, **conicity}
         )
     except RailsimError as error:
         return {"at": point.at, "linear": None, "nonlinear": None, "remarks": [str(error)]}
     return {"at": point.at, **found.record()}
 
 
-def _kept(folder: Path | None, job: tuple[MapPoint, dict[str, Any]]) -> Path | None:
+def _stored_path(folder: Path | None, job: tuple[MapPoint, dict[str, Any]]) -> Path | None:
     if folder is None:
         return None
     point, options = job

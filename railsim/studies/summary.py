@@ -206,9 +206,9 @@ def _write_rows(rows: Iterable[Row], stream: BinaryIO) -> None:
         header = (f"{name} ({unit})" if unit else name for name, unit in units.items())
         stream.write(_csv_line(header))
         lines.seek(0)
-        for length, cells in sizes:
+        for length, width in sizes:
             stream.write(lines.read(length).removesuffix(b"\n"))
-            stream.write(b"," * (len(columns) - cells) + b"\n")
+            stream.write(b"," * (len(columns) - width) + b"\n")
 
 
 def _csv_line(cells: Iterable[Any]) -> bytes:
