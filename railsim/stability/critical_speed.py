@@ -108,8 +108,8 @@ def critical_speed(
     def prepared(settings: Settings, contact: Contact, track: Track = track) -> LinearVehicle:
         return LinearVehicle(vehicle, track, contact=contact, settings=settings, profiles=profiles)
 
-    found = CriticalSpeed(contact, vehicle.name, conditions(track, settings), low, high)
     smooth = prepared(law, contact)
+    found = CriticalSpeed(contact, vehicle.name, conditions(track, settings), low, high)
     found.remarks += smooth.remarks
     found.conicity_over_amplitude = _conicity(smooth)
     found.linear = _linear(found, smooth)
