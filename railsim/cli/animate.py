@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.common import output_options, report_file
 from railsim.files import TABLE_BYTES, check_file, read_text
 
 if TYPE_CHECKING:
@@ -33,9 +33,7 @@ ENDINGS = (".html", ".htm", ".gif", ".mp4")
               help="Frames per second of a film.")  # fmt: skip
 @click.option("--gain", type=click.FloatRange(0.0, 1000.0), default=1.0, show_default=True,
               help="Magnification of the motion of the bodies in a film.")  # fmt: skip
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     file: str,
     out: str | None,
@@ -67,10 +65,8 @@ def command(
         write_movie(scene, path, frames_per_second=fps, gain=gain, overwrite=overwrite)
     else:
         write_page(scene, path, overwrite=overwrite)
-    if as_json:
-        print_json({"file": str(path), "frames": len(scene.time), "title": scene.title})
-    elif not quiet:
-        echo(str(path))
+    frames = len(scene.time)
+    report_file(path, as_json=as_json, quiet=quiet, frames=frames, title=scene.title)
 
 
 def _scene(

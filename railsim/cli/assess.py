@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, table
+from railsim.cli.common import echo, output_options, print_json, table
 from railsim.files import check_folder, make_folder, whole_file
 from railsim.text import spreadsheet_cell
 
@@ -50,9 +50,7 @@ FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sect
 @click.option("--all-sections", is_flag=True, help="Also use sections outside a zone's conditions.")
 @click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
 @click.option("--out", metavar="DIR", help="Folder for assessment.json, .csv and .png.")
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     files: tuple[str, ...],
     standard: str,

@@ -2,11 +2,11 @@
 
 import json
 import os
-import re
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -38,18 +38,9 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
         return float(click.FLOAT.convert(value, param, ctx))
 
 
-# what `echo` turns into colours where it writes to a terminal
-STYLES = {"\ue000": "1", "\ue001": "31", "\ue002": "32", "\ue003": "0"}
-BOLD, RED, GREEN, PLAIN = STYLES
-_STYLED = re.compile(f"([{''.join(STYLES)}])")
-GOOD, BAD = ("pass", "complete"), ("fail", "failed", "derailed", "exceeded", "waiting")
-
-
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print a line, on stderr with `err`; what would steer the terminal is shown as its code."""
-    parts = _STYLED.split(str(text))
-    codes = "".join(f"\x1b[{STYLES[p]}m" if p in STYLES else printable(p) for p in parts)
-    click.echo(codes, err=err)  # without the codes where this is no terminal
+    click.echo(printable(str(text)), err=err)
 
 
 def show(*parts: "str | Table") -> None:
@@ -97,58 +88,46 @@ def remarks_on(definition: "FileDefinition") -> list["Remark"]:
     return found
 
 
-def json_option(function: F) -> F:
-    """Add ``--json`` as the argument `as_json`."""
-    return click.option(
-        "--json", "as_json", is_flag=True, help="Machine-readable results on stdout."
-    )(function)
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Machine-readable results on stdout."
+)
+quiet_option = click.option("--quiet", is_flag=True, help="No progress bars and remarks.")
+overwrite_option = click.option("--overwrite", is_flag=True, help="Replace output that exists.")
+set_option = click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="KEY.PATH=VALUE",
+    help="Replace one value of the input; may be given several times.",
+)
+load_option = click.option(
+    "--load", metavar="NAME", help="Load case of the vehicle; by default its design load."
+)
 
 
-def quiet_option(function: F) -> F:
-    """Add ``--quiet``."""
-    return click.option("--quiet", is_flag=True, help="No progress bars and remarks.")(function)
-
-
-def overwrite_option(function: F) -> F:
-    """Add ``--overwrite``."""
-    return click.option("--overwrite", is_flag=True, help="Replace output that exists.")(function)
-
-
-def set_option(function: F) -> F:
-    """Add ``--set key.path=value``, repeatable, as the argument `assignments`."""
-    return click.option(
-        "--set",
-        "assignments",
-        multiple=True,
-        metavar="KEY.PATH=VALUE",
-        help="Replace one value of the input; may be given several times.",
-    )(function)
+def output_options(function: F) -> F:
+    """Add ``--overwrite``, ``--json``, ``--quiet``."""
+    return overwrite_option(json_option(quiet_option(function)))
 
 
 def linearisation_options(function: F) -> F:
     """Add ``--linearisation`` and ``--amplitude``."""
-    function = click.option(
+    linearisation = click.option(
+        "--linearisation",
+        default="tangent",
+        show_default=True,
+        type=click.Choice(["tangent", "harmonic"]),
+        help="Contact: its derivative, or its first harmonic for --amplitude.",
+    )
+    amplitude = click.option(
         "--amplitude",
         type=float,
         default=3e-3,
         show_default=True,
         metavar="A",
         help="Lateral amplitude of the wheelsets in m, for harmonic.",
-    )(function)
-    return click.option(
-        "--linearisation",
-        default="tangent",
-        show_default=True,
-        type=click.Choice(["tangent", "harmonic"]),
-        help="Contact: its derivative, or its first harmonic for --amplitude.",
-    )(function)
-
-
-def load_option(function: F) -> F:
-    """Add ``--load NAME`` as the argument `load`."""
-    return click.option(
-        "--load", metavar="NAME", help="Load case of the vehicle; by default its design load."
-    )(function)
+    )
+    return linearisation(amplitude(function))
 
 
 def with_load(assignments: Sequence[str], load: str | None, prefix: str = "") -> tuple[str, ...]:
@@ -201,65 +180,17 @@ def plain(data: Any) -> Any:
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1) -> list[str]:
-    r"""Return the lines of a table; on a terminal folded to its width, with colours.
+    """Return the lines of a table of texts; from the column `numbers` on they are aligned right."""
+    from railsim.table import Column, Table
 
-    Parameters
-    ----------
-    header : sequence of str
-        Column titles.
-    rows : sequence of sequences of str
-        Cells.
-    numbers : int
-        First column that is aligned to the right.
-
-    Examples
-    --------
-    >>> print("\n".join(table(["body", "mass"], [["frame", "2615"], ["car", "43628"]])))
-    body    mass
-    frame   2615
-    car    43628
-    """
-    if sys.stdout.isatty():
-        return folded(header, rows, numbers, shutil.get_terminal_size().columns)
-    widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
-    lines = []
-    for row in (header, *rows):
-        cells = [
-            cell.ljust(width) if column < numbers else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return lines
+    columns = [Column(name or " ", format=">" * (k >= numbers)) for k, name in enumerate(header)]
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    return Table(columns, rows).lines(width)
 
 
-def folded(
-    header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int, width: int
-) -> list[str]:
-    """Return the lines of a table that is no wider than `width`: long cells take several lines."""
-    from io import StringIO
-
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    drawn = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-    for number, title in enumerate(header):
-        drawn.add_column(
-            Text(printable(title)), justify="left" if number < numbers else "right", overflow="fold"
-        )
-    for row in rows:
-        drawn.add_row(*(Text(printable(cell), _style(cell)) for cell in row))
-    stream = StringIO()
-    console = Console(
-        file=stream, width=width, force_terminal=True, color_system="standard", no_color=False,
-        legacy_windows=False,
-    )  # fmt: skip
-    console.print(drawn)
-    text = stream.getvalue()
-    for mark, code in STYLES.items():
-        text = text.replace(f"\x1b[{code}m", mark)
-    return [re.sub(f" +({PLAIN}?)$", r"\1", line).rstrip() for line in text.splitlines()]
-
-
-def _style(cell: str) -> str:
-    return "green" if cell in GOOD else "red" if cell in BAD else ""
+def report_file(path: Path, *, as_json: bool, quiet: bool, **facts: Any) -> None:
+    """Print the path of the file that a command has written."""
+    if as_json:
+        print_json({"file": str(path), **facts})
+    elif not quiet:
+        echo(str(path))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, show
+from railsim.cli.common import echo, output_options, print_json, show
 from railsim.files import check_folder, make_folder, whole_file
 
 if TYPE_CHECKING:
@@ -34,9 +34,7 @@ MOST = 8  # results in one picture
     show_default=True,
     help="Horizontal axis of the picture.",
 )
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     files: tuple[str, ...], out: str | None, over: str, overwrite: bool, as_json: bool, quiet: bool
 ) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option, show
+from railsim.cli.common import echo, output_options, print_json, show
 from railsim.cli.progress import progress_bar
 from railsim.files import check_folder, make_folder, whole_file
 
@@ -111,9 +111,7 @@ RANGES = {
 @click.option(
     "--out", metavar="DIR", help="Folder for pictures and tables; created if it does not exist."
 )
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     profiles: tuple[str, ...],
     wheels: tuple[str, ...],

@@ -4,16 +4,14 @@ from pathlib import Path
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.common import output_options, report_file
 from railsim.files import check_file
 
 
 @click.command()
 @click.argument("file", metavar="R.h5")
 @click.option("--out", required=True, metavar="F", help="File: .csv, .mat or .parquet.")
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(file: str, out: str, overwrite: bool, as_json: bool, quiet: bool) -> None:
     """Write a result as CSV, for MATLAB and Octave, or as Parquet.
 
@@ -29,7 +27,4 @@ def command(file: str, out: str, overwrite: bool, as_json: bool, quiet: bool) ->
 
     check_file(Path(out), overwrite=overwrite, endings=ENDINGS)
     path = export(open_run(file), out, overwrite=overwrite)
-    if as_json:
-        print_json({"file": str(path)})
-    elif not quiet:
-        echo(str(path))
+    report_file(path, as_json=as_json, quiet=quiet)

@@ -7,16 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    faults_in,
-    json_option,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    set_option,
-    show,
-)
+from railsim.cli.common import echo, faults_in, output_options, print_json, set_option, show
 from railsim.files import check_folder, write_folder
 
 if TYPE_CHECKING:
@@ -53,9 +44,7 @@ REPORT, OPTIMISED = "report.html", "optimised.toml"
     "--out", metavar="DIR", help=f"Folder for {REPORT}, pictures, animation, positions.csv."
 )
 @set_option
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     files: tuple[str, ...],
     searched: bool,

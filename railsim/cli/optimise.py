@@ -5,15 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    json_option,
-    names_of,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    table,
-)
+from railsim.cli.common import echo, names_of, output_options, print_json, table
 from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
 
@@ -51,9 +43,7 @@ MOST_ROWS = 15
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
 @click.option("--resume", is_flag=True, help="Continue in DIR although STUDY has changed.")
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     study: str,
     out: str,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.common import output_options, report_file
 from railsim.errors import Fault, InputError, nearest
 from railsim.files import PICTURES, RESULTS, check_file
 
@@ -47,9 +47,7 @@ DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
     type=click.Choice(["curves", "map", "ranking"]),
     help="Of a study: curves; colours over two parameters; the runs by their values.",
 )
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     file: str,
     selections: tuple[str, ...],
@@ -104,10 +102,7 @@ def command(
     from railsim.plot.style import save
 
     save(figure, path, overwrite=overwrite)
-    if as_json:
-        print_json({"file": str(path)})
-    elif not quiet:
-        echo(str(path))
+    report_file(path, as_json=as_json, quiet=quiet)
 
 
 def _result_figure(

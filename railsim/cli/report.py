@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, quiet_option
+from railsim.cli.common import output_options, report_file
 from railsim.files import check_file, whole_file
 
 ENDINGS = (".html", ".htm")
@@ -23,9 +23,7 @@ ENDINGS = (".html", ".htm")
     metavar="N",
     help="Runs whose curves are shown; of more, those with the largest values.",
 )
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     files: tuple[str, ...],
     out: str,
@@ -49,10 +47,7 @@ def command(
     path = Path(out)
     check_file(path, overwrite=overwrite, endings=ENDINGS)
     write_report(files, path, title=title, curves=curves)
-    if as_json:
-        print_json({"file": str(path)})
-    elif not quiet:
-        echo(str(path))
+    report_file(path, as_json=as_json, quiet=quiet)
 
 
 def write_report(

@@ -12,6 +12,7 @@ from railsim.cli.common import (
     echo,
     faults_in,
     json_option,
+    output_options,
     overwrite_option,
     print_json,
     quiet_option,
@@ -203,9 +204,7 @@ def fatigue(
 @click.option("--load", metavar="NAME", help="Load at which the springs are taken.")
 @click.option("--extends", metavar="VEHICLE", help="Vehicle to extend instead of vehicle.extends.")
 @set_option
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def vehicle(
     file: str,
     out: str | None,

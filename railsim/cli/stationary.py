@@ -5,16 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import (
-    echo,
-    json_option,
-    load_option,
-    overwrite_option,
-    print_json,
-    quiet_option,
-    set_option,
-    table,
-)
+from railsim.cli.common import echo, load_option, output_options, print_json, set_option, table
 
 if TYPE_CHECKING:
     from railsim.studies.stationary import Stationary
@@ -36,9 +27,7 @@ FILES = ("stationary.json",)
 @click.option("--out", metavar="DIR", help="Folder for stationary.json.")
 @load_option
 @set_option
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     vehicle: str,
     cant: float | None,

@@ -8,12 +8,10 @@ import click
 from railsim.cli.common import (
     Speed,
     echo,
-    json_option,
     load_option,
     names_of,
-    overwrite_option,
+    output_options,
     print_json,
-    quiet_option,
     set_option,
     table,
 )
@@ -51,9 +49,7 @@ MOST_STEPS = 1000
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
 @load_option
 @set_option
-@overwrite_option
-@json_option
-@quiet_option
+@output_options
 def command(
     vehicle: str,
     routes: tuple[tuple[str, float, float], ...],

@@ -7,40 +7,33 @@ import sys
 import pytest
 
 from railsim.cli import main
-from railsim.cli.common import BOLD, STYLES, echo, folded, table
+from railsim.cli.common import show
+from railsim.table import Table
 
-HEADER = ["quantity", "where it is", "value"]
-ROWS = [
-    ["derailment quotient of the leading wheel", "wheelset 1 right", "0.390"],
-    ["a\x1b[31mname", "pass", "12345.678"],
-]
+TABLE = Table(["quantity", "verdict"], [["a\x1b[31mname", "fail"], ["of " * 40, "pass"]])
 
 
-def plain(line):
-    return re.sub(f"[{''.join(STYLES)}]", "", line)
-
-
-@pytest.mark.parametrize("width", [30, 50, 200])
-def test_tables_fold_to_the_width_and_lose_nothing(width):
-    lines = [plain(line) for line in folded(HEADER, ROWS, 2, width)]
-    assert max(map(len, lines)) <= width
-    # a cell that takes several lines is read down its column
-    letters = sorted("".join(lines).replace(" ", ""))
-    cells = [*HEADER, *(cell for row in ROWS for cell in row)]
-    assert letters == sorted("".join(cells).replace("\x1b", "\\x1b").replace(" ", ""))
-
-
-def test_a_table_that_fits_is_that_of_a_file():
-    lines = [plain(line).split() for line in folded(HEADER, ROWS, 2, 200)]
-    assert lines == [line.replace("\x1b", "\\x1b").split() for line in table(HEADER, ROWS, 2)]
-
-
-def test_colours_are_those_of_a_terminal_only(capsys, monkeypatch):
-    echo(f"{BOLD}title\x1b[31m")
-    assert capsys.readouterr().out == "title\\x1b[31m\n"
+@pytest.mark.parametrize("columns", [80, 200])
+@pytest.mark.parametrize("colours", [True, False])
+def test_a_terminal_gets_tables_of_its_width(columns, colours, capsys, monkeypatch):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
-    echo(f"{BOLD}title\x1b[31m")
-    assert capsys.readouterr().out == "\x1b[1mtitle\\x1b[31m\n"
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    if not colours:
+        monkeypatch.setenv("NO_COLOR", "1")
+    show("title\x1b[31m", TABLE)
+    title, *lines = capsys.readouterr().out.splitlines()
+    assert title == "title\\x1b[31m"
+    assert any("\x1b[31mfail" in line for line in lines) == colours
+    assert any("\x1b" in line for line in lines) == colours
+    assert max(len(re.sub(r"\x1b\[\d+m", "", line)) for line in lines) <= columns
+
+
+def test_a_file_gets_whole_lines(capsys):
+    show(TABLE)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3
+    assert "a\\x1b[31mname" in lines[1]
 
 
 def test_faults_are_told_to_programs_too(capsys):
