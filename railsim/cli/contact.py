@@ -271,7 +271,8 @@ def _profiles(names: Sequence[str], kind: Any) -> tuple[Any, Any]:
 
 def _described(found: "ContactSummary") -> "Description":
     """Return what is printed, and everything for ``--json``, SI."""
-    from railsim.assessment.influences import RADIUS, steering_index
+    from railsim.assessment.criteria import steering_index
+    from railsim.assessment.influences import RADIUS
     from railsim.contact import tables
     from railsim.contact.gauges import gauge_table
     from railsim.description import Description

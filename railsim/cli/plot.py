@@ -119,7 +119,7 @@ def _study_figure(
     file: str, selections: tuple[str, ...], chosen: "dict[str, str | None]"
 ) -> "Figure":
     from railsim.cli.gathered import gather
-    from railsim.plot.study import Column, curves_figure, map_figure, ranking_figure
+    from railsim.plot.study import curves_figure, map_figure, ranking_figure
     from railsim.report.spread import columns, parameters
 
     ended = ("complete", "derailed", "stopped")
@@ -133,7 +133,7 @@ def _study_figure(
         for name in names
         if name not in known
     ]
-    varied = {name: Column(_words(name), values) for name, values in parameters(records).items()}
+    varied = {name: _quantity(column) for name, column in parameters(records).items()}
     faults += [
         Fault(
             option, "", f"'{chosen[option]}' was not varied", nearest(str(chosen[option]), varied)
@@ -167,10 +167,6 @@ def _quantity(column: "dict[str, Any]") -> "Column":
     sentence = " " in words  # a name in a file stays as it is
     words = f"{words[:1].upper()}{words[1:]}" if sentence else words
     return Column(f"{words} ({unit})" if unit else words, column["values"])
-
-
-def _words(name: str) -> str:
-    return "speed (m/s)" if name == "speed" else name
 
 
 def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":
