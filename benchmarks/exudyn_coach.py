@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import exudyn
 import exudyn.itemInterface as items
-import numba
 import numpy as np
 from exudyn_contact import OUTPUT, forces_of
 
@@ -70,7 +69,7 @@ class ExudynCoach:
         self.Q0 = prepared.balance.Q0
         self.names = list(prepared.model.index.bodies)
         system = prepared.model.system
-        self._models = numba.typed.List([(system, work_arrays(system))])
+        self._model = system, work_arrays(system)
         self._flat = flatten(vehicle)
         rows = round(self.duration / OUTPUT) + 1
         wheelsets = len(prepared.model.index.wheelsets)
@@ -204,21 +203,13 @@ class ExudynCoach:
         state[-1] = self.speed
         scratch = (state, np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((3, 3)))
         forces = np.zeros(6 * n)
-        models, reference, records = self._models, self._reference, self.records
+        model, reference, records = self._model, self._reference, self.records
         self.evaluations = 0
 
         def user_forces(mbs, t, number, q, q_t):
             self.evaluations += 1
             status = forces_of(
-                models,
-                stops,
-                reference,
-                t,
-                np.asarray(q),
-                np.asarray(q_t),
-                forces,
-                scratch,
-                records,
+                model, stops, reference, t, np.asarray(q), np.asarray(q_t), forces, scratch, records
             )
             if status != RUNNING:
                 raise ValueError(f"status {status} at t = {t}")
@@ -226,15 +217,7 @@ class ExudynCoach:
 
         # compile before the clock runs
         forces_of(
-            models,
-            stops,
-            reference,
-            0.0,
-            np.zeros(6 * n),
-            np.zeros(6 * n),
-            forces,
-            scratch,
-            records,
+            model, stops, reference, 0.0, np.zeros(6 * n), np.zeros(6 * n), forces, scratch, records
         )
         records.count[0] = 0
         zero = np.zeros((6 * n, 6 * n))

@@ -33,6 +33,12 @@ def contact(system, work, speed, state):
     return wheel_rail(system, work, speed, state)
 
 
+@compiled
+def poses(system, work, state):
+    """`kinematics` likewise."""
+    kinematics(system, work, state)
+
+
 @numba.njit(cache=True)
 def to_rail(x, y, z):
     """Exudyn's axes to railsim's."""
@@ -69,9 +75,9 @@ def add_force(forces, b, G, arm, F, M):
 
 
 @numba.njit(cache=True)
-def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
+def forces_of(model, stops, reference, t, q, q_t, forces, scratch, records):
     """Generalised forces on all bodies; a record every `OUTPUT`."""
-    system, work = models[0]
+    system, work = model
     bodies = system.bodies
     state, A, G, vector = scratch
     n = bodies.kind.shape[0]
@@ -124,7 +130,7 @@ def forces_of(models, stops, reference, t, q, q_t, forces, scratch, records):
         state[j + 3] = cy * u[0] + sy * u[1]
         state[j + 4] = -sy * cr * u[0] + cy * cr * u[1] + sr * u[2]
         state[j + 5] = sy * sr * u[0] - cy * sr * u[1] + cr * u[2]
-    kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
+    poses(system, work, state)
     status, _, _ = contact(system, work, speed, state)
     if status != RUNNING:
         return status

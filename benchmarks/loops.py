@@ -13,6 +13,7 @@ from railsim.kernels.fastsim import fastsim, kalker_lookup
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rhs import dynamics, kinematics, locate_frames, mechanics, rates_of_state
 from railsim.kernels.support import AS_GIVEN
+from railsim.kernels.system import ARC_LENGTH, SPEED
 from railsim.kernels.wheel_contact import normal_contact
 from railsim.kernels.wheel_rail import add_creep_forces, wheel_rail
 
@@ -40,7 +41,7 @@ def many_frames(system, work, state, derivative, n):
             system.track,
             system.frame_offset,
             origin,
-            state[-2],
+            state[ARC_LENGTH],
             work.frames,
             work.cell,
             work.cell_u,
@@ -51,15 +52,7 @@ def many_frames(system, work, state, derivative, n):
 def many_kinematics(system, work, state, derivative, n):
     """Positions, attitudes and velocities of all bodies."""
     for _ in range(n):
-        kinematics(
-            system.bodies,
-            work.frames,
-            state[-1],
-            state,
-            work.relative,
-            work.pose,
-            work.acceleration,
-        )
+        kinematics(system, work, state)
 
 
 @compiled
@@ -68,7 +61,7 @@ def many_links(system, work, state, derivative, n):
     first = 12 * system.bodies.kind.shape[0]
     inner = state[first : first + system.internal.kind.shape[0]]
     for _ in range(n):
-        link_forces(system.links, system.curves, inner, work.drive, work.laws, work.pose)
+        link_forces(system, work, inner)
 
 
 @compiled
@@ -77,23 +70,14 @@ def many_mounts(system, work, state, derivative, n):
     first = 12 * system.bodies.kind.shape[0]
     inner = state[first : first + system.internal.kind.shape[0]]
     for _ in range(n):
-        mount_forces(
-            system.mounts,
-            system.internal,
-            system.curves,
-            work.friction,
-            inner,
-            work.drive,
-            work.laws,
-            work.pose,
-        )
+        mount_forces(system, work, inner)
 
 
 @compiled
 def many_wheel_rail(system, work, state, derivative, n):
     """All of the wheel-rail contact."""
     for _ in range(n):
-        wheel_rail(system, work, state[-1], state)
+        wheel_rail(system, work, state[SPEED], state)
 
 
 @compiled
@@ -101,7 +85,7 @@ def many_normal_contacts(system, work, state, derivative, n):
     """Table look-up and normal forces of all wheels; the number of patches."""
     patches = 0
     for _ in range(n):
-        _, _, patches = normal_contact(system, work, state[-1], state)
+        _, _, patches = normal_contact(system, work, state[SPEED], state)
     return patches
 
 
@@ -110,7 +94,7 @@ def many_creepages(system, work, state, patches, n):
     """Creepages and Kalker's coefficients of all patches."""
     patch = work.patch
     for _ in range(n):
-        creepages(system, work, patches, state[-1], state)
+        creepages(system, work, patches, state[SPEED], state)
         kalker_lookup(patches, side_by_side(patch), system.contact.kalker)
 
 
@@ -126,25 +110,14 @@ def many_fastsims(system, work, state, patches, n):
 def many_creep_forces(system, work, state, patches, n):
     """Creep forces put on the wheelsets, outputs of the wheels gathered."""
     for _ in range(n):
-        add_creep_forces(system, work, patches, state[-1], state)
+        add_creep_forces(system, work, patches, state[SPEED], state)
 
 
 @compiled
 def many_dynamics(system, work, state, derivative, n):
     """Accelerations of all bodies."""
     for _ in range(n):
-        dynamics(
-            system.bodies,
-            work.frames,
-            state[-1],
-            system.gravity,
-            state,
-            work.relative,
-            work.pose,
-            work.rail_force,
-            work.acceleration,
-            derivative,
-        )
+        dynamics(system, work, state, derivative)
 
 
 @compiled

@@ -1,15 +1,12 @@
 """scipy's `solve_ivp` over the same compiled right-hand side, as a skilled user would call it.
 
-A call of a compiled function with the whole `System` unpacks its hundred arrays each time (some
-30 us, five times the right-hand side itself); a typed list that holds it once is unpacked in one
-microsecond.  What remains are scipy's own steps in Python.
+What remains beside the right-hand side are scipy's own steps in Python.
 """
 
 import time
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 
 from railsim.definitions.settings import Settings
@@ -22,14 +19,6 @@ from railsim.model.work import work_arrays
 from railsim.simulation import prepare
 from railsim.simulation.advance import Preparation
 from railsim.simulation.outputs import quantities
-
-
-@numba.njit(cache=True)
-def rate(models, states, derivatives):
-    """Right-hand side of the model in a typed list of one; one state, one row."""
-    system, work = models[0]
-    status, _, _ = right_hand_sides(system, work, states, derivatives)
-    return status
 
 
 @dataclass
@@ -65,15 +54,15 @@ class Peer:
         from scipy.integrate import solve_ivp
 
         system = self.prepared.model.system
-        models = numba.typed.List([(system, work_arrays(system))])
+        work = work_arrays(system)
         states = self.prepared.state[None].copy()
         derivatives = np.zeros_like(states)
         kept = self.kept
-        rate(models, states, derivatives)
+        right_hand_sides(system, work, states, derivatives)
 
         def function(t, y):
             states[0, kept] = y
-            rate(models, states, derivatives)
+            right_hand_sides(system, work, states, derivatives)
             return derivatives[0, kept]
 
         begin = time.process_time()

@@ -52,22 +52,17 @@ def _cache_folder() -> Path | None:
 _FOLDER = _cache_folder()
 
 
-def compiled(function=None, *, python=True, merge=False, inline=False, ordered=False, in_loop=True):
+def compiled(function=None, *, python=True, inline=False, ordered=False, in_loop=True):
     """Compile a kernel: numpy error model, fastmath that preserves NaN; kept in the cache.
 
     Parameters
     ----------
     python : bool
-        Whether Python calls it too.  The entry for Python, which takes a `System` apart into its
-        arrays, costs more to compile than many a function itself.
-    merge : bool
-        For a part of the time loop: LLVM puts it into its callers, and Python cannot call it.  A
-        `System` handed down is copied to the stack, some five hundred words: for the right-hand
-        side and its parts together a tenth of the time.
+        Whether Python calls it too.  If not, it is optimised and translated as a part of its
+        callers alone: half of the time of compilation.
     inline : bool
-        For a small function: numba puts it into its caller.  A call with a tuple of arrays puts all
-        their descriptions on the stack, some hundred words; in the innermost loops that costs more
-        than the function itself.
+        For a small function, such as a sum of vectors: numba puts it into its caller, which saves
+        the compilation of a call.
     ordered : bool
         For a loop over contact patches: no sum is reordered, and each patch gets the same bits
         everywhere.  Of many patches the compiler takes eight at a time, of few one after the other;
@@ -78,18 +73,16 @@ def compiled(function=None, *, python=True, merge=False, inline=False, ordered=F
     """
     if function is None:
         return functools.partial(
-            compiled, python=python, merge=merge, inline=inline, ordered=ordered, in_loop=in_loop
+            compiled, python=python, inline=inline, ordered=ordered, in_loop=in_loop
         )
     options = {"inline": "always"} if inline else {}
-    if merge:
-        options["forceinline"] = True
     if not in_loop:
         options["nogil"] = True
     return compiled_by(
         function,
         _FOLDER,
         ORDERED if ordered else FASTMATH,
-        python=python and not merge,
+        python=python,
         allocates=not in_loop,
         **options,
     )

@@ -51,13 +51,49 @@ if PRIVATE:
     class _SelfContained(JITCodeLibrary):  # type: ignore[misc]
         """Compiled code whose callees are invisible to all other code."""
 
+        def add_linking_library(self, library):
+            """Take a callee, and what that one calls."""
+            super().add_linking_library(library)
+            if isinstance(library, _Part):
+                for callee in library._linking_libraries:
+                    self.add_linking_library(callee)
+
+        def _optimize_final_module(self):
+            # Once: numba's first pass prepares the removal of reference counts.  What nobody else
+            # sees may be put into its only caller.
+            self._hide_callees()
+            passes, builder = self._codegen._module_pass_manager()
+            passes.run(self._final_module, builder)
+
         def _finalize_final_module(self):
             self._finalized = True  # no more is added: what callers link is taken before
             self._get_module_for_linking()
+            self._hide_callees()
+            super()._finalize_final_module()
+
+        def _hide_callees(self):
             for function in self._final_module.functions:
                 if function.linkage == Linkage.linkonce_odr:
                     function.linkage = Linkage.internal
-            super()._finalize_final_module()
+
+    class _NoEnvironment:
+        @staticmethod
+        def set_env(name, env):
+            """Nothing: a part raises no exceptions."""
+
+    class _Part(_SelfContained):
+        """Code that only compiled code calls: optimised and translated with its callers alone."""
+
+        codegen = _NoEnvironment()
+
+        def finalize(self):
+            """Nothing is added any more."""
+            self._raise_if_finalized()
+            self._finalized = True
+
+        def get_pointer_to_function(self, name):
+            """None: it is nowhere in memory."""
+            return 0
 
     class _Flags(Flags):  # type: ignore[misc]
         """Compiler flags that are compared by those that are set.
@@ -76,11 +112,16 @@ if PRIVATE:
             return super().__eq__(other)
 
     class _Compiler(Compiler):  # type: ignore[misc]
+        library = _SelfContained
+
         def compile_extra(self, func):
             self.state.flags = _Flags(self.state.flags)
-            self.state.library = _SelfContained(self.state.targetctx.codegen(), func.__qualname__)
+            self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
             self.state.library.enable_object_caching()
             return super().compile_extra(func)
+
+    class _PartCompiler(_Compiler):
+        library = _Part
 
     class _Internal(CPUDispatcher):  # type: ignore[misc]
         """Compiled function without an entry for Python, where a call of it would crash."""
@@ -166,7 +207,7 @@ def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **o
     compiled = numba.njit(
         error_model="numpy",
         fastmath=fastmath,
-        pipeline_class=_Compiler,
+        pipeline_class=_Compiler if python else _PartCompiler,
         no_cfunc_wrapper=True,
         **({} if python else {"no_cpython_wrapper": True}),
         **({} if allocates else {"_nrt": False}),
@@ -174,10 +215,10 @@ def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **o
     )(function)
     if _config.DISABLE_JIT:
         return compiled
-    if folder is not None:
-        compiled._cache = KernelCache(function, folder)
     if not python:
         compiled.__class__ = _Internal
+    elif folder is not None:
+        compiled._cache = KernelCache(function, folder)
     return compiled
 
 

@@ -42,7 +42,7 @@ from railsim.kernels.support import (
 )
 
 
-@compiled(ordered=True)
+@compiled(python=False, ordered=True)
 def creep_slopes(n, patches, speed, G, along, across):
     """Slopes of the creep force along and across over the slip in that direction [N s/m].
 
@@ -83,7 +83,7 @@ def creep_slopes(n, patches, speed, G, along, across):
         across[i] = scale * c22[i] * (share * secant + (1.0 - share) * tangent)
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def begin_support(support, support_step):
     """Nothing yet acts on the rails whose contact is evaluated."""
     for w in range(support.shape[0]):
@@ -94,14 +94,15 @@ def begin_support(support, support_step):
                 support[w, side, k] = 0.0
 
 
-@compiled(inline=True)
-def add_slopes(support, w, side, patch, k, across):
+@compiled(python=False)
+def add_slopes(work, w, side, k, across):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
 
     By a motion d of the wheel at the patch, N changes by k_N n d and c_N n d', and the creep force
     with it, being nearly proportional to N; T_y by the slope of the creep law, `across`, times
     t d'.
     """
+    support, patch = work.support, work.patch
     s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
     cy, cz = patch[FOOT_Y, k], patch[FOOT_Z, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
@@ -128,13 +129,14 @@ def add_slopes(support, w, side, patch, k, across):
     support[w, side, STIFFNESS] += stiffness
 
 
-@compiled(inline=True)
-def add_damping(jacobian, b, patch, k, across):
+@compiled(python=False)
+def add_damping(work, b, k, across):
     """Add what patch `k` takes from the wheelset's speeds in y, z and roll.
 
     Across, -T_y t with the slope `across` of the creep law; along the normal, -(N n + T_y t) with
     the contact damping, the creep force being nearly proportional to N.
     """
+    jacobian, patch = work.contact_jacobian, work.patch
     s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
     cy, cz = patch[C_Y, k], patch[C_Z, k]
     arm = -c * cz - s * cy

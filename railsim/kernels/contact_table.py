@@ -109,7 +109,7 @@ def locate(contact, table, y, roll, stretched, w):
     return INSIDE, iy, ir, iw, ty - iy, tr - ir, tw
 
 
-@compiled
+@compiled(python=False)
 def is_far(contact, table, patch, iy, ir, iw, tr, tw, z):
     """Whether a patch is so far from touching that its look-up can be skipped."""
     values = contact.values
@@ -118,7 +118,7 @@ def is_far(contact, table, patch, iy, ir, iw, tr, tw, z):
     return z - node - tr * (following - node) - tw * (yawed - node) < -FAR
 
 
-@compiled
+@compiled(python=False)
 def spline_weights(t, per_step, weights, first):
     """Four weights of the uniform cubic B-spline at t in [0, 1), four of its derivative.
 

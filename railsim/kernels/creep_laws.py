@@ -22,7 +22,7 @@ _NO_LOAD = 1e-200  # a bound below this is none: its inverse would overflow [N]
 _EXCESS_POINTS = 16
 
 
-@compiled(ordered=True)
+@compiled(python=False, ordered=True)
 def linear_saturated(n, patches, G):
     """Kalker's linear theory, saturated after Shen, Hedrick and Elkins (1983), spin included.
 
@@ -179,7 +179,7 @@ def adhesion_curve(n, patches, curve):
         patches.M_z[i] = 0.0
 
 
-@compiled
+@compiled(python=False)
 def _fastrip_strips(n, nx, ny, patches, G, work):
     """Prepare the strips of all patches for `_fastrip_march`.
 
@@ -253,14 +253,14 @@ def _fastrip_strips(n, nx, ny, patches, G, work):
             work[10, c] = _ellipse_area(end) - _ellipse_area(max(rear, -1.0))
 
 
-@compiled
+@compiled(python=False)
 def _ellipse_area(x):
     """Integral of sqrt(1 - x^2) from 0 to x, |x| <= 1."""
     x = min(max(x, -1.0), 1.0)
     return 0.5 * (x * math.sqrt(1.0 - x * x) + math.asin(x))
 
 
-@compiled
+@compiled(python=False)
 def _stick_zone(kappa, lam_d, psi, d):
     """Integrals over the stick zone 2 d - 1 < x < 1 of a strip: p_x, p_y, x p_y.
 
@@ -294,7 +294,7 @@ def _stick_zone(kappa, lam_d, psi, d):
     return x_sum, y_sum, m_sum
 
 
-@compiled
+@compiled(python=False)
 def _fastrip_cell(m, lead, trail, x_slip, step, ellipse, work):
     """One cell of all m strips: FASTSIM's direction, and its share of the slip zone added up."""
     grow_x, grow_y, grow_s, slip_end = work[0], work[1], work[2], work[3]

@@ -43,7 +43,7 @@ _NO_LOAD = 1e-200  # a bound below this is none [N]
 _TINY = 1e-300
 
 
-@compiled
+@compiled(python=False)
 def _weights(position, intervals):
     """Interval of a uniform grid and the four weights of the cubic B-splines there."""
     position = position if position > 0.0 else 0.0  # also for NaN, which must not become an index
@@ -60,7 +60,7 @@ def _weights(position, intervals):
     )
 
 
-@compiled
+@compiled(python=False)
 def _angle(y, x):
     """atan2(y, x) for x, y >= 0, not both zero, by a polynomial (Hastings type, error 2e-8).
 
@@ -79,7 +79,7 @@ def _angle(y, x):
     return 0.5 * math.pi - angle if y > x else angle
 
 
-@compiled
+@compiled(python=False)
 def _along_ratio(scale, r, column, r0, r1, r2, r3):
     """Factor of a creepage in q at the node r in log(a/b)."""
     return (

@@ -35,7 +35,7 @@ from railsim.kernels.system import Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def creepages(system, work, n, speed, state):
     """Positions and creepages of the active patches, see the module's equations."""
     patch, C, frames, plane = work.patch, work.relative, work.frames, work.plane

@@ -3,6 +3,7 @@
 from railsim.kernels import compiled
 from railsim.kernels.rotation import sine_cosine
 from railsim.kernels.system import (
+    ARC_LENGTH,
     AXLEBOX,
     BRAKES,
     FORCE,
@@ -12,7 +13,9 @@ from railsim.kernels.system import (
     RADIUS,
     SLIP_BEGIN,
     SLIP_END,
+    SPEED,
     TABLE,
+    TIME,
     Y_0,
     Z_0,
 )
@@ -22,7 +25,7 @@ from railsim.kernels.track_frame import OMEGA, OMEGA_S
 BRAKES_FULLY = 0.1
 
 
-@compiled
+@compiled(python=False)
 def table_value_slope(table, x):
     """Value and slope at `x` of a table of rows [x, value]: linear, constant beyond its ends."""
     last = table.shape[0] - 1
@@ -37,9 +40,10 @@ def table_value_slope(table, x):
     return table[i, 1] + slope * (x - table[i, 0]), slope
 
 
-@compiled(merge=True)
-def add_traction(drive, bodies, frames, speed, pose):
+@compiled(python=False)
+def add_traction(system, work, speed):
     """Traction less running resistance of a free-running vehicle, on the reference body."""
+    drive, bodies, frames, pose = system.drive, system.bodies, work.frames, work.pose
     force, _ = table_value_slope(drive.table, speed)
     force -= drive.resistance[0] + speed * (drive.resistance[1] + speed * drive.resistance[2])
     b = bodies.references[0]
@@ -48,9 +52,10 @@ def add_traction(drive, bodies, frames, speed, pose):
         pose[b, FORCE + k] += force * frames[f, 3 + 3 * k]
 
 
-@compiled(inline=True)
-def axle_torque(drives, e, time, s, frame_offset, bodies, speed, state):
+@compiled(python=False)
+def axle_torque(drives, e, frame_offset, bodies, state):
     """Torque of one drive or brake on its wheelset, forwards positive [N m]."""
+    time, s, speed = state[TIME], state[ARC_LENGTH], state[SPEED]
     w = drives.body[e, 1]
     first, demand, end = drives.start[2 * e], drives.start[2 * e + 1], drives.start[2 * e + 2]
     torque, _ = table_value_slope(drives.table[first:demand], speed)
@@ -70,12 +75,13 @@ def axle_torque(drives, e, time, s, frame_offset, bodies, speed, state):
     return torque
 
 
-@compiled(merge=True)
-def add_axle_torques(drives, time, s, frame_offset, bodies, speed, state, pose):
+@compiled(python=False)
+def add_axle_torques(system, work, state):
     """Driving and braking torques on wheelsets, their reactions on the bodies that carry them."""
+    drives, pose = system.drives, work.pose
     for e in range(drives.body.shape[0]):
         b, w = drives.body[e, 0], drives.body[e, 1]
-        torque = axle_torque(drives, e, time, s, frame_offset, bodies, speed, state)
+        torque = axle_torque(drives, e, system.frame_offset, system.bodies, state)
         for k in range(3):
             moment = torque * pose[w, 3 * k + 1]
             pose[w, MOMENT + k] -= moment
@@ -96,20 +102,18 @@ def recorded_axle_torques(drives, frame_offset, bodies, states, torque):
     """
     for i in range(states.shape[0]):
         torque[i] = 0.0
-        time, s, speed = states[i, -3], states[i, -2], states[i, -1]
         for e in range(drives.body.shape[0]):
-            torque[i, drives.body[e, 1]] += axle_torque(
-                drives, e, time, s, frame_offset, bodies, speed, states[i]
-            )
+            torque[i, drives.body[e, 1]] += axle_torque(drives, e, frame_offset, bodies, states[i])
 
 
-@compiled(merge=True)
-def speed_change(drive, bodies, frames, state, derivative):
+@compiled(python=False)
+def speed_change(system, work, state, derivative):
     """V' as prescribed, or as it follows from the forces in free running [m/s2]."""
+    drive, bodies, frames = system.drive, system.bodies, work.frames
     if drive.mode == TABLE:
         # V(s) gives V' = V dV/ds
-        _, slope = table_value_slope(drive.table, state[-2])
-        return state[-1] * slope
+        _, slope = table_value_slope(drive.table, state[ARC_LENGTH])
+        return state[SPEED] * slope
     if drive.mode == FREE:
         b = bodies.references[0]
         f = bodies.frame[b]
@@ -121,9 +125,10 @@ def speed_change(drive, bodies, frames, state, derivative):
     return 0.0
 
 
-@compiled(merge=True)
-def apply_speed_change(bodies, frames, state, rate, derivative):
+@compiled(python=False)
+def apply_speed_change(system, work, state, rate, derivative):
     """Subtract V' (e_x + omega x r) from the relative accelerations of all bodies."""
+    bodies, frames = system.bodies, work.frames
     n = bodies.kind.shape[0]
     for b in range(n):
         if bodies.kind[b] == AXLEBOX:
@@ -139,9 +144,10 @@ def apply_speed_change(bodies, frames, state, rate, derivative):
         derivative[v + 2] -= rate * (w1 * y - w2 * x)
 
 
-@compiled(merge=True)
-def hold_reference(bodies, relative, acceleration, derivative):
+@compiled(python=False)
+def hold_reference(bodies, work, derivative):
     """Keep the reference bodies' x; the force that holds one is part of its acceleration."""
+    relative, acceleration = work.relative, work.acceleration
     n = bodies.kind.shape[0]
     for k in range(bodies.references.shape[0]):
         b = bodies.references[k]
@@ -152,9 +158,10 @@ def hold_reference(bodies, relative, acceleration, derivative):
         derivative[held] = 0.0
 
 
-@compiled(inline=True)
-def turn_fixed(bodies, frames, speed, state):
+@compiled(python=False)
+def turn_fixed(bodies, frames, state):
     """Rotate fixed bodies with their track frames: u = C^T w_F, r' = 0."""
+    speed = state[SPEED]
     n = bodies.kind.shape[0]
     for k in range(bodies.fixed.shape[0]):
         b = bodies.fixed[k]
@@ -172,12 +179,13 @@ def turn_fixed(bodies, frames, speed, state):
         state[v + 3], state[v + 4], state[v + 5] = speed * w1, speed * w2, speed * w3
 
 
-@compiled(inline=True)
-def hold_fixed(bodies, frames, speed, rate, C, acceleration, derivative):
+@compiled(python=False)
+def hold_fixed(bodies, work, speed, rate, derivative):
     """Hold fixed bodies; the forces that hold them are part of their accelerations.
 
     u' = C^T (V^2 omega_s + V' omega), `rate` being V'.
     """
+    frames, C, acceleration = work.frames, work.relative, work.acceleration
     n = bodies.kind.shape[0]
     for k in range(bodies.fixed.shape[0]):
         b = bodies.fixed[k]

@@ -61,7 +61,7 @@ def link_output(system, work, inner, index, e, out):
     one, two = end_of(links.body, 0, which), end_of(links.body, 1, which)
     point_1, point_2, law = link_columns(links.row, which)
     _, _, _, _, _, _, g, w = relative_motion(work.pose, one, two, point_1, point_2)
-    _, tension = link_law(links, system.curves, index, 1, (g, w, law), inner, work.drive, laws)
+    _, tension = link_law(system, work, index, 1, (g, w, law), inner)
     elongation, rate = laws[0], laws[LANES]
     force = first_lane(laws, tension)
     out[e, DEFLECTION] = elongation
@@ -81,18 +81,7 @@ def mount_output(system, work, inner, index, e, out):
         d, rate = in_axes_of(R1, omega_1, g, w)
         begin = laws_before(mounts.law, 0, 3 * index)
         block = (index, begin, laws_before(mounts.law, begin, 3 * index + 3))
-        more = other_laws(
-            mounts,
-            system.internal,
-            system.curves,
-            work.friction,
-            block,
-            d,
-            rate,
-            inner,
-            work.drive,
-            laws,
-        )
+        more = other_laws(system, work, block, d, rate, inner)
         force = plus(spring_damper(spring, d, rate), more)
         put(out, e, DEFLECTION, laws, d)
         put(out, e, FORCE, laws, force)

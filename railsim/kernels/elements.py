@@ -118,13 +118,13 @@ AHEAD, RATE_OF_STOPS = 9 * LANES, 9 * LANES + 1
 LAWS_SIZE = 10 * LANES
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def note_stop(laws, force, coming):
     """Note how fast the force of a stop changes from `force` to `coming`."""
     laws[RATE_OF_STOPS] = max(laws[RATE_OF_STOPS], abs(coming - force) / laws[AHEAD])
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def spring_table(curves, index, d, rate, laws):
     """Force of a table at the deflection `d`; steps in which it changes fast are divided."""
     force = curve_value(curves, index, d)
@@ -133,9 +133,10 @@ def spring_table(curves, index, d, rate, laws):
     return force
 
 
-@compiled(inline=True)
-def link_laws(links, curves, first, n, inner, drive, laws):
+@compiled(python=False)
+def link_laws(system, work, first, n, inner):
     """Forces of internal states and tables of `n` links; `laws`: elongations, rates, forces."""
+    links, curves, drive, laws = system.links, system.curves, work.drive, work.laws
     for k in range(n):
         e = first + k
         rate = laws[LANES + k]
@@ -152,7 +153,7 @@ def link_laws(links, curves, first, n, inner, drive, laws):
 
 
 @compiled(inline=True)
-def link_law(links, curves, first, n, motion, inner, drive, laws):
+def link_law(system, work, first, n, motion, inner):
     """Direction and tension of `n` links, in lanes; `laws` keeps their elongations and rates.
 
     ``motion``: see `relative_motion`, and the link's columns.
@@ -162,16 +163,22 @@ def link_law(links, curves, first, n, motion, inner, drive, laws):
     direction = g[0] / length, g[1] / length, g[2] / length
     rate = dot(direction, w)
     elongation = length - nominal
+    laws = work.laws
     store_lanes(laws, 0, elongation)
     store_lanes(laws, LANES, rate)
-    link_laws(links, curves, first, n, inner, drive, laws)
+    link_laws(system, work, first, n, inner)
     force = preload + stiffness * elongation + damping * rate + load_lanes(laws, 2 * LANES)
     return direction, force
 
 
-@compiled(merge=True)
-def link_forces(links, curves, inner, drive, laws, pose):
-    """Add the forces of all point-to-point elements to the bodies' rows in `pose`."""
+@compiled(python=False)
+def link_forces(system, work, inner):
+    """Add the forces of all point-to-point elements to the bodies' rows in `pose`.
+
+    inner : float64[m]
+        Internal states of elements.
+    """
+    links, pose = system.links, work.pose
     count = links.body.shape[0]
     for first in range(0, count, LANES):
         n = min(count - first, LANES)
@@ -179,7 +186,7 @@ def link_forces(links, curves, inner, drive, laws, pose):
         one, two = end_of(links.body, 0, which), end_of(links.body, 1, which)
         point_1, point_2, law = link_columns(links.row, which)
         _, _, _, _, a, b, g, w = relative_motion(pose, one, two, point_1, point_2)
-        direction, force = link_law(links, curves, first, n, (g, w, law), inner, drive, laws)
+        direction, force = link_law(system, work, first, n, (g, w, law), inner)
         f = times(force, direction)
         push(pose, one, two, f, cross(a, f), negative(cross(b, f)), n)
 
@@ -191,7 +198,7 @@ def limit_of(friction, e, k, normal):
 
 
 @compiled(python=False)
-def grip(mounts, internal, friction, e, normal, inner):
+def grip(system, friction, e, normal, inner):
     """Factor that reduces the friction forces of a pad that slides in any direction to its limit.
 
     With q the forces over their limits, |q| - e q_z <= 1; e = mu/tan(angle) of a wedge, else 0.  A
@@ -199,6 +206,7 @@ def grip(mounts, internal, friction, e, normal, inner):
     presses on the column with N = (F + T_z)/tan(angle), T_z being the friction force on the side
     frame, downwards positive: |T| <= mu N.
     """
+    mounts, internal = system.mounts, system.internal
     square, z, skew = 0.0, 0.0, 0.0
     for k in range(3):
         m = mounts.internal[e, k]
@@ -211,12 +219,14 @@ def grip(mounts, internal, friction, e, normal, inner):
     return 1.0 / size if size > 1.0 else 1.0
 
 
-@compiled(inline=True)
-def axis_law(mounts, internal, curves, friction, e, k, motion, inner, drive, laws):
+@compiled(python=False)
+def axis_law(system, work, e, k, motion, inner):
     """Force along axis `k` of mount `e` of its table and internal state.
 
     ``motion``: deflection, its rate, and the load on a pad.
     """
+    mounts, internal, curves = system.mounts, system.internal, system.curves
+    friction, drive, laws = work.friction, work.drive, work.laws
     d, rate, normal = motion
     force = 0.0
     if mounts.curve[e, k] >= 0:
@@ -229,7 +239,7 @@ def axis_law(mounts, internal, curves, friction, e, k, motion, inner, drive, law
             if internal.parameter[m, 1] == 0.0:
                 force += min(limit, max(-limit, inner[m]))
             elif limit > 0.0:
-                force += inner[m] * grip(mounts, internal, friction, e, normal, inner)
+                force += inner[m] * grip(system, friction, e, normal, inner)
         elif internal.kind[m] == AIR:
             drive[m, 0] = d
             force += internal.parameter[m, 0] * (d - inner[m])
@@ -243,7 +253,7 @@ def axis_law(mounts, internal, curves, friction, e, k, motion, inner, drive, law
     return force
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def pad_load(mounts, curves, e, z):
     """Vertical spring force that loads the friction pads of mount `e` at its deflection `z`.
 
@@ -273,17 +283,17 @@ def lifted_part(mounts, e, z, rate, normal):
     return max(0.0, normal + damper) - normal - damper
 
 
-@compiled(inline=True)
-def mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive, laws):
+@compiled(python=False)
+def mount_laws(system, work, block, inner):
     """Forces of internal states and tables of mounts; `laws`: deflections, rates, forces."""
+    mounts, laws = system.mounts, work.laws
+    first, law, end = block
     for i in range(law, end):
         e, k = mounts.law[i] // 3, mounts.law[i] % 3
         lane = e - first
         d, rate = laws[k * LANES + lane], laws[(3 + k) * LANES + lane]
-        normal = pad_load(mounts, curves, e, laws[2 * LANES + lane])
-        laws[(6 + k) * LANES + lane] = axis_law(
-            mounts, internal, curves, friction, e, k, (d, rate, normal), inner, drive, laws
-        )
+        normal = pad_load(mounts, system.curves, e, laws[2 * LANES + lane])
+        laws[(6 + k) * LANES + lane] = axis_law(system, work, e, k, (d, rate, normal), inner)
 
 
 @compiled(inline=True)
@@ -300,18 +310,18 @@ def spring_damper(law, d, rate):
 
 
 @compiled(inline=True)
-def other_laws(mounts, internal, curves, friction, block, d, rate, inner, drive, laws):
+def other_laws(system, work, block, d, rate, inner):
     """Forces of internal states and tables of a block of mounts, see `mount_laws`.
 
     ``block``: first mount, first of `Mounts.law` and the one after the last.
     """
-    first, law, end = block
+    laws = work.laws
     zero = spread(0.0)
     for k in range(3):
         store_lanes(laws, k * LANES, d[k])
         store_lanes(laws, (3 + k) * LANES, rate[k])
         store_lanes(laws, (6 + k) * LANES, zero)
-    mount_laws(mounts, internal, curves, friction, first, law, end, inner, drive, laws)
+    mount_laws(system, work, block, inner)
     return load_lanes(laws, 6 * LANES), load_lanes(laws, 7 * LANES), load_lanes(laws, 8 * LANES)
 
 
@@ -344,14 +354,16 @@ def rotation_law(R1, R2, omega_1, omega_2, law):
     return angle, rate, plus(spring, by_axis(damping, rate))
 
 
-@compiled(merge=True)
-def friction_at_speed(mounts, internal, laws, pose, friction):
+@compiled(python=False)
+def friction_at_speed(system, work):
     """Limits of pads with friction that falls: r + (1 - r) exp(-|v|/v_s) of those at rest.
 
     v is the rate of the deflection, of a pad that slides in any direction that along all its axes
     (Bo, Pavelescu 1982; as in the elastic pads of Canudas de Wit et al. 1995 it is not reduced by
     the rate of the pad's own elastic deflection).
     """
+    mounts, internal = system.mounts, system.internal
+    laws, pose, friction = work.laws, work.pose, work.friction
     for i in range(mounts.falling.shape[0]):
         e = mounts.falling[i]
         which = eight_from(e, e + 1)
@@ -374,14 +386,15 @@ def friction_at_speed(mounts, internal, laws, pose, friction):
             friction[e, k, 1] = share * mounts.friction[e, k, 1]
 
 
-@compiled(merge=True)
-def mount_forces(mounts, internal, curves, friction, inner, drive, laws, pose):
+@compiled(python=False)
+def mount_forces(system, work, inner):
     """Add the forces of all three-axis elements to the bodies' rows in `pose`.
 
     The force acts in the axes of body 1, of a shear spring half of it in those of body 2.  The
     gradient of the potential puts the moment g x f on the body whose axes they are, besides the
-    forces +-f at the points.  ``friction``: limits at the sliding speed, see `friction_at_speed`.
+    forces +-f at the points.  ``inner``: internal states.
     """
+    mounts, pose = system.mounts, work.pose
     count = mounts.body.shape[0]
     end = 0
     for first in range(0, count, LANES):
@@ -399,10 +412,7 @@ def mount_forces(mounts, internal, curves, friction, inner, drive, laws, pose):
         t = spring_damper(spring, d, rate)
         if law < end:
             block = (first, law, end)
-            t = plus(
-                t,
-                other_laws(mounts, internal, curves, friction, block, d, rate, inner, drive, laws),
-            )
+            t = plus(t, other_laws(system, work, block, d, rate, inner))
         f = rotate(R1, times(share[0], t))
         moment_1 = cross(g, f)
         moment_2 = spread(0.0), spread(0.0), spread(0.0)
@@ -433,21 +443,23 @@ def load_component(table, first, last, at, k):
     return table[i, k] + share * (table[i + 1, k] - table[i, k])
 
 
-@compiled(merge=True)
-def load_forces(loads, time, s, frame_offset, bodies, frames, pose):
+@compiled(python=False)
+def load_forces(system, work, time, s):
     """Add the given forces and torques at `time` and `s` to the bodies' rows in `pose`."""
+    loads, pose = system.loads, work.pose
     for e in range(loads.body.shape[0]):
         b = loads.body[e]
         first, last = loads.start[e], loads.start[e + 1]
-        f = bodies.frame[b]
-        at = s + frame_offset[f] if loads.flags[e, 2] else time
+        f = system.bodies.frame[b]
+        at = s + system.frame_offset[f] if loads.flags[e, 2] else time
         given = (
             load_component(loads.table, first, last, at, 1),
             load_component(loads.table, first, last, at, 2),
             load_component(loads.table, first, last, at, 3),
         )
         R = matrix_at(pose, b, 0)
-        v = rotate(matrix_at(frames, f, ATTITUDE), given) if loads.flags[e, 1] else rotate(R, given)
+        axes = matrix_at(work.frames, f, ATTITUDE) if loads.flags[e, 1] else R
+        v = rotate(axes, given)
         if loads.flags[e, 0]:
             add_at(pose, b, MOMENT, v)
             continue

@@ -11,7 +11,7 @@ from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.rails import against_rails
 from railsim.kernels.support import SUPPORT_SIZE, support_begin
-from railsim.kernels.system import Z_0
+from railsim.kernels.system import ARC_LENGTH, TIME, Z_0
 
 # columns of Work.extremes; those of a wheel are followed by the same of the right one
 (
@@ -34,7 +34,7 @@ EXTREMES = 16
 MAX, MIN = 0, 3
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def note_unloaded(wheel, h, unloaded):
     """Add a step of length `h` to the time of every wheel that carries nothing."""
     for w in range(wheel.shape[0]):
@@ -43,13 +43,11 @@ def note_unloaded(wheel, h, unloaded):
                 unloaded[w, side] += h
 
 
-@compiled(inline=True)
-def note_extremes(system, wheel, plane, state, present, extremes):
-    """Take the values of this instant into the extremes; `present` is scratch of their size.
-
-    `wheel` and `plane` are those of the state: wheel forces and planes of the rails.
-    """
-    time, s = state[-3], state[-2]
+@compiled(python=False)
+def note_extremes(system, work, state):
+    """Take the values of this instant into the extremes."""
+    wheel, plane, present, extremes = work.wheel, work.plane, work.present, work.extremes
+    time, s = state[TIME], state[ARC_LENGTH]
     body = system.contact.body
     rails = support_begin(system)
     for w in range(body.shape[0]):

@@ -96,7 +96,7 @@ def kalker_lookup(n, patches, table):
         c33[i] = table[node, 3] + w * (table[node + 1, 3] - table[node, 3])
 
 
-@compiled(ordered=True)
+@compiled(python=False, ordered=True)
 def _patch_slopes(n, nx, patches, G, work):
     """Growth per cell of the scaled traction of every patch, at the middle strip.
 

@@ -12,7 +12,7 @@ import math
 from railsim.kernels import compiled
 
 
-@compiled
+@compiled(python=False)
 def carlson_rf(x, y, z):
     """Symmetric elliptic integral of the first kind R_F(x, y, z) [1], at most one argument 0."""
     for _ in range(40):
@@ -28,7 +28,7 @@ def carlson_rf(x, y, z):
     return (1.0 - e2 / 10.0 + e3 / 14.0 + e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0) / math.sqrt(mean)
 
 
-@compiled
+@compiled(python=False)
 def carlson_rd(x, y, z):
     """Symmetric elliptic integral of the second kind R_D(x, y, z) [1], z > 0."""
     total, factor = 0.0, 1.0
@@ -60,14 +60,14 @@ def carlson_rd(x, y, z):
     return 3.0 * total + factor * series / (mean * math.sqrt(mean))
 
 
-@compiled
+@compiled(python=False)
 def log_curvature_ratio(log_k):
     """Logarithm of A/B of the ellipse whose axis ratio b/a has the logarithm `log_k` [1]."""
     k2 = math.exp(2.0 * log_k)
     return math.log(carlson_rd(0.0, k2, 1.0) / carlson_rd(0.0, 1.0, k2))
 
 
-@compiled
+@compiled(python=False)
 def axis_ratio(A, B):
     """Axis ratio b/a of the Hertz ellipse for half relative curvatures A, B > 0 [1]."""
     target = math.log(A / B)

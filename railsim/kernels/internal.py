@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.record import record
 
 MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
 MOST_RETURNS = 8  # iterations of `hold_within`
@@ -31,6 +32,7 @@ RETURNED = 1e-12  # what is left beyond the limit, over it
 LEAST_LIMIT = 1e-6  # N; below it there is no friction
 
 
+@record
 class Internal(NamedTuple):
     """Laws of the internal states.
 
@@ -77,7 +79,7 @@ def curve_speed(curves, index, f, v):
     return min(max(v, slow), fast)
 
 
-@compiled
+@compiled(python=False)
 def speed_on_branch(curves, i, f, flat):
     """Speed at which branch `i`, continued, has the value `f`; `flat` where it has no slope."""
     rise = curves.f[i + 1] - curves.f[i]
@@ -124,7 +126,7 @@ def curve_advanced(curves, index, k_s, f, v, h):
     return f
 
 
-@compiled
+@compiled(python=False)
 def within_table(curves, index, f):
     """`f`, but not beyond the end of a table that is flat there."""
     first = curves.start[index]
@@ -136,7 +138,7 @@ def within_table(curves, index, f):
     return f
 
 
-@compiled
+@compiled(python=False)
 def relaxation_time(internal, i):
     """Time constant of state `i`, a linear one [s]."""
     p = internal.parameter
@@ -145,7 +147,7 @@ def relaxation_time(internal, i):
     return p[i, 2] / (p[i, 0] + p[i, 1])
 
 
-@compiled
+@compiled(python=False)
 def steady_value(internal, i, drive):
     """Value to which state `i`, a linear one, relaxes at a constant drive."""
     p = internal.parameter
@@ -154,7 +156,7 @@ def steady_value(internal, i, drive):
     return p[i, 0] * drive / (p[i, 0] + p[i, 1])
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def internal_rate(internal, curves, i, x, drive, limit):
     """Time derivative of state `i`."""
     if internal.kind[i] == PAD:

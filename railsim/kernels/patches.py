@@ -25,6 +25,7 @@ from railsim.kernels.contact_columns import (
     A,
     B,
 )
+from railsim.kernels.record import record
 
 
 class Patches(NamedTuple):
@@ -60,6 +61,7 @@ class Patches(NamedTuple):
     outside: np.ndarray
 
 
+@record
 class CreepLaw(NamedTuple):
     """Which creep law, with its grid, its material and its data.
 
@@ -87,6 +89,7 @@ class CreepLaw(NamedTuple):
     curve: np.ndarray
 
 
+@record
 class CreepScratch(NamedTuple):
     """Work arrays of the creep laws.
 
@@ -100,7 +103,7 @@ class CreepScratch(NamedTuple):
     offsets: np.ndarray
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def side_by_side(patch):
     """Return the arrays of `Work.patch` that the creep laws take."""
     return Patches(

@@ -23,6 +23,7 @@ from math import asin, sqrt
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.system import AHEAD, ARC_LENGTH, SPEED
 from railsim.kernels.track_frame import (
     MU_LEFT,
     Y_LEFT,
@@ -54,7 +55,7 @@ COMING_Y, COMING_Z, COMING_ROLL = range(3)
 COMING = 4
 
 
-@compiled(inline=True)
+@compiled
 def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
     """Rails under all wheelsets into `plane` and `rail`.
 
@@ -81,7 +82,7 @@ def locate_rails(track, wheelset_body, frame, cell, cell_u, plane, rail):
             locate_displaced(c, i, u, w, plane, rail)
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def locate_displaced(c, i, u, w, plane, rail):
     """Plane and rails of wheelset `w` from the displacements in cell `i` of the tables `c`."""
     y_l, y_l1, y_l2 = polynomial(
@@ -114,29 +115,26 @@ def locate_displaced(c, i, u, w, plane, rail):
     rail[w, 1, RAIL_SLOPE], rail[w, 1, RAIL_BEND] = y_r1, y_r2
 
 
-@compiled(merge=True)
-def foresee(track, s, speed, w, plane, rail, state, own, h, coming):
-    """How the rates of wheelset `w` beside its rails will have changed after `h`, into `coming`.
+@compiled(python=False)
+def foresee(system, work, w, state):
+    """How the rates of wheelset `w` beside its rails will have changed after `AHEAD`.
 
-    The rails' slopes are those at `s`, where the wheelset will then be; the wheelset is taken to
-    keep its acceleration, so that nothing changes for one that follows its rails.
-
-    Parameters
-    ----------
-    plane : float64[w, PLANE_SIZE];  rail : float64[w, 2, RAIL_SIZE]
-        Where the wheelsets are now.
-    own : int
-        Where its smoothed accelerations begin in the state.
-    coming : float64[2, COMING]
-        Rates of y, z [m/s] and roll [rad/s] by side; zero beyond the end of the track's table.
+    The rails' slopes are those where the wheelset will then be; the wheelset is taken to keep its
+    acceleration, so that nothing changes for one that follows its rails.  Of `Work.coming` are
+    written rates of y, z [m/s] and roll [rad/s] by side; zero beyond the end of the track's table.
     """
-    i, u = cell_of(track, s)
+    plane, rail, coming, h = work.plane, work.rail, work.coming, work.watch[AHEAD]
+    b = system.contact.body[w]
+    speed = state[SPEED]
+    own = 12 * system.bodies.kind.shape[0] + system.internal.kind.shape[0] + 6 * b
+    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]] + speed * h
+    i, u = cell_of(system.track, s)
     change = speed if i >= 0 else 0.0
     for side in range(2):
         y_slope, z_slope = 0.0, 0.0
         if i >= 0:
             y, z = (Y_RIGHT, Z_RIGHT) if side else (Y_LEFT, Z_LEFT)
-            c = track.rail
+            c = system.track.rail
             _, y_slope, _ = polynomial(c[i, y, 0], c[i, y, 1], c[i, y, 2], c[i, y, 3], u)
             _, z_slope, _ = polynomial(c[i, z, 0], c[i, z, 1], c[i, z, 2], c[i, z, 3], u)
         arm = (side - 0.5) * CANT_BASE * plane[w, COSINE]
@@ -194,7 +192,7 @@ def recorded_against_rails(track, body, offset, height, first, size, states, pla
     for i in range(states.shape[0]):
         for w in range(body.shape[0]):
             if track.has_irregularity:
-                cell, u = cell_of(track, states[i, -2] + offset[w])
+                cell, u = cell_of(track, states[i, ARC_LENGTH] + offset[w])
                 if cell >= 0:
                     locate_displaced(track.rail, cell, u, w, plane, rail)
             if size > 0:

@@ -13,10 +13,6 @@ C^T w_F + (roll', yaw' sin roll, yaw' cos roll) for a wheelset, so that its spin
 the gyroscopic moment is exact.  The reference body's x is held: V' is given, or (free running) it
 is what keeps x'' = 0.  Of a fixed body r' = 0 and u = C^T w_F, whatever the forces on it.
 
-Hot path: loops are inside the functions, arrays are indexed directly.  A row view (`R[b]`) costs a
-reference count and a call with a whole `System` hundreds of words on the stack; together they made
-the right-hand side four times slower.
-
 Source: standard relative kinematics, e.g. Shabana, Zaazaa, Sugiyama (2008), Railroad Vehicle
 Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
@@ -64,6 +60,7 @@ from railsim.kernels.support import (
 )
 from railsim.kernels.support_step import correct_support
 from railsim.kernels.system import (
+    ARC_LENGTH,
     BODY_SIZE,
     COS_ROLL,
     EVALUATIONS,
@@ -76,6 +73,8 @@ from railsim.kernels.system import (
     RATES_SIZE,
     RELATIVE_SIZE,
     SIN_ROLL,
+    SPEED,
+    TIME,
     UNSETTLED,
     Y_0,
     Z_0,
@@ -106,7 +105,7 @@ from railsim.kernels.wheel_rail import wheel_rail
 STANDSTILL_SPEED = 0.05  # m/s; creepage is a speed over the vehicle's speed
 
 
-@compiled(inline=True)
+@compiled
 def locate_frames(track, offset, origin, s, frames, cell, cell_u):
     """Evaluate all track frames; END_OF_TRACK where one lies outside the table.
 
@@ -142,13 +141,15 @@ def store_motion(pose, offsets, R, X, V, omega):
     store_rows(pose, offsets, 16, (omega[1], omega[2], zero, zero, zero, zero, zero, zero))
 
 
-@compiled(merge=True)
-def kinematics(bodies, frames, speed, state, relative, pose, rates):
+@compiled(python=False)
+def kinematics(system, work, state):
     """Poses and velocities of all bodies in global axes, rates of their coordinates.
 
-    `rates` (columns 3 to 5: roll, pitch, yaw) is the array `Work.acceleration`, which keeps them
+    The latter (columns 3 to 5: roll, pitch, yaw) are in `Work.acceleration`, which keeps them
     until the accelerations are known.  Forces and moments in `pose` are set to zero.
     """
+    bodies, frames, relative = system.bodies, work.frames, work.relative
+    pose, rates, speed = work.pose, work.acceleration, state[SPEED]
     n = bodies.kind.shape[0]
     for first in range(0, bodies.whole.shape[0], LANES):
         own = eight(bodies.whole, first)
@@ -190,12 +191,13 @@ def kinematics(bodies, frames, speed, state, relative, pose, rates):
             rotate(A, v),
             rotate(R, (u1, u2, u3)),
         )
-    axlebox_kinematics(bodies, state, pose, rates)
+    axlebox_kinematics(bodies, work, state)
 
 
-@compiled(inline=True)
-def axlebox_kinematics(bodies, state, pose, rates):
+@compiled(python=False)
+def axlebox_kinematics(bodies, work, state):
     """Poses of the axleboxes: those of their wheelsets, turned by their own pitch."""
+    pose, rates = work.pose, work.acceleration
     n = bodies.kind.shape[0]
     for first in range(0, bodies.axleboxes.shape[0], LANES):
         own = eight(bodies.axleboxes, first)
@@ -219,8 +221,8 @@ def axlebox_kinematics(bodies, state, pose, rates):
         store_motion(pose, starts(own, POSE_SIZE), turned, X, V, omega)
 
 
-@compiled(merge=True)
-def hold_axleboxes(bodies, axles, frames, C, state, pose):
+@compiled(python=False)
+def hold_axleboxes(system, work, state):
     """Take from the moments of elements on a wheelset what would turn it about its axle.
 
     Elements sit on the axleboxes, which do not spin: of their moment M in the axes C = Rz(yaw)
@@ -230,8 +232,9 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
     per metre, less that of the axes held to it, goes into a force along the track:
     F_x (1 + (omega x r)_x) = M_2 (omega_2 cos yaw - omega_1 sin yaw)/cos roll, some 0.1 N.
     """
-    for w in range(axles.shape[0]):
-        b = axles[w]
+    bodies, frames, C, pose = system.bodies, work.frames, work.relative, work.pose
+    for w in range(system.contact.body.shape[0]):
+        b = system.contact.body[w]
         f = bodies.frame[b]
         sr, cr = C[b, SIN_ROLL], C[b, COS_ROLL]
         axle = pose[b, 1], pose[b, 4], pose[b, 7]
@@ -247,9 +250,10 @@ def hold_axleboxes(bodies, axles, frames, C, state, pose):
         add_at(pose, b, FORCE, times(along, track))
 
 
-@compiled(inline=True)
-def axlebox_dynamics(bodies, pose, rates, derivative):
+@compiled(python=False)
+def axlebox_dynamics(bodies, work, derivative):
     """Pitch accelerations of the axleboxes; all other forces and moments act on their wheelsets."""
+    pose, rates = work.pose, work.acceleration
     n = bodies.kind.shape[0]
     zero = spread(0.0)
     count = bodies.axleboxes.shape[0]
@@ -270,13 +274,15 @@ def axlebox_dynamics(bodies, pose, rates, derivative):
         store_rows(rates, starts(own, RATES_SIZE), 0, (zero, zero, zero, zero, acceleration, zero))
 
 
-@compiled(merge=True)
-def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, rates, derivative):
+@compiled(python=False)
+def dynamics(system, work, state, derivative):
     """Accelerations of all bodies for V' = 0, and the rates of their coordinates.
 
-    Leaves the absolute accelerations in body axes in `rates` (`Work.acceleration`).
+    Leaves the absolute accelerations in body axes in `Work.acceleration`.
     """
-    axlebox_dynamics(bodies, pose, rates, derivative)
+    bodies, frames, relative, pose = system.bodies, work.frames, work.relative, work.pose
+    rail_force, rates, speed = work.rail_force, work.acceleration, state[SPEED]
+    axlebox_dynamics(bodies, work, derivative)
     n = bodies.kind.shape[0]
     square, twice = speed * speed, 2.0 * speed
     for first in range(0, bodies.whole.shape[0], LANES):
@@ -300,7 +306,8 @@ def dynamics(bodies, frames, speed, gravity, state, relative, pose, rail_force, 
         m = rotate_back(C, plus(rotate_back(A, (mx, my, mz)), (qx, qy, qz)))
         # gravity points along global z: the third row of A
         a = plus(
-            (force[0] / mass, force[1] / mass, force[2] / mass), times(gravity, (A[6], A[7], A[8]))
+            (force[0] / mass, force[1] / mass, force[2] / mass),
+            times(system.gravity, (A[6], A[7], A[8])),
         )
         # a wheelset's axes do not spin: take its own rotation out again
         o2 = u2 - spins * (pitch_rate - speed / radius)
@@ -346,7 +353,7 @@ def right_hand_sides(system, work, states, derivatives):
     return status, where, n_patches
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def rates_of_state(system, work, state, derivative):
     """As `right_hand_side`, within compiled code."""
     status, where, n_patches = mechanics(system, work, state, derivative, AS_GIVEN)
@@ -355,7 +362,7 @@ def rates_of_state(system, work, state, derivative):
     return status, where, n_patches
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def internal_rates(system, work, state, derivative):
     """Derivative of the internal states of elements."""
     first = 12 * system.bodies.kind.shape[0]
@@ -375,7 +382,7 @@ def keep_counts(events, support_step, first, to):
         events[w, to + 1] = events[w, first + 1]
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def mechanics(system, work, state, derivative, rails):
     """Derivative of coordinates, velocities, position and speed; drives of the internal states.
 
@@ -393,7 +400,7 @@ def mechanics(system, work, state, derivative, rails):
     """
     bodies = system.bodies
     n = bodies.kind.shape[0]
-    time, s, speed = state[-3], state[-2], state[-1]
+    time, s, speed = state[TIME], state[ARC_LENGTH], state[SPEED]
     if not speed > STANDSTILL_SPEED:
         return STANDSTILL, 0, 0
     status = locate_frames(
@@ -410,25 +417,22 @@ def mechanics(system, work, state, derivative, rails):
     if system.support.elastic:
         locate_support(system, work, s)
     if bodies.fixed.shape[0] > 0:
-        turn_fixed(bodies, work.frames, speed, state)
-    kinematics(bodies, work.frames, speed, state, work.relative, work.pose, work.acceleration)
+        turn_fixed(bodies, work.frames, state)
+    kinematics(system, work, state)
     m = system.internal.kind.shape[0]
     inner = state[12 * n : 12 * n + m]
-    mounts, laws, pose = system.mounts, work.laws, work.pose
-    laws[AHEAD], laws[RATE_OF_STOPS] = work.watch[0], 0.0
-    link_forces(system.links, system.curves, inner, work.drive, laws, pose)
-    if mounts.falling.shape[0] > 0:
-        friction_at_speed(mounts, system.internal, laws, pose, work.friction)
-    mount_forces(
-        mounts, system.internal, system.curves, work.friction, inner, work.drive, laws, pose
-    )
-    hold_axleboxes(bodies, system.contact.body, work.frames, work.relative, state, pose)
+    work.laws[AHEAD], work.laws[RATE_OF_STOPS] = work.watch[0], 0.0
+    link_forces(system, work, inner)
+    if system.mounts.falling.shape[0] > 0:
+        friction_at_speed(system, work)
+    mount_forces(system, work, inner)
+    hold_axleboxes(system, work, state)
     if system.loads.body.shape[0] > 0:
-        load_forces(system.loads, time, s, system.frame_offset, bodies, work.frames, pose)
+        load_forces(system, work, time, s)
     if system.drives.body.shape[0] > 0:
-        add_axle_torques(system.drives, time, s, system.frame_offset, bodies, speed, state, pose)
+        add_axle_torques(system, work, state)
     if system.drive.mode == FREE:
-        add_traction(system.drive, bodies, work.frames, speed, work.pose)
+        add_traction(system, work, speed)
     work.parts[EVALUATIONS] += 1
     left = evaluations(system, state, rails)
     as_given = left == 0
@@ -449,25 +453,14 @@ def mechanics(system, work, state, derivative, rails):
         keep_counts(work.events, work.support_step, 2, 0)
     if status != RUNNING:
         return status, where, n_patches
-    dynamics(
-        bodies,
-        work.frames,
-        speed,
-        system.gravity,
-        state,
-        work.relative,
-        work.pose,
-        work.rail_force,
-        work.acceleration,
-        derivative,
-    )
-    rate = speed_change(system.drive, bodies, work.frames, state, derivative)
+    dynamics(system, work, state, derivative)
+    rate = speed_change(system, work, state, derivative)
     if rate != 0.0:
-        apply_speed_change(bodies, work.frames, state, rate, derivative)
-    hold_reference(bodies, work.relative, work.acceleration, derivative)
+        apply_speed_change(system, work, state, rate, derivative)
+    hold_reference(bodies, work, derivative)
     if bodies.fixed.shape[0] > 0:
-        hold_fixed(bodies, work.frames, speed, rate, work.relative, work.acceleration, derivative)
-    derivative[-3] = 1.0
-    derivative[-2] = speed
-    derivative[-1] = rate
+        hold_fixed(bodies, work, speed, rate, derivative)
+    derivative[TIME] = 1.0
+    derivative[ARC_LENGTH] = speed
+    derivative[SPEED] = rate
     return RUNNING, 0, n_patches

@@ -41,7 +41,7 @@ def _series(x):
     return s, c
 
 
-@compiled
+@compiled(python=False)
 def sine_cosine(x):
     """Sine and cosine of `x` [rad], by a series where |x| <= 0.125."""
     if not abs(x) <= SMALL:

@@ -24,6 +24,7 @@ import numpy as np
 from railsim.kernels import compiled
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.rails import MOTION_Y, MOTION_Y_RATE, MOTION_Z, MOTION_Z_RATE
+from railsim.kernels.system import LAST_STEP
 
 # columns of a wheelset's track in the state: u, u', r_0, s_0, u''
 RAIL_DOF, DOF = 4, 7
@@ -113,7 +114,7 @@ def factors(variation, s, out):
     out[BALLAST] = variation[i, 2] + u * (variation[i + 1, 2] - variation[i, 2])
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def locate_support(system, work, s):
     """Factors of stiffness and damping under each wheelset, the reference body being at `s`.
 
@@ -129,7 +130,7 @@ def locate_support(system, work, s):
             factors(system.support.variation, s + system.frame_offset[f], work.support_step[w])
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def track_forces(support, track, u, first, k, c, out, sign):
     """Add `sign` times the forces of pads and ballast, k K x + c C x with x at ``u[first:]``.
 
@@ -165,7 +166,7 @@ def track_forces(support, track, u, first, k, c, out, sign):
         out[6] += much * (k * row[K_BALLAST_ROLL] + c * row[C_BALLAST_ROLL]) * u[first + 6] - roll
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def solve_track(support, track, side, m, c, k):
     """Solve (m M + c (C + D) + k (K + K_c)) x = b for one wheelset's track.
 
@@ -255,7 +256,7 @@ def mass_of(row, k):
     return row[M_SLEEPER] if k < DOF - 1 else row[I_SLEEPER]
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def imbalance(system, work, state, w):
     """F - C u' - K u of the track under wheelset `w` into ``work.support_step[w, :7]``."""
     first = support_begin(system) + SUPPORT_SIZE * w
@@ -275,7 +276,7 @@ def support_begin(system):
     return 18 * system.bodies.kind.shape[0] + 2 * system.internal.kind.shape[0]
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def support_rates(system, work, state, derivative):
     """Rates of the track's displacements and of their rates.
 
@@ -296,7 +297,7 @@ def support_rates(system, work, state, derivative):
             derivative[first + RATE + k] = work.support_step[w, k] / mass if moves else 0.0
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def settle_rates(system, work, state):
     """One Newton step for the rates of a massless track, with the forces just evaluated.
 
@@ -324,7 +325,7 @@ def settle_rates(system, work, state):
     return changed
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def rail_motions(system, work, state):
     """Displacements and velocities of the rails for `rails`."""
     for w in range(work.support.shape[0]):
@@ -337,7 +338,7 @@ def rail_motions(system, work, state):
             work.rail_motion[w, side, MOTION_Z_RATE] = state[i + RATE + 1]
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def complete_slopes(system, work, state):
     """Forces on the rails, and what their slopes have learnt at the same set of patches."""
     for w in range(work.support.shape[0]):
@@ -358,10 +359,10 @@ def complete_slopes(system, work, state):
             contact[D_Z_SLIP] += state[i + L_Z_SLIP]
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def evaluations(system, state, rails):
     """How often the contact forces may be evaluated again for the rails: `rails` as `AS_GIVEN`."""
-    if rails == AFTER_STEP and system.support.elastic and state[-4] > 0.0:
+    if rails == AFTER_STEP and system.support.elastic and state[LAST_STEP] > 0.0:
         return MOST_CORRECTIONS  # a step has been taken
     if rails == BALANCED and system.support.elastic and system.support.massless:
         return MOST_BALANCES

@@ -87,7 +87,7 @@ from railsim.kernels.support import (
     support_begin,
     track_forces,
 )
-from railsim.kernels.system import AGAIN, WHOLE, WHOLE_TOLERANCE, Z_0
+from railsim.kernels.system import AGAIN, ARC_LENGTH, LAST_STEP, SPEED, WHOLE, WHOLE_TOLERANCE, Z_0
 from railsim.kernels.track_frame import cell_of
 
 # `learn`: scales of way and slip [m, m/s] in a step of this length [s]; share of an error that is
@@ -109,7 +109,7 @@ def step_compliance(support, h, out):
     out[1] = 1.0 / (mass + 1.5 * row[C_PAD_Z] + h * row[K_PAD_Z])
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def remember_track(system, work, state):
     """Initialise the memory of `step_support` from `state`."""
     for w in range(work.support.shape[0]):
@@ -123,7 +123,7 @@ def remember_track(system, work, state):
             state[first + ACCELERATION + k] = 0.0
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def note_wheelsets(system, work, state):
     """Store the positions of the wheelsets in the planes of their rails before a step.
 
@@ -133,14 +133,14 @@ def note_wheelsets(system, work, state):
     for w in range(work.support.shape[0]):
         track = work.support_step[w]
         first = support_begin(system) + SUPPORT_SIZE * w
-        learn(work, state, first + LEARNT, w, system.contact.load[w], abs(state[-4]))
+        learn(work, state, first + LEARNT, w, system.contact.load[w], abs(state[LAST_STEP]))
         if track[WAITS] > 0.0:
-            move_rails(track, state, first, state[-4])
+            move_rails(track, state, first, state[LAST_STEP])
             track[WAITS] = 0.0
         note_wheelset(system, work, state, w)
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def note_wheelset(system, work, state, w):
     """Motion of a wheelset in the plane of its rails into its row of `work.support_step`.
 
@@ -149,7 +149,7 @@ def note_wheelset(system, work, state, w):
     """
     n = system.bodies.kind.shape[0]
     b = system.contact.body[w]
-    track, plane, speed = work.support_step[w], work.plane, state[-1]
+    track, plane, speed = work.support_step[w], work.plane, state[SPEED]
     height = system.bodies.row[b, Z_0]
     q = 6 * b
     v = 6 * n + q
@@ -166,7 +166,7 @@ def note_wheelset(system, work, state, w):
     track[MOTION + 9] = speed * (work.rail[w, 1, RAIL_SLOPE] - state[q + 5])
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def step_support(system, work, state, h, last):
     """Advance the track under all wheelsets by `h`, with bodies, position and speed after it.
 
@@ -183,7 +183,7 @@ def step_support(system, work, state, h, last):
             before[k] = track[MOTION + k]
         if system.track.has_irregularity:
             f = system.bodies.frame[b]
-            cell, cell_u = cell_of(system.track, state[-2] + system.frame_offset[f])
+            cell, cell_u = cell_of(system.track, state[ARC_LENGTH] + system.frame_offset[f])
             if cell >= 0:
                 locate_displaced(system.track.rail, cell, cell_u, w, work.plane, work.rail)
         note_wheelset(system, work, state, w)
@@ -248,7 +248,7 @@ def step_support(system, work, state, h, last):
             state[first + MEAN_RATE + k] = track[k]
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def learn(work, state, first, w, load, h):
     """Take the errors of the forces foreseen in the last step into the slopes at both wheels.
 
@@ -287,7 +287,7 @@ def bounded(value, least, most):
     return min(most, max(least, value))
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def stretch_correction(track, i, stretch):
     """Multiply the imbalance of one rail so that the next correction does what the last missed.
 
@@ -307,7 +307,7 @@ def stretch_correction(track, i, stretch):
     track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def change_forces(system, work, w, h, c):
     """Change the forces between wheelset `w` and its rails as moving the rails does, linearly.
 
@@ -341,7 +341,7 @@ def change_forces(system, work, w, h, c):
         force[b, 3] -= moment / contact[STIFFNESS]
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def move_rails(track, state, first, h):
     """Add the mean rate in ``track[:7]`` over a step `h` to the motion that led to `state`."""
     c = 1.0 + state[first + WEIGHT]
@@ -354,7 +354,7 @@ def move_rails(track, state, first, h):
         state[first + ACCELERATION + k] += c * c / h * r
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def correct_support(system, work, state, left):
     """One Newton step for the rails after a step of the fast scheme.
 
@@ -374,7 +374,7 @@ def correct_support(system, work, state, left):
     -------
     bool : whether rails have moved, so that the forces are to be evaluated again.
     """
-    h = state[-4]
+    h = state[LAST_STEP]
     share = min(1.0, h / work.watch[WHOLE_TOLERANCE])
     moved = False
     for w in range(work.support.shape[0]):

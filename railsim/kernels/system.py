@@ -9,8 +9,8 @@ State vector (float64[n_state]), for n bodies and m internal element states:
     12n .. 12n+m  internal states of elements, see `internal`
     then 6n, m    memory of the fast scheme: smoothed accelerations, drives of the internal states
     then 54w      of each wheelset on elastic rails: track under it, see `support`
-    -4            memory of the fast scheme: length of the last step (s), 0 where there was none
-    -3, -2, -1    time t (s), arc length s of the reference body's frame (m), speed V = s' (m/s)
+    LAST_STEP     memory of the fast scheme: length of the last step (s), 0 where there was none
+    TIME, ARC_LENGTH, SPEED   t (s), s of the reference body's frame (m), V = s' (m/s)
 
 An axlebox has one coordinate, its pitch about the axle; of its twelve entries only `pitch` and u_2
 (here the pitch rate relative to the wheelset's axes) are used.  A fixed body keeps its coordinates;
@@ -24,6 +24,7 @@ import numpy as np
 from railsim.kernels.element_columns import FRICTION, LINK_COLUMNS, MOUNT_COLUMNS, ONE_SIDED
 from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
+from railsim.kernels.record import record
 from railsim.kernels.track_frame import TrackTables
 
 # kinds of bodies
@@ -31,7 +32,9 @@ RIGID, WHEELSET, AXLEBOX, FIXED = range(4)
 
 # ways of driving
 CONSTANT, TABLE, FREE = range(3)
-N_SCALARS = 4  # last step, t, s, V at the end of the state
+# at the end of the state
+LAST_STEP, TIME, ARC_LENGTH, SPEED = range(-4, 0)
+N_SCALARS = 4
 
 
 # columns of Bodies.row
@@ -68,6 +71,7 @@ AGAIN = 5
 N_EVENTS = 6
 
 
+@record
 class Bodies(NamedTuple):
     """Bodies, vehicle by vehicle; within one: rigid bodies, wheelsets from the front, axleboxes.
 
@@ -114,6 +118,7 @@ class Bodies(NamedTuple):
         return self.row[:, RADIUS]
 
 
+@record
 class Contact(NamedTuple):
     """Wheel-rail contact; sides in the order left, right.
 
@@ -151,6 +156,7 @@ class Contact(NamedTuple):
     friction_decay: float
 
 
+@record
 class Links(NamedTuple):
     """Point-to-point elements: springs, dampers, rods (tension positive).
 
@@ -184,6 +190,7 @@ class Links(NamedTuple):
         return self.row[:, first.start : last.stop]
 
 
+@record
 class Mounts(NamedTuple):
     """Elements with three axes: bushings, shear springs, roll bars, bump stops.
 
@@ -254,6 +261,7 @@ def falling_friction(friction: np.ndarray) -> np.ndarray:
     return np.flatnonzero((friction[:, :, 2] < 1.0).any(axis=1))
 
 
+@record
 class Curves(NamedTuple):
     """Piecewise linear tables, one after the other; beyond its ends a table continues linearly.
 
@@ -268,6 +276,7 @@ class Curves(NamedTuple):
     f: np.ndarray
 
 
+@record
 class Loads(NamedTuple):
     """Given forces and torques over time or distance.
 
@@ -288,6 +297,7 @@ class Loads(NamedTuple):
     table: np.ndarray
 
 
+@record
 class Drives(NamedTuple):
     """Torques between wheelsets and the bodies that take their reactions.
 
@@ -306,6 +316,7 @@ class Drives(NamedTuple):
     table: np.ndarray
 
 
+@record
 class Drive(NamedTuple):
     """How the speed goes along the track.
 
@@ -322,6 +333,7 @@ class Drive(NamedTuple):
     resistance: np.ndarray
 
 
+@record
 class Support(NamedTuple):
     """Moving track model, the same under each wheelset.
 
@@ -339,6 +351,7 @@ class Support(NamedTuple):
     variation: np.ndarray
 
 
+@record
 class System(NamedTuple):
     """Everything the time loop reads.
 
@@ -362,6 +375,7 @@ class System(NamedTuple):
     gravity: float
 
 
+@record
 class Work(NamedTuple):
     """Scratch arrays and by-products of one evaluation of the right-hand side.
 

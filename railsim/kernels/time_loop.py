@@ -26,6 +26,7 @@ from railsim.kernels.internal import (
     slides_together,
     within_table,
 )
+from railsim.kernels.record import record
 from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
 from railsim.kernels.support import AFTER_STEP, BALANCED, support_rates
@@ -37,6 +38,7 @@ from railsim.kernels.support_step import (
 )
 from railsim.kernels.system import (
     AHEAD,
+    ARC_LENGTH,
     AXLEBOX,
     COS_PITCH,
     COS_ROLL,
@@ -44,13 +46,16 @@ from railsim.kernels.system import (
     I_1,
     I_2,
     I_3,
+    LAST_STEP,
     MASS,
     PARTS,
     SHARE,
     SIN_PITCH,
     SIN_ROLL,
+    SPEED,
     STEPS,
     TABLE,
+    TIME,
     WHEELSET,
     WHOLE,
 )
@@ -70,6 +75,7 @@ SMOOTHING_ELASTIC = 1.0
 SPIN = 4  # component of a body about its y axis
 
 
+@record
 class Recorder(NamedTuple):
     """Arrays that receive the output of one chunk.
 
@@ -162,7 +168,7 @@ def implicitness(z):
     return 0.5 if z < 2.0 else 1.0 - 1.0 / z
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def soften(rate, before, i, damping, inverse, h):
     """Take a damper of one coordinate linearly implicit; `inverse`: 1/mass."""
     z = h * damping * inverse
@@ -170,7 +176,7 @@ def soften(rate, before, i, damping, inverse, h):
     rate[i] = (rate[i] + theta_z * before[i]) / (1.0 + theta_z)
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
     """Take a damper of the speed of coordinate i + lever times that of j linearly implicit."""
     z = h * damping * (inverse_i + lever * lever * inverse_j)
@@ -181,7 +187,7 @@ def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
     rate[j] -= force * lever * inverse_j
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     """Take what the contact takes from the speeds in y, z and roll linearly implicit.
 
@@ -217,7 +223,7 @@ def soften_across(jacobian, b, rate, before, v, mass, roll, h):
     )
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def soften_contact(bodies, jacobian, b, rate, before, h):
     """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
 
@@ -246,7 +252,7 @@ def soften_contact(bodies, jacobian, b, rate, before, h):
     soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def remember(system, work, state, derivative, h):
     """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
     n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
@@ -263,10 +269,10 @@ def remember(system, work, state, derivative, h):
         state[first + 6 * n + i] = work.drive[i, 0]
     if system.support.elastic:
         remember_track(system, work, state)
-    state[-4] = 0.0
+    state[LAST_STEP] = 0.0
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def step_fast(system, work, state, derivative, decay, h):
     """Advance `state` by `h` with the derivative already evaluated there.
 
@@ -280,11 +286,11 @@ def step_fast(system, work, state, derivative, decay, h):
     n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
     first = 12 * n + m
     rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
-    frames, half = work.frames, 0.5 * h * state[-1] * state[-1]
+    frames, half = work.frames, 0.5 * h * state[SPEED] * state[SPEED]
     if system.support.elastic:
         note_wheelsets(system, work, state)
     # negative in results of earlier versions
-    last = abs(state[-4]) if state[-4] != 0.0 else h
+    last = abs(state[LAST_STEP]) if state[LAST_STEP] != 0.0 else h
     shift = 0.5 * (last - h)
     for b in range(n):
         q = 6 * b
@@ -333,23 +339,23 @@ def step_fast(system, work, state, derivative, decay, h):
         )
         if slides_together(system.internal, i):
             hold_within(system.internal, i, 12 * n, work.drive, state)
-    state[-4] = h
+    state[LAST_STEP] = h
     advance_position(system.drive, state, derivative, h)
     if system.support.elastic:
         step_support(system, work, state, h, last)
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def advance_position(drive, state, derivative, h):
     """Time, position and speed after a step; a speed table is met exactly."""
-    state[-2] += h * (state[-1] + 0.5 * h * derivative[-1])
-    state[-1] += h * derivative[-1]
-    state[-3] += h
+    state[ARC_LENGTH] += h * (state[SPEED] + 0.5 * h * derivative[SPEED])
+    state[SPEED] += h * derivative[SPEED]
+    state[TIME] += h
     if drive.mode == TABLE:
-        state[-1], _ = table_value_slope(drive.table, state[-2])
+        state[SPEED], _ = table_value_slope(drive.table, state[ARC_LENGTH])
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def settle_limits(internal, curves, first, drive, state):
     """Bring the forces of friction pads and of tables that end flat back within their limits."""
     for i in range(internal.kind.shape[0]):
@@ -363,12 +369,6 @@ def settle_limits(internal, curves, first, drive, state):
 
 
 @compiled(python=False)
-def balanced_mechanics(system, work, state, derivative):
-    """As `mechanics` for the reference scheme; a function of its own, to compile it only once."""
-    return mechanics(system, work, state, derivative, BALANCED)
-
-
-@compiled(inline=True)
 def step_rk4(system, work, state, derivative, stages, h):
     """Advance `state` by `h`; `derivative` holds the first stage."""
     total, trial, rate = stages[0], stages[1], stages[2]
@@ -379,7 +379,7 @@ def step_rk4(system, work, state, derivative, stages, h):
         fraction = 0.5 * h if stage < 3 else h
         for k in range(state.shape[0]):
             trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = balanced_mechanics(system, work, trial, rate)
+        status, where, _ = mechanics(system, work, trial, rate, BALANCED)
         if status != RUNNING:
             return status, where
         internal_rates(system, work, trial, rate)
@@ -395,7 +395,7 @@ def step_rk4(system, work, state, derivative, stages, h):
     return RUNNING, 0
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def striking(contact, swing, h, share):
     """First wheelset with a contact force about to change by more than a share of the wheel load.
 
@@ -407,7 +407,7 @@ def striking(contact, swing, h, share):
     return -1
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def all_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
     for k in range(state.shape[0]):
@@ -451,12 +451,10 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
     left = np.int64(0)  # parts of a divided step that are still to be taken
     decay, length = work.decay, h
     while step < end + chunk.closing:
-        if scheme == RK4:
-            status, where, patches = balanced_mechanics(system, work, state, derivative)
-        else:
-            status, where, patches = mechanics(system, work, state, derivative, AFTER_STEP)
+        rails = BALANCED if scheme == RK4 else AFTER_STEP
+        status, where, patches = mechanics(system, work, state, derivative, rails)
         if status == RUNNING:
-            note_extremes(system, work.wheel, work.plane, state, work.present, work.extremes)
+            note_extremes(system, work, state)
             if scheme == RK4:
                 internal_rates(system, work, state, derivative)
                 support_rates(system, work, state, derivative)
@@ -466,7 +464,7 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                     rows += 1
                 if step == end:
                     return RUNNING, 0, chunk.steps, rows
-                watch(work.wheel, work.vibration, b0, a1, a2, fading, h, state[-2])
+                watch(work, b0, a1, a2, fading, h, state[ARC_LENGTH])
                 if scheme == FAST and chunk.fresh and step == first_step:
                     remember(system, work, state, derivative, h)
                 decay, length = work.decay, h

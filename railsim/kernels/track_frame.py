@@ -15,6 +15,7 @@ import numpy as np
 
 from railsim.kernels import compiled
 from railsim.kernels.lanes import LANES, eight_from, eight_of, load_rows, starts, store_rows
+from railsim.kernels.record import record
 from railsim.kernels.rotation import sine_cosine_lanes
 
 # rows of TrackTables.coefficients
@@ -31,6 +32,7 @@ GRAVITY = 9  # 9:12 direction of gravity in frame axes (1): the third row of A
 FRAME_SIZE = 24  # whole cache lines
 
 
+@record
 class TrackTables(NamedTuple):
     """Piecewise cubic tables over arc length, value = c0 + c1 u + c2 u^2 + c3 u^3, u = s - s_cell.
 
@@ -63,7 +65,7 @@ def frame_columns(frames, offsets):
     return (x, y, z), (a0, a1, a2, a3, a4, a5, a6, a7, a8), (w1, w2, w3), (e1, e2, e3)
 
 
-@compiled
+@compiled(python=False)
 def cell_of(track, s):
     """Cell index of arc length `s`, -1 outside the table, and the distance into the cell [m]."""
     position = (s - track.s_start) / track.ds
@@ -83,7 +85,7 @@ def polynomial(c0, c1, c2, c3, u):
     )
 
 
-@compiled(merge=True)
+@compiled(python=False)
 def track_frames(track, cell, cell_u, origin, frames):
     """Evaluate track frames into ``frames[:, FRAME_SIZE]``.
 

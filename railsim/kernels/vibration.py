@@ -20,7 +20,7 @@ BEGUN, Z_1, Z_2, LAST, SQUARE, CHANGE, AMPLITUDE, POSITION, FREQUENCY = range(9)
 VIBRATION = 9
 
 
-@compiled
+@compiled(python=False)
 def high_pass(h):
     """Coefficients of the filter at the step `h` [s]: b0 = -b1/2 = b2, a1, a2; fading in a step."""
     k = tan(pi * min(CUT_OFF * h, 0.4))
@@ -33,9 +33,10 @@ def high_pass(h):
     )
 
 
-@compiled(merge=True)
-def watch(wheel, vibration, b0, a1, a2, fading, h, s):
+@compiled(python=False)
+def watch(work, b0, a1, a2, fading, h, s):
     """Take up the wheel loads of a step of length `h` that begins at arc length `s`."""
+    wheel, vibration = work.wheel, work.vibration
     for w in range(wheel.shape[0]):
         for side in range(2):
             load = wheel[w, side, 0]

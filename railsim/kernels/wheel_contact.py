@@ -100,7 +100,7 @@ DEEPEST = 1e-3  # penetration under some 2 MN, more than any wheel that climbs c
 LIFT_RANGE = 0.05  # a wheel higher than this above its rail is beyond the model (m)
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def normal_contact(system, work, speed, state):
     """Look up all wheels, add elastic normal forces, list the active patches.
 
@@ -113,7 +113,6 @@ def normal_contact(system, work, speed, state):
     force, plane, above = work.rail_force, work.plane, work.above
     jacobian = work.contact_jacobian
     n_bodies = system.bodies.kind.shape[0]
-    smoothed = 12 * n_bodies + system.internal.kind.shape[0]
     ahead = work.watch[AHEAD]
     n = np.int64(0)  # a plain 0 would have everything that takes it compiled twice
     for w in range(contact.body.shape[0]):
@@ -149,9 +148,7 @@ def normal_contact(system, work, speed, state):
         above[8], above[9] = stretched_roll(above[2])
         work.swing[w] = work.laws[RATE_OF_STOPS]
         if ahead > 0.0 and system.track.has_irregularity:
-            own = smoothed + 6 * b
-            s = state[-2] + system.frame_offset[system.bodies.frame[b]] + speed * ahead
-            foresee(system.track, s, speed, w, plane, work.rail, state, own, ahead, work.coming)
+            foresee(system, work, w, state)
         for side in range(2):
             status, n = wheel_contact(system, work, w, side, speed, n)
             if status != RUNNING:
@@ -207,7 +204,7 @@ def meeting(work, w, side, speed):
     )
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def wheel_contact(system, work, w, side, speed, n):
     """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
 
@@ -252,7 +249,7 @@ def wheel_contact(system, work, w, side, speed, n):
     return RUNNING, n
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def clear_wheel(wheel, w, side, lift):
     """Nothing yet acts on a wheel."""
     wheel[w, side, W_Q] = 0.0
@@ -266,7 +263,7 @@ def clear_wheel(wheel, w, side, lift):
     wheel[w, side, W_LIFT] = lift
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def patch_contact(system, work, w, side, patch, meet, n):
     """Normal force of one patch; where it carries, the patch becomes number `n` of the active ones.
 
@@ -332,7 +329,7 @@ def patch_contact(system, work, w, side, patch, meet, n):
     return n
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def add_normal_force(work, b, w, side, meet, p, k, vertical):
     """Add a patch's generalised normal forces to those of wheelset `w`, body `b`.
 
@@ -353,7 +350,7 @@ def add_normal_force(work, b, w, side, meet, p, k, vertical):
     work.wheel[w, side, W_Y] -= q_y
 
 
-@compiled
+@compiled(python=False)
 def all_far(contact, table, iy, ir, iw, tr, z):
     """Whether every patch is more than LIFT_RANGE away from its rail."""
     for patch in range(N_PATCH):
@@ -394,8 +391,8 @@ def has_climbed(contact, table, meet, stretched):
     return True
 
 
-@compiled(merge=True)
-def complete_normal_force(b, bodies, frames, C, state, force):
+@compiled(python=False)
+def complete_normal_force(system, work, b, state):
     """Moment vector from the generalised moments, and the force along the track.
 
     The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
@@ -407,6 +404,7 @@ def complete_normal_force(b, bodies, frames, C, state, force):
     work; hence F_x (1 + (omega x r)_x) = -F_y (omega x r)_y - F_z (omega x r)_z - M omega: on a
     twisted track the wheels climb the rails.  `force[b, 0]` brings the share of irregular rails.
     """
+    bodies, frames, C, force = system.bodies, work.frames, work.relative, work.rail_force
     m1 = force[b, 3]
     m3 = force[b, 5] / C[b, COS_ROLL]
     mx = C[b, 0] * m1 + C[b, 2] * m3

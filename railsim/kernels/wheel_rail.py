@@ -70,7 +70,7 @@ from railsim.kernels.support import PATCHES, SKIP, complete_slopes, rail_motions
 from railsim.kernels.wheel_contact import complete_normal_force, normal_contact
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def add_creep_forces(system, work, n, speed, state):
     """Put the tangential forces on the wheelsets and gather the wheels' outputs."""
     contact = system.contact
@@ -107,21 +107,21 @@ def add_creep_forces(system, work, n, speed, state):
             wheel[w, side, W_PHI] = scale * patch[PHI, k]
         along, across = patch[SLOPE_ALONG, k], patch[SLOPE_ACROSS, k]
         if system.support.elastic:
-            add_slopes(work.support, w, side, patch, k, across)
+            add_slopes(work, w, side, k, across)
             work.support[w, side, PATCHES] += float(1 << work.patch_index[k, 2])
             # a rail that gives way is in series with the creep force
             across /= 1.0 + across * (c * c * work.compliance[0] + s * s * work.compliance[1])
         work.contact_jacobian[b, J_ALONG] += along
         work.contact_jacobian[b, J_ALONG_LEVER] += along * cz
         work.contact_jacobian[b, J_YAW] += along * cy * cy
-        add_damping(work.contact_jacobian, b, patch, k, across)
+        add_damping(work, b, k, across)
         work.events[w, 0] += 1
         work.events[w, 1] += int(patch[BEYOND, k])
     if system.support.elastic:
         complete_slopes(system, work, state)
 
 
-@compiled(inline=True)
+@compiled(python=False)
 def wheel_rail(system, work, speed, state):
     """All wheel-rail forces on the wheelsets, track axes, into ``work.rail_force``.
 
@@ -151,7 +151,7 @@ def wheel_rail(system, work, speed, state):
         b = system.contact.body[k]
         if system.support.elastic and work.support_step[k, SKIP] > 0.0:
             continue
-        complete_normal_force(b, system.bodies, work.frames, work.relative, state, work.rail_force)
+        complete_normal_force(system, work, b, state)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
         third = cube_root(patch[NORMAL, k])

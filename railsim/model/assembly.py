@@ -339,8 +339,7 @@ def side_by_side(tables: Sequence[Floats]) -> Floats:
     values = tables[0][None] if len(tables) == 1 else np.stack(tables)
     if values.ctypes.data % CACHE_LINE:
         values = aligned(values)
-    # as on disk: for an array that can be written to the time loop would be compiled again
-    values.setflags(write=False)
+    values.setflags(write=False)  # as on disk
     return values
 
 
