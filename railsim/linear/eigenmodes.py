@@ -212,8 +212,8 @@ def loss_of_stability(
     at: At,
     low: float,
     high: float,
-    points: int = 12,
     counts: Callable[[Eigenmodes], bool] | None = None,
+    points: int = 12,
 ) -> LossOfStability:
     """Find the lowest parameter at which an oscillation is no longer damped.
 
@@ -223,10 +223,10 @@ def loss_of_stability(
         Parameter to linearisation.
     low, high : float
         Range of the search.
-    points : int
-        Values of the parameter at which the range is looked through.
     counts : callable, optional
         Whether a mode that is undamped counts; by default all do.
+    points : int
+        Values of the parameter at which the range is looked through.
     """
     known: dict[float, Eigenmodes] = {}
 

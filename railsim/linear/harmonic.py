@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 ANGLES = 24
 BALANCED = 1e-2  # N and N m, of a wheelset's vertical force and roll moment
 MOST_ITERATIONS = 15
+SLOW = 0.1  # ratio of two residuals from which on slopes are formed again
 STEP = 1e-8  # m and rad
 Y, Z, ROLL = 1, 2, 3
 
@@ -41,8 +42,9 @@ class ContactPath:
 
     def __init__(self, amplitude: float) -> None:
         self.amplitude = amplitude
-        # where the path was found last: the next speed's is near
+        # where the path was found last, and the slopes there: the next speed's are near
         self._known: dict[tuple[int, float], Floats] = {}
+        self._slopes: dict[tuple[int, float], Floats] = {}
 
     def matrix(self, vehicle: FreeVehicle, tangent: Floats) -> Floats:
         """Return the matrix of a linearisation with the columns of y replaced.
@@ -112,17 +114,16 @@ class ContactPath:
             vehicle.rate(x)
             return np.asarray(vehicle.work.rail_force[body, [2, 3]] - goal)
 
+        before = np.inf
         for _ in range(MOST_ITERATIONS):
             value = rest(pose)
-            if np.max(np.abs(value)) < BALANCED:
+            size = np.max(np.abs(value))
+            if size < BALANCED:
                 break
-            slopes = np.array(
-                [
-                    (rest(pose + STEP * unit) - rest(pose - STEP * unit)) / (2.0 * STEP)
-                    for unit in np.eye(2)
-                ]
-            ).T
-            pose = pose - np.linalg.solve(slopes, value)
+            if (body, y) not in self._slopes or size > SLOW * before:
+                ends = [rest(pose + STEP * unit) - rest(pose - STEP * unit) for unit in np.eye(2)]
+                self._slopes[body, y] = np.transpose(ends) / (2.0 * STEP)
+            pose, before = pose - np.linalg.solve(self._slopes[body, y], value), size
         else:
             raise ModelError("no contact path at this amplitude; try a smaller one")
         x = base.copy()

@@ -4,9 +4,9 @@ Car bodies are the rigid bodies that no element joins to a wheelset or axlebox (
 none, the heaviest ones); bogies are those that one does.
 
 =============  ==================================================================================
-car body       more than half of the energy is in car bodies: bounce, pitch, yaw, longitudinal;
-               lateral with roll is lower sway where both are in phase (the pole lies below the
-               centre of gravity), else upper sway
+car body       more than half of the energy is in car bodies: bounce, pitch, yaw, longitudinal,
+               of a body with another name after that (tank yaw); lateral with roll is lower sway
+               where both are in phase (the pole lies below the centre of gravity), else upper sway
 hunting        a wheelset whose yaw V/(omega y) is 1 +- 0.3 and about 90 degrees ahead or behind,
                and whose y is at least half of the largest lateral motion; of the bogie that moves
                most
@@ -142,10 +142,11 @@ def mode_name(parts: Parts, shape: Complex, eigenvalue: complex, speed: float) -
 
 def _car_name(parts: Parts, shape: Complex, shares: Floats) -> str:
     component = int(np.argmax(shares[list(parts.cars)].sum(axis=0)))
-    words = "car body" if len(parts.cars) == 1 else "car bodies"
-    if component in CAR_NAMES:
-        return f"{words} {CAR_NAMES[component]}"
     car = max(parts.cars, key=lambda b: float(shares[b].sum()))
+    if component in CAR_NAMES:
+        name = parts.model.index.bodies[car].split(".")[-1].replace("_", " ")
+        words = "car body" if name == "carbody" else name
+        return f"{words if len(parts.cars) == 1 else 'car bodies'} {CAR_NAMES[component]}"
     y, roll = parts.component(shape, car, 1), parts.component(shape, car, 3)
     return "lower sway" if (y * roll.conjugate()).real > 0.0 else "upper sway"
 

@@ -205,6 +205,7 @@ class LinearVehicle:
         self.hold = tuple(hold)
         self.coordinates: Coordinates = coordinates(self.model, held=held, hold=hold)
         self._known: dict[float, SteadyState] = {}
+        self._tangents: dict[float, tuple[FreeVehicle, Floats]] = {}
         self._rest = balance.state.copy()
         self._rest[-2] = POSITION
         there = circle(track, curvature=self.curvature, cant=cant)
@@ -270,12 +271,15 @@ class LinearVehicle:
             self.model, self.system, self.steady(speed).state, held=self.held, hold=self.hold
         )
 
-    def linearised(self, speed: float) -> Linearisation:
-        """Return the linearisation at a speed [m/s]."""
-        vehicle = self.free(speed)
-        matrix = vehicle.tangent()
-        if self._path is not None:
-            matrix = self._path.matrix(vehicle, matrix)
+    def linearised(self, speed: float, path: ContactPath | None = None) -> Linearisation:
+        """Return the linearisation at a speed [m/s], with a `path` for its amplitude."""
+        if speed not in self._tangents:
+            vehicle = self.free(speed)
+            self._tangents[speed] = vehicle, vehicle.tangent()
+        vehicle, matrix = self._tangents[speed]
+        path = path or self._path
+        if path is not None:
+            matrix = path.matrix(vehicle, matrix)
         return vehicle.linearisation(matrix)
 
 

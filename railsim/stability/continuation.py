@@ -20,12 +20,12 @@ from railsim.stability.vehicle_flow import VehicleFlow
 Progress = Callable[[float], None]
 
 LARGEST_AMPLITUDE = 12e-3  # m, at which a branch is followed no further
-ARC_STEP = 1.0  # units of the arc length, about 1 mm or 1 m/s
-MOST_MOTIONS = 30  # of one branch
+ARC_STEP = 1.5  # units of the arc length, about 1 mm or 1 m/s
+MOST_MOTIONS = 20  # of one branch
 FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken
 FROM_END = 1.0  # m/s above the slow end of a branch of runs, where its motion is taken
 RUNS = ("up", "down", "further")  # branches of runs
-COVERED = 0.05  # relative difference of amplitudes within which a motion is on a known line
+COVERED = 0.2  # relative difference of amplitudes within which a motion is on a known line
 
 
 @dataclass
@@ -77,6 +77,7 @@ def followed_branches(
         if found.branches:
             found.begins = found.branches[0].points[0]
     pieces = [piece for one in known if one.direction in RUNS for piece in one.pieces()]
+    pieces.sort(key=lambda piece: piece[0].speed)  # of two on one branch first the longer one
     tried: list[Sequence[Point]] = []
     for number, piece in enumerate(pieces):
         progress((1.0 + number) / (1.0 + len(pieces)))

@@ -22,6 +22,7 @@ from railsim.linear.eigenmodes import (
     loss_of_stability,
     oscillations,
 )
+from railsim.linear.harmonic import ContactPath
 from railsim.linear.modes import SPEED_RANGE
 from railsim.linear.naming import Parts, mode_name, parts_of
 from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, conditions, smooth_law
@@ -114,9 +115,7 @@ def critical_speed(
     found.conicity_over_amplitude = _conicity(smooth)
     found.linear = _linear(found, smooth)
     if over_amplitude:
-        found.linear_over_amplitude = _over_amplitude(
-            lambda size: prepared(law, Contact("harmonic", size, conicity)), low, high
-        )
+        found.linear_over_amplitude = _over_amplitude(smooth, low, high)
         if found.linear is not None and smooth.system.support.elastic:
             rigid = prepared(law, contact, track.replace(support={"preset": "rigid"}))
             lost = _loss_of_hunting(rigid, low, high).parameter
@@ -191,7 +190,9 @@ def _hunts(parts: Parts) -> Callable[[Eigenmodes], bool]:
     return answer
 
 
-def _loss_of_hunting(prepared: LinearVehicle, low: float, high: float) -> LossOfStability:
+def _loss_of_hunting(
+    prepared: LinearVehicle, low: float, high: float, path: ContactPath | None = None
+) -> LossOfStability:
     """Where steady rolling loses its stability; of vehicles whose friction sticks to hunting only.
 
     Friction that sticks damps nothing: the sway of such a vehicle is undamped at speeds at which
@@ -200,7 +201,7 @@ def _loss_of_hunting(prepared: LinearVehicle, low: float, high: float) -> LossOf
     counts = None
     if prepared.sticking:
         counts = _hunts(parts_of(prepared.model, prepared.coordinates))
-    return loss_of_stability(prepared.linearised, low, high, counts=counts)
+    return loss_of_stability(lambda speed: prepared.linearised(speed, path), low, high, counts)
 
 
 def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
@@ -240,14 +241,12 @@ def _linear(found: CriticalSpeed, prepared: LinearVehicle) -> LinearLoss | None:
     return None
 
 
-def _over_amplitude(
-    prepared: Callable[[float], LinearVehicle], low: float, high: float
-) -> OverAmplitude:
+def _over_amplitude(prepared: LinearVehicle, low: float, high: float) -> OverAmplitude:
     """Linear critical speeds with harmonic linearisation, up to the width of the contact table."""
     found = OverAmplitude()
     for amplitude in AMPLITUDES:
         try:
-            lost = _loss_of_hunting(prepared(amplitude), low, high)
+            lost = _loss_of_hunting(prepared, low, high, ContactPath(amplitude))
         except InputError:
             break
         critical = lost.modes[0] if lost.parameter is not None else None
@@ -359,7 +358,7 @@ def _by_continuation(search: _Search, progress: Progress) -> None:
     found.remarks += followed.remarks
     ends = list(followed.folds)
     if begins.parameter is not None and followed.begins is not None:
-        rising = followed.begins.speed >= begins.parameter
+        rising = followed.begins.speed > begins.parameter - 0.5 * RESOLUTION
         found.onset = "supercritical" if rising else "subcritical"
         ends.append(Point(begins.parameter, 0.0, float(begins.modes[0].frequencies[0])))
     if ends:

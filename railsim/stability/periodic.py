@@ -29,11 +29,13 @@ Floats = NDArray[np.float64]
 
 SETTLED = 1e-6  # last change of Newton's method, in scaled units
 MOST_ITERATIONS = 20
+MOST_MATRICES = 4  # formed until then; each costs as much as the flow of all components
 SLOW = 0.3  # ratio of two changes from which on the matrix is formed again
 QUICK = 8  # iterations after which the next step may be longer
 DIFFERENCE = 1e-5  # of the difference quotients, in scaled units
 MULTIPLIER = 1e-3  # by which a multiplier may exceed 1: error of difference quotients
 SMALLEST_SHARE = 1.0 / 256.0  # of the given step
+FOLD = 3e-3  # share of the arc length to which a fold is sought; its speed is of second order
 LEAD = 0.05  # least cosine between a tangent and the direction it is to lead in
 
 
@@ -224,12 +226,15 @@ class Shooting:
         lead = float(now.tangent @ direction)
         u = base + now.tangent * length / lead if abs(lead) > LEAD else base + length * direction
         matrix = now.matrix
-        before = np.inf
+        before, formed = np.inf, 0
         for iteration in range(1, MOST_ITERATIONS + 1):
-            if matrix is None:
-                residual, matrix = self._periodicity(u)
-            else:  # the matrix costs as much as the flow of all components
+            if matrix is not None:
                 residual = self._residual(u)
+            elif formed < MOST_MATRICES:
+                residual, matrix = self._periodicity(u)
+                formed += 1
+            else:
+                break
             rest = conditions @ (u - base) - np.array([0.0, length])
             full = np.vstack([matrix, conditions])
             if not np.isfinite(full).all():
@@ -265,7 +270,7 @@ class Shooting:
         first = 1e-6 * length
         if forward(first) * forward(length) > 0.0:  # of a fold with a kink: the nearer motion
             return after
-        root = float(brentq(forward, first, length, xtol=1e-5 * length))
+        root = float(brentq(forward, first, length, xtol=FOLD * length))
         forward(root)
         return found[root]
 
