@@ -31,19 +31,14 @@ class Case:
     ----------
     name : str
         Name of the run, and of its file without the ending.
-    vehicle, track, settings
-        Definitions.
     speed : float
         Speed, at the start where it varies [m/s].
-    start : float
-        Distance at which the reference body starts [m].
-    duration, until : float or None
-        End of the run: time from its start [s] or distance [m]; the end of the track's plan if
-        neither.
     labels : mapping of str to str or float
-        Labels of the case: ``vehicle``, ``track``, ``speed`` and the keys of a grid.
+        ``vehicle``, ``track``, ``speed`` and the keys of a grid.
     analyses : mapping of str to Analysis
         Analyses by name; without analyses, a run is computed.
+
+    Others as in `RunSpec`.
     """
 
     name: str

@@ -50,16 +50,10 @@ class Job:
 
     Attributes
     ----------
-    case : Case
-        Case to run.
-    path : Path
-        Result file; an existing one is replaced.
-    picture : Path or None
-        Figure of the result.
+    path, picture : Path
+        Files of result and figure; existing ones are replaced.
     function : str or None
         Function for user-defined quantities, see `railsim.studies.user_function`.
-    retention : Retention
-        Parts of the result that are kept.
     exists : bool
         Whether the run exists, and only its analyses are to be computed.
     """
@@ -80,66 +74,52 @@ class Stopped(Exception):
 
 
 def batches(jobs: Sequence[Job], together: int, workers: int) -> list[Batch]:
-    """Group jobs that can share a call into batches.
+    """Group jobs that can share a call into batches of at most `together` jobs.
 
-    Parameters
-    ----------
-    together : int
-        Largest number of jobs in a batch.
-    workers : int
-        No batch is larger than the share of one worker in all jobs, so that no worker is idle.
+    No batch is larger than the share of one worker in all jobs, so that no worker is idle.
     """
     size = min(together, math.ceil(len(jobs) / workers))
-    alone: list[Job] = []
-    kinds: list[list[Job]] = []
+    found: list[Batch] = []
+    alike: list[list[Job]] = []  # jobs that differ only in the vehicle
     for job in jobs:
         if size <= 1 or job.exists or not job.case.file_name:
-            alone.append(job)
+            found.append((job,))
             continue
-        for kind in kinds:
-            if can_share_a_call(kind[0].case, job.case):
-                kind.append(job)
-                break
+        group = next((some for some in alike if can_share_a_call(some[0].case, job.case)), None)
+        if group is None:
+            alike.append([job])
         else:
-            kinds.append([job])
-    found: list[Batch] = [(job,) for job in alone]
-    for kind in kinds:
-        parts = math.ceil(len(kind) / size)
-        ends = [len(kind) * part // parts for part in range(parts + 1)]
-        found += [tuple(kind[begin:end]) for begin, end in pairwise(ends)]
+            group.append(job)
+    for group in alike:
+        parts = math.ceil(len(group) / size)
+        ends = [len(group) * part // parts for part in range(parts + 1)]
+        found += [tuple(group[begin:end]) for begin, end in pairwise(ends)]
     return found
 
 
 def perform(batch: Batch, progress: Progress | None = None) -> list[Record]:
     """Carry out the jobs of a batch and return their records, whether they succeed or fail."""
-    found: list[Result | Exception]
-    if not batch[0].case.file_name:
+    first = batch[0]
+    if not first.case.file_name:
         return [_analysed(job) for job in batch]
-    if batch[0].exists and (record := _existing(batch[0])) is not None:
+    if first.exists and (record := _existing(first)) is not None:
         return [record]
+    files = [None if job.retention.summary else job.path for job in batch]
+    found: list[Result | Exception]
     try:
         if len(batch) == 1:
-            (job,) = batch
-            only = _quantities(job)
-            found = [run_case(job.case, _file(job), overwrite=True, progress=progress, only=only)]
+            only = _quantities(first)
+            result = run_case(first.case, files[0], overwrite=True, progress=progress, only=only)
+            found = [result]
         else:
-            found = run_cases(
-                [job.case for job in batch],
-                [_file(job) for job in batch],
-                overwrite=True,
-                progress=progress,
-            )
+            cases = [job.case for job in batch]
+            found = run_cases(cases, files, overwrite=True, progress=progress)
     except Stopped:
         raise
     except Exception as error:
         found = [error] * len(batch)
     found.reverse()  # each result is released after its record: it holds data read from its file
     return [_record(job, found.pop()) for job in batch]
-
-
-def _file(job: Job) -> Path | None:
-    """Return the result file of a job; None if only its summary is kept."""
-    return None if job.retention.summary else job.path
 
 
 def _quantities(job: Job) -> Collection[str] | None:

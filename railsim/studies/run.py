@@ -24,14 +24,8 @@ def run_case(
 
     Parameters
     ----------
-    case : Case
-        Case to run.
     path : str or Path or None
         Result file; None to keep the result in memory.
-    overwrite : bool
-        Replace an existing file.
-    progress : callable, optional
-        Called repeatedly with the finished fraction.
     resume : Result, optional
         Result whose final state is the initial state of this run; the file then carries no key.
     only : collection of str, optional

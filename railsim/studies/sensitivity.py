@@ -48,7 +48,7 @@ class Sensitivity:
 def sensitivities(
     designs: Floats, values: Floats, chosen: Floats, variables: list[str], quantities: list[str]
 ) -> list[Sensitivity]:
-    """Return the sensitivities of each quantity.
+    """Return the sensitivities of each quantity, by names.
 
     Parameters
     ----------
@@ -57,9 +57,7 @@ def sensitivities(
     values : float64[design, quantity]
         NaN where a design has no value.
     chosen : float64[variable]
-        Chosen design, about which single variables are varied.
-    variables, quantities : list of str
-        Names.
+        Design about which single variables are varied.
     """
     from scipy.stats import sobol_indices, uniform
 

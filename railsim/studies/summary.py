@@ -13,9 +13,9 @@ import tempfile
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Annotated, Any, BinaryIO, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from railsim.definitions.analyses import unit_of_number
 from railsim.errors import Fault, InputError, RailsimError, words_of
@@ -113,9 +113,10 @@ class Index(BaseModel):
 
     model_config = ConfigDict(extra="ignore")
 
+    format: Literal["railsim-study-result/1"]
     status: str
     inputs: StudySpec
-    runs: list[Run]
+    runs: Annotated[list[Run], Field(max_length=MOST_RUNS)]
 
 
 def read_index(path: Path) -> Index:
@@ -131,18 +132,13 @@ def read_index(path: Path) -> Index:
         raise InputError([Fault(str(path), "", "too many values", f"{MOST_VALUES} at most")])
     try:
         index: Any = json.loads(text)
-    except json.JSONDecodeError as error:
-        fault = Fault(str(path), f"line {error.lineno}", f"broken JSON: {error.msg}", "")
-        raise InputError([fault]) from None
     except (ValueError, RecursionError) as error:
-        raise InputError([Fault(str(path), "", f"broken JSON: {error}", "")]) from None
-    found = index.get("format") if isinstance(index, dict) else None
-    if found != FORMAT:
-        shown = repr(found)[:60]
-        raise InputError([Fault(str(path), "format", shown, f"allowed: {FORMAT}")])
-    if isinstance(index.get("runs"), list) and len(index["runs"]) > MOST_RUNS:
-        raise InputError([Fault(str(path), "runs", "too many", f"{MOST_RUNS} at most")])
-    refuse_too_many(index.get("inputs"), str(path))
+        line = f"line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        words = f"broken JSON: {getattr(error, 'msg', error)}"
+        raise InputError([Fault(str(path), line, words, "")]) from None
+    index = index if isinstance(index, dict) else {"format": None}
+    if index.get("format") == FORMAT:
+        refuse_too_many(index.get("inputs"), str(path))
     return checked(Index, index, str(path))
 
 
