@@ -20,7 +20,7 @@ FILES = ("critical_speed.json", "critical_speed.png")
 
 @click.command(name="critical-speed")
 @click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
-@click.argument("track", metavar="TRACK", required=False, shell_complete=names_of("track"))
+@click.argument("track", metavar="[TRACK]", required=False, shell_complete=names_of("track"))
 @click.option(
     "--method",
     default="ramp",

@@ -19,7 +19,7 @@ ANIMATION = "mode.html"
 
 @click.command()
 @click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
-@click.argument("track", metavar="TRACK", required=False, shell_complete=names_of("track"))
+@click.argument("track", metavar="[TRACK]", required=False, shell_complete=names_of("track"))
 @click.option(
     "--speed", type=float, default=20.0, show_default=True, metavar="V", help="Speed in m/s."
 )
