@@ -1,6 +1,6 @@
 """How a vehicle stands at rest, and at which frequencies its bodies oscillate."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from railsim.definitions.flatten import flatten
@@ -8,6 +8,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.description.values import Description, Parts
 from railsim.linear.modes import modes
 from railsim.model.statics import SLOW, static_loads
+from railsim.profiles import Profile
 from railsim.table import Column, Table
 
 
@@ -33,13 +34,13 @@ def describe_statics(vehicle: Vehicle, loads: Sequence[str | None] = ()) -> Desc
     return Description(data, parts)
 
 
-def rest_frequencies(vehicle: Vehicle) -> Table:
+def rest_frequencies(vehicle: Vehicle, profiles: Mapping[str, Profile] | None = None) -> Table:
     """Return natural frequencies of bounce, pitch and roll of the sprung bodies.
 
     Each is that of the mode in which the motion has the largest share of the kinetic energy, of
     the vehicle linearised at rest: friction sticks.
     """
-    found = modes(vehicle, speed=SLOW).oscillations
+    found = modes(vehicle, speed=SLOW, profiles=profiles).oscillations
     motions = {"bounce": "z", "pitch": "pitch", "roll": "roll"}
     rows = []
     for body in flatten(vehicle).of_kind("body"):

@@ -6,6 +6,7 @@ The page loads no other files; its plots are drawn by uPlot (`vendor/`).
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,14 +14,19 @@ from markupsafe import Markup
 
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.description.rest import rest_frequencies
+from railsim.errors import InputError, ModelError
+from railsim.model.statics import static_loads
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
+from railsim.profiles import Profile
 from railsim.report.curves import cells_of, curve_data, groups
 from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published
 from railsim.report.spread import LEAST, WORDS, columns, command, parameters, spread_rows
-from railsim.report.tables import Cell, Table
+from railsim.report.tables import Cell, Table, of_values
 from railsim.result import Result
 from railsim.text import printable
 from railsim.version import __version__
@@ -28,6 +34,7 @@ from railsim.version import __version__
 Record = Mapping[str, Any]
 MOST_ROWS = 300  # of a table on the page
 MOST_SHOWN = 12  # values of an input of a study
+MOST_AT_REST = 3  # vehicles
 MOST_DIFFERENCES = 40  # keys in which the vehicles differ
 
 
@@ -292,6 +299,7 @@ def _what_was_run(results: Mapping[str, Result], inputs: Mapping[str, Any]) -> S
         words = f"Friction {friction}; rails {rails}."
         drawing = _svg(track_svg(variants[0]))
         section.drawings.append(Drawing(printable(name), printable(words), drawing))
+    section.details += _at_rest(results)
     if len(vehicles) > 1:
         section.tables.append(_differences(vehicles))
     if results:
@@ -299,6 +307,23 @@ def _what_was_run(results: Mapping[str, Result], inputs: Mapping[str, Any]) -> S
     if inputs:
         section.tables.append(_inputs(inputs))
     return section
+
+
+def _at_rest(results: Mapping[str, Result]) -> list[Table]:
+    """Return how the vehicles of the results stand at rest, each in its load case."""
+    vehicles: list[tuple[Vehicle, Mapping[str, Profile]]] = []
+    for result in results.values():
+        vehicle = result.vehicle()
+        if all(vehicle != known for known, _ in vehicles) and len(vehicles) < MOST_AT_REST:
+            vehicles.append((vehicle, result.profiles))
+    found = []
+    for vehicle, profiles in vehicles:
+        with suppress(InputError, ModelError):
+            loads = static_loads(vehicle, profiles=profiles)
+            subject = f"{vehicle.name}, load '{loads.load}' at rest"
+            found += [of_values(table, subject) for table in loads.tables]
+            found.append(of_values(rest_frequencies(vehicle, profiles), subject))
+    return found
 
 
 def _inputs(inputs: Mapping[str, Any]) -> Table:

@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from railsim import table as values
+from railsim.text import printable
+
 Cell = str | tuple[str, str]  # a value, or a value with small print below it
 
 
@@ -29,3 +32,13 @@ class Table:
     words: frozenset[int] = frozenset({0})
     failed: frozenset[int] = frozenset()
     note: str = ""
+
+
+def of_values(table: values.Table, subject: str) -> Table:
+    """Return a table of values for the page; its caption begins with its subject."""
+    return Table(
+        [column.heading for column in table.columns],
+        table.texts(),
+        printable(f"{subject}: {table.caption}"),
+        words=frozenset(k for k, column in enumerate(table.columns) if not column.format),
+    )

@@ -392,3 +392,13 @@ def test_page_and_assessment_of_a_folder_agree(tmp_path, capsys):
     # a section without curves says so instead of showing controls
     assert "The results hold none of the quantities that are drawn here." in html
     assert '"curves":[]' in html
+
+
+def test_vehicles_are_shown_at_rest_in_their_load_case(tmp_path):
+    result = example_result()
+    result.to_hdf5(tmp_path / "one.h5")
+    assert main(["report", str(tmp_path / "one.h5"), "--out", str(tmp_path / "r.html")]) == 0
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    name = escape(f"{result.vehicle().name}, load 'design' at rest")
+    for part in ("Static wheel loads", "Heights", "Springs", "Weights", "Natural frequencies"):
+        assert f"{name}: {part}" in text
