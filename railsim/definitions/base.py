@@ -115,6 +115,10 @@ class Definition(BaseModel):
             if type(value) is dict:
                 self.__dict__[name] = FrozenDict(value)
 
+    def __dir__(self) -> list[str]:
+        """Return names to complete: keys and own methods, without those of pydantic."""
+        return sorted(set(super().__dir__()) - set(dir(BaseModel)))
+
     def __copy__(self) -> Self:
         """Return a copy without what was worked out from the values: those of the copy may differ.
 

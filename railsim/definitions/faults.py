@@ -9,7 +9,7 @@ from pydantic import BaseModel, Tag, ValidationError
 
 from railsim.definitions.base import meanings
 from railsim.definitions.paths import LONGEST_KEY
-from railsim.definitions.sources import Source
+from railsim.definitions.sources import Source, located_fault
 from railsim.errors import MOST_FAULTS, Fault, nearest
 from railsim.text import shortened
 
@@ -38,7 +38,7 @@ def validation_faults(
         path = _written_path(detail, source.data)
         found, allowed = _wording(_as_written(detail, path, source.data), model)
         key = shortened(".".join(path), LONGEST_KEY)
-        faults.append(Fault(source.file_of(path), key, found, allowed))
+        faults.append(located_fault(source.file_of(path), key, found, allowed))
     # a number that stands for both sides is objected to twice, the second time at its row
     shown = faults[:MOST_FAULTS]
     return [

@@ -29,6 +29,22 @@ class FileDefinition(Definition):
     OPEN_TABLES: ClassVar[tuple[str, ...]] = ()
     """Tables that an assignment makes where they are missing; their members are dotted names."""
 
+    def __init__(self, /, **values: Any) -> None:
+        """Check the values.
+
+        Raises
+        ------
+        InputError
+            Everything that is wrong in them.
+        """
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            kind = type(self)
+            raise InputError(validation_faults(error, Source(kind.KIND, values), kind)) from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # not that of files
+
     @classmethod
     def format_name(cls) -> str:
         """Return the value of the key `format`."""
@@ -82,8 +98,8 @@ class FileDefinition(Definition):
         return path
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with top-level keys replaced, validated again."""
-        return type(self).model_validate({**self.model_dump(exclude_none=True), **changes})
+        """Return a copy with top-level keys replaced, validated again; raises `InputError`."""
+        return type(self)(**{**self.model_dump(exclude_none=True), **changes})
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with other values at some keys, checked as a file would be.

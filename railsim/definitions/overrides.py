@@ -13,12 +13,10 @@ from types import MappingProxyType
 from typing import Any
 
 from railsim.definitions.paths import descend, full_path, key_path
-from railsim.definitions.sources import Source, replace_origin
+from railsim.definitions.sources import OVERRIDE, Source, override_fault, replace_origin
 from railsim.errors import Fault, InputError
 from railsim.text import shortened
 from railsim.units import number_with_unit
-
-OVERRIDE = "--set"
 
 
 def apply_overrides(
@@ -53,7 +51,7 @@ def apply_overrides(
             _apply(changed, text, free, defaults)
         except KeyError as problem:
             key = text.partition("=")[0].strip()
-            faults.append(Fault(OVERRIDE, key, str(problem.args[0]), ""))
+            faults.append(override_fault(key, str(problem.args[0])))
     if faults:
         raise InputError(faults)
     return changed
@@ -167,7 +165,7 @@ def split_overrides(overrides: Iterable[str]) -> dict[str, list[str]]:
         else:
             key = text.partition("=")[0]
             allowed = "a path that begins with vehicle., track. or settings."
-            faults.append(Fault(OVERRIDE, key, "unknown beginning", allowed))
+            faults.append(override_fault(key, "unknown beginning", allowed))
     if faults:
         raise InputError(faults)
     return sorted_ones

@@ -173,7 +173,9 @@ def _holds(keys: Sequence[str], path: Sequence[str]) -> bool:
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:
     table = ".".join(before) or "the file"
     if isinstance(node, dict):
-        return f"no '{part}' in {table}; {nearest(part, {*node, *others})}"
+        known = {*node, *others}
+        allowed = nearest(part, known) if known else f"it is empty; {table}.{part}={{...}} adds it"
+        return f"no '{part}' in {table}; {allowed}"
     if isinstance(node, list):
         names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
         if names:

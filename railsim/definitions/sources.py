@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from railsim.definitions.paths import descend, key_path
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.files import DEFINITION_BYTES, is_file, read_text
 from railsim.text import shortened
 
@@ -40,6 +40,21 @@ _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}){{{DEEPEST}}}""")
 LONGEST_CHAIN = 20  # files that extend each other
 
 KeyPath = tuple[str, ...]
+
+
+OVERRIDE = "overrides"  # parameter that holds assignments, for the command line `--set`
+
+
+def override_fault(key: str, found: str, allowed: str = "") -> Fault:
+    """Return the fault of an assignment."""
+    return argument_fault(OVERRIDE, key, found, allowed, "--set")
+
+
+def located_fault(file: str, key: str, found: str, allowed: str) -> Fault:
+    """Return the fault of a key that came from a file or from an assignment."""
+    if file == OVERRIDE:
+        return override_fault(key, found, allowed)
+    return Fault(file, key, found, allowed)
 
 
 @dataclass
@@ -69,7 +84,7 @@ class Source:
 
     def fault(self, key: str, found: str, allowed: str = "") -> Fault:
         """Return a fault of this source with the file that holds the key."""
-        return Fault(self.file_of(tuple(key.split("."))), key, found, allowed)
+        return located_fault(self.file_of(tuple(key.split("."))), key, found, allowed)
 
 
 def shipped_folder(kind: str) -> Path:

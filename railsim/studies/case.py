@@ -11,8 +11,9 @@ from typing import Any
 
 from railsim.definitions.analyses import Analysis, needs_run, needs_speed
 from railsim.definitions.loading import load_settings, load_track, load_vehicle
-from railsim.definitions.overrides import OVERRIDE, split_overrides
+from railsim.definitions.overrides import split_overrides
 from railsim.definitions.settings import Settings
+from railsim.definitions.sources import OVERRIDE
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError
@@ -142,7 +143,8 @@ class Loader:
             return fault
         key = f"{kind}.{fault.key}"
         of_grid = any(key == name or key.startswith(f"{name}.") for name in self._grid)
-        return replace(fault, file="--grid" if of_grid else OVERRIDE, key=key)
+        parameter, option = ("grid", "--grid") if of_grid else ("assignments", "--set")
+        return replace(fault, file=parameter, option=option, key=key)
 
     def _overrides(self, assignments: tuple[str, ...]) -> dict[str, Overrides]:
         """Return the assignments to vehicle, track and settings, each with the file's own keys."""

@@ -217,7 +217,7 @@ def test_cant_list_shorter_than_the_plan_is_usual():
     ],
 )
 def test_wrong_value_is_refused(change):
-    with pytest.raises(ValidationError):
+    with pytest.raises(InputError):
         track(**{"plan": [STRAIGHT], **change})
 
 
@@ -286,5 +286,5 @@ def test_settings_for_a_table_and_for_free_running():
 def test_replace_validates_the_copy():
     straight = track([STRAIGHT])
     assert straight.replace(friction=0.2).friction == (0.2, 0.2)
-    with pytest.raises(ValidationError):
+    with pytest.raises(InputError, match=r"friction: -0.2; must be greater than or equal to 0"):
         straight.replace(friction=-0.2)

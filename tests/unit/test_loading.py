@@ -318,7 +318,7 @@ def test_override_names_rows_and_columns_of_tables_by_their_index(write):
 )
 def test_override_of_a_member_that_is_not_there_is_refused(write, key, words):
     (fault,) = faults(load_settings, write("s.toml", TABLE), [f"{key}=3"])
-    assert str(fault).removesuffix("; ") == f"--set: {key}: {words}"
+    assert str(fault).removesuffix("; ") == f"overrides: {key}: {words}"
 
 
 def test_override_changes_one_of_several_default_values():
@@ -359,7 +359,7 @@ def test_wrong_overrides_come_at_once():
     ]
     found = [str(fault) for fault in faults(load_vehicle, "coach_manchester", wrong)]
     assert len(found) == len(wrong)
-    assert all(text.startswith("--set") for text in found)
+    assert all(text.startswith("overrides: ") for text in found)
     assert "did you mean 'carbody'?" in found[0]
     assert "did you mean 'front'?" in found[1]
 
@@ -367,7 +367,8 @@ def test_wrong_overrides_come_at_once():
 def test_fault_of_an_overridden_value_names_the_option():
     wrong = ["bodies.carbody.mass=-3", "bodies.carbody.weight=3", "reference=engine"]
     found = faults(load_vehicle, "coach_manchester", wrong)
-    assert {fault.file for fault in found} == {"--set"}
+    assert {fault.file for fault in found} == {"overrides"}
+    assert {fault.on_command_line().file for fault in found} == {"--set"}
     assert {f.key for f in found} == {"bodies.carbody.mass", "bodies.carbody.weight", "reference"}
 
 
