@@ -40,7 +40,7 @@ Progress = Callable[[float], None]
 
 # Longest chunk in outputs, and in steps of all its vehicles: some hundredths of a second of
 # computing by the fast scheme, and below a second by the other one
-ROWS, STEPS = 500, 64_000
+ROWS, STEPS = 1000, 64_000
 ROUND_OFF = 1e-9  # s
 
 # state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes,
