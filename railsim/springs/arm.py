@@ -148,7 +148,8 @@ def unit_moment(arm: Arm, coil: Coil, phi: Values) -> Values:
     design equations are linear in the stiffnesses sought.
     """
     if arm.form == "energy":
-        return _unit_energy(arm, coil, phi + 1j * _COMPLEX_STEP).imag / _COMPLEX_STEP
+        with np.errstate(invalid="ignore"):  # nan where the arm does not reach
+            return _unit_energy(arm, coil, phi + 1j * _COMPLEX_STEP).imag / _COMPLEX_STEP
     state = coil_state(arm, replace(coil, K_V=1.0), phi)
     shearing = helical.seat_moment(state.deflection, state.K_L, state.height)
     return (

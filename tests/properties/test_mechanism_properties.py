@@ -106,6 +106,36 @@ def test_turned_and_scaled_linkages_move_alike(ground, crank, coupler, rocker, t
     assert sizes[1] == pytest.approx(k * sizes[0], rel=1e-9)
 
 
+def mirrored(mechanism):
+    """The same linkage seen in a mirror on the y axis: x and angles change, gravity does not."""
+    data = mechanism.model_dump()
+    data["ground"]["points"] = {n: [-x, y] for n, (x, y) in data["ground"]["points"].items()}
+    for body in data["bodies"].values():
+        body["points"] = {name: [u, -v] for name, (u, v) in body["points"].items()}
+        body["centre"] = [body["centre"][0], -body["centre"][1]]
+    for pose in data["start"].values():
+        pose["angle"] = math.pi - pose["angle"]
+    data["driver"] |= {key: -data["driver"][key] for key in ("start", "end")}
+    data["driver"]["zero"] = math.pi - data["driver"]["zero"]
+    return Mechanism.model_validate(data)
+
+
+@FEW
+@given(LENGTH, LENGTH, LENGTH, LENGTH, ANGLE)
+def test_a_linkage_in_a_mirror_needs_the_opposite_torque(ground, crank, coupler, rocker, turn):
+    plain = moved(mechanism := four_bar(ground, crank, coupler, rocker, turn))
+    mirror = moved(mirrored(mechanism))
+    # the driver of the mirror runs backwards: rates and friction change their sign with it
+    cases = [(Rates(0.7, -2.0, 1), Rates(-0.7, 2.0, -1)), (Rates(), Rates())]
+    for ours, theirs in cases:
+        force, other = (actuator_force(m, "hand", r) for m, r in ((plain, ours), (mirror, theirs)))
+        assert other == pytest.approx(-force, rel=1e-7, abs=1e-7)
+        joints, _ = reactions(plain, {"hand": force}, ours)
+        seen, _ = reactions(mirror, {"hand": other}, theirs)
+        for name in ("left", "pin"):
+            assert seen[name] == pytest.approx(joints[name] * [-1.0, 1.0], rel=1e-6, abs=1e-6)
+
+
 @FEW
 @given(LENGTH, LENGTH, LENGTH, LENGTH)
 def test_friction_takes_as_much_on_either_way(ground, crank, coupler, rocker):

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from railsim.definitions.loading import load_spring
+from railsim.errors import InputError
 from railsim.springs import arm as trailing_arm
 from railsim.springs import helical
 from railsim.springs.arm import Arm, Coil
@@ -233,3 +234,11 @@ def test_equal_springs_share_the_deflection():
         outer, inner = case.springs.values()
         assert outer.deflection == inner.deflection
         assert outer.height == inner.height
+
+
+def test_deflections_beyond_the_arm_s_reach_are_refused_in_both_forms():
+    # a seat forty times the arm's length above the axle: most deflections have no rotation
+    for form in ("grossi", "energy"):
+        changes = ["arm.seat_height=15.9", "mounting.load=82550", f"arm.equilibrium={form}"]
+        with pytest.raises(InputError, match="target"):
+            design(load_spring("turasas_axlebox", changes))
