@@ -16,15 +16,19 @@ from railsim.definitions.base import Count, Definition, Name, Remark, Text
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.mechanism_parts import (
     AUTO,
+    ActuatorName,
     AirSpring,
     Angle,
     Body,
+    BodyName,
     Cam,
+    CatalogueName,
     Cylinder,
     Damper,
     Driver,
     Force,
     GasSpring,
+    GasSpringName,
     Ground,
     HandForce,
     HandTorque,
@@ -126,9 +130,9 @@ class Zone(Definition):
 class Solve(Definition):
     """What is unknown."""
 
-    unknown: Name
+    unknown: ActuatorName
     """Actuator whose force (or torque) holds the mechanism"""
-    actuator: Name | None = None
+    actuator: ActuatorName | None = None
     """Actuator whose length the ratios are taken over; by default the unknown one"""
 
 
@@ -144,11 +148,11 @@ class Contact(Definition):
 class Motion(Definition):
     """Motion law of an actuator's length or a body's angle, for inverse dynamics."""
 
-    actuator: Name | None = None
+    actuator: ActuatorName | None = None
     """Actuator whose length follows the law"""
-    angle: Name | None = None
+    angle: BodyName | None = None
     """Body whose angle follows it, instead, such as a crank"""
-    unknown: Name | None = None
+    unknown: ActuatorName | None = None
     """Actuator whose force drives the motion; by default the same, of an angle that of `[solve]`"""
     law: Literal["constant_speed", "polynomial_345", "table"] = "constant_speed"
     """Constant speed, the 3-4-5 polynomial from rest to rest, or a table"""
@@ -225,16 +229,16 @@ class CatalogueRow(Definition):
 class Selection(Definition):
     """A gas spring to be found in a catalogue."""
 
-    element: Name
+    element: GasSpringName
     """The gas spring"""
-    catalogue: Name
+    catalogue: CatalogueName
     """The catalogue"""
 
 
 class Lid(Definition):
     """Quick check of a lid's gas springs by the makers' formula F1 = G D/(b n) 9.8 alpha."""
 
-    element: Name
+    element: GasSpringName
     """Gas spring whose `F1` is checked"""
     mass: Quantity
     """Mass of the lid G [kg]"""

@@ -1,6 +1,6 @@
 """What the parts of a mechanism file say together: names, parameters, freedoms, sizes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,15 +8,15 @@ import numpy as np
 from railsim.definitions.base import Remark
 from railsim.definitions.expressions import Expression
 from railsim.definitions.mechanism import RESULTS, Mechanism
-from railsim.definitions.mechanism_parts import AirSpring, Cam, Cylinder, GasSpring, Link, Piston
+from railsim.definitions.mechanism_parts import AirSpring, Cam, Cylinder, GasSpring, Link, Reference
 from railsim.definitions.mechanism_values import (
     ends,
-    expressions,
     number,
     parameter_values,
     part_sizes,
     point_names,
     sizes,
+    texts_of,
 )
 from railsim.errors import Fault, InputError, nearest
 
@@ -70,7 +70,7 @@ def _parameter_faults(mechanism: Mechanism) -> list[Fault]:
     used: set[str] = set()
     for name in sorted(mechanism.parameters.keys() & mechanism.derived.keys()):
         faults.append(Fault("", f"derived.{name}", "is a parameter too", "another name"))
-    for key, expression in expressions(mechanism):
+    for key, expression in texts_of(Expression, mechanism):
         for name in sorted(expression.names - known.keys()):
             hint = nearest(name, known) if known else "there are no parameters"
             faults.append(Fault("", key, f"no parameter '{name}' in '{expression}'", hint))
@@ -108,16 +108,23 @@ def _reference_faults(mechanism: Mechanism) -> list[Fault]:
     faults = []
     if "ground" in mechanism.bodies:
         faults.append(Fault("", "bodies.ground", "the ground is no body", "it is [ground]"))
-    for key, found, kind in _references(mechanism):
-        allowed: Any = {
-            "point": points,
-            "body": bodies,
-            "actuator": mechanism.actuators,
-            "gas spring": [n for n, e in mechanism.elements.items() if isinstance(e, GasSpring)],
-            "catalogue": mechanism.catalogues,
-        }[kind]
-        if found not in allowed:
-            faults.append(Fault("", key, f"no {kind} '{found}'", nearest(found, allowed)))
+    elements = mechanism.elements.items()
+    allowed: dict[str, Any] = {
+        "point": points,
+        "body": bodies,
+        "actuator": mechanism.actuators,
+        "gas spring": [name for name, part in elements if isinstance(part, GasSpring)],
+        "catalogue": mechanism.catalogues,
+    }
+    found: list[tuple[str, str, str]] = [
+        (key, name.kind, name) for key, name in texts_of(Reference, mechanism)
+    ]
+    found += [(f"start.{name}", "body", name) for name in mechanism.start]
+    faults += [
+        Fault("", key, f"no {kind} '{name}'", nearest(name, allowed[kind]))
+        for key, kind, name in found
+        if name not in allowed[kind]
+    ]
     for body, part in mechanism.bodies.items():
         for name in part.outline:
             if name not in part.points:
@@ -126,62 +133,6 @@ def _reference_faults(mechanism: Mechanism) -> list[Fault]:
     if not faults:
         faults = [*_end_faults(mechanism), *_actuator_faults(mechanism)]
     return faults
-
-
-def _references(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
-    """Every name of a point, body, actuator, ... in the file: key, name, kind."""
-    for table in ("joints", "actuators", "elements"):
-        for name, part in getattr(mechanism, table).items():
-            yield from _part_references(f"{table}.{name}", part)
-    for name in mechanism.start:
-        yield f"start.{name}", name, "body"
-    driver = mechanism.driver
-    if driver.angle is not None:
-        yield "driver.angle", driver.angle, "body"
-    for i, point in enumerate(driver.length or ()):
-        yield f"driver.length.{i}", point, "point"
-    if driver.coordinate is not None:
-        yield "driver.coordinate", driver.coordinate, "point"
-    for name, angle in mechanism.angles.items():
-        for i, line in enumerate(angle.between):
-            for j, point in enumerate(line):
-                yield f"angles.{name}.between.{i}.{j}", point, "point"
-    if mechanism.output is not None:
-        yield "output.point", mechanism.output.point, "point"
-    if mechanism.solve is not None:
-        yield "solve.unknown", mechanism.solve.unknown, "actuator"
-        if mechanism.solve.actuator is not None:
-            yield "solve.actuator", mechanism.solve.actuator, "actuator"
-    if mechanism.motion is not None:
-        if mechanism.motion.actuator is not None:
-            yield "motion.actuator", mechanism.motion.actuator, "actuator"
-        if mechanism.motion.angle is not None:
-            yield "motion.angle", mechanism.motion.angle, "body"
-        if mechanism.motion.unknown is not None:
-            yield "motion.unknown", mechanism.motion.unknown, "actuator"
-    for i, selection in enumerate(mechanism.selection):
-        yield f"selection.{i}.element", selection.element, "gas spring"
-        yield f"selection.{i}.catalogue", selection.catalogue, "catalogue"
-    if mechanism.lid is not None:
-        yield "lid.element", mechanism.lid.element, "gas spring"
-    for i, box in enumerate(mechanism.optimise.envelope if mechanism.optimise else ()):
-        for j, point in enumerate(box.points):
-            yield f"optimise.envelope.{i}.points.{j}", point, "point"
-
-
-def _part_references(key: str, part: Any) -> Iterator[tuple[str, str, str]]:
-    for field in ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston",
-                  "spring", "damper", "stop", "gas_spring"):  # fmt: skip
-        for i, point in enumerate(getattr(part, field, ())):
-            yield f"{key}.{field}.{i}", point, "point"
-    for field in ("push", "force", "point_mass", "cam", "path"):
-        if (point := getattr(part, field, None)) is not None:
-            yield f"{key}.{field}", point, "point"
-    for i, body in enumerate(getattr(part, "torsion_spring", ())):
-        yield f"{key}.torsion_spring.{i}", body, "body"
-    for field in ("turn", "torque", "body", "joint_friction"):
-        if (body := getattr(part, field, None)) is not None:
-            yield f"{key}.{field}", body, "body"
 
 
 def _end_faults(mechanism: Mechanism) -> list[Fault]:
@@ -201,20 +152,15 @@ def _end_faults(mechanism: Mechanism) -> list[Fault]:
 def _actuator_faults(mechanism: Mechanism) -> list[Fault]:
     """Actuators that do not suit what they are named for."""
     faults = []
-    along = (Cylinder, AirSpring, Piston)
-    if mechanism.solve is not None:
-        actuator = mechanism.solve.actuator or mechanism.solve.unknown
-        if mechanism.solve.actuator and not isinstance(mechanism.actuators[actuator], along):
-            found = f"'{actuator}' has no length"
-            faults.append(Fault("", "solve.actuator", found, "an actuator between two points"))
-    if (motion := mechanism.motion) is not None:
-        moved = motion.actuator
-        if moved is not None and not isinstance(mechanism.actuators[moved], along):
-            found = f"'{moved}' has no length"
-            faults.append(Fault("", "motion.actuator", found, "an actuator between two points"))
-        if moved is None and motion.unknown is None and mechanism.solve is None:
-            found = "nothing drives the motion of an angle"
-            faults.append(Fault("", "motion.unknown", found, "an actuator, here or in [solve]"))
+    solve, motion = mechanism.solve, mechanism.motion
+    for key, table in (("solve", solve), ("motion", motion)):
+        name = table.actuator if table is not None else None
+        if name is not None and ends(mechanism.actuators[name]) is None:
+            found = f"'{name}' has no length"
+            faults.append(Fault("", f"{key}.actuator", found, "an actuator between two points"))
+    if motion is not None and (motion.actuator or motion.unknown or solve) is None:
+        found = "nothing drives the motion of an angle"
+        faults.append(Fault("", "motion.unknown", found, "an actuator, here or in [solve]"))
     needs = [
         ("zone", mechanism.zone, "output", mechanism.output),
         ("contact", mechanism.contact, "zone", mechanism.zone),
@@ -250,7 +196,7 @@ def _value_faults(mechanism: Mechanism, case: str | None) -> list[Fault]:
     except InputError as error:
         return list(error.faults)
     faults = []
-    for key, expression in expressions(chosen):
+    for key, expression in texts_of(Expression, chosen):
         if key.startswith(("parameters.", "derived.", "cases.")):
             continue
         if automatic := expression.names & chosen.automatic:
@@ -275,9 +221,21 @@ POSITIVE: dict[Any, tuple[str, ...]] = {
     Cylinder: ("bore", "count", "supply_pressure"),
     GasSpring: ("F1", "progression", "stroke", "extended"),
 }
+POSITIVE_OF = {
+    "motion": ("speed", "duration"),
+    "release": ("speed", "duration"),
+    "lid": ("mass", "centre", "lever", "springs", "factor"),
+}
 NOT_NEGATIVE = {
-    "mass", "inertia", "stiffness", "damping", "friction", "moment", "rod", "end_damping"
-}  # fmt: skip
+    "mass",
+    "inertia",
+    "stiffness",
+    "damping",
+    "friction",
+    "moment",
+    "rod",
+    "end_damping",
+}
 
 
 def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fault]:
@@ -301,17 +259,11 @@ def _positive_faults(mechanism: Mechanism, values: Mapping[str, Any]) -> list[Fa
                 faults += _spring_table_faults(f"{table}.{name}", part, values)
             if isinstance(part, AirSpring):
                 faults += _table_faults(f"{table}.{name}", part, values)
-    for key, timed in (("motion", mechanism.motion), ("release", mechanism.release)):
-        for field in ("speed", "duration"):
-            quantity = getattr(timed, field, None)
-            if quantity is not None and not number(quantity, values) > 0.0:
-                value = number(quantity, values)
-                faults.append(_value_fault(f"{key}.{field}", quantity, value, "greater than 0"))
-    if (lid := mechanism.lid) is not None:
-        for field in ("mass", "centre", "lever", "springs", "factor"):
-            quantity = getattr(lid, field)
-            if not (value := number(quantity, values)) > 0.0:
-                faults.append(_value_fault(f"lid.{field}", quantity, value, "greater than 0"))
+    for table, fields in POSITIVE_OF.items():
+        for field in fields:
+            quantity = getattr(getattr(mechanism, table), field, None)
+            if quantity is not None and not (value := number(quantity, values)) > 0.0:
+                faults.append(_value_fault(f"{table}.{field}", quantity, value, "greater than 0"))
     driver = mechanism.driver
     begin, end = number(driver.start, values), number(driver.end, values)
     if begin == end:
@@ -374,8 +326,7 @@ def _spring_table_faults(key: str, spring: Any, values: Mapping[str, Any]) -> li
 
 def _table_faults(key: str, table: AirSpring, values: Mapping[str, Any]) -> list[Fault]:
     for field in ("heights", "pressures"):
-        steps = np.diff([number(q, values) for q in getattr(table, field)])
-        if not np.all(steps > 0.0):
+        if np.any(np.diff([number(q, values) for q in getattr(table, field)]) <= 0.0):
             return [Fault("", f"{key}.{field}", "not rising", "rising from value to value")]
     forces = np.array([[number(q, values) for q in row] for row in table.forces])
     if not np.all(np.diff(forces, axis=1) > 0.0):

@@ -4,7 +4,15 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
 
 from railsim.definitions.base import Definition, Flag, Name
 from railsim.definitions.expressions import Expression
@@ -38,9 +46,34 @@ QuantityOrAuto = Annotated[
     PlainValidator(_quantity_or_auto),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]
+
+
+class Reference(str):
+    """The name of a part of the file; `kind` says of which parts."""
+
+    kind = ""
+
+
+def _refers(kind: str) -> AfterValidator:
+    """Make names references to parts of a kind: the file's own parts are looked up by it."""
+
+    def reference(name: str) -> Reference:
+        made = Reference(name)
+        made.kind = kind
+        return made
+
+    return AfterValidator(reference)
+
+
 PointName = Annotated[
-    str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*\.[A-Za-z_][A-Za-z0-9_-]*$")
+    str,
+    Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*\.[A-Za-z_][A-Za-z0-9_-]*$"),
+    _refers("point"),
 ]
+BodyName = Annotated[Name, _refers("body")]
+ActuatorName = Annotated[Name, _refers("actuator")]
+GasSpringName = Annotated[Name, _refers("gas spring")]
+CatalogueName = Annotated[Name, _refers("catalogue")]
 Pair = tuple[PointName, PointName]
 
 
@@ -169,7 +202,7 @@ class Cam(Definition):
     """Centre of the roller"""
     path: PointName | None = None
     """Point of the cam where the path of the roller's centre begins, for tangent arcs"""
-    body: Name | None = None
+    body: BodyName | None = None
     """Body that carries the cam, where arcs have centres"""
     tangent: Quantity = 0.0
     """Direction of the path at its begin, in the axes of the cam's body [rad]"""
@@ -222,9 +255,7 @@ class Cylinder(Definition):
     """Shortest length of the cylinder between its pins less its stroke [m]"""
     bores: tuple[Quantity, ...] = (0.032, 0.04, 0.05, 0.063, 0.08, 0.1, 0.125, 0.16, 0.2)
     """Bores that are made [m]"""
-    strokes: tuple[Quantity, ...] = (
-        0.025, 0.05, 0.08, 0.1, 0.125, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5,
-    )  # fmt: skip
+    strokes: tuple[Quantity, ...] = (0.025, 0.05, 0.08, 0.1, 0.125, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5)
     """Strokes that are made [m]"""
 
 
@@ -273,7 +304,7 @@ class HandForce(Definition):
 class HandTorque(Definition):
     """A torque on a body, of unknown size."""
 
-    turn: Name
+    turn: BodyName
     """The body"""
 
 
@@ -302,7 +333,7 @@ class Force(Definition):
 class Torque(Definition):
     """A given torque on a body."""
 
-    torque: Name
+    torque: BodyName
     """The body"""
     size: Quantity
     """Its size, anticlockwise [N m]"""
@@ -340,7 +371,7 @@ class Spring(Definition):
 class TorsionSpring(Definition):
     """A torsion spring between two bodies, linear or by a table."""
 
-    torsion_spring: tuple[Name, Name]
+    torsion_spring: tuple[BodyName, BodyName]
     """The bodies; `ground` too"""
     stiffness: Quantity | None = None
     """Stiffness [N m/rad]"""
@@ -358,7 +389,7 @@ class TorsionSpring(Definition):
 class JointFriction(Definition):
     """Dry friction of joints against a body's turning."""
 
-    joint_friction: Name
+    joint_friction: BodyName
     """Body that turns against the ground"""
     moment: Quantity
     """Torque against its motion [N m]"""
@@ -426,7 +457,7 @@ class GasSpring(Definition):
 class Driver(Definition):
     """The coordinate that moves the mechanism: an angle, a length or a coordinate."""
 
-    angle: Name | None = None
+    angle: BodyName | None = None
     """Body whose angle it is"""
     length: Pair | None = None
     """Points whose distance it is"""

@@ -1,7 +1,7 @@
 """Values of a mechanism's parameters, points and sizes."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
@@ -15,19 +15,22 @@ PARTS = ("length", "free_length", "stroke", "extended", "bore", "rod", "pin_to_p
 """Lengths of actuators and elements."""
 
 
-def expressions(node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Expression]]:
-    """Yield every expression in a definition with its dotted key."""
-    if isinstance(node, Expression):
+T = TypeVar("T", bound=str)
+
+
+def texts_of(kind: type[T], node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, T]]:
+    """Yield every text of a kind, such as an expression, in a definition with its dotted key."""
+    members: Any = ()
+    if isinstance(node, kind):
         yield ".".join(path), node
     elif isinstance(node, BaseModel):
-        for name in type(node).model_fields:
-            yield from expressions(getattr(node, name), (*path, name))
+        members = ((name, getattr(node, name)) for name in type(node).model_fields)
     elif isinstance(node, Mapping):
-        for key, value in node.items():
-            yield from expressions(value, (*path, str(key)))
+        members = node.items()
     elif isinstance(node, list | tuple):
-        for index, value in enumerate(node):
-            yield from expressions(value, (*path, str(index)))
+        members = enumerate(node)
+    for key, value in members:
+        yield from texts_of(kind, value, (*path, str(key)))
 
 
 def parameter_values(
@@ -100,8 +103,19 @@ def point_names(mechanism: Mechanism) -> list[str]:
     return [*names, *(f"{b}.{p}" for b, part in mechanism.bodies.items() for p in part.points)]
 
 
-PAIRS = ("revolute", "link", "slot", "prismatic", "cylinder", "air_spring", "piston", "spring",
-         "damper", "stop", "gas_spring")  # fmt: skip
+PAIRS = (
+    "revolute",
+    "link",
+    "slot",
+    "prismatic",
+    "cylinder",
+    "air_spring",
+    "piston",
+    "spring",
+    "damper",
+    "stop",
+    "gas_spring",
+)
 """Keys of parts between two points."""
 
 

@@ -50,8 +50,9 @@ def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
             share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.5
             guess[i] = low[i] + share * (high[i] - low[i])
     there = np.isfinite(guess)
-    guess[there] = _refined(motion.model, quantity, wanted[there], guess[there], low[there],
-                            high[there], size)  # fmt: skip
+    guess[there] = _refined(
+        motion.model, quantity, wanted[there], guess[there], low[there], high[there], size
+    )
     return guess
 
 

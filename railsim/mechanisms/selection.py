@@ -109,9 +109,11 @@ def _gas_spring(
     if chosen is not None and row.extended is not None:
         factor, constant = (n(x) for x in row.extended)
         fitting = [
-            c for c in strokes if factor * c + constant >= lengths.most + unlock and
-            (factor - 1.0) * c + constant <= lengths.least
-        ]  # fmt: skip
+            c
+            for c in strokes
+            if factor * c + constant >= lengths.most + unlock
+            and (factor - 1.0) * c + constant <= lengths.least
+        ]
         chosen = fitting[0] if fitting else None
         if chosen is None:
             least, most = lengths.least * 1e3, lengths.most * 1e3
@@ -165,8 +167,9 @@ def _with_row(
     if rod is not None:
         section = 0.25 * np.pi * n(rod) ** 2
         values["pressure_least"], values["pressure_most"] = (
-            F1 / section, F1 * progression / section,
-        )  # fmt: skip
+            F1 / section,
+            F1 * progression / section,
+        )
     if result.definition.solve is None:
         return values
     made = {"stroke": stroke, "extended": extended, "progression": progression, "rod": rod}

@@ -220,8 +220,13 @@ def _contact_sentences(contact: Contact) -> list[str]:
 
 def comparison_table(comparison: Comparison) -> Table:
     """Return one row for each mechanism; the first is the reference of the error."""
-    return Table(COMPARISON, [dict.fromkeys((c.name for c in COMPARISON), np.nan) | row
-                              for row in comparison_data(comparison)])  # fmt: skip
+    return Table(
+        COMPARISON,
+        [
+            dict.fromkeys((c.name for c in COMPARISON), np.nan) | row
+            for row in comparison_data(comparison)
+        ],
+    )
 
 
 def optimum_sentences(optimum: "Optimum") -> list[str]:
@@ -283,8 +288,9 @@ def scatter_table(found: Sequence[Scatter]) -> Table:
     """Return one row for each result: its scatter and the parameter that matters most."""
     rows = []
     for one in found:
-        column = Column("", unit=SHOWN.get(one.unit, "" if one.unit == "1" else one.unit),
-                        format=".4f")  # fmt: skip
+        column = Column(
+            "", unit=SHOWN.get(one.unit, "" if one.unit == "1" else one.unit), format=".4f"
+        )
         most = max(one.single, key=lambda name: abs(one.single[name]))
         values = [Amount(value, column) for value in (one.value, one.random, one.worst)]
         change = one.single[most] * column.scale

@@ -14,9 +14,15 @@ from railsim.plot.style import DISTINCT, Picture
 
 Floats = NDArray[np.float64]
 DASHES: tuple[Any, ...] = (
-    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)),
-    (0, (11, 3)), (0, (1, 3)), (0, (9, 2, 3, 2)),
-)  # fmt: skip
+    "-",
+    (0, (5, 2)),
+    (0, (1, 1.2)),
+    (0, (6, 2, 1, 2)),
+    (0, (3, 1, 1, 1, 1, 1)),
+    (0, (11, 3)),
+    (0, (1, 3)),
+    (0, (9, 2, 3, 2)),
+)
 MAIN, SECOND, FAINT = DISTINCT[0], DISTINCT[1], "0.75"
 
 

@@ -47,8 +47,15 @@ from railsim.plot.style import LIMIT, Picture
 __all__ = ["cases_figure", "comparison_figure", "held_figure", "search_figure"]
 
 SHADES = ("0.72", "0.55", "0.35", "#004a80")
-WIDTHS = {"body": 2.2, "link": 1.3, "guide": 0.8, "cam": 1.8, "actuator": 3.2, "spring": 1.0,
-          "damper": 1.6}  # fmt: skip
+WIDTHS = {
+    "body": 2.2,
+    "link": 1.3,
+    "guide": 0.8,
+    "cam": 1.8,
+    "actuator": 3.2,
+    "spring": 1.0,
+    "damper": 1.6,
+}
 CENTRE: dict[str, Any] = {"marker": "$\\oplus$", "color": "k", "ms": 8, "ls": "", "zorder": 5}
 """Centre of gravity."""
 STYLES = {"guide": (0, (1, 1.5)), "damper": (0, (3, 1.5))}
@@ -188,8 +195,15 @@ def angles_figure(result: Analysis) -> Figure:
     if limits is not None and limits.min_transmission_angle is not None:
         limit = np.degrees(result.model.number(limits.min_transmission_angle))
         axes.axhline(limit, color=LIMIT, lw=0.9)
-        axes.annotate("limit", (1.0, limit), xycoords=("axes fraction", "data"), fontsize=8,
-                      color=LIMIT, ha="right", va="bottom")  # fmt: skip
+        axes.annotate(
+            "limit",
+            (1.0, limit),
+            xycoords=("axes fraction", "data"),
+            fontsize=8,
+            color=LIMIT,
+            ha="right",
+            va="bottom",
+        )
     return figure
 
 
@@ -219,9 +233,14 @@ def cam_figure(result: Analysis) -> Figure:
     for change in result.transitions:
         at = change.travel * scale
         axes.axvline(at, color="0.4", lw=0.8)
-        axes.annotate(f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm",
-                      (at, 1.0), xycoords=("data", "axes fraction"), fontsize=8,
-                      xytext=(3, -10), textcoords="offset points")  # fmt: skip
+        axes.annotate(
+            f"{at:.2f}°" if scale > 1e2 or not unit else f"{at:.2f} mm",
+            (at, 1.0),
+            xycoords=("data", "axes fraction"),
+            fontsize=8,
+            xytext=(3, -10),
+            textcoords="offset points",
+        )
     mark_zone(axes, result, "travel")
     axes.set_xlabel(label_of("travel", result, "driver"))
     axes.set_ylabel(words)
@@ -288,8 +307,15 @@ def carpet_figure(result: Analysis) -> Figure:
     for i, pressure in enumerate(table.pressures):
         axes.plot(heights, table.forces[:, i] / 1e3, color="0.55", lw=0.9, marker=".", ms=3)
         point = (heights[0], table.forces[0, i] / 1e3)
-        axes.annotate(f"{pressure / 1e6:g} MPa", point, xytext=(-4, 0), fontsize=8,
-                      textcoords="offset points", ha="right", va="center")  # fmt: skip
+        axes.annotate(
+            f"{pressure / 1e6:g} MPa",
+            point,
+            xytext=(-4, 0),
+            fontsize=8,
+            textcoords="offset points",
+            ha="right",
+            va="center",
+        )
     length = values_of("length", result)
     axes.plot(length, result.output["force"] / 1e3, color=MAIN, lw=2.2, label="load")
     if result.zone:

@@ -163,8 +163,12 @@ def positions(result: Analysis) -> bytes:
     }
     unit = quantity("travel", definition).si_unit
     for courses, value, of in _courses(result.motion):
-        columns |= _columns(courses, f"{value} [{of}]", f"{value} first [{of}/{unit}]",
-                            f"{value} second [{of}/{unit}2]")  # fmt: skip
+        columns |= _columns(
+            courses,
+            f"{value} [{of}]",
+            f"{value} first [{of}/{unit}]",
+            f"{value} second [{of}/{unit}2]",
+        )
     return _csv(columns)
 
 
@@ -176,8 +180,12 @@ def motion_table(result: Analysis) -> bytes:
     force = f"force [{force_unit(driving(result.definition), result.definition)}]"
     columns = {"time [s]": timed.time, f"travel [{unit}]": timed.motion.s, force: timed.force}
     for courses, value, of in _courses(timed.motion):
-        columns |= _columns(timed.in_time(courses), f"{value} [{of}]", f"{value} speed [{of}/s]",
-                            f"{value} acceleration [{of}/s2]")  # fmt: skip
+        columns |= _columns(
+            timed.in_time(courses),
+            f"{value} [{of}]",
+            f"{value} speed [{of}/s]",
+            f"{value} acceleration [{of}/s2]",
+        )
     if result.definition.output is not None:
         v, a = timed.point(result.definition.output.point)
         for k, axis in enumerate("xy"):
