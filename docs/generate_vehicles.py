@@ -312,6 +312,17 @@ def hunting(vehicle: Vehicle) -> str:
         words += "no loss of stability at rest"
     else:
         words += f"rest loses its stability at {3.6 * found.linear.speed:.0f} km/h"
+        rigid = found.linear.speed_on_rigid_rails
+        if rigid is not None:
+            words += f" ({3.6 * rigid:.0f} on rigid rails)"
+    line = found.linear_over_amplitude
+    if line is not None and line.smallest is not None:
+        speed, amplitude = line.smallest
+        words += (
+            f", linearised for amplitudes of {1e3 * line.amplitude[0]:g} to "
+            f"{1e3 * line.amplitude[-1]:g} mm at {3.6 * speed:.0f} km/h or more "
+            f"({1e3 * amplitude:g} mm)"
+        )
     lowest = found.lowest
     if lowest is None:
         return f"{words}; from no disturbance tried does it hunt."

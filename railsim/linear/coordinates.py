@@ -18,7 +18,7 @@ from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
 from railsim.kernels.system import FREE, N_SCALARS, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
-from railsim.linear.system import Linearisation, jacobian_of_rows
+from railsim.linear.system import Linearisation, jacobian
 from railsim.model.assembly import Model
 from railsim.model.work import components_of, work_arrays
 from railsim.notation import COMPONENTS
@@ -225,7 +225,7 @@ class FreeVehicle:
         ModelError
             It is not finite.
         """
-        matrix = jacobian_of_rows(self.rates, self.x, self.coordinates.steps)
+        matrix = jacobian(self.rates, self.x, self.coordinates.steps)
         if not np.isfinite(matrix).all():
             raise ModelError("the vehicle cannot be linearised: a derivative is not finite")
         return matrix

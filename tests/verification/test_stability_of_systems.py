@@ -5,15 +5,22 @@ import numpy as np
 import pytest
 
 from railsim.linear.eigenmodes import followed, loss_of_stability
-from railsim.linear.system import Linearisation, NamedSystem, linearise
+from railsim.linear.system import Linearisation, jacobian
 from railsim.stability.periodic import Shooting
 
 
+def linearised(names, rate, step, speed):
+    """Linearisation of x' = rate(x, speed) about rest."""
+
+    def rates(rows):
+        return np.array([rate(row, speed) for row in rows])
+
+    rest = np.zeros(len(names))
+    return Linearisation(names, jacobian(rates, rest, np.full(len(names), step)), rest, speed)
+
+
 def bogie(speed):
-    system = NamedSystem(
-        cooperrider.NAMES, cooperrider.rate, lambda _: np.zeros(14), np.full(14, 1e-9)
-    )
-    return linearise(system, speed)
+    return linearised(cooperrider.NAMES, cooperrider.rate, 1e-9, speed)
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +55,8 @@ def test_suspended_wheelset_loses_stability_at_the_speed_of_the_closed_form(coni
         moment = 2.0 * f * (b0**2 * yaw_rate / speed + b0 * conicity * y / r0) + kpsi * yaw
         return np.array([y_rate, yaw_rate, -lateral / m, -moment / inertia])
 
-    system = NamedSystem(("y", "yaw", "y'", "yaw'"), rate, lambda _: np.zeros(4), np.full(4, 1e-6))
-    lost = loss_of_stability(lambda speed: linearise(system, speed), 5.0, 90.0)
+    names = ("y", "yaw", "y'", "yaw'")
+    lost = loss_of_stability(lambda speed: linearised(names, rate, 1e-6, speed), 5.0, 90.0)
     square = (2 * f * kpsi + 2 * f * b0**2 * ky) / (2 * f * inertia + 2 * f * b0**2 * m)
     stiff = (ky - m * square) * (kpsi - inertia * square) / (4 * f * f)
     closed = np.sqrt(square * b0**2 / (b0 * conicity / r0 + stiff))
