@@ -335,10 +335,6 @@ def modes(
     profiles : mapping of str to Profile, optional
         Profiles that take precedence over built-in ones and files.
 
-    Returns
-    -------
-    Modes
-
     Raises
     ------
     InputError

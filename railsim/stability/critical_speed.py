@@ -91,10 +91,6 @@ def critical_speed(
     progress : callable, optional
         Called repeatedly with the finished fraction.
 
-    Returns
-    -------
-    CriticalSpeed
-
     Raises
     ------
     InputError

@@ -9,7 +9,7 @@ such points are marked, and those where it does not come to rest or leaves the t
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -141,10 +141,8 @@ class Curving(Plottable):
 
     def record(self) -> dict[str, Any]:
         """Return everything as plain data; dimensions are named."""
-        data: dict[str, Any] = {
-            "radius": self.radius.tolist(),
-            "cant_deficiency": self.cant_deficiency.tolist(),
-            "friction": self.friction.tolist(),
+        return {
+            **{name: getattr(self, name).tolist() for name in self.DIMS},
             "cant": self.cant,
             "wheelset": list(self.wheelsets),
             "wheelset_position": list(self.wheelset_position),
@@ -154,8 +152,8 @@ class Curving(Plottable):
             "speed": self.speed.tolist(),
             "converged": self.converged.tolist(),
             "dims": {name: [*self.DIMS, *dims] for name, dims in self.VALUES.items()},
+            **{name: getattr(self, name).tolist() for name in self.VALUES},
         }
-        return data | {name: getattr(self, name).tolist() for name in self.VALUES}
 
     @property
     def title(self) -> str:
@@ -185,9 +183,7 @@ class Curving(Plottable):
         import xarray
 
         coords = {
-            "radius": self.radius,
-            "cant_deficiency": self.cant_deficiency,
-            "friction": self.friction,
+            **{name: getattr(self, name) for name in self.DIMS},
             "wheelset": list(self.wheelsets),
             "side": ["left", "right"],
             "bogie": list(self.bogies),
@@ -234,10 +230,6 @@ def curving(
         Profiles that take precedence over built-in ones and files.
     progress : callable, optional
         Called repeatedly with the finished fraction.
-
-    Returns
-    -------
-    Curving
 
     Raises
     ------
@@ -313,10 +305,9 @@ def _speed(radius: float, cant: float, deficiency: float) -> float:
 
 @dataclass(frozen=True)
 class _Known:
-    curvature: float
-    cant: float
-    square: float  # of the speed
-    friction: float
+    """A steady state; curvature, cant, square of the speed and friction at which it holds."""
+
+    values: Floats
     state: Floats
 
 
@@ -344,7 +335,7 @@ class _Search:
         self.parts = parts_of(self.model, coordinates(self.model))
         rest = balance.state.copy()
         rest[-2] = POSITION
-        self._rest = _Known(0.0, 0.0, WALKING_PACE**2, _friction(track), rest)
+        self._rest = _Known(np.array([0.0, 0.0, WALKING_PACE**2, _friction(track)]), rest)
         self._last: _Known = self._rest
 
     def _system(self, curvature: float, cant: float, friction: float) -> System:
@@ -354,45 +345,31 @@ class _Search:
     def point(self, radius: float, deficiency: float, friction: float) -> Point:
         """Steady state at one point of the grid."""
         speed = _speed(radius, self.cant, deficiency)
-        goal = _Known(
-            1.0 / radius, math.copysign(self.cant, radius), speed**2, friction, self._last.state
-        )
+        goal = np.array([1.0 / radius, math.copysign(self.cant, radius), speed**2, friction])
         for start in (self._last, self._rest):
-            if start.curvature * goal.curvature < 0.0:
+            if start.values[0] * radius < 0.0:
                 continue
+
+            def along(share: float, start: _Known = start) -> tuple[System, float]:
+                curvature, cant, square, mu = start.values + share * (goal - start.values)
+                return self._system(curvature, cant, mu), math.sqrt(square)
+
             try:
-                state, solver = self._led(start, goal)
+                found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
             except NotConverged:
                 continue
-            self._last = replace(goal, state=state)
-            return solver, state, NEWTON
-        return self._in_time(goal)
+            self._last = _Known(goal, found.state)
+            return solver, found.state, NEWTON
+        system = self._system(goal[0], goal[1], friction)
+        return self._in_time(system, speed, self._system(0.0, 0.0, friction))
 
-    def _led(self, start: _Known, goal: _Known) -> tuple[Floats, SteadyRolling]:
-        def along(share: float) -> tuple[System, float]:
-            def between(a: float, b: float) -> float:
-                return a + share * (b - a)
-
-            system = self._system(
-                between(start.curvature, goal.curvature),
-                between(start.cant, goal.cant),
-                between(start.friction, goal.friction),
-            )
-            return system, math.sqrt(between(start.square, goal.square))
-
-        found, solver = led(self.model, along, start.state, smallest=1.0 / 16.0)
-        return found.state, solver
-
-    def _in_time(self, goal: _Known) -> Point:
+    def _in_time(self, system: System, speed: float, straight: System) -> Point:
         """Run on the circle until nothing changes; failed where it does not come to that."""
-        system = self._system(goal.curvature, goal.cant, goal.friction)
-        speed = math.sqrt(goal.square)
         solver = SteadyRolling(self.model, system)
         state = self._last.state.copy()
         state[-3:] = 0.0, POSITION, speed
         try:
             state = solver.prepared(state, speed)
-            straight = self._system(0.0, 0.0, goal.friction)
             rolling = solver.prepared(self._rest.state, speed)
             # the curve itself is where the run settles: judged with the state that Newton left
             step = Stability(
