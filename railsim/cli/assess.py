@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, output_options, print_json, table
+from railsim.cli.common import echo, output_options, print_json, show, text_table
 from railsim.files import check_folder, make_folder, whole_file
 from railsim.text import spreadsheet_cell
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from railsim.assessment.zones import Assessed
     from railsim.definitions.vehicle_tables import Service
     from railsim.result import Result
+    from railsim.table import Table
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
 SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
@@ -89,7 +90,7 @@ def command(
         print_json([assessment.record() for assessment in assessments])
     else:
         for assessment in assessments:
-            echo("\n".join(assessment_lines(assessment, quiet=quiet)))
+            show(*assessment_lines(assessment, quiet=quiet))
         for path in written:
             echo(str(path))
     return LIMIT_EXCEEDED if fail and any(a.exceeded for a in assessments) else DONE
@@ -218,11 +219,11 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[str]:
+def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> "list[str | Table]":
     """Return an assessment as lines for a screen."""
     edition = f", {assessment.limits.edition}" if assessment.limits else ""
     runs = f"{len(assessment.runs)} run{'s' * (len(assessment.runs) > 1)}"
-    lines = [f"{assessment.vehicle}{edition}, {runs}"]
+    lines: list[str | Table] = [f"{assessment.vehicle}{edition}, {runs}"]
     lines += _verdict_lines(assessment)
     for zone in assessment.zones:
         header = [
@@ -230,21 +231,21 @@ def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> list[s
             "N", "mean", "s", "method", "estimate", "limit", "% of limit",
         ]  # fmt: skip
         rows = [_row(row) for row in zone.nearest]
-        lines += ["", *table(header, rows, numbers=3)]
+        lines += ["", text_table(header, rows, numbers=3)]
     lines += _comfort_lines(assessment) + _wear_lines(assessment) + _safety_lines(assessment)
     if not quiet:
         lines += ["", *(f"note: {remark}" for remark in assessment.remarks)]
     return lines
 
 
-def _verdict_lines(assessment: "Assessment") -> list[str]:
+def _verdict_lines(assessment: "Assessment") -> "list[str | Table]":
     """Overall verdict, and each of its parts with its reasons; a reason of several parts once."""
     from railsim.assessment.criteria import WORDS
 
     if not assessment.verdict:
         return []
     deciding = getattr(assessment.limits, "deciding", ())
-    lines = [f"verdict: {assessment.verdict}"]
+    lines: list[str | Table] = [f"verdict: {assessment.verdict}"]
     for name, verdict in assessment.verdicts.items():
         told = "" if name in deciding else " (for information)"
         lines.append(f"  {WORDS[name]}{told}: {verdict.value}")
@@ -265,8 +266,8 @@ def _row(row: "Assessed") -> list[str]:
     ]  # fmt: skip
 
 
-def _comfort_lines(assessment: "Assessment") -> list[str]:
-    lines: list[str] = []
+def _comfort_lines(assessment: "Assessment") -> "list[str | Table]":
+    lines: list[str | Table] = []
     for run, points in assessment.comfort.items():
         header = [run, "x (m)", "N_MV", "N_VA", "N_VD", "ISO a_v (m/s2)", "Wz lateral",
                   "Wz vertical", "P_CT standing (%)", "P_DE standing (%)"]  # fmt: skip
@@ -280,15 +281,15 @@ def _comfort_lines(assessment: "Assessment") -> list[str]:
                 f"{point.sperling['lateral']:.2f}", f"{point.sperling['vertical']:.2f}",
                 "" if most is None else f"{most:.1f}", f"{point.events['standing']:.1f}",
             ])  # fmt: skip
-        lines += ["", *table(header, rows)]
+        lines += ["", text_table(header, rows)]
     return lines
 
 
-def _wear_lines(assessment: "Assessment") -> list[str]:
+def _wear_lines(assessment: "Assessment") -> "list[str | Table]":
     from railsim.assessment.wear import LAWS
 
     columns = [f"{law.name} (mm2/1000 km)" for law in LAWS.values()]
-    lines: list[str] = []
+    lines: list[str | Table] = []
     for run, wheels in assessment.wear.items():
         header = [run, "T_gamma (N)", "95 %", "99.85 %", *columns, "WLRM (1e-6)",
                   "FI_surf"]  # fmt: skip
@@ -302,12 +303,12 @@ def _wear_lines(assessment: "Assessment") -> list[str]:
             ]
             for w in wheels
         ]  # fmt: skip
-        lines += ["", *table(header, rows)]
+        lines += ["", text_table(header, rows)]
     return lines
 
 
-def _safety_lines(assessment: "Assessment") -> list[str]:
-    lines: list[str] = []
+def _safety_lines(assessment: "Assessment") -> "list[str | Table]":
+    lines: list[str | Table] = []
     for run, report in assessment.safety.items():
         header = [run, "Nadal", "largest Y/Q", "climb (m)", "rise (mm)"]
         rows = [
@@ -315,9 +316,7 @@ def _safety_lines(assessment: "Assessment") -> list[str]:
              f"{w.Y_over_Q:.3f}", f"{w.climb_distance:.2f}", f"{1e3 * w.rise:.2f}"]
             for w in report.wheels
         ]  # fmt: skip
-        lines += ["", *table(header, rows), ""]
-        lines += table(
-            ["bogie", "overturning"],
-            [[name, f"{value:.3f}"] for name, value in report.overturning.items()],
-        )
+        lines += ["", text_table(header, rows), ""]
+        rows = [[name, f"{value:.3f}"] for name, value in report.overturning.items()]
+        lines.append(text_table(["bogie", "overturning"], rows))
     return lines

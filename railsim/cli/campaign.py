@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from railsim.cli.common import echo, print_json
+from railsim.cli.common import echo, print_json, show
 from railsim.cli.progress import progress_bar
 
 
@@ -52,7 +52,7 @@ def run_campaign(
         })  # fmt: skip
         return DONE
     for assessment in done.assessments:
-        echo("\n".join(["", *assessment_lines(assessment, quiet=quiet)]))
+        show("", *assessment_lines(assessment, quiet=quiet))
     for path in written:
         echo(str(path))
     return DONE

@@ -4,7 +4,7 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -179,13 +179,12 @@ def plain(data: Any) -> Any:
     return data
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1) -> list[str]:
-    """Return the lines of a table of texts; from the column `numbers` on they are aligned right."""
+def text_table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: int = 1) -> "Table":
+    """Return a table of texts, from the column `numbers` on aligned to the right."""
     from railsim.table import Column, Table
 
     columns = [Column(name or " ", format=">" * (k >= numbers)) for k, name in enumerate(header)]
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    return Table(columns, rows).lines(width)
+    return Table(columns, rows)
 
 
 def report_file(path: Path, *, as_json: bool, quiet: bool, **facts: Any) -> None:

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import echo, names_of, output_options, print_json, table
+from railsim.cli.common import echo, names_of, output_options, print_json, show, text_table
 from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
     from railsim.studies.designs import Design
     from railsim.studies.optimise import Optimisation
+    from railsim.table import Table
 
 MOST_ROWS = 15
 
@@ -93,11 +94,10 @@ def command(
     if as_json:
         print_json({"folder": str(found.folder), **found.record()})
         return
-    for line in _lines(found):
-        echo(line)
+    show(*_lines(found))
 
 
-def _lines(found: "Optimisation") -> list[str]:
+def _lines(found: "Optimisation") -> "list[str | Table]":
     from railsim.studies.designs import values_by_name
 
     definition = found.definition
@@ -117,7 +117,7 @@ def _lines(found: "Optimisation") -> list[str]:
         for design, numbers in zip(shown, zip(*values.values(), strict=True), strict=True)
     ]
     number = f"front of {len(found.front)} in {len(found.designs)} designs"
-    lines = [number, "", *table(header, rows, numbers=1), ""]
+    lines: list[str | Table] = [number, "", text_table(header, rows, numbers=1), ""]
     lines += [f"active: {words}" for words in found.active]
     for one in found.sensitivities:
         shares = sorted(one.total.items(), key=lambda item: -item[1])

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import echo, load_option, output_options, print_json, set_option, table
+from railsim.cli.common import load_option, output_options, print_json, set_option, show, text_table
 
 if TYPE_CHECKING:
     from railsim.studies.stationary import Stationary
+    from railsim.table import Table
 
 FILES = ("stationary.json",)
 
@@ -69,13 +70,13 @@ def command(
     if as_json:
         print_json(found.record())
     else:
-        echo("\n".join(_lines(found, quiet=quiet)))
+        show(*_lines(found, quiet=quiet))
         folder.tell()
     return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
 
 
-def _lines(found: "Stationary", *, quiet: bool) -> list[str]:
-    lines = [f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}"]
+def _lines(found: "Stationary", *, quiet: bool) -> "list[str | Table]":
+    lines: list[str | Table] = [f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}"]
     lines += [f"  {reason}" for reason in found.reasons]
     rows = []
     for value in found.values:
@@ -86,7 +87,7 @@ def _lines(found: "Stationary", *, quiet: bool) -> list[str]:
         ]  # fmt: skip
         rows.append([value.case, value.quantity, value.place, *shown])
     header = ["standing on", "quantity", "location", "value", "limit"]
-    lines += ["", *table(header, rows, numbers=3)]
+    lines += ["", text_table(header, rows, numbers=3)]
     if not quiet:
         how = "held across the track" if found.held else "free across the track"
         lines += ["", f"note: wheelsets {how}"]

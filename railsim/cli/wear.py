@@ -13,7 +13,8 @@ from railsim.cli.common import (
     output_options,
     print_json,
     set_option,
-    table,
+    show,
+    text_table,
 )
 from railsim.cli.progress import progress_bar
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from railsim.cli.analysis import Folder
     from railsim.profiles import Profile
     from railsim.studies.wear_loop import Route, WearStep
+    from railsim.table import Table
 
 FILES = ("wear.json", "wear.png")
 STEPS = "steps"  # folder of the finished steps
@@ -120,7 +122,7 @@ def command(
     }
     _write(folder, record, found)
     if not as_json:
-        echo("\n".join(_lines(coach.name, ways, wear_law(law).source, record["rows"])))
+        show(*_lines(coach.name, ways, wear_law(law).source, record["rows"]))
         folder.tell()
     elif ended is None:
         print_json(record)
@@ -177,7 +179,7 @@ def _write_profile(path: "Path", profile: "Profile") -> "Path":
 
 def _lines(
     vehicle: str, ways: "list[Route]", source: str, rows: "list[dict[str, float | None]]"
-) -> list[str]:
+) -> "list[str | Table]":
     total = sum(way.share for way in ways)
     shares = ", ".join(
         f"{way.share / total:.0%} {way.track.name} at {way.speed:g} m/s" for way in ways
@@ -196,4 +198,4 @@ def _lines(
     header = ["distance (km)", "worn area (mm2)", "deepest (mm)", "at y (mm)", "conicity at 3 mm"]
     note = f"{source}, mean of all wheels; y from the nominal rolling circle, "
     note += "negative towards the flange"
-    return [vehicle, f"  {shares}", f"  {note}", "", *table(header, cells, numbers=0)]
+    return [vehicle, f"  {shares}", f"  {note}", "", text_table(header, cells, numbers=0)]
