@@ -6,22 +6,13 @@ allowed but unusual is a remark.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from railsim.definitions.alignment_rules import alignment_remarks
 from railsim.definitions.base import Remark
 from railsim.definitions.section import Section
-from railsim.definitions.track_tables import (
-    CantElement,
-    Circle,
-    Clothoid,
-    ConstantCant,
-    ConstantGradient,
-    PlanElement,
-    TrackTables,
-    VerticalElement,
-)
+from railsim.definitions.track_tables import TrackElement, TrackTables
 from railsim.errors import Fault
 
 # Ramps steeper than this are remarked on: exceptional limit of EN 13803 (2017) for the cant ramp.
@@ -33,30 +24,19 @@ ASTRAY_CANT = 1e-3
 SMALL = 1e-6
 
 
-@dataclass(frozen=True)
-class _Draft:
-    """A section whose ends may still be open; a ramp's given ends must match its neighbours."""
-
-    type: str
-    length: float
-    start: float | None
-    end: float | None
-    ramp: bool
-
-
 def curvature_sections(track: TrackTables) -> list[Section]:
     """Return the plan as curvature over arc length [1/m]."""
-    return _sections("plan", [_plan_draft(element) for element in track.plan])[0]
+    return _sections("plan", track.plan)[0]
 
 
 def cant_sections(track: TrackTables) -> list[Section]:
     """Return the cant over arc length [m]; empty where there is none."""
-    return _sections("cant", [_cant_draft(element) for element in track.cant])[0]
+    return _sections("cant", track.cant)[0]
 
 
 def gradient_sections(track: TrackTables) -> list[Section]:
     """Return the gradient over arc length [1]; empty for a level track."""
-    return _sections("vertical", [_vertical_draft(element) for element in track.vertical])[0]
+    return _sections("vertical", track.vertical)[0]
 
 
 def is_straight_and_level(track: TrackTables) -> bool:
@@ -67,9 +47,9 @@ def is_straight_and_level(track: TrackTables) -> bool:
 
 def track_faults(track: TrackTables) -> list[Fault]:
     """Return what contradicts itself in a track; the faults' file is left empty."""
-    _, faults = _sections("plan", [_plan_draft(element) for element in track.plan])
-    cant, cant_faults = _sections("cant", [_cant_draft(element) for element in track.cant])
-    _, vertical_faults = _sections("vertical", [_vertical_draft(e) for e in track.vertical])
+    _, faults = _sections("plan", track.plan)
+    cant, cant_faults = _sections("cant", track.cant)
+    _, vertical_faults = _sections("vertical", track.vertical)
     faults += cant_faults + vertical_faults
     if not cant_faults:
         faults += _cant_steps(cant)
@@ -97,45 +77,22 @@ def track_remarks(track: TrackTables) -> list[Remark]:
 # elements ---------------------------------------------------------------------------------------
 
 
-def _curvature(radius: float | None) -> float | None:
-    return None if radius is None else 1.0 / radius
-
-
-def _plan_draft(element: PlanElement) -> _Draft:
-    if isinstance(element, Clothoid):
-        start, end = _curvature(element.radius_start), _curvature(element.radius_end)
-        return _Draft(element.type, element.length, start, end, ramp=True)
-    kappa = 1.0 / element.radius if isinstance(element, Circle) else 0.0
-    return _Draft(element.type, element.length, kappa, kappa, ramp=False)
-
-
-def _cant_draft(element: CantElement) -> _Draft:
-    if isinstance(element, ConstantCant):
-        return _Draft(element.type, element.length, element.cant, element.cant, ramp=False)
-    return _Draft(element.type, element.length, element.cant_start, element.cant_end, ramp=True)
-
-
-def _vertical_draft(element: VerticalElement) -> _Draft:
-    if isinstance(element, ConstantGradient):
-        return _Draft(element.type, element.length, element.gradient, element.gradient, ramp=False)
-    start, end = element.gradient_start, element.gradient_end
-    return _Draft(element.type, element.length, start, end, ramp=True)
-
-
-def _sections(name: str, drafts: Sequence[_Draft]) -> tuple[list[Section], list[Fault]]:
+def _sections(name: str, elements: Sequence[TrackElement]) -> tuple[list[Section], list[Fault]]:
     """Return the sections of a list, with a fault for each end that is open or does not match."""
     sections, faults = [], []
     begin = 0.0
-    for index, draft in enumerate(drafts):
-        before = drafts[index - 1] if index > 0 else None
-        behind = drafts[index + 1] if index + 1 < len(drafts) else None
+    ends = [element.ends for element in elements]
+    for index, element in enumerate(elements):
+        before = ends[index - 1][1] if index > 0 else None
+        behind = ends[index + 1][0] if index + 1 < len(elements) else None
+        start, end = ends[index]
         key = f"{name}.{index}"
-        start = draft.start if draft.start is not None else (before.end if before else None)
-        end = draft.end if draft.end is not None else (behind.start if behind else None)
-        faults += _end_faults(key, draft, before, behind)
-        end_of_section = begin + draft.length
-        section = Section(key, draft.type, begin, end_of_section, start or 0.0, end or 0.0)
-        sections.append(section)
+        if element.is_ramp:
+            faults += _end_faults(key, element.type, "start", start, before)
+            faults += _end_faults(key, element.type, "end", end, behind)
+        start, end = before if start is None else start, behind if end is None else end
+        end_of_section = begin + element.length
+        sections.append(Section(key, element.type, begin, end_of_section, start or 0.0, end or 0.0))
         begin = end_of_section
     return sections, faults
 
@@ -144,25 +101,19 @@ _END_KEYS = {"plan": "radius", "cant": "cant", "vertical": "gradient"}
 
 
 def _end_faults(
-    key: str, draft: _Draft, before: _Draft | None, behind: _Draft | None
+    key: str, kind: str, end: str, own: float | None, other: float | None
 ) -> list[Fault]:
-    if not draft.ramp:
-        return []
+    """Faults of one end of a ramp with its value and that of the neighbour there."""
     word = _END_KEYS[key.split(".")[0]]
-    faults = []
-    for end, own, other in (
-        ("start", draft.start, before.end if before else None),
-        ("end", draft.end, behind.start if behind else None),
-    ):
-        neighbour = "before" if end == "start" else "behind"
-        if own is None and other is None:
-            allowed = f"'{word}_{end}' here, as no element {neighbour} gives it"
-            faults.append(Fault("", key, f"the {end} of the {draft.type} is open", allowed))
-        elif own is not None and other is not None and not _same(own, other):
-            found = f"its {word} does not match the element {neighbour}"
-            text = f"{_written(word, own)}, the element {neighbour} has {_written(word, other)}"
-            faults.append(Fault("", f"{key}.{word}_{end}", text, found))
-    return faults
+    neighbour = "before" if end == "start" else "behind"
+    if own is None and other is None:
+        allowed = f"'{word}_{end}' here, as no element {neighbour} gives it"
+        return [Fault("", key, f"the {end} of the {kind} is open", allowed)]
+    if own is not None and other is not None and not _same(own, other):
+        found = f"its {word} does not match the element {neighbour}"
+        text = f"{_written(word, own)}, the element {neighbour} has {_written(word, other)}"
+        return [Fault("", f"{key}.{word}_{end}", text, found)]
+    return []
 
 
 def _same(a: float, b: float) -> bool:
@@ -179,32 +130,36 @@ def _written(word: str, value: float) -> str:
 
 
 def _cant_steps(cant: Sequence[Section]) -> list[Fault]:
-    faults = []
-    for before, behind in pairwise(cant):
-        if not _same(before.end_value, behind.start_value):
-            found = f"the cant steps from {before.end_value:g} to {behind.start_value:g} m"
-            faults.append(Fault("", behind.key, found, "a ramp (LIR) between the two elements"))
-    return faults
+    return [
+        Fault(
+            "",
+            behind.key,
+            f"the cant steps from {before.end_value:g} to {behind.start_value:g} m",
+            "a ramp (LIR) between the two elements",
+        )
+        for before, behind in _steps(cant)
+    ]
+
+
+def _steps(sections: Sequence[Section]) -> list[tuple[Section, Section]]:
+    pairs = pairwise(sections)
+    return [(a, b) for a, b in pairs if not _same(a.end_value, b.start_value)]
 
 
 def _curvature_steps(plan: Sequence[Section]) -> list[Remark]:
-    remarks = []
-    for before, behind in pairwise(plan):
-        if not _same(before.end_value, behind.start_value):
-            text = (
-                f"the radius steps from {_written('radius', before.end_value)} to "
-                f"{_written('radius', behind.start_value)} without a transition (CLO)"
-            )
-            remarks.append(Remark(behind.key, text))
-    return remarks
+    return [
+        Remark(
+            behind.key,
+            f"the radius steps from {_written('radius', before.end_value)} to "
+            f"{_written('radius', behind.start_value)} without a transition (CLO)",
+        )
+        for before, behind in _steps(plan)
+    ]
 
 
 def _gradient_steps(vertical: Sequence[Section]) -> list[Remark]:
-    return [
-        Remark(behind.key, "the gradient steps without a vertical curve (LIR)")
-        for before, behind in pairwise(vertical)
-        if not _same(before.end_value, behind.start_value)
-    ]
+    text = "the gradient steps without a vertical curve (LIR)"
+    return [Remark(behind.key, text) for _, behind in _steps(vertical)]
 
 
 def _too_long(name: str, sections: Sequence[Section], plan: Sequence[Section]) -> list[Remark]:

@@ -9,13 +9,6 @@ from typing import TypeVar
 from railsim.definitions.base import Vector
 from railsim.definitions.elements.base import Element
 from railsim.definitions.track import Track
-from railsim.definitions.track_tables import (
-    CantElement,
-    Circle,
-    Clothoid,
-    ConstantCant,
-    PlanElement,
-)
 from railsim.definitions.vehicle import Vehicle
 from railsim.definitions.vehicle_tables import Assembly, Axlebox, Body, Placement, Wheelset
 
@@ -37,8 +30,8 @@ def mirrored_track(track: Track) -> Track:
     """
     return track.model_copy(
         update={
-            "plan": tuple(_mirrored_plan(element) for element in track.plan),
-            "cant": tuple(_mirrored_cant(element) for element in track.cant),
+            "plan": tuple(element.mirrored() for element in track.plan),
+            "cant": tuple(element.mirrored() for element in track.cant),
             "rail": track.rail[::-1],
             "friction": track.friction[::-1],
             "friction_table": _sides_exchanged(track.friction_table),
@@ -46,23 +39,6 @@ def mirrored_track(track: Track) -> Track:
             "irregularities": tuple(part.mirrored() for part in track.irregularities),
         }
     )
-
-
-def _mirrored_plan(element: PlanElement) -> PlanElement:
-    if isinstance(element, Circle):
-        return element.model_copy(update={"radius": -element.radius})
-    if isinstance(element, Clothoid):
-        ends = {"radius_start": element.radius_start, "radius_end": element.radius_end}
-        update = {key: -radius for key, radius in ends.items() if radius is not None}
-        return element.model_copy(update=update)
-    return element
-
-
-def _mirrored_cant(element: CantElement) -> CantElement:
-    if isinstance(element, ConstantCant):
-        return element.model_copy(update={"cant": -element.cant})
-    ends = {"cant_start": element.cant_start, "cant_end": element.cant_end}
-    return element.model_copy(update={key: -cant for key, cant in ends.items() if cant is not None})
 
 
 def _sides_exchanged(rows: tuple[Row, ...] | None) -> tuple[Row, ...] | None:

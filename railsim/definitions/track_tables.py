@@ -5,7 +5,7 @@ A transition (CLO, LIR) takes its ends from its neighbours where it does not nam
 cant and gradient are piecewise linear in the arc length and rounded over `rounding`.
 """
 
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -72,74 +72,102 @@ Cant = Annotated[Finite, Field(ge=-0.5, le=0.5)]
 Gradient = Annotated[Finite, Field(ge=-0.3, le=0.3)]
 
 
-class Straight(Definition):
-    """A straight."""
+class TrackElement(Definition):
+    """An element of plan, cant or vertical profile, constant or linear in the arc length."""
 
-    type: Literal["STR"]
+    KEYS: ClassVar[tuple[str, ...]] = ()
+    """Keys of its value at the beginning and at the end, one key of a constant."""
+    TURNS: ClassVar[bool] = True
+    """Whether the mirror image of the track has the opposite values."""
+
+    type: str
     length: Length
     """Length [m]"""
 
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Curvature [1/m], cant [m] or gradient [1] at its ends; None is that of the neighbour."""
+        if not self.KEYS:
+            return 0.0, 0.0
+        values = [getattr(self, key) for key in self.KEYS]
+        if "radius" in self.KEYS[0]:
+            values = [None if radius is None else 1.0 / radius for radius in values]
+        return values[0], values[-1]
 
-class Circle(Definition):
+    @property
+    def is_ramp(self) -> bool:
+        """Whether its ends may differ."""
+        return len(self.KEYS) == 2
+
+    def mirrored(self) -> Self:
+        """Return the element with left and right exchanged."""
+        values = {key: getattr(self, key) for key in self.KEYS if self.TURNS}
+        update = {key: -value for key, value in values.items() if value is not None}
+        return self.model_copy(update=update)
+
+
+class Straight(TrackElement):
+    """A straight."""
+
+    type: Literal["STR"]
+
+
+class Circle(TrackElement):
     """A circular curve."""
 
+    KEYS: ClassVar = ("radius",)
     type: Literal["CIR"]
-    length: Length
-    """Length along the centre line [m]"""
     radius: Radius
     """Radius, positive to the right [m]"""
 
 
-class Clothoid(Definition):
+class Clothoid(TrackElement):
     """A transition with curvature linear in the arc length."""
 
+    KEYS: ClassVar = ("radius_start", "radius_end")
     type: Literal["CLO"]
-    length: Length
-    """Length [m]"""
     radius_start: Radius | None = None
     """Radius at its beginning, `inf` if straight [m]; by default that of the element before"""
     radius_end: Radius | None = None
     """Radius at its end [m]; by default that of the following element"""
 
 
-class ConstantCant(Definition):
+class ConstantCant(TrackElement):
     """Constant cant."""
 
+    KEYS: ClassVar = ("cant",)
     type: Literal["CST"]
-    length: Length
-    """Length [m]"""
     cant: Cant
     """Height of the left rail over the right one, on the cant base of 1.5 m [m]"""
 
 
-class CantRamp(Definition):
+class CantRamp(TrackElement):
     """A ramp with cant linear in the arc length."""
 
+    KEYS: ClassVar = ("cant_start", "cant_end")
     type: Literal["LIR"]
-    length: Length
-    """Length [m]"""
     cant_start: Cant | None = None
     """Cant at its beginning [m]; by default that of the element before"""
     cant_end: Cant | None = None
     """Cant at its end [m]; by default that of the following element"""
 
 
-class ConstantGradient(Definition):
+class ConstantGradient(TrackElement):
     """Constant gradient."""
 
+    KEYS: ClassVar = ("gradient",)
+    TURNS: ClassVar = False
     type: Literal["CST"]
-    length: Length
-    """Length [m]"""
     gradient: Gradient
     """Rise over horizontal distance, positive uphill [1]"""
 
 
-class GradientRamp(Definition):
+class GradientRamp(TrackElement):
     """A vertical curve: gradient linear in the arc length, radius = length / change of gradient."""
 
+    KEYS: ClassVar = ("gradient_start", "gradient_end")
+    TURNS: ClassVar = False
     type: Literal["LIR"]
-    length: Length
-    """Length [m]"""
     gradient_start: Gradient | None = None
     """Gradient at its beginning [1]; by default that of the element before"""
     gradient_end: Gradient | None = None

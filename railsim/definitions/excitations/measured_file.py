@@ -6,7 +6,6 @@ The rows become part of the track, so that a result carries its irregularities w
 import csv
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +68,7 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
         if path.suffix.lower() != ".csv":
             faults.append(Fault("", key, f"'{path.name}' is no CSV", "the name must end in .csv"))
             continue
-        how = Reading.of(table)
+        how = _definition(table)
         if how is None:
             continue  # refused by the definition
         rows, wrong = read_measured(path, how)
@@ -81,44 +80,20 @@ def embed_measured(data: dict[str, Any]) -> list[Fault]:
     return faults
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How the file of a measured irregularity is read; see `Measured`."""
-
-    encoding: str = "utf-8-sig"
-    columns: dict[str, str] | None = None
-    units: dict[str, str] | None = None
-    offset: dict[str, float] | None = None
-    reverse: tuple[str, ...] = ()
-    falling_mileage: bool = False
-    chord: tuple[float, float] | None = None
-    band: tuple[float, float] | None = None
-
-    @classmethod
-    def of(cls, table: dict[str, Any]) -> "Reading | None":
-        """Return what a plain table says; None where it is not well formed."""
-        try:
-            # the definition itself checks the keys, with a file that need not be there
-            part = Measured.model_validate({**table, "file": "-"})
-        except ValidationError:
-            return None
-        band = BANDS[part.band] if isinstance(part.band, str) else part.band
-        return cls(
-            part.encoding or "utf-8-sig",
-            part.columns,
-            dict(part.units or {}),
-            dict(part.offset or {}),
-            part.reverse,
-            part.falling_mileage,
-            part.chord,
-            band,
-        )
+def _definition(table: dict[str, Any]) -> Measured | None:
+    """Return what a plain table says, with a file that need not be there; None if it is wrong."""
+    try:
+        return Measured.model_validate({**table, "file": "-"})
+    except ValidationError:
+        return None
 
 
-def read_measured(path: Path, how: Reading = Reading()) -> tuple[Rows, list[Fault]]:
+def read_measured(path: Path, how: Measured) -> tuple[Rows, list[Fault]]:
     """Read rows [s, y_left, z_left, y_right, z_right] in m, and the faults of the file."""
     try:
-        return _rows_of(path, read_bytes(path, TABLE_BYTES).decode(how.encoding), how)
+        return _rows_of(
+            path, read_bytes(path, TABLE_BYTES).decode(how.encoding or "utf-8-sig"), how
+        )
     except LookupError:
         allowed = "a name such as utf-8, latin-1 or utf-16"
         return [], [Fault("", "encoding", f"unknown encoding '{how.encoding}'", allowed)]
@@ -131,7 +106,7 @@ def read_measured(path: Path, how: Reading = Reading()) -> tuple[Rows, list[Faul
         return [], [Fault(str(path), "", f"no CSV ({error})", "a header and rows of numbers")]
 
 
-def _rows_of(path: Path, text: str, how: Reading) -> tuple[Rows, list[Fault]]:
+def _rows_of(path: Path, text: str, how: Measured) -> tuple[Rows, list[Fault]]:
     numbered = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -168,7 +143,7 @@ def _rows_of(path: Path, text: str, how: Reading) -> tuple[Rows, list[Fault]]:
     return rows, counted(faults)
 
 
-def _filtered(path: Path, rows: Rows, how: Reading) -> tuple[Rows, list[Fault]]:
+def _filtered(path: Path, rows: Rows, how: Measured) -> tuple[Rows, list[Fault]]:
     table = np.array(rows)
     step = equal_step(table[:, 0])
     if step is None:
@@ -179,14 +154,15 @@ def _filtered(path: Path, rows: Rows, how: Reading) -> tuple[Rows, list[Fault]]:
     if how.chord:
         values = from_chord(values, step, how.chord)
     if how.band:
-        values = band_passed(values, step, how.band)
+        band = BANDS[how.band] if isinstance(how.band, str) else how.band
+        values = band_passed(values, step, band)
     return [(s, *row) for s, row in zip(table[:, 0].tolist(), values.T.tolist(), strict=True)], []
 
 
 Column = tuple[str, float, float]  # our name, unit [m], value of the undisplaced rails
 
 
-def _with_unit(column: Column, how: Reading) -> Column:
+def _with_unit(column: Column, how: Measured) -> Column:
     name, unit, _ = column
     if how.units and name in how.units:
         unit = UNITS[f"_{how.units[name]}"]
@@ -194,7 +170,7 @@ def _with_unit(column: Column, how: Reading) -> Column:
     return name, -unit if name in how.reverse else unit, offset
 
 
-def _mapped(path: Path, head: list[str], how: Reading) -> tuple[list[Column | None], list[Fault]]:
+def _mapped(path: Path, head: list[str], how: Measured) -> tuple[list[Column | None], list[Fault]]:
     """Name and unit of every column that is named; None for the others."""
     assert how.columns is not None  # by the caller
     columns: list[Column | None] = [None] * len(head)
