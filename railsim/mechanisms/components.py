@@ -3,11 +3,14 @@
 Pure functions of numbers and arrays, SI.  Forces are positive when the component pushes.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+EDGE = 1e-9
+"""Share of an interval by which rounding may leave a table."""
 T_REFERENCE = 20.0
 """Temperature to which the nominal forces of gas springs refer [C]."""
 
@@ -20,24 +23,10 @@ def gas_spring_force(
     law: str = "linear",
     temperature: Any = T_REFERENCE,
 ) -> Any:
-    """Push of a gas spring without friction [N].
+    """Push of a gas spring without friction, compressed by a part s of its stroke S [N].
 
     Linear: `F = F1 (1 + (p - 1) s/S)`; isothermal: `F = F1/(1 - (1 - 1/p) s/S)`; both `F1` extended
-    and `p F1` compressed.  Temperature: `gas_temperature_factor`.
-
-    Parameters
-    ----------
-    compressed : float or ndarray
-        Part of the stroke that is compressed s [m].
-    F1 : float
-        Force fully extended at 20 C [N].
-    progression : float
-        p = F2/F1.
-    stroke : float
-        Stroke S [m].
-    law : {'linear', 'isothermal'}
-    temperature : float
-        Temperature of the gas [C].
+    and `p F1` compressed, F1 at 20 C.  Temperature [C]: `gas_temperature_factor`.
 
     Notes
     -----
@@ -74,16 +63,8 @@ def gas_temperature_factor(temperature: Any) -> Any:
 def lid_force(weight: float, D: float, b: float, n: float, alpha: float) -> float:
     """Quick check of a lid's gas springs, `F1 = G D/(b n) 9.8 alpha` [N].
 
-    Parameters
-    ----------
-    weight : float
-        Mass of the lid G [kg].
-    D, b : float
-        Levers of the centre of gravity and of the springs about the hinge, lid open [m].
-    n : float
-        Number of springs.
-    alpha : float
-        Factor of safety.
+    Mass of the lid G [kg], levers of its centre of gravity D and of the springs b about the hinge,
+    lid open [m], number of springs n, factor of safety alpha.
 
     Notes
     -----
@@ -123,46 +104,41 @@ def table_value(rows: NDArray[np.float64], x: Any) -> Any:
     >>> float(table_value(np.array([[0.0, 50.0], [2.0, 20.0]]), 1.0))
     35.0
     """
-    k = np.clip(np.searchsorted(rows[:, 0], np.real(x), side="right") - 1, 0, len(rows) - 2)
-    share = (x - rows[k, 0]) / (rows[k + 1, 0] - rows[k, 0])
-    inside = (np.real(share) >= -1e-9) & (np.real(share) <= 1.0 + 1e-9)
-    return np.where(inside, rows[k, 1] * (1.0 - share) + rows[k + 1, 1] * share, np.nan)
+    k, share = _interval(rows[:, 0], x)
+    return rows[k, 1] * (1.0 - share) + rows[k + 1, 1] * share
 
 
+def _interval(grid: Any, x: Any) -> tuple[Any, Any]:
+    """Interval of a rising grid (..., n) in which x (...) lies, share of it; NaN outside."""
+    x = np.asarray(x)
+    grid = np.broadcast_to(grid, (*x.shape, np.shape(grid)[-1]))
+    below = np.sum(np.real(grid) <= np.real(x)[..., None], axis=-1) - 1
+    k = np.clip(below, 0, grid.shape[-1] - 2)
+    low, high = (np.take_along_axis(grid, i[..., None], -1)[..., 0] for i in (k, k + 1))
+    share = (x - low) / (high - low)
+    inside = (np.real(share) >= -EDGE) & (np.real(share) <= 1.0 + EDGE)
+    return k, np.where(inside, share, np.nan)
+
+
+@dataclass(frozen=True)
 class AirSpringTable:
-    """Force of an air spring over height and pressure: linear in the height, then in the pressure.
+    """Force of an air spring: linear in the height, then in the pressure."""
 
-    Parameters
-    ----------
-    heights, pressures : ndarray
-        Rising [m], [Pa].
-    forces : ndarray, shape (height, pressure)
-        [N]
-    """
-
-    def __init__(
-        self,
-        heights: NDArray[np.float64],
-        pressures: NDArray[np.float64],
-        forces: NDArray[np.float64],
-    ) -> None:
-        self.heights, self.pressures, self.forces = heights, pressures, forces
+    heights: NDArray[np.float64]  # rising [m]
+    pressures: NDArray[np.float64]  # rising [Pa]
+    forces: NDArray[np.float64]  # shape (height, pressure) [N]
 
     def rows(self, height: Any) -> Any:
         """Forces at the table's pressures, shape (..., pressure); NaN outside the heights."""
-        x = np.real(height)
-        k = np.clip(np.searchsorted(self.heights, x, side="right") - 1, 0, len(self.heights) - 2)
-        share = (height - self.heights[k]) / (self.heights[k + 1] - self.heights[k])
-        edge = 1e-9
-        inside = (np.real(share) >= -edge) & (np.real(share) <= 1.0 + edge)
-        share = np.where(inside, share, np.nan)[..., None]
-        return self.forces[k] * (1.0 - share) + self.forces[k + 1] * share
+        k, share = _interval(self.heights, height)
+        return self.forces[k] * (1.0 - share[..., None]) + self.forces[k + 1] * share[..., None]
 
     def force(self, height: Any, pressure: Any) -> Any:
         """Force [N]; NaN outside the table."""
         rows = self.rows(height)
-        column, share = self._column(np.broadcast_to(self.pressures, rows.shape), pressure)
-        return _between(rows, column, share)
+        k, share = _interval(self.pressures, np.broadcast_to(pressure, rows.shape[:-1]))
+        low, high = (np.take_along_axis(rows, i[..., None], -1)[..., 0] for i in (k, k + 1))
+        return low * (1.0 - share) + high * share
 
     def pressure(self, height: Any, force: Any) -> Any:
         """Pressure that gives a force [Pa]; NaN outside the table.
@@ -175,36 +151,13 @@ class AirSpringTable:
         (300000.0, 250.0)
         """
         rows = self.rows(height)
-        column, share = self._column(rows, force)
-        return _between(np.broadcast_to(self.pressures, rows.shape), column, share)
-
-    def _column(self, grid: Any, value: Any) -> tuple[Any, Any]:
-        """Column below a value in each rising row of a grid, and the share towards the next."""
-        value = np.broadcast_to(value, grid.shape[:-1])
-        below = np.sum(np.real(grid) <= np.real(value)[..., None], axis=-1) - 1
-        column = np.clip(below, 0, grid.shape[-1] - 2)[..., None]
-        low = np.take_along_axis(grid, column, -1)
-        high = np.take_along_axis(grid, column + 1, -1)
-        share = (value[..., None] - low) / (high - low)
-        edge = 1e-9
-        inside = (np.real(share) >= -edge) & (np.real(share) <= 1.0 + edge)
-        return column, np.where(inside, share, np.nan)
+        k, share = _interval(rows, np.broadcast_to(force, rows.shape[:-1]))
+        return self.pressures[k] * (1.0 - share) + self.pressures[k + 1] * share
 
     def reason(self, height: float, force: float) -> str:
         """Why there is no pressure for a height and a force."""
-        low, high = self.heights[0], self.heights[-1]
+        at, (low, high) = f"{height * 1e3:.1f} mm", self.heights[[0, -1]]
         if not low <= height <= high:
-            return f"height {height * 1e3:.1f} mm is outside the table, {low * 1e3:g} to " + (
-                f"{high * 1e3:g} mm"
-            )
-        row = self.rows(height)
-        return (
-            f"{force:.0f} N at {height * 1e3:.1f} mm is outside the table, {row[0]:.0f} to "
-            f"{row[-1]:.0f} N"
-        )
-
-
-def _between(grid: Any, column: Any, share: Any) -> Any:
-    low = np.take_along_axis(grid, column, -1)
-    high = np.take_along_axis(grid, column + 1, -1)
-    return (low * (1.0 - share) + high * share)[..., 0]
+            return f"height {at} is outside the table, {low * 1e3:g} to {high * 1e3:g} mm"
+        least, most = self.rows(height)[[0, -1]]
+        return f"{force:.0f} N at {at} is outside the table, {least:.0f} to {most:.0f} N"

@@ -13,7 +13,7 @@ their least values between these: the exchange method of semi-infinite programmi
 K. O. Kortanek, Semi-infinite programming, SIAM Review 35, 1993).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -133,10 +133,22 @@ class Judge:
                 [Fault(name, f"optimise.{key}", words, remedy) for key, words in found]
             )
 
+    def named(self, x: Sequence[float] | Floats) -> dict[str, float]:
+        """Values of the parameters that may change, by their names."""
+        return dict(zip(self.names, map(float, x), strict=True))
+
+    def point_of(self, values: Mapping[str, Any]) -> tuple[Floats, dict[str, float]]:
+        """Those of some values that may change, and those that choose an assembly."""
+        choice = {name: float(values[name]) for name in self.wanted.assemblies}
+        return np.array([float(values[name]) for name in self.names]), choice
+
     def model(self, x: Sequence[float] | Floats, choice: dict[str, float]) -> Model:
         """The model with its lanes for values of the parameters that may change."""
-        values = dict(zip(self.names, map(float, x), strict=True))
-        return build(self.definition, {**self.fixed, **choice, **with_lanes(values)})
+        return build(self.definition, {**self.fixed, **choice, **with_lanes(self.named(x))})
+
+    def real_model(self, x: Sequence[float] | Floats, choice: dict[str, float]) -> Model:
+        """The same without lanes."""
+        return build(self.definition, {**self.fixed, **choice, **self.named(x)})
 
     def grid(self, model: Model, extra: Sequence[float] = ()) -> Floats:
         """Values of the driver at which constraints are held; `extra` are shares of the travel."""
@@ -182,8 +194,7 @@ class Judge:
         near : float
             Margin above which the least known value is not refined.
         """
-        values = dict(zip(self.names, map(float, x), strict=True))
-        model = build(self.definition, {**self.fixed, **choice, **values})
+        model = self.real_model(x, choice)
         motion = solve(model, np.linspace(model.start, model.end, DENSE))
         found: dict[str, tuple[float, float]] = {}
         for i, (name, _, known) in enumerate(self._everywhere(motion)):

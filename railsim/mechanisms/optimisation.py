@@ -9,6 +9,7 @@ updates then begin with the right curvature.
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 from multiprocessing import get_context
 from typing import Any
 
@@ -22,8 +23,7 @@ from railsim.errors import Fault, InputError, argument_fault
 from railsim.mechanisms.forces import unit_work
 from railsim.mechanisms.judgement import Judge, Judgement
 from railsim.mechanisms.kinematics import solve
-from railsim.mechanisms.model import build
-from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of, own_choice
+from railsim.mechanisms.optimum import FEASIBLE, Optimum, Start, best_of, optimum_of
 from railsim.processes import workers_begin
 from railsim.units import duration_in_words
 
@@ -106,8 +106,8 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
     """
     generator = np.random.default_rng(seed)
     choices = _choices(judge)
-    own = np.array([float(judge.values[name]) for name in judge.names])
-    found = [(np.clip(own, judge.lower, judge.upper), own_choice(judge))]
+    own, choice = judge.point_of(judge.values)
+    found = [(np.clip(own, judge.lower, judge.upper), choice)]
     for i in range(1, count):
         choice = choices[i % len(choices)]
         for _ in range(DRAWS):
@@ -119,20 +119,14 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
 
 
 def _choices(judge: Judge) -> list[dict[str, float]]:
-    choices: list[dict[str, float]] = [{}]
-    for name, values in judge.wanted.assemblies.items():
-        choices = [
-            {**choice, name: float(number(value, judge.values))}
-            for choice in choices
-            for value in values
-        ]
-    return choices
+    assemblies = judge.wanted.assemblies
+    values = ([float(number(v, judge.values)) for v in each] for each in assemblies.values())
+    return [dict(zip(assemblies, chosen, strict=True)) for chosen in product(*values)]
 
 
 def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
     try:
-        values = dict(zip(judge.names, map(float, x), strict=True))
-        model = build(judge.definition, {**judge.fixed, **choice, **values})
+        model = judge.real_model(x, choice)
         motion = solve(model, judge.grid(model))
     except InputError:
         return False
@@ -170,15 +164,7 @@ def _finals(judge: Judge, starts: Sequence[Start]) -> list[Any]:
     ranked = sorted(usable, key=lambda start: (max(start.violation, FEASIBLE), start.objective))
     own = [start for start in ranked[FINALISTS:] if start.number == 0]
     chosen = [*ranked[:FINALISTS], *own]
-    return [
-        (
-            start.number,
-            np.array([start.end[name] for name in judge.names]),
-            {name: start.end[name] for name in judge.wanted.assemblies},
-            FINISH,
-        )
-        for start in chosen
-    ]
+    return [(start.number, *judge.point_of(start.end), FINISH) for start in chosen]
 
 
 def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) -> list[Start]:
@@ -194,8 +180,7 @@ def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) ->
             count = start.evaluations + end.evaluations
             found.append(replace(end, begin=start.begin, evaluations=count))
         else:
-            x = np.array([start.end[name] for name in judge.names])
-            choice = {name: start.end[name] for name in judge.wanted.assemblies}
+            x, choice = judge.point_of(start.end)
             judged = judge(x, choice)
             violation = max(judged.violation, _between(judge, x, choice)[0])
             found.append(replace(start, objective=judged.objective, violation=violation))
@@ -221,13 +206,11 @@ class _Problem:
                 found = self.judge(self.judge.lower + u * self.span, self.choice, self.extra)
                 self.known = (
                     key,
-                    Judgement(
-                        found.residuals,
-                        found.jacobian * self.span,
-                        found.peak,
-                        found.peak_gradient * self.span,
-                        found.margins,
-                        found.slopes * self.span,
+                    replace(
+                        found,
+                        jacobian=found.jacobian * self.span,
+                        peak_gradient=found.peak_gradient * self.span,
+                        slopes=found.slopes * self.span,
                     ),
                 )
             except InputError:
@@ -253,11 +236,10 @@ def _run(
     """One start from begin to end."""
     problem = _Problem(judge, choice)
     u = np.clip((begin - judge.lower) / problem.span, 0.0, 1.0)
+    named = judge.named(begin) | choice
     here = problem(u)
     if here is None:
-        nan = float("nan")
-        named = dict(zip(judge.names, map(float, begin), strict=True)) | choice
-        return Start(index, named, named, nan, nan, problem.evaluations)
+        return Start(index, named, named, np.nan, np.nan, problem.evaluations)
     u, here = _rounds(problem, u, here, effort)
     violation = here.violation
     for _ in range(EXCHANGES if effort is FINISH else 0):
@@ -270,15 +252,8 @@ def _run(
         if judged is None:
             break
         u, here = _rounds(problem, u, judged, effort)
-    x = judge.lower + u * problem.span
-    return Start(
-        index,
-        dict(zip(judge.names, map(float, begin), strict=True)) | choice,
-        dict(zip(judge.names, map(float, x), strict=True)) | choice,
-        here.objective,
-        violation,
-        problem.evaluations,
-    )
+    end = judge.named(judge.lower + u * problem.span) | choice
+    return Start(index, named, end, here.objective, violation, problem.evaluations)
 
 
 def _rounds(
@@ -338,21 +313,17 @@ def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats
         known = at(z) or here
         return np.vstack((known.slopes @ S, S, -S))
 
+    kept: Any = {"type": "ineq", "fun": margins, "jac": slopes}
     found: Any = minimize(
         objective,
         np.zeros(m),
         jac=gradient,
         method="SLSQP",
-        constraints=_kept(margins, slopes),
+        constraints=kept,
         options={"maxiter": steps, "ftol": 1e-10},
     )
     end: Floats = np.clip(u0 + S @ found.x, 0.0, 1.0)
     return end
-
-
-def _kept(margins: Any, slopes: Any) -> Any:
-    """Constraints for scipy: margins that must not be negative."""
-    return [{"type": "ineq", "fun": margins, "jac": slopes}]
 
 
 def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Floats, Judgement]:
@@ -369,20 +340,18 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
         found = problem(y[:m]) or here
         return np.hstack((found.slopes, np.ones((len(found.margins), 1))))
 
-    def breach(y: Floats) -> float:
-        return float(y[m])
+    kept: Any = {"type": "ineq", "fun": margins, "jac": slopes}
 
-    def unit(y: Floats) -> Floats:
-        slope: Floats = np.eye(m + 1)[m]
-        return slope
+    def breach(y: Floats) -> tuple[float, Floats]:
+        return float(y[m]), np.eye(m + 1)[m]
 
     found: Any = minimize(
         breach,
         np.append(u0, here.violation),
-        jac=unit,
+        jac=True,
         method="SLSQP",
         bounds=Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf)),
-        constraints=_kept(margins, slopes),
+        constraints=kept,
         options={"maxiter": 100, "ftol": 1e-9},
     )
     u: Floats = np.clip(found.x[:m], 0.0, 1.0)

@@ -80,17 +80,11 @@ def best_of(starts: Sequence[Start]) -> Start:
     return min(usable, key=lambda start: start.violation)
 
 
-def own_choice(judge: Judge) -> dict[str, float]:
-    """Return the choices that the mechanism's own file makes."""
-    return {name: float(judge.values[name]) for name in judge.wanted.assemblies}
-
-
 def optimum_of(
     definition: Mechanism, judge: Judge, best: Start, starts: tuple[Start, ...], seed: int
 ) -> Optimum:
     """Return the best of all starts with what is active there."""
-    x = np.array([best.end[name] for name in judge.names])
-    choice = {name: best.end[name] for name in judge.wanted.assemblies}
+    x, choice = judge.point_of(best.end)
     least = judge.least(x, choice)
     judged = judge(x, choice, [share for margin, share in least.values() if margin < ACTIVE])
     listed = {
@@ -102,8 +96,7 @@ def optimum_of(
     after = analyse(better)
     try:
         before: Analysis | None = analyse(definition)
-        own = np.array([float(judge.values[name]) for name in judge.names])
-        objective_before = Judge(definition)(own, own_choice(judge)).objective
+        objective_before = Judge(definition)(*judge.point_of(judge.values)).objective
     except InputError:
         before, objective_before = None, float("nan")
     scales = dict(judge.labels)
