@@ -20,7 +20,10 @@ from types import ModuleType
 from railsim.threads import one_thread_each
 
 PRELOADED = "railsim.studies.worker"
-REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+REQUESTS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+FORKSERVER = "forkserver" in multiprocessing.get_all_start_methods()  # not on Windows
 # variables by which a process does something else
 NAMES = ("HOME", "PATH", "TMPDIR")
 BEGINNINGS = ("RAILSIM_", "NUMBA_", "XDG_", "PYTHON", "OPENBLAS_", "MKL_", "OMP_")
@@ -29,7 +32,7 @@ _environment: dict[str, str] = {}  # of the server; empty before it begins
 
 def begin_server() -> None:
     """Let the server begin, to be there when workers are wanted; once is enough."""
-    if _environment:
+    if _environment or not FORKSERVER:
         return
     _environment.update(_that_matter())
     with workers_begin():
@@ -66,7 +69,7 @@ def workers_begin() -> Iterator[None]:
 def worker_context() -> BaseContext:
     """Return how worker processes begin: as copies of the server, where it suits."""
     begin_server()
-    same = _environment == _that_matter()
+    same = FORKSERVER and _environment == _that_matter()
     return multiprocessing.get_context("forkserver" if same else "spawn")
 
 
@@ -81,12 +84,16 @@ def _that_matter() -> dict[str, str]:
 
 def hear_requests() -> None:
     """Let this process, a worker, end on what ends processes, except for Ctrl-C."""
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS[1:])
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS[1:])
 
 
 @contextmanager
 def signals_later(signals: Sequence[signal.Signals] = REQUESTS[:1]) -> Iterator[None]:
     """Let signals wait for the end of the block; processes that begin in it never hear them."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         yield

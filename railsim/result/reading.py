@@ -9,6 +9,7 @@ than it has bytes on the disk.  Arrays are read when they are first asked for.
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -68,7 +69,7 @@ def open_result(path: str | Path) -> Result:
         found = "not a regular file" if os.path.lexists(path) else "there is no such file"
         found = "a folder" if os.path.isdir(path) else found
         raise InputError([Fault(str(path), "", found, "give a result file (.h5)")])
-    try:
+    with _readable(path):
         if path.stat().st_size == 0:
             raise InputError([Fault(str(path), "", "the file is empty", AS_WRITTEN)])
         stamp = _stamp(os.stat(path))
@@ -76,10 +77,6 @@ def open_result(path: str | Path) -> Result:
         with h5py.File(path, "r") as file:
             _refuse_another(path, file, stamp)
             return _Reader(file, path, stamp).result(whole=whole)
-    except InputError:
-        raise
-    except Exception as error:  # HDF5 and h5py raise every kind
-        raise _unreadable(path, "", error) from None
 
 
 def open_run(path: str | Path) -> Result:
@@ -163,14 +160,9 @@ class StoredArrays(FrozenArrays):
         return self._loaded[name][rows] if name in self._loaded else self._read(name, rows)
 
     def _read(self, name: str, rows: slice | tuple[()] = ()) -> Array:
-        try:
-            with h5py.File(self._absolute, "r") as file:
-                _refuse_another(self._path, file, self._stamp)
-                return frozen(file[name][rows])
-        except InputError:
-            raise
-        except Exception as error:
-            raise _unreadable(self._path, name, error) from None
+        with _readable(self._path, name), h5py.File(self._absolute, "r") as file:
+            _refuse_another(self._path, file, self._stamp)
+            return frozen(file[name][rows])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._shapes)
@@ -195,14 +187,22 @@ def _refuse_another(path: Path, file: h5py.File, stamp: tuple[int, ...]) -> None
         raise InputError([Fault(str(path), "", found, "open it again")])
 
 
-def _unreadable(path: Path, name: str, error: Exception) -> InputError:
-    words = " ".join(str(error).split())
-    if isinstance(error, OSError) and error.errno is not None and error.strerror:
-        words = os.strerror(error.errno)
-    words = words if len(words) <= 160 else f"{words[:157]}..."
-    is_hdf5 = isinstance(error, OSError) and "signature not found" in words
-    found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
-    return InputError([Fault(str(path), name, found, "give a result of railsim; " + REMEDY)])
+@contextmanager
+def _readable(path: Path, name: str = "") -> Iterator[None]:
+    """Refuse what cannot be read within the block: HDF5 and h5py raise every kind of exception."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        words = " ".join(str(error).split())
+        if isinstance(error, OSError) and error.errno is not None and error.strerror:
+            words = os.strerror(error.errno)
+        words = words if len(words) <= 160 else f"{words[:157]}..."
+        is_hdf5 = isinstance(error, OSError) and "signature not found" in words
+        found = "not an HDF5 file" if is_hdf5 else f"cannot be read ({words})"
+        allowed = "give a result of railsim; " + REMEDY
+        raise InputError([Fault(str(path), name, found, allowed)]) from None
 
 
 class _Reader:
@@ -265,11 +265,9 @@ class _Reader:
         if len(group) > MOST_MEMBERS:
             raise self.fault(above, f"{len(group)} members", f"{MOST_MEMBERS} at most")
         for name in group:
-            try:
+            with _readable(self._path, above + name):
                 link = group.get(name, getlink=True)
                 member = group[name] if isinstance(link, h5py.HardLink) else None
-            except Exception as error:
-                raise _unreadable(self._path, above + name, error) from None
             if isinstance(member, h5py.Dataset):
                 self._check_dataset(above + name, member)
             elif not isinstance(member, h5py.Group):
@@ -313,10 +311,8 @@ class _Reader:
             if key in ("DIMENSION_LIST", "REFERENCE_LIST"):
                 continue
             location = f"{name}.{key}" if name else key
-            try:
+            with _readable(self._path, location):
                 value = thing.attrs[key]
-            except Exception as error:
-                raise _unreadable(self._path, location, error) from None
             value = value.item() if isinstance(value, np.generic) else value
             if isinstance(value, bytes):  # a text of fixed length
                 value = value.decode("utf-8", errors="replace")
@@ -377,10 +373,8 @@ class _Reader:
     def _labels(self, name: str, dataset: h5py.Dataset) -> tuple[str, ...]:
         if dataset.ndim != 1:
             raise self.fault(name, f"its shape is {dataset.shape}", "a list of names")
-        try:
+        with _readable(self._path, name):
             labels = tuple(text.decode("utf-8") for text in dataset[()].tolist())
-        except Exception as error:
-            raise _unreadable(self._path, name, error) from None
         if len(set(labels)) < len(labels):
             raise self.fault(name, "a name occurs twice", REMEDY)
         return labels
@@ -390,10 +384,8 @@ class _Reader:
         if name in QUANTITIES:
             return QUANTITIES[name]
         facts = self._attributes(dataset, name)
-        try:
+        with _readable(self._path, name):
             dims = tuple(scale.keys()[0] if len(scale) else "" for scale in dataset.dims)
-        except Exception as error:
-            raise _unreadable(self._path, name, error) from None
         unit = str(facts.get("units", "1"))
         scale = facts.get("shown_scale", 1.0)
         if isinstance(scale, str) or not math.isfinite(scale):
@@ -412,10 +404,8 @@ class _Reader:
     def _floats(self, name: str, dataset: h5py.Dataset) -> Array:
         if dataset.dtype.kind == "S":
             raise self.fault(name, "names instead of numbers")
-        try:
+        with _readable(self._path, name):
             return frozen(dataset[()])
-        except Exception as error:
-            raise _unreadable(self._path, name, error) from None
 
     def _profile(self, name: str, dataset: h5py.Dataset) -> Profile:
         points, facts = self._floats(name, dataset), self._attributes(dataset, name)
