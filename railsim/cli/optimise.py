@@ -5,12 +5,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import echo, names_of, output_options, print_json, show, text_table
+from railsim.cli.common import echo, names_of, output_options, print_json, show
 from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
-    from railsim.studies.designs import Design
     from railsim.studies.optimise import Optimisation
     from railsim.table import Table
 
@@ -98,34 +97,27 @@ def command(
 
 
 def _lines(found: "Optimisation") -> "list[str | Table]":
-    from railsim.studies.designs import values_by_name
+    from railsim.table import Table
 
-    definition = found.definition
     if found.chosen is None:
         reasons = {design.reason for design in found.designs if design.reason}
         why = f": {sorted(reasons)[0]}" if reasons else ""
         return [f"none of {len(found.designs)} designs keeps all constraints{why}"]
-    header = ["", "design", *(path.removeprefix("vehicle.") for path in definition.variables)]
     step = math.ceil(len(found.front) / MOST_ROWS)
     shown = [*found.front[::step]]
     if found.chosen not in shown:
         shown.append(found.chosen)
-    values = values_by_name(definition, shown)
-    header += values
+    designs, ends = found.table(), 3  # feasible, front and reason are for spreadsheets
     rows = [
-        _row(design, list(numbers), design is found.chosen)
-        for design, numbers in zip(shown, zip(*values.values(), strict=True), strict=True)
+        ["chosen" if design is found.chosen else "", *designs.rows[design.number - 1][:-ends]]
+        for design in shown
     ]
+    table = Table(["", *designs.columns[:-ends]], rows)
     number = f"front of {len(found.front)} in {len(found.designs)} designs"
-    lines: list[str | Table] = [number, "", text_table(header, rows, numbers=1), ""]
+    lines: list[str | Table] = [number, "", table, ""]
     lines += [f"active: {words}" for words in found.active]
     for one in found.sensitivities:
         shares = sorted(one.total.items(), key=lambda item: -item[1])
         words = ", ".join(f"{p.removeprefix('vehicle.')} {100.0 * s:.0f} %" for p, s in shares)
         lines.append(f"{one.quantity} depends on: {words}")
     return [*lines, *map(str, found.vehicles), str(found.folder / "front.png")]
-
-
-def _row(design: "Design", values: list[float], chosen: bool) -> list[str]:
-    numbers = (*design.variables.values(), *values)
-    return ["chosen" if chosen else "", str(design.number), *(f"{value:.5g}" for value in numbers)]

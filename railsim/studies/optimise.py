@@ -5,9 +5,7 @@ the study: an optimisation that is started again proposes the same designs and f
 the journal.  Begin reading in `optimise`; `search.py` proposes designs.
 """
 
-import csv
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +39,7 @@ from railsim.studies.search import Task, search
 from railsim.studies.sensitivity import Sensitivity, sensitivities
 from railsim.studies.spec import Execution, checked
 from railsim.studies.summary import unit_of
+from railsim.table import Column, Table
 
 NEAR_BOUND = 0.01  # tolerance, as a share of a range or a limit, within which it counts as reached
 INPUT_BYTES = 1_000_000
@@ -88,6 +87,30 @@ class Optimisation:
         signs = signs_of(self.definition)
         front = np.array([design.objectives for design in self.front]).reshape(-1, len(signs))
         return hypervolume(signs * front, signs * np.array(reference))
+
+    def table(self) -> Table:
+        """Return all designs with variables, objectives and constraints [SI]."""
+        values = values_by_name(self.definition, self.designs)
+        on_front = {design.number for design in self.front}
+        variables = [
+            Column(path, path.removeprefix("vehicle."), format=".5g")
+            for path in self.definition.variables
+        ]
+        columns = [Column("design", format="d"), *variables]
+        columns += [Column(name, format=".5g") for name in values]
+        numbers = zip(*values.values(), strict=True)
+        rows = [
+            [
+                design.number,
+                *design.variables.values(),
+                *of_design,
+                int(design.feasible),
+                int(design.number in on_front),
+                design.reason,
+            ]
+            for design, of_design in zip(self.designs, numbers, strict=True)
+        ]
+        return Table([*columns, "feasible", "front", "reason"], rows)
 
     def record(self) -> dict[str, Any]:
         """Return everything as plain data [SI]."""
@@ -292,7 +315,8 @@ def _write(found: Optimisation) -> None:
     with whole_file(found.folder / "optimise.json") as partial:
         text = json.dumps(finite(found.record()), indent=1, allow_nan=False)
         partial.write_text(text + "\n", encoding="utf-8")
-    _write_designs(found)
+    with whole_file(found.folder / "designs.csv") as partial:
+        partial.write_text(found.table().csv(), encoding="utf-8")
     labels = [with_unit(one) for one in found.definition.objectives]
     values = np.array([design.objectives for design in found.designs])
     feasible = np.array([design.feasible for design in found.designs])
@@ -306,23 +330,3 @@ def _write(found: Optimisation) -> None:
         names = [units[one.quantity] for one in found.sensitivities]
         figure = sensitivity_figure([one.record() for one in found.sensitivities], names)
         save(figure, found.folder / "sensitivities.png", overwrite=True)
-
-
-def _write_designs(found: Optimisation) -> None:
-    definition = found.definition
-    names = ["design", *definition.variables]
-    values = values_by_name(definition, found.designs)
-    names += values
-    on_front = {design.number for design in found.front}
-    with (
-        whole_file(found.folder / "designs.csv") as partial,
-        open(partial, "w", encoding="utf-8", newline="") as stream,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*names, "feasible", "front", "reason"])
-        columns = zip(*values.values(), strict=True)
-        for design, own in zip(found.designs, columns, strict=True):
-            numbers = (*design.variables.values(), *own)
-            cells = ["" if math.isnan(number) else number for number in numbers]
-            on = design.number in on_front
-            writer.writerow([design.number, *cells, int(design.feasible), int(on), design.reason])
