@@ -5,7 +5,7 @@ slow ends: there the stable motion meets an unstable one and turns back.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -91,7 +91,19 @@ def followed_branches(
             f"{1e3 * seed.amplitude:.2f} mm at {seed.speed:.4g} m/s,"
         )
         _follow(found, lambda seed=seed: _at(motion, seed), speeds, name)  # type: ignore[misc]
+    found.branches = [settled_to(branch, pieces) for branch in found.branches]
     return found
+
+
+def settled_to(branch: Branch, pieces: Sequence[Sequence[Point]]) -> Branch:
+    """The branch with the motions stable that runs settle to, whatever their multipliers."""
+    return Branch(
+        branch.direction,
+        [
+            replace(point, stable=point.stable or _is_covered(point, pieces))
+            for point in branch.points
+        ],
+    )
 
 
 def _follow(

@@ -377,15 +377,22 @@ def _conclude(found: CriticalSpeed, prepared: LinearVehicle, begins: float | Non
         found.type = "supercritical"
     # EN 14363: sum_Y 10 kN + 2 Q0/3, of which the instability criterion takes half as rms
     force = 0.5 * (10e3 + 2.0 * float(np.min(prepared.Q0)) / 3.0)
-    branches = [_above_its_end(branch, found.nonlinear.get("ramp")) for branch in found.branches]
+    # a ramp passes the end of a branch late
+    branches = [branch for branch in found.branches if branch.direction != "ramp"]
+    only_ramp = not branches
+    if only_ramp:
+        branches = [_above_its_end(branch, lowest) for branch in found.branches]
     found.amplitude_limit = first_beyond(branches, AMPLITUDE_LIMIT, "amplitude", found.high)
     found.instability_limit = first_beyond(branches, force, "sum_Y_rms", found.high)
+    if only_ramp and (found.amplitude_limit.reached or found.instability_limit.reached):
+        found.remarks.append(
+            "limits: lowest speeds on the falling ramp; at constant speed they are exceeded from "
+            "up to 2 m/s above (bifurcation)"
+        )
 
 
 def _above_its_end(branch: Branch, lowest: Point | None) -> Branch:
-    """A branch; of a ramp, which undershoots its end, what lies above that."""
-    if branch.direction != "ramp":
-        return branch
+    """What of a ramp lies above the end of its branch."""
     end = np.inf if lowest is None else lowest.speed
     return Branch(branch.direction, [point for point in branch.points if point.speed >= end])
 
