@@ -9,10 +9,10 @@ from railsim.definitions.base import Definition, Finite, Name, NonNegative, Posi
 
 # units of the numbers, by what stands behind the analysis' name
 UNITS = {
-    "damping": "", "frequency": "Hz", "linear": "m/s", "ramp": "m/s", "bifurcation": "m/s",
-    "continuation": "m/s", "T_gamma": "N", "T_gamma_largest": "N", "Q": "N", "Y": "N",
-    "sum_Y": "N", "sum_abs_Y": "N", "attack": "rad", "lateral": "m", "car_roll": "rad",
-}  # fmt: skip
+    **dict.fromkeys(("linear", "ramp", "bifurcation", "continuation"), "m/s"),
+    **dict.fromkeys(("T_gamma", "T_gamma_largest", "Q", "Y", "sum_Y", "sum_abs_Y"), "N"),
+    **{"frequency": "Hz", "attack": "rad", "lateral": "m", "car_roll": "rad"},
+}
 
 
 class RunAnalysis(Definition):

@@ -150,11 +150,9 @@ def _paths(node: Any, before: tuple[str, ...] = ()) -> Iterator[list[str]]:
         members = [(str(key), value) for key, value in node.items()]
     elif isinstance(node, list):
         vector = len(node) == len(AXES) and all(_is_number(value) for value in node)
-        names = AXES if vector else [
-            str(m["name"]) if isinstance(m, dict) and "name" in m else str(i)
-            for i, m in enumerate(node)
-        ]  # fmt: skip
-        members = list(zip(names, node, strict=True))
+        named = [isinstance(m, dict) and "name" in m for m in node]
+        names = [str(m["name"] if named[i] else i) for i, m in enumerate(node)]
+        members = list(zip(AXES if vector else names, node, strict=True))
     else:
         return
     for key, value in members:

@@ -17,7 +17,7 @@ slab         rail CHN60 (EI 6.62 MN m2, 60.64 kg/m) on fastenings of 40 MN/m and
              per length; the lateral part as co-running (assumed)
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, WithJsonSchema, model_validator
@@ -48,23 +48,9 @@ FactorRows = Annotated[
 
 @dataclass(frozen=True)
 class SupportValues:
-    """All values of a support, preset and single keys together.
+    """All values of a support, preset and single keys together; see `Support`.
 
-    Attributes
-    ----------
-    rail_mass : float
-        Mass of a rail [kg].
-    pad_vertical, pad_lateral : (float, float)
-        Stiffness [N/m] and damping [N s/m] between a rail and the sleeper.
-    sleeper_mass, sleeper_inertia : float
-        Mass [kg] and moment of inertia in roll [kg m2].
-    ballast_vertical : (float, float) or None
-        Stiffness and damping under each half of the sleeper; None where the pads stand on firm
-        ground.
-    ballast_lateral : (float, float) or None
-        Stiffness and damping of the whole sleeper.
-    ballast_base : float
-        Lateral distance of the ballast's vertical springs from the track's middle [m].
+    Without `ballast_vertical` the pads stand on firm ground.
     """
 
     rail_mass: float
@@ -120,15 +106,7 @@ _CO_RUNNING = SupportValues(
 )
 PRESETS: dict[str, SupportValues | None] = {
     "rigid": None,
-    "ballasted": SupportValues(
-        0.0,
-        _CO_RUNNING.pad_vertical,
-        _CO_RUNNING.pad_lateral,
-        0.0,
-        0.0,
-        _CO_RUNNING.ballast_vertical,
-        _CO_RUNNING.ballast_lateral,
-    ),
+    "ballasted": replace(_CO_RUNNING, rail_mass=0.0, sleeper_mass=0.0, sleeper_inertia=0.0),
     "co-running": _CO_RUNNING,
     "p2": SupportValues(245.0, (62e6, 55.4e3), _CO_RUNNING.pad_lateral),
     "slab": _slab(),
@@ -194,12 +172,8 @@ class Support(Definition):
 
     @staticmethod
     def _damped(values: SupportValues) -> bool:
-        parts = [
-            values.pad_vertical,
-            values.pad_lateral,
-            values.ballast_vertical,
-            values.ballast_lateral,
-        ]
+        pads, ballast = values.pad_vertical, values.ballast_vertical
+        parts = [pads, values.pad_lateral, ballast, values.ballast_lateral]
         return all(part[1] > 0.0 for part in parts if part is not None)
 
     @property
@@ -208,9 +182,5 @@ class Support(Definition):
         base = PRESETS[self.preset]
         if base is None:
             return None
-        return SupportValues(
-            **{
-                name: getattr(base, name) if getattr(self, name) is None else getattr(self, name)
-                for name in SupportValues.__dataclass_fields__
-            }
-        )
+        own = {name: getattr(self, name) for name in SupportValues.__dataclass_fields__}
+        return replace(base, **{name: value for name, value in own.items() if value is not None})

@@ -82,7 +82,7 @@ class TrackElement(Definition):
 
     type: str
     length: Length
-    """Length [m]"""
+    """Length along the centre line [m]"""
 
     @property
     def ends(self) -> tuple[float | None, float | None]:

@@ -124,10 +124,10 @@ def _between(positions: Array, values: Array, slopes: Array) -> Array:
     """Cubic Hermite interpolation at seven positions within every interval between the rows."""
     h = np.diff(positions)
     t = _INNER
+    rest = 1.0 - t
     basis = np.stack(
-        ((1.0 + 2.0 * t) * (1.0 - t) ** 2, t * (1.0 - t) ** 2, t**2 * (3.0 - 2.0 * t),
-         t**2 * (t - 1.0))
-    )  # fmt: skip
+        ((1.0 + 2.0 * t) * rest**2, t * rest**2, t**2 * (3.0 - 2.0 * t), -(t**2) * rest)
+    )
     ends = (values[..., :-1], h * slopes[..., :-1], values[..., 1:], h * slopes[..., 1:])
     return np.asarray(np.stack(ends, axis=-1) @ basis)
 
