@@ -10,21 +10,44 @@ from railsim.files import check_file
 
 @click.command()
 @click.argument("file", metavar="R.h5")
+@click.argument("quantities", nargs=-1, metavar="[QUANTITY]...")
 @click.option("--out", required=True, metavar="F", help="File: .csv, .mat or .parquet.")
+@click.option("--between", type=float, nargs=2, metavar="A B", help="Section of the track, m.")
+@click.option("--rate", type=float, metavar="N", help="Values per second, low-pass filtered.")
+@click.option(
+    "--units",
+    type=click.Choice(["si", "shown"]),
+    default="si",
+    show_default=True,
+    help="SI, or those of tables and plots: kN, mm.",
+)
 @output_options
-def command(file: str, out: str, overwrite: bool, as_json: bool, quiet: bool) -> None:
-    """Write a result as CSV, for MATLAB and Octave, or as Parquet.
+def command(
+    file: str,
+    quantities: tuple[str, ...],
+    out: str,
+    between: tuple[float, float] | None,
+    rate: float | None,
+    units: str,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Write a result, or some of its quantities, as CSV, for MATLAB and Octave, or as Parquet.
 
     CSV and Parquet have a column for each wheel, body or sensor of each quantity; a MATLAB file
-    holds the arrays with their dimensions.  All numbers are SI.
+    holds the arrays with their dimensions.
 
     \b
     Example:
       railsim export run.h5 --out run.mat
+      railsim export run.h5 Q Y --between 300 400 --rate 50 --units shown --out curve.csv
     """  # noqa: D301 - click reads the escape
     from railsim.result import open_run
-    from railsim.result.export import ENDINGS, export
+    from railsim.result.export import ENDINGS, export, selected
 
     check_file(Path(out), overwrite=overwrite, endings=ENDINGS)
-    path = export(open_run(file), out, overwrite=overwrite)
+    shown = units == "shown"
+    part = selected(open_run(file), quantities, between=between, rate=rate, shown_units=shown)
+    path = export(part, out, overwrite=overwrite)
     report_file(path, as_json=as_json, quiet=quiet)

@@ -6,17 +6,22 @@ their names with their dimensions, and ``units``, names and facts of the run as 
 """
 
 import csv
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from railsim.errors import InputError, argument_fault
+from railsim.errors import InputError, argument_fault, nearest
 from railsim.files import check_file, whole_file
 from railsim.result.data import Array, Result
+from railsim.result.filters import low_passed
 
 ENDINGS = (".csv", ".mat", ".parquet")
 ROWS_AT_ONCE = 4096
+POSITIONS = ("time", "distance", "mileage", "wheelset_distance")
+"""Quantities that are not filtered."""
 
 
 def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -33,6 +38,82 @@ def export(result: Result, path: str | Path, *, overwrite: bool = False) -> Path
     with whole_file(path) as partial:
         write(result, partial)
     return path
+
+
+def selected(
+    result: Result,
+    quantities: Sequence[str] = (),
+    *,
+    between: tuple[float, float] | None = None,
+    rate: float | None = None,
+    shown_units: bool = False,
+) -> Result:
+    """Return a part of a result: some quantities over a section, in other units.
+
+    Parameters
+    ----------
+    result : Result
+    quantities : sequence of str
+        Names; by default all.  Time and distance are kept always.
+    between : (float, float), optional
+        Section of the track, by the distance of the reference body [m].
+    rate : float, optional
+        Values at equal times, as many per second, interpolated linearly; values that change
+        faster than half of it are filtered before (`low_passed`) [1/s].
+    shown_units : bool
+        In the units of tables and plots (kN, mm) instead of SI.
+
+    Raises
+    ------
+    InputError
+        A quantity that the result does not have; a section that was not run; a rate that is no
+        number above 0.
+    """
+    faults = [
+        argument_fault("quantities", name, "no such quantity", nearest(name, result), "QUANTITY")
+        for name in quantities
+        if name not in result
+    ]
+    time, distance = result["time"], result["distance"]
+    low, high = between or (-np.inf, np.inf)
+    rows = np.flatnonzero((distance >= low) & (distance <= high))
+    if between and len(rows) < 2:
+        found = f"{low:g} to {high:g} m"
+        allowed = f"within {distance[0]:.1f} to {distance[-1]:.1f} m"
+        faults.append(argument_fault("between", "", found, allowed, "--between"))
+    if rate is not None and not 0.0 < rate < np.inf:
+        faults.append(argument_fault("rate", "", f"found {rate:g}", "above 0 per s", "--rate"))
+    if faults:
+        raise InputError(faults)
+    wanted = dict.fromkeys(["time", "distance", *(quantities or result)])
+    chosen = {name: quantity for name, quantity in result.quantities.items() if name in wanted}
+    instants = time[rows]
+    if rate is not None and len(rows):
+        instants = np.arange(instants[0], instants[-1] + 1e-9, 1.0 / rate)
+    arrays = {}
+    for name, quantity in chosen.items():
+        array = result[name]
+        if quantity.dims[:1] == ("time",):
+            smooth = array if rate is None or name in POSITIONS else _smooth(time, array, rate)
+            array = array[rows] if rate is None else _at(instants, time, smooth)
+        arrays[name] = array * (quantity.scale if shown_units else 1.0)
+    if shown_units:
+        chosen = {name: replace(one, unit=one.shown_unit) for name, one in chosen.items()}
+    return Result(arrays, chosen, result.coordinates, result.attributes, result.profiles)
+
+
+def _smooth(time: Array, values: Array, rate: float) -> Array:
+    """Return values without what changes faster than half the rate; as they are at uneven times."""
+    steps = np.diff(time[:-1])  # the last one may be shorter
+    if len(steps) < 2 or np.ptp(steps) > 1e-6 * steps[0] or rate * steps[0] >= 1.0:
+        return values
+    return low_passed(values, 1.0 / float(np.mean(steps)), 0.4 * rate)
+
+
+def _at(instants: Array, time: Array, values: Array) -> Array:
+    series = values.reshape(len(time), -1).T
+    found = np.array([np.interp(instants, time, one) for one in series])
+    return found.T.reshape(len(instants), *values.shape[1:])
 
 
 def _columns(result: Result) -> list[tuple[str, str, Array]]:

@@ -1,0 +1,58 @@
+"""``railsim export``: choice of quantities, section, rate and units."""
+
+import csv
+
+import numpy as np
+import pytest
+from example_result import example_result
+
+import railsim
+from railsim.cli import main
+from railsim.result.export import selected
+
+
+@pytest.fixture(scope="module")
+def result():
+    return example_result()
+
+
+def test_a_section_of_some_quantities_in_the_units_of_tables(result, tmp_path):
+    file, out = result.to_hdf5(tmp_path / "run.h5"), tmp_path / "part.csv"
+    begin, end = 0.25 * result.distance[-1], 0.5 * result.distance[-1]
+    arguments = ["export", str(file), "Q", "wheelset_yaw", "--between", str(begin), str(end)]
+    assert main([*arguments, "--units", "shown", "--out", str(out)]) == 0
+    with out.open(encoding="utf-8") as stream:
+        header, *rows = csv.reader(stream)
+    assert header[:3] == ["time (s)", "distance (m)", f"Q:{result.wheelsets[0]}:left (kN)"]
+    assert header[-1] == f"wheelset_yaw:{result.wheelsets[-1]} (mrad)"
+    inside = (result.distance >= begin) & (result.distance <= end)
+    values = np.array(rows, dtype=float)
+    np.testing.assert_allclose(values[:, 1], result.distance[inside])
+    np.testing.assert_allclose(values[:, 2], 1e-3 * result.Q[inside, 0, 0])
+
+
+def test_units_of_positions_and_angles_are_shown_ones_too(result):
+    part = selected(result, ["body_position"], shown_units=True)
+    assert part.quantities["body_position"].component("yaw").unit == "mrad"
+    np.testing.assert_array_equal(part.body_position, 1e3 * result.body_position)
+
+
+def test_values_at_a_lower_rate_are_filtered(result):
+    part = selected(result, ["sum_Y"], rate=5.0)
+    np.testing.assert_allclose(np.diff(part.time), 0.2)
+    assert part.sum_Y.shape == (len(part.time), *result.sum_Y.shape[1:])
+    # a slow quantity stays what it is
+    inner = part.time[5:-5]
+    expected = np.interp(inner, result.time, result.distance)
+    np.testing.assert_allclose(part.distance[5:-5], expected, rtol=1e-3)
+
+
+def test_all_that_is_wrong_is_named_at_once(result, tmp_path, capsys):
+    file = result.to_hdf5(tmp_path / "run.h5")
+    wrong = ["export", str(file), "QQ", "--between", "1e6", "2e6", "--rate", "-1"]
+    assert main([*wrong, "--out", str(tmp_path / "a.csv")]) == 2
+    words = capsys.readouterr().err
+    for part in ("QQ: no such quantity", "--between: ", "--rate: "):
+        assert part in words
+    with pytest.raises(railsim.InputError, match="rate"):
+        selected(result, rate=np.nan)
