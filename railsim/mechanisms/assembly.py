@@ -29,25 +29,13 @@ IN_LOOP = 1e-3
 
 @dataclass(frozen=True)
 class OpenLoop:
-    """A loop that cannot close.
+    """A loop that cannot close."""
 
-    Attributes
-    ----------
-    joints : tuple of str
-        Its joints, in the order of the file.
-    blamed : str
-        The rod of the loop, else the joint that is furthest open.
-    gap : float
-        How far that joint stays open with all others closed; of a rod, distance of its points less
-        its length [m].
-    rod : bool
-        Whether the blamed joint is a rod.
-    """
-
-    joints: tuple[str, ...]
-    blamed: str
-    gap: float
-    rod: bool
+    joints: tuple[str, ...]  # in the order of the file
+    blamed: str  # the rod of the loop, else the joint that is furthest open
+    gap: float  # how far that joint stays open with all others closed; of a rod, distance of its
+    # points less its length [m]
+    rod: bool  # whether the blamed joint is a rod
 
     def __str__(self) -> str:
         loop = ", ".join(f"'{name}'" for name in self.joints)
@@ -58,18 +46,9 @@ class OpenLoop:
 
 
 def assembled(model: Model, s: float, pose: Floats, arcs: NDArray[np.int64]) -> Floats | None:
-    """The assembly at a value of the driver near a pose; None where there is none.
+    """The assembly at a value of the driver near a pose (n_bodies + 1, 3); None where none is.
 
-    Parameters
-    ----------
-    model : Model
-        A real model.
-    s : float
-        Driver [rad or m].
-    pose : float64, shape (n_bodies + 1, 3)
-        Where it is looked for.
-    arcs : int64, shape (joint,)
-        Arc of every cam's roller.
+    `arcs` are those of every cam's roller, shape (joint,).
     """
     generator = np.random.default_rng(0)
     for amount in TRIES:

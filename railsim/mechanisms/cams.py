@@ -85,18 +85,8 @@ def _transition(dense: Motion, joint: str, row: int, k: int) -> Transition:
 def on_one_arc(motion: Motion, row: int, arc: int, beyond: float) -> Motion | None:
     """Positions with the roller kept on one arc, also a bit beyond where it leaves it.
 
-    Parameters
-    ----------
-    motion : Motion
-        Positions, some of them with the roller on the arc.
-    row, arc : int
-        The cam's row among the kernel's joints; the arc.
-    beyond : float
-        Range of the driver to go on by, within the mechanism's range [rad or m].
-
-    Returns
-    -------
-    Motion or None : None where the links cannot be assembled so far.
+    The cam is a row of the kernel's joints; `beyond` is a range of the driver, within that of the
+    mechanism [rad or m].  None where the links cannot be assembled so far.
     """
     on = np.flatnonzero(motion.arcs[:, row] == arc)
     linkage = motion.model.linkage

@@ -26,20 +26,11 @@ COILS = 8
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the drawing.
+    """A line of the drawing."""
 
-    Attributes
-    ----------
-    kind : {'body', 'link', 'guide', 'cam', 'actuator', 'spring', 'damper'}
-    name : str
-        Part that it shows.
-    xy : ndarray, shape (position, point, 2)
-        [m]
-    """
-
-    kind: str
-    name: str
-    xy: Floats
+    kind: str  # body, link, guide, cam, actuator, spring or damper
+    name: str  # part that it shows
+    xy: Floats  # shape (position, point, 2) [m]
 
 
 def lines(motion: Motion) -> list[Line]:

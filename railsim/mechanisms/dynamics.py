@@ -166,20 +166,10 @@ def free_motion(
     speed: float = 0.0,
     force: Callable[[float, Motion], Any] | None = None,
 ) -> FreeMotion:
-    """Motion from given position and speed under the elements' forces: `M s'' = Q - M' s'^2/2`.
+    """Motion from a position and speed under the elements' forces: `M s'' = Q - M' s'^2/2`.
 
-    Parameters
-    ----------
-    model : Model
-        The mechanism.
-    start, until : float
-        Values of the driver where it begins and ends [rad or m].
-    duration : float
-        Time after which it ends in any case [s].
-    speed : float
-        Rate of the driver at the start.
-    force : callable, optional
-        Further generalised force of time and position.
+    From and to values of the driver [rad or m], for the duration at most [s]; `force` is a further
+    generalised force of time and position.
 
     Raises
     ------

@@ -21,16 +21,8 @@ ZOOMS, ZOOMED = 7, 9
 def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
     """Values of the driver at which a quantity has given values; NaN where it never has them.
 
-    The first crossing along the motion counts; Newton's method within its bracket.
-
-    Parameters
-    ----------
-    motion : Motion
-        Positions dense enough to bracket the values.
-    quantity : callable
-        The quantity and its derivative.
-    values : array_like, shape (value,)
-        What it shall be.
+    The first crossing along the motion counts, whose positions must be dense enough to bracket the
+    values; Newton's method within its bracket.
     """
     wanted = np.atleast_1d(np.asarray(values, dtype=float))
     known, _ = quantity(motion)
@@ -50,22 +42,15 @@ def driver_at(motion: Motion, quantity: Quantity, values: ArrayLike) -> Floats:
             share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.5
             guess[i] = low[i] + share * (high[i] - low[i])
     there = np.isfinite(guess)
-    guess[there] = _refined(
-        motion.model, quantity, wanted[there], guess[there], low[there], high[there], size
-    )
+    bracket = (low[there], high[there])
+    guess[there] = _refined(motion.model, quantity, wanted[there], guess[there], bracket, size)
     return guess
 
 
 def _refined(
-    model: Model,
-    quantity: Quantity,
-    wanted: Floats,
-    s: Floats,
-    low: Floats,
-    high: Floats,
-    size: float,
+    model: Model, quantity: Quantity, wanted: Floats, s: Floats, bracket: Any, size: float
 ) -> Floats:
-    left, right = np.minimum(low, high), np.maximum(low, high)
+    left, right = np.sort(bracket, axis=0)
     span = max(abs(model.end - model.start), 1e-300)
     for _ in range(ITERATIONS):
         if not len(s):
@@ -111,17 +96,8 @@ def zeros(motion: Motion, function: Callable[[Motion], Any]) -> list[float]:
 def largest(motion: Motion, function: Callable[[Motion], Any], known: Any) -> tuple[float, float]:
     """Largest value of a function of the motion between its positions: driver's value, value.
 
-    The neighbourhood of the largest of the known values is searched in ever smaller steps; the
-    function need not be smooth.
-
-    Parameters
-    ----------
-    motion : Motion
-        Positions dense enough to have the largest value between neighbours of the largest known.
-    function : callable
-        The function of a motion, shape (position,).
-    known : array_like, shape (position,)
-        Its values at the positions of the motion.
+    The neighbourhood of the largest of the known values, one at each position of the motion, is
+    searched in ever smaller steps; the function need not be smooth.
     """
     s, values = motion.s, np.asarray(known)
     if not np.any(np.isfinite(values)):

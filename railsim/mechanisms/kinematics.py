@@ -29,26 +29,14 @@ BEYOND = 1e-3
 
 @dataclass(frozen=True)
 class Motion:
-    """Positions of all bodies.
-
-    Attributes
-    ----------
-    model : Model
-        The mechanism.
-    s : ndarray, shape (..., position)
-        Driver [rad or m].
-    q, q1, q2 : ndarray, shape (..., position, body, 3)
-        x, y, theta and their derivatives by the driver; body 0 is the ground.
-    arcs : int64 ndarray, shape (position, joint)
-        Arc on which each cam's roller is.
-    """
+    """Positions of all bodies; shapes (..., position), with a first axis for lanes."""
 
     model: Model
-    s: NDArray[Any]
-    q: NDArray[Any]
-    q1: NDArray[Any]
+    s: NDArray[Any]  # driver [rad or m]
+    q: NDArray[Any]  # x, y, theta, (..., position, body, 3); body 0 is the ground
+    q1: NDArray[Any]  # its derivatives by the driver
     q2: NDArray[Any]
-    arcs: NDArray[np.int64]
+    arcs: NDArray[np.int64]  # arc on which each cam's roller is, (position, joint)
     known: dict[str, Triple] = field(default_factory=dict, repr=False, compare=False)
 
     def point(self, name: str) -> Triple:

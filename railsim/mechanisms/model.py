@@ -26,31 +26,15 @@ STEP = 1e-30
 
 @dataclass(frozen=True)
 class Model:
-    """A mechanism ready to be computed.
-
-    Attributes
-    ----------
-    definition : Mechanism
-        What the file says.
-    values : dict
-        Values of the parameters: floats, or complex arrays of shape (lane, 1).
-    linkage : Linkage
-        The arrays of the kernel.
-    points, bodies : dict
-        Number of every point and body by name; the ground is body 0.
-    pose : float64, shape (body, 3)
-        Where the assembly at the start is looked for.
-    start, end : float
-        Range of the driver [rad or m].
-    """
+    """A mechanism ready to be computed."""
 
     definition: Mechanism
-    values: dict[str, Any]
-    linkage: Linkage
-    points: dict[str, int]
-    bodies: dict[str, int]
-    pose: NDArray[np.float64]
-    start: float
+    values: dict[str, Any]  # of the parameters: floats, or complex arrays of shape (lane, 1)
+    linkage: Linkage  # arrays of the kernel
+    points: dict[str, int]  # number of every point by name
+    bodies: dict[str, int]  # and of every body; the ground is body 0
+    pose: NDArray[np.float64]  # where the assembly at the start is looked for, (body, 3)
+    start: float  # range of the driver [rad or m]
     end: float
 
     def number(self, quantity: float | str) -> Values:
@@ -109,14 +93,7 @@ class Model:
 
 
 def build(definition: Mechanism, changed: Mapping[str, Any] | None = None) -> Model:
-    """Return the model of a mechanism.
-
-    Parameters
-    ----------
-    definition : Mechanism
-        What the file says.
-    changed : mapping of str to float or complex ndarray of shape (lane, 1), optional
-        Values of parameters instead of the file's.
+    """Return the model of a mechanism; `changed` are values instead of the file's.
 
     Raises
     ------

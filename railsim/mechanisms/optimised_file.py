@@ -16,16 +16,8 @@ def optimised_text(
 ) -> str:
     """Return the text of the file.
 
-    Parameters
-    ----------
-    base : str
-        Path or name of the file that was searched, as the new one must name it.
-    optimum : Optimum
-        What was found.
-    assignments : sequence of str
-        Overrides ``key.path=value`` that were in force.
-    case : str or None
-        Case that was in force; its parameters are written down.
+    `base` is the searched file as the new one must name it; the overrides ``key.path=value`` and
+    the parameters of the case that were in force are written down.
     """
     definition = optimum.definition
     data: dict[str, Any] = {}

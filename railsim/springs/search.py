@@ -74,58 +74,28 @@ class BuiltSpring:
 
 @dataclass(frozen=True)
 class Nest:
-    """A feasible nest with rounded dimensions.
-
-    Attributes
-    ----------
-    outer, inner : BuiltSpring
-        The springs.
-    mass : float
-        Mass of both [kg].
-    fatigue_margin : float
-        The smaller one of the two springs' margins, `inf` without a table `[fatigue]`.
-    mounting_error, target_error : float
-        Deviation from the wanted deflections that rounding leaves [m].
-    active : tuple of str
-        Limits that hold the optimum in place, before rounding.
-    slack : dict of str to float
-        Relative distance to each limit, as built.
-    """
+    """A feasible nest with rounded dimensions."""
 
     outer: BuiltSpring
     inner: BuiltSpring
-    mass: float
-    fatigue_margin: float
-    mounting_error: float
+    mass: float  # of both [kg]
+    fatigue_margin: float  # the smaller one of the springs' margins, inf without a table [fatigue]
+    mounting_error: float  # deviation from the wanted deflections that rounding leaves [m]
     target_error: float
-    active: tuple[str, ...]
-    slack: Mapping[str, float]
+    active: tuple[str, ...]  # limits that hold the optimum in place, before rounding
+    slack: Mapping[str, float]  # relative distance to each limit, as built
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Feasible nests, the best first.
+    """Feasible nests, the best first."""
 
-    Attributes
-    ----------
-    nests : tuple of Nest
-        One for each pair of wires, ranked.
-    objective : str
-        What they are ranked by.
-    tried, feasible : int
-        Number of candidates and how many of them kept every limit.
-    broken : dict of str to int
-        Number of candidates that broke a limit, by limit.
-    cloud : ndarray, shape (feasible, 2)
-        Mass [kg] and fatigue margin of the feasible candidates.
-    """
-
-    nests: tuple[Nest, ...]
-    objective: str
-    tried: int
-    feasible: int
-    broken: Mapping[str, int]
-    cloud: Floats
+    nests: tuple[Nest, ...]  # one for each pair of wires, ranked
+    objective: str  # what they are ranked by
+    tried: int  # candidates
+    feasible: int  # and how many of them kept every limit
+    broken: Mapping[str, int]  # number of candidates that broke a limit, by limit
+    cloud: Floats  # mass [kg] and fatigue margin of the feasible candidates, (feasible, 2)
 
 
 def search(suspension: TrailingArmSuspension) -> SearchResult:

@@ -32,25 +32,13 @@ _INNERMOST_ARRAY = re.compile(r"\[\n([^\[\]]+)\]")
 
 @dataclass(frozen=True)
 class VehiclePart:
-    """The parts of a vehicle file that a suspension gives.
+    """The parts of a vehicle file that a suspension gives."""
 
-    Attributes
-    ----------
-    assembly : str
-        Dotted key of the assembly that holds them.
-    axleboxes, elements : dict
-        Tables of the assembly.
-    case : Case
-        The load at which the springs are taken.
-    remarks : tuple of str
-        What the vehicle model cannot carry over.
-    """
-
-    assembly: str
-    axleboxes: dict[str, Any]
+    assembly: str  # dotted key of the assembly that holds them
+    axleboxes: dict[str, Any]  # tables of the assembly
     elements: dict[str, Any]
-    case: Case
-    remarks: tuple[str, ...]
+    case: Case  # the load at which the springs are taken
+    remarks: tuple[str, ...]  # what the vehicle model cannot carry over
 
 
 def axlebox_load(vehicle: FlatVehicle) -> float:
@@ -70,12 +58,7 @@ def axlebox_load(vehicle: FlatVehicle) -> float:
 def vehicle_part(suspension: TrailingArmSuspension, load: str | None = None) -> VehiclePart:
     """Return a suspension's parts of a vehicle file.
 
-    Parameters
-    ----------
-    suspension : TrailingArmSuspension
-        The file's content, with a table `[vehicle]`.
-    load : str, optional
-        Name of the load at which the springs are taken; by default that of the table.
+    The springs are taken at a named load, by default that of the table `[vehicle]`.
 
     Raises
     ------
@@ -110,16 +93,8 @@ def vehicle_text(
 ) -> str:
     """Return the text of a vehicle file that replaces the primary suspension of another one.
 
-    Parameters
-    ----------
-    suspension : TrailingArmSuspension
-        The file's content.
-    part : VehiclePart
-        Its parts of the vehicle.
-    extends : str, optional
-        Vehicle file to extend; by default that of the table `[vehicle]`.
-    remove : sequence of str, optional
-        Parts of that vehicle to remove; by default those of the table.
+    The vehicle file that it extends, and the parts of it to remove, are by default those of the
+    table `[vehicle]`.
     """
     table = suspension.vehicle
     if table is None:
