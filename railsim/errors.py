@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,20 @@ class InputError(RailsimError):
 
 class ModelError(RailsimError):
     """A model was asked for something outside its range of validity."""
+
+
+def optional_package(name: str, method: str, install: str) -> Any:
+    """Return a package that a method needs and that may not be installed.
+
+    Raises
+    ------
+    ImportError : it is not; with the command that installs it.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        words = f"{method} needs {name}; install it with: pip install {install}"
+        raise ImportError(words) from None
 
 
 LONGEST_NAME = 200

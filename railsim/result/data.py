@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.errors import InputError, nearest
+from railsim.errors import InputError, nearest, optional_package
 from railsim.notation import Quantity
 from railsim.plottable import picture_of
 from railsim.profiles.profile import Profile
@@ -392,12 +392,7 @@ class Result:
         ImportError
             Xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise ImportError(
-                "to_xarray needs xarray; install it with: pip install 'railsim[xarray]'"
-            ) from None
+        package = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         variables = {
             name: (
                 quantity.dims,
@@ -410,7 +405,8 @@ class Result:
         for name in ("time", "distance"):
             if name in variables:
                 coords[name] = variables.pop(name)
-        return xarray.Dataset(variables, coords, dict(self._attributes))
+        data: xarray.Dataset = package.Dataset(variables, coords, dict(self._attributes))
+        return data
 
     def to_pandas(self, *names: str) -> "pandas.DataFrame":
         """Return quantities over time as a `pandas.DataFrame`.
@@ -432,12 +428,7 @@ class Result:
         ImportError
             Pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError(
-                "to_pandas needs pandas; install it with: pip install 'railsim[pandas]'"
-            ) from None
+        pandas = optional_package("pandas", "to_pandas", "'railsim[pandas]'")
         found = list(self.columns(*names))
         columns = {column: values for column, _, values in found}
         frame = pandas.DataFrame(columns, index=pandas.Index(self["time"], name="time"))

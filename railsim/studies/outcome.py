@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from railsim.errors import optional_package
 from railsim.result import Result, open_result
 from railsim.studies.journal import NOT_DONE, Records
 from railsim.studies.records import Record
@@ -59,19 +60,15 @@ class Outcome:
         ------
         ImportError : pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError(
-                "to_dataframe needs pandas; install it with: pip install pandas"
-            ) from None
-        rows = [summary_row(record) for record in self.records]
-        frame = pandas.DataFrame(rows)
-        labels = [name for name in dict.fromkeys(n for r in self.records for n in r["labels"])]
-        for name in labels:  # values of a grid are texts, as in a file
+        pandas = optional_package("pandas", "to_dataframe", "pandas")
+        frame = pandas.DataFrame([summary_row(record) for record in self.records])
+        for name in self._labels():  # values of a grid are texts, as in a file
             with suppress(ValueError, TypeError):
                 frame[name] = pandas.to_numeric(frame[name])
         return frame
+
+    def _labels(self) -> list[str]:
+        return list(dict.fromkeys(name for record in self.records for name in record["labels"]))
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the numbers of the summary as an `xarray.Dataset` with the grid as dimensions.
@@ -83,22 +80,18 @@ class Outcome:
         ------
         ImportError : pandas or xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise ImportError(
-                "to_xarray needs xarray; install it with: pip install 'railsim[xarray]'"
-            ) from None
+        package = optional_package("xarray", "to_xarray", "'railsim[xarray]'")
         frame = self.to_dataframe()
-        labels = list(dict.fromkeys(name for record in self.records for name in record["labels"]))
+        labels = self._labels()
         varied = [name for name in labels if frame[name].nunique(dropna=False) > 1]
         numbers = frame.select_dtypes("number").columns.difference(labels, sort=False)
         full = math.prod(frame[name].nunique() for name in varied) == len(frame)
+        data: xarray.Dataset
         if varied and full and not frame.duplicated(varied).any():
-            data = xarray.Dataset.from_dataframe(frame.set_index(varied)[list(numbers)])
+            data = package.Dataset.from_dataframe(frame.set_index(varied)[list(numbers)])
         else:
             indexed = frame.set_index("name").rename_axis("run")
-            data = xarray.Dataset.from_dataframe(indexed[[*varied, *numbers]]).set_coords(varied)
+            data = package.Dataset.from_dataframe(indexed[[*varied, *numbers]]).set_coords(varied)
         for name in data:
             data[name].attrs["units"] = unit_of(str(name)) or "1"
         return data
