@@ -14,14 +14,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from railsim.cli.common import echo, print_json
-from railsim.cli.interrupts import Interrupted, obey, remembered_interrupts
+from railsim.cli.interrupts import Interrupted, raise_pending_signal, remembered_interrupts
 from railsim.cli.streams import silence, usable_streams
 from railsim.errors import InputError, ModelError, RailsimError, fault_lines, words_of
 from railsim.threads import use_one_thread
@@ -35,45 +34,45 @@ COMPLETE = "_RAILSIM_COMPLETE"  # by which a shell asks for completions
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 
-# name of a command: its module in this package, and what it does
+# name of a command, and what it does
 COMMANDS = {
-    "run": ("run", "One vehicle on one track: one HDF5 file and a table of peak values."),
-    "study": ("study", "Every combination of vehicles, tracks and speeds."),
-    "optimise": ("optimise", "Parameters of a vehicle against objectives and constraints."),
-    "compare": ("compare", "Results side by side: tables and overlaid plots."),
-    "plot": ("plot", "Time histories of a result; a track in plan."),
-    "animate": ("animate", "A vehicle and its contacts moving along the track."),
-    "report": ("report", "One page of inputs, tables against limits and plots."),
-    "export": ("export", "A result as CSV, for MATLAB, or as Parquet."),
-    "assess": ("assess", "Running safety and ride comfort of results."),
-    "modes": ("modes", "Eigenfrequencies, damping and mode shapes of a vehicle."),
-    "critical-speed": ("critical_speed", "Linear and non-linear critical speed."),
-    "curving": ("curving", "Steady curving over radius, cant deficiency and friction."),
-    "stationary": ("stationary", "Standing on twisted track and on cant, against limits."),
-    "wear": ("wear", "Wheel profile over the distance run, with the worn profile run again."),
-    "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
-    "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
-    "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),
-    "list": ("library", "Available vehicles, tracks, profiles and design files."),
-    "validate": ("validate", "Check files and list every fault."),
-    "info": ("info", "Contents of a vehicle, track or result file on one screen."),
-    "bench": ("bench", "The runtime benchmark on this machine."),
+    "run": "One vehicle on one track: one HDF5 file and a table of peak values.",
+    "study": "Every combination of vehicles, tracks and speeds.",
+    "optimise": "Parameters of a vehicle against objectives and constraints.",
+    "compare": "Results side by side: tables and overlaid plots.",
+    "plot": "Time histories of a result; a track in plan.",
+    "animate": "A vehicle and its contacts moving along the track.",
+    "report": "One page of inputs, tables against limits and plots.",
+    "export": "A result as CSV, for MATLAB, or as Parquet.",
+    "assess": "Running safety and ride comfort of results.",
+    "modes": "Eigenfrequencies, damping and mode shapes of a vehicle.",
+    "critical-speed": "Linear and non-linear critical speed.",
+    "curving": "Steady curving over radius, cant deficiency and friction.",
+    "stationary": "Standing on twisted track and on cant, against limits.",
+    "wear": "Wheel profile over the distance run, with the worn profile run again.",
+    "contact": "Contact geometry of a wheel on a rail, equivalent conicity.",
+    "spring": "Trailing-arm suspension: design and verify its coil springs.",
+    "mechanism": "Planar linkages: kinematics, forces, optimisation.",
+    "list": "Available vehicles, tracks, profiles and design files.",
+    "validate": "Check files and list every fault.",
+    "info": "Contents of a vehicle, track or result file on one screen.",
+    "bench": "The runtime benchmark on this machine.",
 }
+MODULES = {"list": "library"}  # others are called as their commands
 
 
 class LazyGroup(click.Group):
     """A group whose commands are imported when they are called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of the commands that this version has."""
-        here = Path(__file__).parent
-        return [name for name, (module, _) in COMMANDS.items() if _has(here, module)]
+        """Return the names of the commands."""
+        return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import and return a command."""
-        if cmd_name not in self.list_commands(ctx):
+        if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"railsim.cli.{COMMANDS[cmd_name][0]}")
+        module = import_module(f"railsim.cli.{MODULES.get(cmd_name, cmd_name.replace('-', '_'))}")
         command: click.Command = module.command
         return command
 
@@ -81,10 +80,10 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that the arguments begin with; a wrong name gets the nearest one."""
-        if args and args[0] not in self.list_commands(ctx) and not args[0].startswith("-"):
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             from railsim.errors import nearest
 
-            ctx.fail(f"no command '{args[0]}'; {nearest(args[0], self.list_commands(ctx))}")
+            ctx.fail(f"no command '{args[0]}'; {nearest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -92,19 +91,15 @@ class LazyGroup(click.Group):
         if incomplete.startswith("-"):
             return super().shell_complete(ctx, incomplete)
         return [
-            CompletionItem(name, help=COMMANDS[name][1])
-            for name in self.list_commands(ctx)
+            CompletionItem(name, help=words)
+            for name, words in COMMANDS.items()
             if name.startswith(incomplete)
         ]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name][1]) for name in self.list_commands(ctx)])
-
-
-def _has(folder: Path, module: str) -> bool:
-    return (folder / f"{module}.py").exists() or (folder / module / "__init__.py").exists()
+            formatter.write_dl([*COMMANDS.items()])
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -170,13 +165,13 @@ def _status(arguments: list[str]) -> int:
             faults = [fault.on_command_line() for fault in error.faults]
             for line in fault_lines(faults):
                 echo(line, err=True)
-            return _told(arguments, WRONG_INPUT, {"faults": [asdict(fault) for fault in faults]})
+            return _failed(arguments, WRONG_INPUT, {"faults": [asdict(fault) for fault in faults]})
         except ModelError as error:
             echo(f"railsim: {error}", err=True)
-            return _told(arguments, WRONG_INPUT, {"error": str(error)})
+            return _failed(arguments, WRONG_INPUT, {"error": str(error)})
         except RailsimError as error:
             echo(f"railsim: {error}", err=True)
-            return _told(arguments, FAILED, {"error": str(error)})
+            return _failed(arguments, FAILED, {"error": str(error)})
         except (KeyboardInterrupt, click.Abort) as interrupt:
             request = interrupt if isinstance(interrupt, Interrupted) else Interrupted()
             echo(f"railsim: {request}", err=True)
@@ -193,7 +188,7 @@ def _status(arguments: list[str]) -> int:
             return FAILED
 
 
-def _told(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int:
+def _failed(arguments: Sequence[str], status: int, words: dict[str, Any]) -> int:
     """Print the error, as JSON if requested; return the status."""
     if "--json" in arguments:
         print_json({"exit_status": status, **words})
@@ -211,10 +206,10 @@ def _called(arguments: list[str]) -> int:
     try:
         status = _invoked(arguments)
     except Exception:
-        obey()
+        raise_pending_signal()
         raise
     if status not in (DONE, ENDED_EARLY, LIMIT_EXCEEDED):
-        obey()
+        raise_pending_signal()
     return status
 
 
@@ -229,5 +224,5 @@ def _invoked(arguments: list[str]) -> int:
         if where is not None:
             echo(where.get_usage(), err=True)
         echo(f"railsim: {error.format_message()}", err=True)
-        return _told(arguments, WRONG_INPUT, {"error": error.format_message()})
+        return _failed(arguments, WRONG_INPUT, {"error": error.format_message()})
     return status if isinstance(status, int) else DONE

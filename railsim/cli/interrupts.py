@@ -3,8 +3,8 @@
 Python raises the exception of a signal between any two of its instructions.  If these belong to a
 callback of the import system or of the compiler, or to a finaliser, the exception is printed and
 forgotten ("Exception ignored in ..."); a library that is being loaded may turn it into another one.
-So the signal is remembered as well, and looked at where the work goes on: see `obey`; what Python
-would print of the lost exception is left out.
+So the signal is remembered as well, and looked at where the work goes on, by
+`raise_pending_signal`; what Python would print of the lost exception is left out.
 
 And Python raises nothing at all for as long as one call outside it takes: compiling the time loop
 is minutes.  So a thread listens too; where the program has not ended `PATIENCE` after a signal, it
@@ -116,7 +116,7 @@ def _hear(number: int, _: FrameType | None) -> None:
     raise Interrupted(number)
 
 
-def obey() -> None:
+def raise_pending_signal() -> None:
     """Raise what was heard and lost.
 
     Raises

@@ -13,7 +13,7 @@ from threading import Event, Thread, main_thread
 from typing import Any
 
 from railsim.cli.common import echo
-from railsim.cli.interrupts import obey
+from railsim.cli.interrupts import raise_pending_signal
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing
 COMPILING = "preparing: compiling (after an installation; one to three minutes, kept for later)"
@@ -58,9 +58,9 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     quiet : bool
         Show nothing at all.  Without a terminal there is no bar either.
     """
-    obey()
+    raise_pending_signal()
     if quiet:
-        yield lambda _: obey()
+        yield lambda _: raise_pending_signal()
         return
     from tqdm import tqdm
 
@@ -80,7 +80,7 @@ def progress_bar(words: str, *, quiet: bool) -> Iterator[Callable[[float], None]
     before, handler = doing.level, _Words(bar, words)
 
     def show(fraction: float) -> None:
-        obey()
+        raise_pending_signal()
         bar.update(fraction - bar.n)
 
     doing.setLevel(logging.INFO)

@@ -1,16 +1,14 @@
 """``railsim validate``: check files and list every fault."""
 
 import os
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from railsim.cli.common import echo, json_option, print_json, quiet_option, remarks_on
 from railsim.files import RESULTS, is_file
-
-if TYPE_CHECKING:
-    from railsim.errors import Fault
 
 PROFILE_SUFFIXES = {".csv", ".txt", ".dat", ".prw", ".prr", ".ban", ".whl"}
 
@@ -33,7 +31,7 @@ def command(files: tuple[str, ...], as_json: bool, quiet: bool) -> int:
 
     reports = [_report(file) for file in files]
     if as_json:
-        print_json(reports)
+        print_json([_record(report) for report in reports])
     else:
         for report in reports:
             _print(report, quiet)
@@ -46,22 +44,19 @@ def _report(file: str) -> dict[str, Any]:
     try:
         kind, remarks = checked(file)
     except InputError as error:
-        faults = [_record(fault) for fault in error.faults]
-        return {"file": file, "kind": None, "faults": faults, "remarks": []}
+        return {"file": file, "kind": None, "faults": list(error.faults), "remarks": []}
     return {"file": file, "kind": kind, "faults": [], "remarks": remarks}
 
 
-def _record(fault: "Fault") -> dict[str, str]:
-    keys = ("file", "key", "found", "allowed")
-    return {key: getattr(fault, key) for key in keys} | {"text": str(fault)}
+def _record(report: dict[str, Any]) -> dict[str, Any]:
+    faults = [{**asdict(fault), "text": str(fault)} for fault in report["faults"]]
+    return {**report, "faults": faults}
 
 
 def _print(report: dict[str, Any], quiet: bool) -> None:
-    from railsim.errors import Fault, fault_lines
+    from railsim.errors import fault_lines
 
-    faults = [Fault(*(fault[key] for key in ("file", "key", "found", "allowed")))
-              for fault in report["faults"]]  # fmt: skip
-    for line in fault_lines(faults):
+    for line in fault_lines(report["faults"]):
         echo(line, err=True)
     if quiet or report["faults"]:
         return
