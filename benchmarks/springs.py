@@ -13,7 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from railsim.definitions.loading import load_spring
-from railsim.report.springs import as_png, collected, figures, page
+from railsim.report.document import as_png
+from railsim.report.springs import collected, figures, page
 from railsim.springs.design import design
 from railsim.springs.nests import evaluate, task_of
 from railsim.springs.search import candidates, search
