@@ -27,7 +27,7 @@
     BEYOND,
     NORMAL_STIFFNESS,
     NORMAL_DAMPING,
-    LEAD,
+    FOOT_X_PER_YAW,
     FOOT_X,
     FOOT_Y,
     FOOT_Z,

@@ -20,25 +20,15 @@ from railsim.kernels.contact_columns import (
     T_Y,
 )
 from railsim.kernels.support import (
-    D_Y_ROLL,
     D_Y_SLIP,
-    D_Y_Y,
-    D_Y_Z,
-    D_Z_ROLL,
     D_Z_SLIP,
-    D_Z_Y,
-    D_Z_Z,
     FOOT_Y_STIFFNESS,
     FOOT_Z_STIFFNESS,
-    K_Y_ROLL,
-    K_Y_Y,
-    K_Y_Z,
-    K_Z_ROLL,
-    K_Z_Y,
-    K_Z_Z,
     SKIP,
     STIFFNESS,
     SUPPORT_COLUMNS,
+    D,
+    K,
 )
 
 
@@ -94,6 +84,14 @@ def begin_support(support, support_step):
                 support[w, side, k] = 0.0
 
 
+@compiled(inline=True)
+def add_to_row(row, first, factor, vector):
+    """Add a factor times a vector to three entries of a row."""
+    row[first] += factor * vector[0]
+    row[first + 1] += factor * vector[1]
+    row[first + 2] += factor * vector[2]
+
+
 @compiled(python=False)
 def add_slopes(work, w, side, k, across):
     """Add to the derivatives of the forces on a rail what patch `k` contributes.
@@ -102,31 +100,26 @@ def add_slopes(work, w, side, k, across):
     with it, being nearly proportional to N; T_y by the slope of the creep law, `across`, times
     t d'.
     """
-    support, patch = work.support, work.patch
+    patch = work.patch
     s, c = patch[ANGLE_SIN, k], patch[ANGLE_COS, k]
     cy, cz = patch[FOOT_Y, k], patch[FOOT_Z, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
     f_y, f_z = s + share * c, c - share * s
     stiffness, damping = patch[NORMAL_STIFFNESS, k], patch[NORMAL_DAMPING, k]
     lever = c * cy - s * cz  # of the normal about the wheelset's centre
-    support[w, side, K_Y_Y] += stiffness * f_y * s
-    support[w, side, K_Y_Z] += stiffness * f_y * c
-    support[w, side, K_Y_ROLL] += stiffness * f_y * lever
-    support[w, side, K_Z_Y] += stiffness * f_z * s
-    support[w, side, K_Z_Z] += stiffness * f_z * c
-    support[w, side, K_Z_ROLL] += stiffness * f_z * lever
     arm = -c * cz - s * cy  # of the tangent
-    support[w, side, D_Y_Y] += damping * f_y * s + across * c * c
-    support[w, side, D_Y_Z] += damping * f_y * c - across * c * s
-    support[w, side, D_Y_ROLL] += damping * f_y * lever + across * c * arm
-    support[w, side, D_Z_Y] += damping * f_z * s - across * s * c
-    support[w, side, D_Z_Z] += damping * f_z * c + across * s * s
-    support[w, side, D_Z_ROLL] += damping * f_z * lever - across * s * arm
-    support[w, side, D_Y_SLIP] += across * c * c
-    support[w, side, D_Z_SLIP] -= across * s * c
-    support[w, side, FOOT_Y_STIFFNESS] += stiffness * cy
-    support[w, side, FOOT_Z_STIFFNESS] += stiffness * cz
-    support[w, side, STIFFNESS] += stiffness
+    contact, normal = work.support[w, side], (s, c, lever)
+    add_to_row(contact, K, stiffness * f_y, normal)
+    add_to_row(contact, K + 3, stiffness * f_z, normal)
+    add_to_row(contact, D, damping * f_y, normal)
+    add_to_row(contact, D + 3, damping * f_z, normal)
+    add_to_row(contact, D, across * c, (c, -s, arm))
+    add_to_row(contact, D + 3, -across * s, (c, -s, arm))
+    contact[D_Y_SLIP] += across * c * c
+    contact[D_Z_SLIP] -= across * s * c
+    contact[FOOT_Y_STIFFNESS] += stiffness * cy
+    contact[FOOT_Z_STIFFNESS] += stiffness * cz
+    contact[STIFFNESS] += stiffness
 
 
 @compiled(python=False)
@@ -136,30 +129,20 @@ def add_damping(work, b, k, across):
     Across, -T_y t with the slope `across` of the creep law; along the normal, -(N n + T_y t) with
     the contact damping, the creep force being nearly proportional to N.
     """
-    jacobian, patch = work.contact_jacobian, work.patch
+    row, patch = work.contact_jacobian[b], work.patch
     s, c = patch[NORMAL_Y, k], patch[NORMAL_Z, k]
     cy, cz = patch[C_Y, k], patch[C_Z, k]
     arm = -c * cz - s * cy
     lever = c * cy - s * cz
-    jacobian[b, J_SLIP] += across * c * c
-    jacobian[b, J_SLIP + 1] -= across * c * s
-    jacobian[b, J_SLIP + 2] += across * c * arm
-    jacobian[b, J_SLIP + 3] += across * s * s
-    jacobian[b, J_SLIP + 4] -= across * s * arm
-    jacobian[b, J_SLIP + 5] += across * arm * arm
+    row[J_SLIP] += across * c * c
+    row[J_SLIP + 1] -= across * c * s
+    row[J_SLIP + 2] += across * c * arm
+    row[J_SLIP + 3] += across * s * s
+    row[J_SLIP + 4] -= across * s * arm
+    row[J_SLIP + 5] += across * arm * arm
     damping = patch[NORMAL_DAMPING, k]
     share = patch[T_Y, k] / patch[NORMAL, k]
-    f_y, f_z, f_roll = (
-        damping * (s + share * c),
-        damping * (c - share * s),
-        damping * (lever + share * arm),
-    )
-    jacobian[b, J_NORMAL] += f_y * s
-    jacobian[b, J_NORMAL + 1] += f_y * c
-    jacobian[b, J_NORMAL + 2] += f_y * lever
-    jacobian[b, J_NORMAL + 3] += f_z * s
-    jacobian[b, J_NORMAL + 4] += f_z * c
-    jacobian[b, J_NORMAL + 5] += f_z * lever
-    jacobian[b, J_NORMAL + 6] += f_roll * s
-    jacobian[b, J_NORMAL + 7] += f_roll * c
-    jacobian[b, J_NORMAL + 8] += f_roll * lever
+    normal = s, c, lever
+    add_to_row(row, J_NORMAL, damping * (s + share * c), normal)
+    add_to_row(row, J_NORMAL + 3, damping * (c - share * s), normal)
+    add_to_row(row, J_NORMAL + 6, damping * (lever + share * arm), normal)

@@ -8,9 +8,9 @@ from railsim.kernels.contact_columns import (
     C_Y,
     C_Z,
     FOOT_X,
+    FOOT_X_PER_YAW,
     FOOT_Y,
     FOOT_Z,
-    LEAD,
     NORMAL_Y,
     NORMAL_Z,
     PATCH_SPEED,
@@ -72,7 +72,7 @@ def creepages(system, work, n, speed, state):
         cx -= turn_z * cz
         more = w3 * (x + cx) - w1 * (z + cz) - roll_slope * (z + cz - plane[w, MIDDLE_Z])
         turn_y = slope + more
-        cx -= (patch[LEAD, k] + cy) * more
+        cx -= (patch[FOOT_X_PER_YAW, k] + cy) * more
         # velocity of the wheel's material against that of the rail, along the rail and across it
         rail_y, rail_z = (
             work.rail_motion[w, side, MOTION_Y_RATE],

@@ -119,9 +119,9 @@ LAWS_SIZE = 10 * LANES
 
 
 @compiled(python=False)
-def note_stop(laws, force, coming):
-    """Note how fast the force of a stop changes from `force` to `coming`."""
-    laws[RATE_OF_STOPS] = max(laws[RATE_OF_STOPS], abs(coming - force) / laws[AHEAD])
+def note_stop(laws, force, next_force):
+    """Note how fast the force of a stop changes from `force` to `next_force`."""
+    laws[RATE_OF_STOPS] = max(laws[RATE_OF_STOPS], abs(next_force - force) / laws[AHEAD])
 
 
 @compiled(python=False)

@@ -50,9 +50,9 @@ RAIL_SIZE = 8
 MOTION_Y, MOTION_Z, MOTION_Y_RATE, MOTION_Z_RATE = range(4)
 MOTION_SIZE = 4
 
-# columns of Work.coming[side], by how much the rates of a wheel beside its rail are about to change
-COMING_Y, COMING_Z, COMING_ROLL = range(3)
-COMING = 4
+# columns of Work.rate_change[side]: how the rates of a wheel beside its rail are about to change
+CHANGE_Y, CHANGE_Z, CHANGE_ROLL = range(3)
+CHANGES = 4
 
 
 @compiled
@@ -116,14 +116,14 @@ def locate_displaced(c, i, u, w, plane, rail):
 
 
 @compiled(python=False)
-def foresee(system, work, w, state):
+def predict_rate_changes(system, work, w, state):
     """How the rates of wheelset `w` beside its rails will have changed after `AHEAD`.
 
     The rails' slopes are those where the wheelset will then be; the wheelset is taken to keep its
-    acceleration, so that nothing changes for one that follows its rails.  Of `Work.coming` are
+    acceleration, so that nothing changes for one that follows its rails.  Of `Work.rate_change` are
     written rates of y, z [m/s] and roll [rad/s] by side; zero beyond the end of the track's table.
     """
-    plane, rail, coming, h = work.plane, work.rail, work.coming, work.watch[AHEAD]
+    plane, rail, rate_change, h = work.plane, work.rail, work.rate_change, work.watch[AHEAD]
     b = system.contact.body[w]
     speed = state[SPEED]
     own = 12 * system.bodies.kind.shape[0] + system.internal.kind.shape[0] + 6 * b
@@ -139,9 +139,11 @@ def foresee(system, work, w, state):
             _, z_slope, _ = polynomial(c[i, z, 0], c[i, z, 1], c[i, z, 2], c[i, z, 3], u)
         arm = (side - 0.5) * CANT_BASE * plane[w, COSINE]
         now = plane[w, SLOPE_Z] + arm * plane[w, ROLL_SLOPE]
-        coming[side, COMING_Y] = change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[own + 1]
-        coming[side, COMING_Z] = change * (now - z_slope) + h * state[own + 2]
-        coming[side, COMING_ROLL] = h * state[own + 3]
+        rate_change[side, CHANGE_Y] = (
+            change * (rail[w, side, RAIL_SLOPE] - y_slope) + h * state[own + 1]
+        )
+        rate_change[side, CHANGE_Z] = change * (now - z_slope) + h * state[own + 2]
+        rate_change[side, CHANGE_ROLL] = h * state[own + 3]
 
 
 @compiled(inline=True)

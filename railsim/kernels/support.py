@@ -69,11 +69,10 @@ MOST_CORRECTIONS, MOST_BALANCES = 10, 50
 ) = range(14)
 SUPPORT_ROW = 14
 
-# columns of Work.support[w, side]: forces on the rail, their derivatives by the wheel's y, z and
-# roll and by their rates
-F_Y, F_Z = 0, 1
-K_Y_Y, K_Y_Z, K_Y_ROLL, K_Z_Y, K_Z_Z, K_Z_ROLL = range(2, 8)
-D_Y_Y, D_Y_Z, D_Y_ROLL, D_Z_Y, D_Z_Z, D_Z_ROLL = range(8, 14)
+# columns of Work.support[w, side]: forces on the rail; two matrices of two rows (y, z), their
+# derivatives by the wheel's y, z and roll and by their rates
+F_Y, F_Z, K, D = 0, 1, 2, 8
+Y_Y, Y_Z, Z_Y, Z_Z = 0, 1, 3, 4  # entries of such a matrix
 # and by a lateral slip that is no motion of wheel or rail, from the wheelset's yaw
 D_Y_SLIP, D_Z_SLIP = 14, 15
 # position of the contact from the wheelset's centre times its stiffness, and that stiffness
@@ -85,8 +84,8 @@ SUPPORT_COLUMNS = 24  # whole cache lines
 # before the step, see `note_wheelset`, and the factors of pads and ballast
 MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
 # imbalance of the rails one correction ago, what corrections are multiplied by, and whether one
-# waits for the next step
-BEFORE, STRETCH, WAITS = DOF + 13, DOF + 17, DOF + 19
+# is left to the next step
+BEFORE, RELAXATION, PENDING = DOF + 13, DOF + 17, DOF + 19
 # whether its contact is not to be evaluated again
 SKIP = DOF + 20
 SUPPORT_STEP = 32
@@ -121,7 +120,7 @@ def locate_support(system, work, s):
     No correction of the rails waits in an evaluation that has only begun.
     """
     for w in range(work.support_step.shape[0]):
-        work.support_step[w, WAITS] = 0.0
+        work.support_step[w, PENDING] = 0.0
         work.support_step[w, SKIP] = 0.0
         work.support_step[w, PADS] = 1.0
         work.support_step[w, BALLAST] = 1.0
@@ -166,6 +165,26 @@ def track_forces(support, track, u, first, k, c, out, sign):
         out[6] += much * (k * row[K_BALLAST_ROLL] + c * row[C_BALLAST_ROLL]) * u[first + 6] - roll
 
 
+@compiled(inline=True)
+def product(contact, matrix, y, z, roll):
+    """Matrix K or D of a contact times a motion of the wheel against the rail: forces (Y, Q)."""
+    m = matrix
+    return (
+        contact[m] * y + contact[m + 1] * z + contact[m + 2] * roll,
+        contact[m + 3] * y + contact[m + 4] * z + contact[m + 5] * roll,
+    )
+
+
+@compiled(inline=True)
+def rail_matrix(contact, y, z, c, k):
+    """Matrix of a rail's y and z, row by row, c D + k K with `y` and `z` on its diagonal; 1/det."""
+    p = y + c * contact[D + Y_Y] + k * contact[K + Y_Y]
+    q = c * contact[D + Y_Z] + k * contact[K + Y_Z]
+    r = c * contact[D + Z_Y] + k * contact[K + Z_Y]
+    t = z + c * contact[D + Z_Z] + k * contact[K + Z_Z]
+    return p, q, r, t, 1.0 / (p * t - q * r)
+
+
 @compiled(python=False)
 def solve_track(support, track, side, m, c, k):
     """Solve (m M + c (C + D) + k (K + K_c)) x = b for one wheelset's track.
@@ -192,15 +211,10 @@ def solve_track(support, track, side, m, c, k):
     b_y, b_z, b_r = track[4], track[5], track[6]
     for i in range(2):
         arm = (2.0 * i - 1.0) * base
-        p = rail + a_y + c * side[i, D_Y_Y] + k * side[i, K_Y_Y]
-        q = c * side[i, D_Y_Z] + k * side[i, K_Y_Z]
-        r = c * side[i, D_Z_Y] + k * side[i, K_Z_Y]
-        t = rail + a_z + c * side[i, D_Z_Z] + k * side[i, K_Z_Z]
-        inverse = 1.0 / (p * t - q * r)
+        p, q, r, t, inverse = rail_matrix(side[i], rail + a_y, rail + a_z, c, k)
         x_y = inverse * (t * track[2 * i] - q * track[2 * i + 1])
         x_z = inverse * (p * track[2 * i + 1] - r * track[2 * i])
-        track[2 * i] = x_y
-        track[2 * i + 1] = x_z
+        track[2 * i], track[2 * i + 1] = x_y, x_z
         if support.sleeper:
             b_y += a_y * x_y
             b_z += a_z * x_z
@@ -219,8 +233,8 @@ def solve_track(support, track, side, m, c, k):
             s_ry += arm * e_zy
             s_rz += arm * e_zz
             s_rr += base * base * e_zz
-    track[4], track[5], track[6] = 0.0, 0.0, 0.0
     if not support.sleeper:
+        track[4], track[5], track[6] = 0.0, 0.0, 0.0
         return
     # the matrix is far from singular: ballast on its diagonal
     f = s_zy / s_yy
@@ -238,11 +252,7 @@ def solve_track(support, track, side, m, c, k):
     track[4], track[5], track[6] = y, z, roll
     for i in range(2):
         arm = (2.0 * i - 1.0) * base
-        p = rail + a_y + c * side[i, D_Y_Y] + k * side[i, K_Y_Y]
-        q = c * side[i, D_Y_Z] + k * side[i, K_Y_Z]
-        r = c * side[i, D_Z_Y] + k * side[i, K_Z_Y]
-        t = rail + a_z + c * side[i, D_Z_Z] + k * side[i, K_Z_Z]
-        inverse = 1.0 / (p * t - q * r)
+        p, q, r, t, inverse = rail_matrix(side[i], rail + a_y, rail + a_z, c, k)
         f_y, f_z = a_y * y, a_z * (z + arm * roll)
         track[2 * i] += inverse * (t * f_y - q * f_z)
         track[2 * i + 1] += inverse * (p * f_z - r * f_y)
@@ -350,12 +360,12 @@ def complete_slopes(system, work, state):
             i = support_begin(system) + SUPPORT_SIZE * w + LEARNT + LEARNT_SIZE * side
             if state[i + L_PATCHES] != contact[PATCHES]:
                 continue
-            contact[K_Y_Y] += state[i + L_Y_Y]
-            contact[K_Z_Y] += state[i + L_Z_Y]
+            contact[K + Y_Y] += state[i + L_Y_Y]
+            contact[K + Z_Y] += state[i + L_Z_Y]
             across = max(-LEAST_SHARE * contact[D_Y_SLIP], state[i + L_Y_SLIP])
-            contact[D_Y_Y] += across
+            contact[D + Y_Y] += across
             contact[D_Y_SLIP] += across
-            contact[D_Z_Y] += state[i + L_Z_SLIP]
+            contact[D + Z_Y] += state[i + L_Z_SLIP]
             contact[D_Z_SLIP] += state[i + L_Z_SLIP]
 
 

@@ -33,14 +33,8 @@ from railsim.kernels.support import (
     BY_SLOPES_Z,
     C_PAD_Y,
     C_PAD_Z,
-    D_Y_ROLL,
     D_Y_SLIP,
-    D_Y_Y,
-    D_Y_Z,
-    D_Z_ROLL,
     D_Z_SLIP,
-    D_Z_Y,
-    D_Z_Z,
     DOF,
     ERROR_Y,
     ERROR_Z,
@@ -50,12 +44,6 @@ from railsim.kernels.support import (
     FOOT_Z_STIFFNESS,
     K_PAD_Y,
     K_PAD_Z,
-    K_Y_ROLL,
-    K_Y_Y,
-    K_Y_Z,
-    K_Z_ROLL,
-    K_Z_Y,
-    K_Z_Z,
     L_ERROR_Y,
     L_ERROR_Z,
     L_PATCHES,
@@ -73,16 +61,19 @@ from railsim.kernels.support import (
     MOST_CORRECTIONS,
     MOTION,
     PATCHES,
+    PENDING,
     RATE,
+    RELAXATION,
     SETTLED,
     SKIP,
     STIFFNESS,
-    STRETCH,
     SUPPORT_SIZE,
-    WAITS,
     WEIGHT,
+    D,
+    K,
     imbalance,
     mass_of,
+    product,
     solve_track,
     support_begin,
     track_forces,
@@ -114,7 +105,7 @@ def remember_track(system, work, state):
     """Initialise the memory of `step_support` from `state`."""
     for w in range(work.support.shape[0]):
         first = support_begin(system) + SUPPORT_SIZE * w
-        work.support_step[w, WAITS] = 0.0
+        work.support_step[w, PENDING] = 0.0
         for k in range(2 * LEARNT_SIZE):
             state[first + LEARNT + k] = 0.0
         for k in range(DOF):
@@ -134,9 +125,9 @@ def note_wheelsets(system, work, state):
         track = work.support_step[w]
         first = support_begin(system) + SUPPORT_SIZE * w
         learn(work, state, first + LEARNT, w, system.contact.load[w], abs(state[LAST_STEP]))
-        if track[WAITS] > 0.0:
+        if track[PENDING] > 0.0:
             move_rails(track, state, first, state[LAST_STEP])
-            track[WAITS] = 0.0
+            track[PENDING] = 0.0
         note_wheelset(system, work, state, w)
 
 
@@ -207,26 +198,10 @@ def step_support(system, work, state, h, last):
             slip = track[MOTION + 8 + side] - before[8 + side]
             v_y = y_rate + state[i + RATE] + g * state[i + MEAN_RATE]
             v_z = z_rate + state[i + RATE + 1] + g * state[i + MEAN_RATE + 1]
-            track[2 * side] += (
-                contact[F_Y]
-                + contact[K_Y_Y] * y
-                + contact[K_Y_Z] * z
-                + contact[K_Y_ROLL] * roll
-                + contact[D_Y_Y] * v_y
-                + contact[D_Y_Z] * v_z
-                + contact[D_Y_ROLL] * roll_rate
-                + contact[D_Y_SLIP] * slip
-            )
-            track[2 * side + 1] += (
-                contact[F_Z]
-                + contact[K_Z_Y] * y
-                + contact[K_Z_Z] * z
-                + contact[K_Z_ROLL] * roll
-                + contact[D_Z_Y] * v_y
-                + contact[D_Z_Z] * v_z
-                + contact[D_Z_ROLL] * roll_rate
-                + contact[D_Z_SLIP] * slip
-            )
+            k_y, k_z = product(contact, K, y, z, roll)
+            d_y, d_z = product(contact, D, v_y, v_z, roll_rate)
+            track[2 * side] += contact[F_Y] + k_y + d_y + contact[D_Y_SLIP] * slip
+            track[2 * side + 1] += contact[F_Z] + k_z + d_z + contact[D_Z_SLIP] * slip
             learnt = first + LEARNT + LEARNT_SIZE * side
             state[learnt + L_WAY] = y
             state[learnt + L_SLIP] = v_y + slip
@@ -288,23 +263,23 @@ def bounded(value, least, most):
 
 
 @compiled(python=False)
-def stretch_correction(track, i, stretch):
+def relax_correction(track, i, relaxation):
     """Multiply the imbalance of one rail so that the next correction does what the last missed.
 
     The relaxation of Irons and Tuck (1969) after Aitken: of the part of the slopes' error that
     dominates, convergence as with the secant.  A factor of zero asks for the first one.
     """
     y, z = track[i], track[i + 1]
-    if track[stretch] == 0.0:
-        track[stretch] = 1.0
+    if track[relaxation] == 0.0:
+        track[relaxation] = 1.0
     else:
         d_y, d_z = y - track[BEFORE + i], z - track[BEFORE + i + 1]
         square = d_y * d_y + d_z * d_z
         if square > 0.0:
             share = -(track[BEFORE + i] * d_y + track[BEFORE + i + 1] * d_z) / square
-            track[stretch] = min(3.0, max(0.3, share * track[stretch]))
+            track[relaxation] = min(3.0, max(0.3, share * track[relaxation]))
     track[BEFORE + i], track[BEFORE + i + 1] = y, z
-    track[i], track[i + 1] = track[stretch] * y, track[stretch] * z
+    track[i], track[i + 1] = track[relaxation] * y, track[relaxation] * z
 
 
 @compiled(python=False)
@@ -323,14 +298,9 @@ def change_forces(system, work, w, h, c):
         if contact[STIFFNESS] <= 0.0:
             continue
         r_y, r_z = track[2 * side], track[2 * side + 1]
-        f_y = -(
-            (h * contact[K_Y_Y] + c * contact[D_Y_Y]) * r_y
-            + (h * contact[K_Y_Z] + c * contact[D_Y_Z]) * r_z
-        )
-        f_z = -(
-            (h * contact[K_Z_Y] + c * contact[D_Z_Y]) * r_y
-            + (h * contact[K_Z_Z] + c * contact[D_Z_Z]) * r_z
-        )
+        k_y, k_z = product(contact, K, -h * r_y, -h * r_z, 0.0)
+        d_y, d_z = product(contact, D, -c * r_y, -c * r_z, 0.0)
+        f_y, f_z = k_y + d_y, k_z + d_z
         contact[F_Y] += f_y
         contact[F_Z] += f_z
         work.wheel[w, side, W_Y] += f_y
@@ -384,7 +354,7 @@ def correct_support(system, work, state, left):
             continue
         imbalance(system, work, state, w)
         if left == MOST_CORRECTIONS:
-            track[STRETCH] = track[STRETCH + 1] = 0.0
+            track[RELAXATION] = track[RELAXATION + 1] = 0.0
         for k in range(DOF):
             track[k] -= mass_of(system.support.row, k) * state[first + ACCELERATION + k]
         for side in range(2):
@@ -393,7 +363,7 @@ def correct_support(system, work, state, left):
         y, z = max(abs(track[0]), abs(track[2])), max(abs(track[1]), abs(track[3]))
         load = share * system.contact.load[w]
         small = left == 0 or (y < BY_SLOPES_Y * load and z < BY_SLOPES_Z * load)
-        track[WAITS] = 1.0 if small and max(y, z) >= SETTLED * load else 0.0
+        track[PENDING] = 1.0 if small and max(y, z) >= SETTLED * load else 0.0
         if small:
             track[SKIP] = 1.0 - work.parts[WHOLE]
             continue
@@ -404,7 +374,7 @@ def correct_support(system, work, state, left):
             if state[i + L_ERROR_Y] == 0.0 and state[i + L_ERROR_Z] == 0.0:
                 state[i + L_ERROR_Y] = contact[side, ERROR_Y]
                 state[i + L_ERROR_Z] = contact[side, ERROR_Z]
-            stretch_correction(track, 2 * side, STRETCH + side)
+            relax_correction(track, 2 * side, RELAXATION + side)
         c = 1.0 + state[first + WEIGHT]
         solve_track(system.support, track, work.support[w], c * c / h, c, h)
         move_rails(track, state, first, h)
@@ -412,7 +382,7 @@ def correct_support(system, work, state, left):
         return True
     for w in range(work.support.shape[0]):
         track = work.support_step[w]
-        if track[WAITS] > 0.0:
+        if track[PENDING] > 0.0:
             c = 1.0 + state[support_begin(system) + SUPPORT_SIZE * w + WEIGHT]
             solve_track(system.support, track, work.support[w], c * c / h, c, h)
             change_forces(system, work, w, h, c)

@@ -408,10 +408,10 @@ class Work(NamedTuple):
                                 [m/(N s)]
     vibration : float64[w, 2, VIBRATION]  of each wheel load, see `vibration`
     events : int64[w, N_EVENTS]   see there
-    swing : float64[w]          largest rate of the contact forces of each wheelset, and of stops
+    force_rate : float64[w]     largest rate of the contact forces of each wheelset, and of stops
                                 between bodies [N/s]
     watch : float64[N_WATCH]    see there
-    coming : float64[2, COMING] of the wheelset at hand, see `rails.foresee`
+    rate_change : float64[2, CHANGES] of the wheelset at hand, see `rails.predict_rate_changes`
     parts : int64[N_PARTS]      see there
     extremes : float64[6, w, EXTREMES]  see `extremes`
     present : float64[EXTREMES] scratch of the extremes
@@ -448,9 +448,9 @@ class Work(NamedTuple):
     vibration: np.ndarray
     events: np.ndarray
     wheel: np.ndarray
-    swing: np.ndarray
+    force_rate: np.ndarray
     watch: np.ndarray
-    coming: np.ndarray
+    rate_change: np.ndarray
     parts: np.ndarray
     extremes: np.ndarray
     present: np.ndarray

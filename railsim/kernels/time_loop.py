@@ -1,11 +1,7 @@
-"""The time loop: integrators and recording, one compiled call per chunk of steps.
+"""The time loop, one compiled call per chunk of steps.
 
-`fast`: one evaluation a step, of order two: velocity Verlet for the springs, velocities in it
-extrapolated by Adams and Bashforth for dampers, contact forces that stiffen as 1/V taken linearly
-implicit (`soften_contact`), internal states of elements advanced exactly for the drive in the
-middle of the step (see `internal`).  The state keeps smoothed accelerations and the last drives.
-
-`rk4`: the classical Runge-Kutta method of order four on the whole state; the reference.
+Each turn evaluates the forces, notes extremes, records, decides whether the step is divided
+(`division`) and steps: by the fast scheme (`step_fast`) or by the reference (`step_rk4`).
 """
 
 from typing import NamedTuple
@@ -13,90 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
-from railsim.kernels.contact_columns import J_ALONG, J_ALONG_LEVER, J_NORMAL, J_SLIP, J_YAW
-from railsim.kernels.driving import table_value_slope
-from railsim.kernels.element_outputs import element_outputs
+from railsim.kernels.division import begin_division, end_division, prepare_steps, striking
 from railsim.kernels.extremes import note_extremes, note_unloaded
-from railsim.kernels.internal import (
-    MAXWELL_CURVE,
-    PAD,
-    advanced,
-    constant_decays,
-    hold_within,
-    slides_together,
-    within_table,
-)
-from railsim.kernels.record import record
-from railsim.kernels.rhs import euler_rates, internal_rates, mechanics
+from railsim.kernels.recording import record_row
+from railsim.kernels.rhs import mechanics
 from railsim.kernels.status import NOT_FINITE, RUNNING, STRIKES
-from railsim.kernels.support import AFTER_STEP, BALANCED, support_rates
-from railsim.kernels.support_step import (
-    note_wheelsets,
-    remember_track,
-    step_compliance,
-    step_support,
-)
-from railsim.kernels.system import (
-    AHEAD,
-    ARC_LENGTH,
-    AXLEBOX,
-    COS_PITCH,
-    COS_ROLL,
-    DIVIDED,
-    I_1,
-    I_2,
-    I_3,
-    LAST_STEP,
-    MASS,
-    PARTS,
-    SHARE,
-    SIN_PITCH,
-    SIN_ROLL,
-    SPEED,
-    STEPS,
-    TABLE,
-    TIME,
-    WHEELSET,
-    WHOLE,
-)
-from railsim.kernels.track_frame import OMEGA_S
-from railsim.kernels.vectors import matrix_at, minus, rotate_back, times, vector_at
+from railsim.kernels.step_fast import remember, step_fast
+from railsim.kernels.step_rk4 import all_rates, step_rk4
+from railsim.kernels.support import AFTER_STEP
+from railsim.kernels.system import ARC_LENGTH, PARTS, STEPS, WHOLE
 from railsim.kernels.vibration import high_pass, watch
 
 FAST, RK4 = range(2)
-# Weight of the last acceleration in the smoothed one, by which speeds are extrapolated: high enough
-# to follow what a vehicle does (lag of 3 ms), low enough to leave out the ringing of the contacts
-# at 200 Hz, which errors of the estimated damping would feed.
-SMOOTHING = 0.3
-# Elastic rails have no such ringing: nothing is smoothed.  An axlebox, as an arm on its bush, keeps
-# the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.  So does the
-# spin of a driven or braked wheelset: a brake that holds it would chatter.
-SMOOTHING_ELASTIC = 1.0
-SPIN = 4  # component of a body about its y axis
-
-
-@record
-class Recorder(NamedTuple):
-    """Arrays that receive the output of one chunk.
-
-    Attributes
-    ----------
-    state : float64[r, n_state]
-    rates : float64[r, 6 n]           rates of the coordinates
-    acceleration : float64[r, n, 6]   absolute, in body axes
-    wheel : float64[r, w, 2, 8]       see `wheel_rail`
-    patch : float64[r, w, 2, 3, PATCH_ROWS]  contact patches, or of length 0
-    chosen : int64[e, 2]              elements to record, see `element_outputs`
-    element : float64[r, e, ELEMENT_COLUMNS]
-    """
-
-    state: np.ndarray
-    rates: np.ndarray
-    acceleration: np.ndarray
-    wheel: np.ndarray
-    patch: np.ndarray
-    chosen: np.ndarray
-    element: np.ndarray
 
 
 class Chunk(NamedTuple):
@@ -119,296 +43,7 @@ class Chunk(NamedTuple):
 
 
 @compiled(python=False)
-def record(recorder, row, system, state, derivative, work, n_patches):
-    """Copy the state and the by-products of its evaluation into row `row`."""
-    for k in range(recorder.state.shape[1]):
-        recorder.state[row, k] = state[k]
-    for k in range(recorder.rates.shape[1]):
-        recorder.rates[row, k] = derivative[k]
-    for b in range(recorder.acceleration.shape[1]):
-        for k in range(6):
-            recorder.acceleration[row, b, k] = work.acceleration[b, k]
-    for w in range(recorder.wheel.shape[1]):
-        for side in range(2):
-            for k in range(recorder.wheel.shape[3]):
-                recorder.wheel[row, w, side, k] = work.wheel[w, side, k]
-    if recorder.patch.shape[0] > 0:
-        record_patches(recorder.patch, row, work, n_patches)
-    if recorder.chosen.shape[0] > 0:
-        first = 12 * system.bodies.kind.shape[0]
-        element_outputs(
-            system,
-            work,
-            state[first : first + system.internal.kind.shape[0]],
-            recorder.chosen,
-            recorder.element[row],
-        )
-
-
-@compiled(python=False)
-def record_patches(out, row, work, n_patches):
-    """Copy the active contact patches to their entries; the others are zero."""
-    for w in range(out.shape[1]):
-        for side in range(2):
-            for k in range(out.shape[3]):
-                for c in range(out.shape[4]):
-                    out[row, w, side, k, c] = 0.0
-    for i in range(n_patches):
-        w, side, k = work.patch_index[i, 0], work.patch_index[i, 1], work.patch_index[i, 2]
-        for c in range(out.shape[4]):
-            out[row, w, side, k, c] = work.patch[c, i]
-
-
-@compiled(inline=True)
-def implicitness(z):
-    """Share of the new value at h times the damping rate: the trapezoid's 1/2, for large z 1 - 1/z.
-
-    The former is of order two, the latter damps what is too fast to be followed.
-    """
-    return 0.5 if z < 2.0 else 1.0 - 1.0 / z
-
-
-@compiled(python=False)
-def soften(rate, before, i, damping, inverse, h):
-    """Take a damper of one coordinate linearly implicit; `inverse`: 1/mass."""
-    z = h * damping * inverse
-    theta_z = implicitness(z) * z
-    rate[i] = (rate[i] + theta_z * before[i]) / (1.0 + theta_z)
-
-
-@compiled(python=False)
-def soften_slip(rate, before, i, j, lever, damping, inverse_i, inverse_j, h):
-    """Take a damper of the speed of coordinate i + lever times that of j linearly implicit."""
-    z = h * damping * (inverse_i + lever * lever * inverse_j)
-    theta = implicitness(z)
-    slip = rate[i] - before[i] + lever * (rate[j] - before[j])
-    force = theta * h * damping / (1.0 + theta * z) * slip
-    rate[i] -= force * inverse_i
-    rate[j] -= force * lever * inverse_j
-
-
-@compiled(python=False)
-def soften_across(jacobian, b, rate, before, v, mass, roll, h):
-    """Take what the contact takes from the speeds in y, z and roll linearly implicit.
-
-    `mass`, `roll`: inverse mass and moment of inertia.  The creep forces may be too fast to be
-    followed; the contact damping is not, but it holds or feeds vibrations of a sliding flange.
-    """
-    J = jacobian
-    t = J_SLIP
-    z = h * ((J[b, t] + J[b, t + 3]) * mass + J[b, t + 5] * roll)
-    f = implicitness(z) * h
-    g = 0.5 * h
-    i = J_NORMAL
-    a11 = 1.0 + mass * (f * J[b, t] + g * J[b, i])
-    a12 = mass * (f * J[b, t + 1] + g * J[b, i + 1])
-    a13 = mass * (f * J[b, t + 2] + g * J[b, i + 2])
-    a21 = mass * (f * J[b, t + 1] + g * J[b, i + 3])
-    a22 = 1.0 + mass * (f * J[b, t + 3] + g * J[b, i + 4])
-    a23 = mass * (f * J[b, t + 4] + g * J[b, i + 5])
-    a31 = roll * (f * J[b, t + 2] + g * J[b, i + 6])
-    a32 = roll * (f * J[b, t + 4] + g * J[b, i + 7])
-    a33 = 1.0 + roll * (f * J[b, t + 5] + g * J[b, i + 8])
-    d1 = rate[v + 1] - before[v + 1]
-    d2 = rate[v + 2] - before[v + 2]
-    d3 = rate[v + 3] - before[v + 3]
-    c11, c12, c13 = a22 * a33 - a23 * a32, a13 * a32 - a12 * a33, a12 * a23 - a13 * a22
-    inverse = 1.0 / (a11 * c11 + a21 * c12 + a31 * c13)
-    rate[v + 1] = before[v + 1] + inverse * (c11 * d1 + c12 * d2 + c13 * d3)
-    rate[v + 2] = before[v + 2] + inverse * (
-        (a23 * a31 - a21 * a33) * d1 + (a11 * a33 - a13 * a31) * d2 + (a13 * a21 - a11 * a23) * d3
-    )
-    rate[v + 3] = before[v + 3] + inverse * (
-        (a21 * a32 - a22 * a31) * d1 + (a12 * a31 - a11 * a32) * d2 + (a11 * a22 - a12 * a21) * d3
-    )
-
-
-@compiled(python=False)
-def soften_contact(bodies, jacobian, b, rate, before, h):
-    """Take the damping of wheelset `b` by its contacts linearly implicit over a step `h`.
-
-    The explicit acceleration a is evaluated with the extrapolated velocity; the acceleration a_n of
-    the step solves a_n + theta h M^-1 D (a_n - b) = a, b as in `step_fast`, D an estimate of that
-    damping (linearly implicit methods: Hairer and Wanner, Solving ODE II, IV.7): exact D gives the
-    trapezoidal rule, and an error of D counts with h^2.  D of rank one for the slip along the
-    track, of x and spin; one matrix for y, z and roll; one number for yaw.
-    """
-    v = 6 * b
-    mass = 1.0 / bodies.row[b, MASS]
-    along = jacobian[b, J_ALONG]
-    if along > 0.0:
-        soften_slip(
-            rate,
-            before,
-            v,
-            v + 4,
-            jacobian[b, J_ALONG_LEVER] / along,
-            along,
-            mass,
-            1.0 / bodies.row[b, I_2],
-            h,
-        )
-    soften_across(jacobian, b, rate, before, v, mass, 1.0 / bodies.row[b, I_1], h)
-    soften(rate, before, v + 5, jacobian[b, J_YAW], 1.0 / bodies.row[b, I_3], h)
-
-
-@compiled(python=False)
-def remember(system, work, state, derivative, h):
-    """Let the memory of `step_fast` begin at `state`, as if it had moved on like this before."""
-    n, m = system.bodies.kind.shape[0], system.internal.kind.shape[0]
-    first = 12 * n + m
-    rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
-    for k in range(6 * n):
-        before[k] = 0.0
-    for b in range(n):
-        if system.bodies.kind[b] == WHEELSET:
-            soften_contact(system.bodies, work.contact_jacobian, b, rate, before, h)
-    for k in range(6 * n):
-        before[k] = rate[k]
-    for i in range(m):
-        state[first + 6 * n + i] = work.drive[i, 0]
-    if system.support.elastic:
-        remember_track(system, work, state)
-    state[LAST_STEP] = 0.0
-
-
-@compiled(python=False)
-def step_fast(system, work, state, derivative, decay, h):
-    """Advance `state` by `h` with the derivative already evaluated there.
-
-    With the acceleration a of this step and b, the smoothed one of the steps before:
-    u = v + h (a - b/2), q <- q + h u, b <- b + SMOOTHING (a - b), v <- u + h/2 b.
-
-    v - h/2 b is the velocity in the middle of the last step; where that was of another length h_0,
-    v is moved by (h_0 - h)/2 (a - b), so that it is that of a last step of length h.
-    """
-    bodies, C = system.bodies, work.relative
-    n, m = bodies.kind.shape[0], system.internal.kind.shape[0]
-    first = 12 * n + m
-    rate, before = derivative[6 * n : 12 * n], state[first : first + 6 * n]
-    frames, half = work.frames, 0.5 * h * state[SPEED] * state[SPEED]
-    if system.support.elastic:
-        note_wheelsets(system, work, state)
-    # negative in results of earlier versions
-    last = abs(state[LAST_STEP]) if state[LAST_STEP] != 0.0 else h
-    shift = 0.5 * (last - h)
-    for b in range(n):
-        q = 6 * b
-        v = 6 * n + q
-        kind = bodies.kind[b]
-        follows = system.support.elastic and kind != AXLEBOX
-        beta = spin = SMOOTHING_ELASTIC if follows else SMOOTHING
-        if kind == WHEELSET:
-            soften_contact(bodies, work.contact_jacobian, b, rate, before, max(last, h))
-            for e in range(system.drives.body.shape[0]):
-                if system.drives.body[e, 1] == b:
-                    spin = SMOOTHING
-        d1 = (h + shift) * rate[q + 3] - (0.5 * h + shift) * before[q + 3]
-        d2 = (h + shift) * rate[q + 4] - (0.5 * h + shift) * before[q + 4]
-        d3 = (h + shift) * rate[q + 5] - (0.5 * h + shift) * before[q + 5]
-        if kind < AXLEBOX:  # rigid bodies and wheelsets; fixed ones do not turn in their frames
-            # the angles are those against the frame, whose own turn changes over the step
-            turn = rotate_back(matrix_at(C, b, 0), vector_at(frames, bodies.frame[b], OMEGA_S))
-            d1, d2, d3 = euler_rates(
-                C[b, SIN_ROLL],
-                C[b, COS_ROLL],
-                C[b, SIN_PITCH],
-                C[b, COS_PITCH],
-                minus((d1, d2, d3), times(half, turn)),
-            )
-        for k in range(3):
-            state[q + k] += h * (
-                state[v + k] + (h + shift) * rate[q + k] - (0.5 * h + shift) * before[q + k]
-            )
-        state[q + 3] += h * (derivative[q + 3] + d1)
-        state[q + 4] += h * (derivative[q + 4] + d2)
-        state[q + 5] += h * (derivative[q + 5] + d3)
-        for k in range(6):
-            change = rate[q + k] - before[q + k]
-            weight = spin if k == SPIN else beta
-            state[v + k] += h * rate[q + k] + (0.5 * weight * h + shift) * change
-            before[q + k] += weight * change
-    drives = first + 6 * n
-    ratio = h / last
-    for i in range(m):
-        k = 12 * n + i
-        drive = work.drive[i, 0] + 0.5 * ratio * (work.drive[i, 0] - state[drives + i])
-        state[drives + i] = work.drive[i, 0]
-        state[k] = advanced(
-            system.internal, system.curves, i, state[k], drive, work.drive[i, 1], h, decay[i]
-        )
-        if slides_together(system.internal, i):
-            hold_within(system.internal, i, 12 * n, work.drive, state)
-    state[LAST_STEP] = h
-    advance_position(system.drive, state, derivative, h)
-    if system.support.elastic:
-        step_support(system, work, state, h, last)
-
-
-@compiled(python=False)
-def advance_position(drive, state, derivative, h):
-    """Time, position and speed after a step; a speed table is met exactly."""
-    state[ARC_LENGTH] += h * (state[SPEED] + 0.5 * h * derivative[SPEED])
-    state[SPEED] += h * derivative[SPEED]
-    state[TIME] += h
-    if drive.mode == TABLE:
-        state[SPEED], _ = table_value_slope(drive.table, state[ARC_LENGTH])
-
-
-@compiled(python=False)
-def settle_limits(internal, curves, first, drive, state):
-    """Bring the forces of friction pads and of tables that end flat back within their limits."""
-    for i in range(internal.kind.shape[0]):
-        k = first + i
-        if slides_together(internal, i):
-            hold_within(internal, i, first, drive, state)
-        elif internal.kind[i] == PAD and internal.parameter[i, 1] == 0.0:
-            state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
-        elif internal.kind[i] == MAXWELL_CURVE:
-            state[k] = within_table(curves, internal.curve[i], state[k])
-
-
-@compiled(python=False)
-def step_rk4(system, work, state, derivative, stages, h):
-    """Advance `state` by `h`; `derivative` holds the first stage."""
-    total, trial, rate = stages[0], stages[1], stages[2]
-    for k in range(state.shape[0]):
-        total[k] = derivative[k]
-        rate[k] = derivative[k]
-    for stage in range(1, 4):
-        fraction = 0.5 * h if stage < 3 else h
-        for k in range(state.shape[0]):
-            trial[k] = state[k] + fraction * rate[k]
-        status, where, _ = mechanics(system, work, trial, rate, BALANCED)
-        if status != RUNNING:
-            return status, where
-        internal_rates(system, work, trial, rate)
-        support_rates(system, work, trial, rate)
-        weight = 2.0 if stage < 3 else 1.0
-        for k in range(state.shape[0]):
-            total[k] += weight * rate[k]
-    for k in range(state.shape[0]):
-        state[k] += h / 6.0 * total[k]
-    settle_limits(
-        system.internal, system.curves, 12 * system.bodies.kind.shape[0], work.drive, state
-    )
-    return RUNNING, 0
-
-
-@compiled(python=False)
-def striking(contact, swing, h, share):
-    """First wheelset with a contact force about to change by more than a share of the wheel load.
-
-    There wheels lift, strike, or ring afterwards; -1 where nothing does.
-    """
-    for w in range(contact.body.shape[0]):
-        if swing[w] * h > share * contact.load[w]:
-            return w
-    return -1
-
-
-@compiled(python=False)
-def all_finite(state):
+def first_not_finite(state):
     """Index of the first entry that is not finite, -1 if there is none."""
     for k in range(state.shape[0]):
         if not np.isfinite(state[k]):
@@ -436,62 +71,51 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
     status, where, steps, rows : int
         Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
     """
-    parts = work.parts[PARTS]
     work.parts[WHOLE] = np.int64(recorder.patch.shape[0] > 0)
-    work.watch[AHEAD] = h if parts > 0 else 0.0
-    constant_decays(system.internal, h, work.decay)
-    if parts > 0:
-        constant_decays(system.internal, h / parts, work.decay_part)
-    if system.support.elastic:
-        step_compliance(system.support, h, work.compliance)
-    b0, a1, a2, fading = high_pass(h)
+    prepare_steps(system, work, h)
+    filter_40_hz = high_pass(h)
     rows = np.int64(0)
-    first_step, every = chunk.first, chunk.every
-    step, end = first_step, first_step + chunk.steps
-    left = np.int64(0)  # parts of a divided step that are still to be taken
+    step, end = chunk.first, chunk.first + chunk.steps
+    left = np.int64(0)  # parts of the step that are still to be taken
     decay, length = work.decay, h
     while step < end + chunk.closing:
-        rails = BALANCED if scheme == RK4 else AFTER_STEP
-        status, where, patches = mechanics(system, work, state, derivative, rails)
+        if scheme == FAST:
+            status, where, patches = mechanics(system, work, state, derivative, AFTER_STEP)
+        else:
+            status, where, patches = all_rates(system, work, state, derivative)
         if status == RUNNING:
             note_extremes(system, work, state)
-            if scheme == RK4:
-                internal_rates(system, work, state, derivative)
-                support_rates(system, work, state, derivative)
             if left == 0:
-                if step % every == 0:
-                    record(recorder, rows, system, state, derivative, work, patches)
+                if step % chunk.every == 0:
+                    record_row(recorder, rows, system, state, derivative, work, patches)
                     rows += 1
                 if step == end:
                     return RUNNING, 0, chunk.steps, rows
-                watch(work, b0, a1, a2, fading, h, state[ARC_LENGTH])
-                if scheme == FAST and chunk.fresh and step == first_step:
+                watch(work, filter_40_hz, h, state[ARC_LENGTH])
+                if scheme == FAST and chunk.fresh and step == chunk.first:
                     remember(system, work, state, derivative, h)
-                decay, length = work.decay, h
-                w = striking(system.contact, work.swing, h, work.watch[SHARE]) if parts > 0 else -1
+                decay, length, left = work.decay, h, np.int64(1)
+                w = striking(system, work, h)
                 if w >= 0:
                     if system.bodies.references.shape[0] > 1:
-                        return STRIKES, w, step - first_step, rows
-                    decay, length = work.decay_part, h / parts
-                    left = parts
-                    work.parts[DIVIDED] += 1
-                    if system.support.elastic:
-                        step_compliance(system.support, length, work.compliance)
+                        return STRIKES, w, step - chunk.first, rows
+                    left = work.parts[PARTS]
+                    decay, length = work.decay_part, h / left
+                    begin_division(system, work, length)
             note_unloaded(work.wheel, length, work.unloaded)
             if scheme == FAST:
                 step_fast(system, work, state, derivative, decay, length)
             else:
                 status, where = step_rk4(system, work, state, derivative, stages, length)
-            if left > 0:
-                left -= 1
-                if left == 0 and system.support.elastic:
-                    step_compliance(system.support, h, work.compliance)
-        if status != RUNNING or (left == 0 and step % every == 0):
-            bad = all_finite(state)
+            left -= 1
+            if left == 0 and length < h:
+                end_division(system, work, h)
+        if status != RUNNING or (left == 0 and step % chunk.every == 0):
+            bad = first_not_finite(state)
             if bad >= 0:
-                return NOT_FINITE, bad, step - first_step, rows
+                return NOT_FINITE, bad, step - chunk.first, rows
         if status != RUNNING:
-            return status, where, step - first_step, rows
+            return status, where, step - chunk.first, rows
         if left == 0:
             step += 1
             work.parts[STEPS] += 1

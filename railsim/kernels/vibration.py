@@ -34,9 +34,13 @@ def high_pass(h):
 
 
 @compiled(python=False)
-def watch(work, b0, a1, a2, fading, h, s):
-    """Take up the wheel loads of a step of length `h` that begins at arc length `s`."""
+def watch(work, coefficients, h, s):
+    """Take up the wheel loads of a step of length `h` that begins at arc length `s`.
+
+    `coefficients`: see `high_pass`.
+    """
     wheel, vibration = work.wheel, work.vibration
+    b0, a1, a2, fading = coefficients
     for w in range(wheel.shape[0]):
         for side in range(2):
             load = wheel[w, side, 0]

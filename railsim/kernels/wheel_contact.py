@@ -11,9 +11,9 @@ from railsim.kernels.contact_columns import (
     ANGLE_SIN,
     CONTACT_JACOBIAN,
     FOOT_X,
+    FOOT_X_PER_YAW,
     FOOT_Y,
     FOOT_Z,
-    LEAD,
     MU_N,
     NORMAL,
     NORMAL_DAMPING,
@@ -60,9 +60,9 @@ from railsim.kernels.rails import (
     ASIDE,
     ASIDE_SLOPE,
     BEND_Z,
-    COMING_ROLL,
-    COMING_Y,
-    COMING_Z,
+    CHANGE_ROLL,
+    CHANGE_Y,
+    CHANGE_Z,
     COSINE,
     FRICTION,
     MIDDLE_Y,
@@ -78,7 +78,7 @@ from railsim.kernels.rails import (
     SINE,
     SLOPE_Y,
     SLOPE_Z,
-    foresee,
+    predict_rate_changes,
 )
 from railsim.kernels.status import (
     BESIDE_RAIL,
@@ -146,9 +146,9 @@ def normal_contact(system, work, speed, state):
         above[6] = work.acceleration[b, 3] - turn + slope * yaw_rate + speed * bend * yaw
         above[7] = yaw_rate
         above[8], above[9] = stretched_roll(above[2])
-        work.swing[w] = work.laws[RATE_OF_STOPS]
+        work.force_rate[w] = work.laws[RATE_OF_STOPS]
         if ahead > 0.0 and system.track.has_irregularity:
-            foresee(system, work, w, state)
+            predict_rate_changes(system, work, w, state)
         for side in range(2):
             status, n = wheel_contact(system, work, w, side, speed, n)
             if status != RUNNING:
@@ -164,7 +164,7 @@ def normal_contact(system, work, speed, state):
     return RUNNING, 0, n
 
 
-class Meeting(NamedTuple):
+class WheelOnRail(NamedTuple):
     """A wheel on its rail, as if it were the right one: both seen in the plane of the rails.
 
     Attributes
@@ -186,12 +186,12 @@ class Meeting(NamedTuple):
 
 
 @compiled(inline=True)
-def meeting(work, w, side, speed):
+def wheel_on_rail(work, w, side, speed):
     """How the wheel `side` of wheelset `w`, which `work.above` describes, stands on its rail."""
     rail, above, motion = work.rail, work.above, work.rail_motion
     sign = 2.0 * side - 1.0
     aside, aside_slope = rail[w, side, ASIDE], rail[w, side, ASIDE_SLOPE]
-    return Meeting(
+    return WheelOnRail(
         sign,
         sign * (above[0] - aside - motion[w, side, MOTION_Y]),
         above[1] - motion[w, side, MOTION_Z],
@@ -216,13 +216,13 @@ def wheel_contact(system, work, w, side, speed, n):
     """
     contact, above = system.contact, work.above
     approach = work.approach
-    meet = meeting(work, w, side, speed)
+    wheel = wheel_on_rail(work, w, side, speed)
     table = contact.table[w, side]
     where, iy, ir, iw, ty, tr, tw = locate(
-        contact, table, meet.y, meet.roll, meet.sign * above[8], meet.yaw * meet.yaw
+        contact, table, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
     )
     if where != INSIDE:
-        return outside(contact, table, where, meet, meet.sign * above[8]), n
+        return outside(contact, table, where, wheel, wheel.sign * above[8]), n
     if tw > 1.0:
         work.events[w, 4] += 1
     cell_weights(contact, ty, tr, above[9], work.weights)
@@ -231,20 +231,20 @@ def wheel_contact(system, work, w, side, speed, n):
         work.stiffness[patch] = 0.0
         work.stiffness[N_PATCH + patch] = 0.0
         approach[patch] = -1.0
-        if is_far(contact, table, patch, iy, ir, iw, tr, tw, meet.z):
+        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
         work.stiffness[patch] = work.look_up[first + 1]
         work.stiffness[N_PATCH + patch] = work.look_up[first + 2]
-        approach[patch] = meet.z - work.look_up[first]
+        approach[patch] = wheel.z - work.look_up[first]
         lift = min(lift, -approach[patch])
     coupled_approaches(contact.coupling, table, work.stiffness, approach)
     clear_wheel(work.wheel, w, side, lift)
     for patch in range(N_PATCH):
         if approach[patch] > -NEAR:
-            n = patch_contact(system, work, w, side, patch, meet, n)
-    if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, meet.z):
+            n = patch_contact(system, work, w, side, patch, wheel, n)
+    if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
     return RUNNING, n
 
@@ -264,7 +264,7 @@ def clear_wheel(wheel, w, side, lift):
 
 
 @compiled(python=False)
-def patch_contact(system, work, w, side, patch, meet, n):
+def patch_contact(system, work, w, side, patch, wheel, n):
     """Normal force of one patch; where it carries, the patch becomes number `n` of the active ones.
 
     Returns
@@ -272,16 +272,16 @@ def patch_contact(system, work, w, side, patch, meet, n):
     n : int
         Number of active patches.
     """
-    contact, t, coming = system.contact, work.look_up, work.coming
+    contact, t, rate_change = system.contact, work.look_up, work.rate_change
     p, k = work.approach[patch], patch * LOOK_UP_SIZE
     p_rate = (
-        meet.z_rate
-        - t[k + G_Y] * meet.y_rate
-        - t[k + G_ROLL] * meet.roll_rate
-        - t[k + G_W] * 2.0 * meet.yaw * meet.yaw_rate
+        wheel.z_rate
+        - t[k + G_Y] * wheel.y_rate
+        - t[k + G_ROLL] * wheel.roll_rate
+        - t[k + G_W] * 2.0 * wheel.yaw * wheel.yaw_rate
     )
-    p_change = coming[side, COMING_Z] - meet.sign * (
-        t[k + G_Y] * coming[side, COMING_Y] + t[k + G_ROLL] * coming[side, COMING_ROLL]
+    p_change = rate_change[side, CHANGE_Z] - wheel.sign * (
+        t[k + G_Y] * rate_change[side, CHANGE_Y] + t[k + G_ROLL] * rate_change[side, CHANGE_ROLL]
     )
     ahead = work.watch[AHEAD]
     deepest = p + ahead * (p_rate + max(p_change, 0.0))
@@ -295,14 +295,14 @@ def patch_contact(system, work, w, side, patch, meet, n):
         root = sqrt(deepest)
         soon = max(soon, (deepest * root * (t[k + 1] + root * t[k + 2]) - elastic) / ahead)
     soon *= max(1.0, work.watch[SIDEWAYS] * abs(t[k + G_Y]))
-    work.swing[w] = max(work.swing[w], soon)
+    work.force_rate[w] = max(work.force_rate[w], soon)
     if p > 0.0:
         root = sqrt(p)
         c_y, c_z, a1, b1, tangent = under_load(t, k, elastic)
         cos_2 = 1.0 / (1.0 + tangent * tangent)
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
-        add_normal_force(work, contact.body[w], w, side, meet, p, k, vertical)
+        add_normal_force(work, contact.body[w], w, side, wheel, p, k, vertical)
         cos_g = sqrt(cos_2)
         N = vertical / cos_g
         if N > 0.0:
@@ -312,12 +312,12 @@ def patch_contact(system, work, w, side, patch, meet, n):
             column[NORMAL, n] = N
             column[MU_N, n] = work.rail[w, side, FRICTION] * N
             column[ANGLE_COS, n] = cos_g
-            column[ANGLE_SIN, n] = meet.sign * tangent * cos_g
+            column[ANGLE_SIN, n] = wheel.sign * tangent * cos_g
             # the normal meets the axle: c + lambda n lies on it, and n does not point along
-            lead = meet.sign * (c_z * tangent - c_y)
-            column[LEAD, n] = lead
-            column[FOOT_X, n] = meet.yaw * lead
-            column[FOOT_Y, n] = meet.sign * c_y
+            per_yaw = wheel.sign * (c_z * tangent - c_y)
+            column[FOOT_X_PER_YAW, n] = per_yaw
+            column[FOOT_X, n] = wheel.yaw * per_yaw
+            column[FOOT_Y, n] = wheel.sign * c_y
             column[FOOT_Z, n] = c_z
             column[PENETRATION, n] = p
             column[NORMAL_STIFFNESS, n] = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) / cos_2
@@ -330,19 +330,19 @@ def patch_contact(system, work, w, side, patch, meet, n):
 
 
 @compiled(python=False)
-def add_normal_force(work, b, w, side, meet, p, k, vertical):
+def add_normal_force(work, b, w, side, wheel, p, k, vertical):
     """Add a patch's generalised normal forces to those of wheelset `w`, body `b`.
 
     `p`: penetration; `k`: where the patch begins in `work.look_up`; `vertical`: its force there.
     """
     force, rail, t = work.rail_force, work.rail, work.look_up
     per_K, per_K2 = 0.4 * p * p * sqrt(p), p * p * p / 3.0
-    q_y = meet.sign * (vertical * t[k + G_Y] - per_K * t[k + K_Y] - per_K2 * t[k + K2_Y])
-    q_yaw = (vertical * t[k + G_W] - per_K * t[k + K_W] - per_K2 * t[k + K2_W]) * 2.0 * meet.yaw
+    q_y = wheel.sign * (vertical * t[k + G_Y] - per_K * t[k + K_Y] - per_K2 * t[k + K2_Y])
+    q_yaw = (vertical * t[k + G_W] - per_K * t[k + K_W] - per_K2 * t[k + K2_W]) * 2.0 * wheel.yaw
     force[b, 0] -= q_y * rail[w, side, ASIDE_SLOPE] + q_yaw * rail[w, side, RAIL_BEND]
     force[b, 1] += q_y
     force[b, 2] -= vertical
-    force[b, 3] += meet.sign * (
+    force[b, 3] += wheel.sign * (
         vertical * t[k + G_ROLL] - per_K * t[k + K_ROLL] - per_K2 * t[k + K2_ROLL]
     )
     force[b, 5] += q_yaw
@@ -360,10 +360,10 @@ def all_far(contact, table, iy, ir, iw, tr, z):
 
 
 @compiled
-def outside(contact, table, where, meet, stretched):
+def outside(contact, table, where, wheel, stretched):
     """Status code for a look-up outside the contact table."""
     if where == ABOVE_Y:
-        return DERAILED if has_climbed(contact, table, meet, stretched) else BESIDE_RAIL
+        return DERAILED if has_climbed(contact, table, wheel, stretched) else BESIDE_RAIL
     if where == BELOW_Y:
         return INWARD_RANGE
     if where == OUTSIDE_ROLL:
@@ -372,7 +372,7 @@ def outside(contact, table, where, meet, stretched):
 
 
 @compiled
-def has_climbed(contact, table, meet, stretched):
+def has_climbed(contact, table, wheel, stretched):
     """Whether a wheel stands as high as the end of the table, its flange's tip over the rail's top.
 
     A wheel that is beyond without having been lifted there, or presses itself into the rail deeper
@@ -386,7 +386,7 @@ def has_climbed(contact, table, meet, stretched):
         # the top is level: yaw does not change how high the tip stands on it
         here = contact.values[table, patch, 0, ir, last, 0]
         following = contact.values[table, patch, 0, ir + 1, last, 0]
-        if meet.z > here + (tr - ir) * (following - here) + DEEPEST:
+        if wheel.z > here + (tr - ir) * (following - here) + DEEPEST:
             return False
     return True
 

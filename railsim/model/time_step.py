@@ -16,11 +16,12 @@ from railsim.errors import ModelError
 from railsim.kernels.contact_columns import PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import N_PATCH
 from railsim.kernels.element_outputs import ELEMENT_COLUMNS
+from railsim.kernels.recording import Recorder
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE
 from railsim.kernels.system import N_SCALARS, PARTS, SHARE, SIDEWAYS, System, Work
-from railsim.kernels.time_loop import FAST, RK4, Chunk, Recorder, time_loop
+from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
 
@@ -46,7 +47,7 @@ PART = {FAST: 1e-4, RK4: 2.5e-4}
 PART_ELASTIC = 2.5e-4
 # share of the static wheel load by which a contact force may change in a step that is not divided,
 # on rigid and on elastic rails, where no vibration follows: on smooth curves no step is
-SWING, SWING_ELASTIC = 0.1, 0.2
+FORCE_CHANGE, FORCE_CHANGE_ELASTIC = 0.1, 0.2
 # what a change of the lateral force counts: flanges strike sideways
 SIDEWAYS_RIGID, SIDEWAYS_ELASTIC = 6.0, 4.0
 # 1/s, growth beyond that of the vehicle that counts as instability of the scheme: on straight track
@@ -95,7 +96,7 @@ def divide_strikes(work: Work, scheme: int, step: float) -> None:
     part = PART_ELASTIC if elastic and scheme == FAST else PART[scheme]
     parts = math.ceil(step / part * (1.0 - 1e-9))
     work.parts[PARTS] = parts if parts > 1 else 0
-    work.watch[SHARE] = SWING_ELASTIC if elastic else SWING
+    work.watch[SHARE] = FORCE_CHANGE_ELASTIC if elastic else FORCE_CHANGE
     work.watch[SIDEWAYS] = SIDEWAYS_ELASTIC if elastic else SIDEWAYS_RIGID
 
 

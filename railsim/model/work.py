@@ -9,7 +9,7 @@ from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
-from railsim.kernels.rails import COMING, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
+from railsim.kernels.rails import CHANGES, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
 from railsim.kernels.support import SUPPORT_COLUMNS, SUPPORT_STEP
 from railsim.kernels.system import (
     AXLEBOX,
@@ -78,9 +78,9 @@ def work_arrays(system: System) -> Work:
         vibration=aligned_zeros((n_wheelsets, 2, VIBRATION)),
         events=aligned_zeros((n_wheelsets, N_EVENTS), np.int64),
         wheel=aligned_zeros((n_wheelsets, 2, WHEEL_COLUMNS)),
-        swing=aligned_zeros(n_wheelsets),
+        force_rate=aligned_zeros(n_wheelsets),
         watch=np.array([0.0, np.inf, 1.0, FULL_TOLERANCE]),
-        coming=aligned_zeros((2, COMING)),
+        rate_change=aligned_zeros((2, CHANGES)),
         parts=aligned_zeros(N_PARTS, np.int64),
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),

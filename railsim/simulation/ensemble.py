@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from railsim.kernels.aligned import aligned
 from railsim.kernels.element_columns import BOTH_ENDS, ROTATES
 from railsim.kernels.element_outputs import LINK
+from railsim.kernels.recording import Recorder
 from railsim.kernels.status import (
     BESIDE_RAIL,
     DERAILED,
@@ -41,7 +42,6 @@ from railsim.kernels.system import (
     falling_friction,
     mount_laws,
 )
-from railsim.kernels.time_loop import Recorder
 from railsim.model.assembly import Model, side_by_side
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,9 @@ from dynamics import Settings, absolute_frame, load_track, load_vehicle, rotatio
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.internal import AIR, PAD, advanced, constant_decays, curve_value
 from railsim.kernels.rhs import right_hand_side
+from railsim.kernels.step_rk4 import settle_limits
 from railsim.kernels.system import AXLEBOX, FORCE, WHEELSET
-from railsim.kernels.time_loop import FAST, RK4, Chunk, settle_limits, time_loop
+from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import assemble
 from railsim.model.time_step import empty_recorder
 from railsim.model.work import level_track, work_arrays

@@ -7,7 +7,7 @@ from railsim.contact.elastic import TableArrays
 from railsim.contact.table import TableGrid, build_contact_table
 from railsim.definitions.loading import load_track, load_vehicle
 from railsim.definitions.settings import Settings
-from railsim.kernels.wheel_contact import Meeting, has_climbed
+from railsim.kernels.wheel_contact import WheelOnRail, has_climbed
 from railsim.profiles import load_profile
 from railsim.simulation import simulate
 
@@ -46,7 +46,7 @@ def test_wheel_beyond_the_rail_that_was_not_lifted_is_not_derailed(roll):
     )  # fmt: skip
 
     def climbed(z):
-        meet = Meeting(1.0, 0.1, z, roll, 0.0, 0.0, 0.0, 0.0, 0.0)
+        meet = WheelOnRail(1.0, 0.1, z, roll, 0.0, 0.0, 0.0, 0.0, 0.0)
         return has_climbed(arrays, 0, meet, roll)
 
     on_top = -FLANGE - 0.75 * roll

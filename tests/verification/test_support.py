@@ -9,7 +9,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.contact_table import K2, K
 from railsim.kernels.status import RUNNING
-from railsim.kernels.support import DOF, RATE, SUPPORT_SIZE, WAITS, support_begin
+from railsim.kernels.support import DOF, PENDING, RATE, SUPPORT_SIZE, support_begin
 from railsim.kernels.system import N_SCALARS
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.model.time_step import SCHEMES, empty_recorder
@@ -228,7 +228,7 @@ def test_forces_corrected_by_slopes_are_those_of_the_contact_with_the_rails_move
     by_slopes, uncorrected = [], []
     for n in range(1, 600):
         forces = run(n, 1)
-        waits = work.support_step[:, WAITS] > 0.0
+        waits = work.support_step[:, PENDING] > 0.0
         if not waits.any():
             continue
         r = work.support_step[:, :DOF].copy()

@@ -1,0 +1,74 @@
+"""Records of one chunk of steps: states, rates, accelerations, wheels, patches, elements."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from railsim.kernels import compiled
+from railsim.kernels.element_outputs import element_outputs
+from railsim.kernels.record import record
+
+
+@record
+class Recorder(NamedTuple):
+    """Arrays that receive the output of one chunk.
+
+    Attributes
+    ----------
+    state : float64[r, n_state]
+    rates : float64[r, 6 n]           rates of the coordinates
+    acceleration : float64[r, n, 6]   absolute, in body axes
+    wheel : float64[r, w, 2, 8]       see `wheel_rail`
+    patch : float64[r, w, 2, 3, PATCH_ROWS]  contact patches, or of length 0
+    chosen : int64[e, 2]              elements to record, see `element_outputs`
+    element : float64[r, e, ELEMENT_COLUMNS]
+    """
+
+    state: np.ndarray
+    rates: np.ndarray
+    acceleration: np.ndarray
+    wheel: np.ndarray
+    patch: np.ndarray
+    chosen: np.ndarray
+    element: np.ndarray
+
+
+@compiled(python=False)
+def record_row(recorder, row, system, state, derivative, work, n_patches):
+    """Copy the state and the by-products of its evaluation into row `row`."""
+    for k in range(recorder.state.shape[1]):
+        recorder.state[row, k] = state[k]
+    for k in range(recorder.rates.shape[1]):
+        recorder.rates[row, k] = derivative[k]
+    for b in range(recorder.acceleration.shape[1]):
+        for k in range(6):
+            recorder.acceleration[row, b, k] = work.acceleration[b, k]
+    for w in range(recorder.wheel.shape[1]):
+        for side in range(2):
+            for k in range(recorder.wheel.shape[3]):
+                recorder.wheel[row, w, side, k] = work.wheel[w, side, k]
+    if recorder.patch.shape[0] > 0:
+        record_patches(recorder.patch, row, work, n_patches)
+    if recorder.chosen.shape[0] > 0:
+        first = 12 * system.bodies.kind.shape[0]
+        element_outputs(
+            system,
+            work,
+            state[first : first + system.internal.kind.shape[0]],
+            recorder.chosen,
+            recorder.element[row],
+        )
+
+
+@compiled(python=False)
+def record_patches(out, row, work, n_patches):
+    """Copy the active contact patches to their entries; the others are zero."""
+    for w in range(out.shape[1]):
+        for side in range(2):
+            for k in range(out.shape[3]):
+                for c in range(out.shape[4]):
+                    out[row, w, side, k, c] = 0.0
+    for i in range(n_patches):
+        w, side, k = work.patch_index[i, 0], work.patch_index[i, 1], work.patch_index[i, 2]
+        for c in range(out.shape[4]):
+            out[row, w, side, k, c] = work.patch[c, i]

@@ -1,0 +1,60 @@
+"""The classical Runge-Kutta method of order four on the whole state; the reference."""
+
+from railsim.kernels import compiled
+from railsim.kernels.internal import MAXWELL_CURVE, PAD, hold_within, slides_together, within_table
+from railsim.kernels.rhs import internal_rates, mechanics
+from railsim.kernels.status import RUNNING
+from railsim.kernels.support import BALANCED, support_rates
+
+
+@compiled(python=False)
+def all_rates(system, work, state, derivative):
+    """Derivative of the whole state, of massless rails with the rates that balance the forces.
+
+    Returns
+    -------
+    status, wheelset, n_patches : int
+    """
+    status, where, n_patches = mechanics(system, work, state, derivative, BALANCED)
+    if status == RUNNING:
+        internal_rates(system, work, state, derivative)
+        support_rates(system, work, state, derivative)
+    return status, where, n_patches
+
+
+@compiled
+def settle_limits(internal, curves, first, drive, state):
+    """Bring the forces of friction pads and of tables that end flat back within their limits."""
+    for i in range(internal.kind.shape[0]):
+        k = first + i
+        if slides_together(internal, i):
+            hold_within(internal, i, first, drive, state)
+        elif internal.kind[i] == PAD and internal.parameter[i, 1] == 0.0:
+            state[k] = min(drive[i, 1], max(-drive[i, 1], state[k]))
+        elif internal.kind[i] == MAXWELL_CURVE:
+            state[k] = within_table(curves, internal.curve[i], state[k])
+
+
+@compiled(python=False)
+def step_rk4(system, work, state, derivative, stages, h):
+    """Advance `state` by `h`; `derivative` holds the first stage."""
+    total, trial, rate = stages[0], stages[1], stages[2]
+    for k in range(state.shape[0]):
+        total[k] = derivative[k]
+        rate[k] = derivative[k]
+    for stage in range(1, 4):
+        fraction = 0.5 * h if stage < 3 else h
+        for k in range(state.shape[0]):
+            trial[k] = state[k] + fraction * rate[k]
+        status, where, _ = all_rates(system, work, trial, rate)
+        if status != RUNNING:
+            return status, where
+        weight = 2.0 if stage < 3 else 1.0
+        for k in range(state.shape[0]):
+            total[k] += weight * rate[k]
+    for k in range(state.shape[0]):
+        state[k] += h / 6.0 * total[k]
+    settle_limits(
+        system.internal, system.curves, 12 * system.bodies.kind.shape[0], work.drive, state
+    )
+    return RUNNING, 0
