@@ -25,7 +25,7 @@ SMALL_AMPLITUDES = 6.0  # mm, drawn where no branch was computed
 
 
 def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
-    """Amplitude, frequency and track shifting force of the hunting motion over speed.
+    """Amplitude, frequency and track shift force of the hunting motion over speed.
 
     Parameters
     ----------
