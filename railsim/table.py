@@ -194,10 +194,14 @@ class Table:
         from rich.text import Text
 
         drawn = Drawn(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-        for column, heading in zip(self.columns, cells[0], strict=True):
-            drawn.add_column(
-                Text(heading), justify="right" if column.format else "left", overflow="fold"
-            )
+        longest = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        fits = sum(longest) + 2 * len(longest) <= width
+        for k, (column, heading) in enumerate(zip(self.columns, cells[0], strict=True)):
+            # headings are broken between words, texts anywhere, numbers nowhere
+            parts = [*heading.split(), *(row[k] for row in cells[1:])]
+            least = None if fits or not column.format else max(map(len, parts), default=None)
+            justify: Any = "right" if column.format else "left"
+            drawn.add_column(Text(heading), justify=justify, overflow="fold", width=least)
         for row in cells[1:]:
             drawn.add_row(*(Text(cell, _style(cell)) for cell in row))
         stream = io.StringIO()

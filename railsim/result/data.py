@@ -209,7 +209,8 @@ class Result:
         name : str
             Quantity.
         **labels : str or int
-            Dimension = name along it, or its index from 0.
+            Dimension = name along it, or its index from 0; texts as ``Q:1:left`` and tables
+            number wheelsets from 1.
 
         Returns
         -------

@@ -48,6 +48,15 @@ def test_tables_fold_to_the_width_and_lose_nothing(width):
         assert [line.split() for line in lines] == [line.split() for line in shown]
 
 
+def test_numbers_are_not_folded():
+    columns = [Column("name"), *(Column(f"length {k}", unit="mm", format=".3f") for k in range(6))]
+    table = Table(columns, [["a long name of a body " * 3, *(12.3456 + k for k in range(6))]])
+    lines = table.lines(80)
+    assert max(map(len, lines)) <= 80
+    numbers = [table.columns[1 + k].text(12.3456 + k) for k in range(6)]
+    assert any(all(number in line.split() for number in numbers) for line in lines)
+
+
 def test_only_colours_steer_the_terminal():
     assert "\x1b" not in str(PEAKS)
     coloured = PEAKS.lines(80, colour=True)
