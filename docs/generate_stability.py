@@ -29,21 +29,22 @@ def modes_picture() -> Figure:
     """Root locus of the coach, contact harmonic with 3 mm."""
     coach = load_vehicle(COACH)
     locus = root_locus(coach, speeds=np.linspace(10.0, 80.0, 29).tolist(), linearisation="harmonic")
-    return locus_figure(locus, f"{coach.name}: contact harmonic 3 mm")
+    return locus_figure(locus)
 
 
 def hunting_picture(name: str) -> Figure:
     """Bifurcation diagram of a vehicle by all methods, on the elastic rails of `straight`."""
     vehicle = load_vehicle(name)
-    found = critical_speed(vehicle, methods=("ramp", "bifurcation", "continuation"))
-    return bifurcation_figure(found, f"{vehicle.name}, elastic rails")
+    return bifurcation_figure(
+        critical_speed(vehicle, methods=("ramp", "bifurcation", "continuation"))
+    )
 
 
 def curving_picture() -> Figure:
     """Steady curving of the coach over radius, cant deficiency and friction."""
     coach = load_vehicle(COACH)
     found = curving(coach, radius=RADII, cant_deficiency=DEFICIENCIES, friction=(0.2, 0.4))
-    return curving_figure(found, f"{coach.name}: steady curving, cant 150 mm")
+    return curving_figure(found)
 
 
 PICTURES: dict[str, Callable[[], Figure]] = {

@@ -37,7 +37,7 @@ def curving_figure(found: Curving, title: str = "") -> Figure:
         mapped = len(found.cant_deficiency) > 1 and len(found.radius) > 1
         heights = [7.4, 1.7, 3.2] if mapped else [7.4, 1.7]
         figure = Picture(figsize=(10.2, sum(heights)), layout="constrained")
-        figure.suptitle(title or found.title, x=0.01, ha="left")
+        figure.suptitle(title or found.title.replace(": ", "\n", 1), x=0.01, ha="left")
         rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         _plan(figure.add_subfigure(rows[1]).subplots(), found)
         if mapped:

@@ -39,7 +39,7 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
     """
     with styled():
         figure = Picture(figsize=(10.2, 7.4), layout="constrained")
-        figure.suptitle(title or locus.title, x=0.01, ha="left")
+        figure.suptitle(title or locus.title.replace(": ", "\n", 1), x=0.01, ha="left")
         grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.0], height_ratios=[1.15, 1.0])
         damping, frequency = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
         plane = figure.add_subplot(grid[1, 1])
@@ -135,7 +135,7 @@ def modes_figure(modes: Modes, title: str = "", most: int = 8) -> Figure:
     with styled():
         rows = max(1, (len(drawn) + 1) // 2)
         figure = Picture(figsize=(10.2, 0.9 + 2.1 * rows), layout="constrained")
-        figure.suptitle(title or modes.title, x=0.01, ha="left")
+        figure.suptitle(title or modes.title.replace(": ", "\n", 1), x=0.01, ha="left")
         grid = figure.add_gridspec(rows, 2)
         if not drawn:
             say(figure.subplots(), f"no oscillation below {SHOWN:g} Hz")

@@ -72,7 +72,7 @@ def bifurcation_figure(found: CriticalSpeed, title: str = "") -> Figure:
 def _title(found: CriticalSpeed) -> str:
     where = found.conditions
     return (
-        f"{found.vehicle}: straight track, rails {where['rails']}, friction {where['friction']}, "
+        f"{found.vehicle}\nstraight track, rails {where['rails']}, friction {where['friction']}, "
         f"{where['law']}"
     )
 

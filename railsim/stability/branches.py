@@ -193,6 +193,7 @@ def _beyond(points: Sequence[Point], limit: float, column: str) -> Iterator[floa
         if point.hunts and value > limit:
             yield point.speed
             # the branch passes the limit between them, if both are on it
-            if neighbour.hunts and DROP * value < other <= limit:
+            jumps_between = far_apart(point.amplitude, neighbour.amplitude)
+            if neighbour.hunts and other <= limit and not jumps_between:
                 share = (limit - other) / (value - other)
                 yield neighbour.speed + share * (point.speed - neighbour.speed)
