@@ -13,6 +13,7 @@ import railsim.model.solutions
 from railsim.contact.table import TableGrid
 
 ROOT = Path(__file__).parent.parent
+collect_ignore = ["extending"]  # modules for a copy of the package, see docs/extending.md
 
 
 @pytest.fixture(scope="session")
