@@ -90,6 +90,4 @@ def forces_by_law(patch: Patch) -> list[dict[str, Any]]:
 def exact_force(patch: Patch, creepages: Sequence[float] | Array) -> ExactCreepForce:
     """Full theory for a patch and its creepages (x, y, spin) [1, 1, 1/m]."""
     x, y, spin = (float(value) for value in creepages)
-    return exact_creep_force(
-        patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu
-    )  # fmt: skip
+    return exact_creep_force(patch.a, patch.b, patch.N, patch.mu, x, y, spin, patch.G, patch.nu)

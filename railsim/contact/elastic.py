@@ -78,6 +78,21 @@ class Patch:
     b: float
     p_max: float
 
+    @property
+    def length(self) -> float:
+        """Extent along the rail [m]."""
+        return 2.0 * self.a
+
+    @property
+    def width(self) -> float:
+        """Extent across [m]."""
+        return 2.0 * self.b
+
+    @property
+    def area(self) -> float:
+        """Area [m2]."""
+        return np.pi * self.a * self.b
+
 
 @dataclass(frozen=True)
 class LoadedContact:

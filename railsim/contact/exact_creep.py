@@ -224,9 +224,17 @@ def normalised_traction(
         sticks = np.ones(n, dtype=np.int64)
         for share in shares:
             status, _ = rolling_traction(
-                grid.middle, grid.centre, share * rigid_middle, share * rigid_centre,
-                grid.bound.ravel(), p, sticks, slip, _TOLERANCE, _ITERATIONS,
-            )  # fmt: skip
+                grid.middle,
+                grid.centre,
+                share * rigid_middle,
+                share * rigid_centre,
+                grid.bound.ravel(),
+                p,
+                sticks,
+                slip,
+                _TOLERANCE,
+                _ITERATIONS,
+            )
         if status == CONVERGED:
             break
     return (

@@ -112,10 +112,12 @@ class ContactSummary:
         """One row for each patch of table and boundary elements, SI."""
         rows = []
         for y, contact in self.contacts.items():
-            rows += [_table_row(y, patch, contact.z) for patch in contact.patches]
+            rows += [_row(y, "table", patch.zone, patch, contact.z) for patch in contact.patches]
             if y in self.exact:
                 solution = self.exact[y]
-                rows += [_exact_row(y, patch, solution.z) for patch in solution.patches[::-1]]
+                rows += [
+                    _row(y, "exact", "", patch, solution.z) for patch in solution.patches[::-1]
+                ]
         return rows
 
     def with_other_normal(self) -> dict[float, LoadedContact]:
@@ -181,11 +183,16 @@ def contact_summary(
     shifts = [round(share * max_shift, 6) for share in PATCH_SHARES]
     contacts = _loaded(right.table(radii, normal), geometry, shifts, load)
     return ContactSummary(
-        (left, right), radii, load, normal, geometry, amplitudes,
+        (left, right),
+        radii,
+        load,
+        normal,
+        geometry,
+        amplitudes,
         geometry.equivalent_conicity(amplitudes),
         contacts,
         _exact(right, radii[1], geometry, list(contacts), load) if exact else {},
-    )  # fmt: skip
+    )
 
 
 def conicity_over_gauge(found: ContactSummary, gauges: Sequence[float]) -> Array:
@@ -261,29 +268,12 @@ def _exact(
     return solutions
 
 
-def _table_row(y: float, patch: Any, z: float) -> dict[str, Any]:
+def _row(y: float, method: str, zone: str, patch: Any, z: float) -> dict[str, Any]:
+    """What both kinds of patches have in common."""
     return {
         "lateral": y,
-        "method": "table",
-        "zone": patch.zone,
-        "N": patch.N,
-        "Q": patch.N_z,
-        "Y": patch.N_y,
-        "contact_y": patch.y,
-        "contact_angle": patch.angle,
-        "length": 2.0 * patch.a,
-        "width": 2.0 * patch.b,
-        "area": float(np.pi) * patch.a * patch.b,
-        "p_max": patch.p_max,
-        "z": z,
-    }
-
-
-def _exact_row(y: float, patch: Any, z: float) -> dict[str, Any]:
-    return {
-        "lateral": y,
-        "method": "exact",
-        "zone": "",
+        "method": method,
+        "zone": zone,
         "N": patch.N,
         "Q": patch.N_z,
         "Y": patch.N_y,

@@ -202,9 +202,10 @@ def _as_they_are(balanced: Model) -> bool:
 def _pulled(flat: FlatVehicle, supports: Iterable[_Support]) -> list[Remark]:
     kinds = {body.name: body.kind for body in flat.bodies}
     pulled = [
-        support for support in supports
+        support
+        for support in supports
         if _carries_from_below(support.element, kinds) and support.load < -1.0
-    ]  # fmt: skip
+    ]
     if not pulled:
         return []
     most = max(-support.load for support in pulled)
@@ -217,9 +218,10 @@ def _pulled(flat: FlatVehicle, supports: Iterable[_Support]) -> list[Remark]:
 def _idle(supports: Iterable[_Support]) -> list[Remark]:
     """Pads that only press, and would have to pull for the vehicle to stand as it is drawn."""
     idle = [
-        support.element.name for support in supports
+        support.element.name
+        for support in supports
         if isinstance(support.element.definition, SideBearer) and support.load <= 0.0
-    ]  # fmt: skip
+    ]
     return [gathered("carries nothing at rest, it would have to pull", idle)] if idle else []
 
 

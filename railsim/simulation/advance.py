@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +44,18 @@ Progress = Callable[[float], None]
 ROWS, STEPS = 1000, 64_000
 ROUND_OFF = 1e-9  # s
 
-# state, whether nothing was before it, whether it is to be recorded, counts of patches, extremes,
-# times without load, vibrations, counts of steps
-_Before = tuple[Floats, bool, bool, NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64]]
+# what a chunk changes in the work arrays: counts of patches and of steps, extremes, times without
+# load, vibrations
+COUNTED = ("events", "extremes", "unloaded", "vibration", "parts")
+
+
+class _Before(NamedTuple):
+    """What a chunk changes, as it was before."""
+
+    state: Floats
+    fresh: bool
+    due: bool
+    counted: list[NDArray[Any]]
 
 
 @dataclass
@@ -237,15 +247,11 @@ class _Convoy:
         """Advance to the end, or to where runs part; return in which groups they go on."""
         while self._left() > 1e-9 or self._due:
             begin = time.perf_counter()
-            before = (
+            before = _Before(
                 self._state.copy(),
                 self._fresh,
                 self._due,
-                self._work.events.copy(),
-                self._work.extremes.copy(),
-                self._work.unloaded.copy(),
-                self._work.vibration.copy(),
-                self._work.parts.copy(),
+                [getattr(self._work, name).copy() for name in COUNTED],
             )
             choices = self._choices()
             if len(set(choices)) > 1 or self._errors():
@@ -376,10 +382,9 @@ class _Convoy:
     def _parted(self, keys: Sequence[object], before: _Before | None = None) -> list[list[Run]]:
         """Runs grouped by equal keys, as they were before; those with an error are at their end."""
         if before is not None:
-            work = self._work
-            self._state, self._fresh, self._due = before[:3]
-            work.events[:], work.extremes[:], work.unloaded[:] = before[3:6]
-            work.vibration[:], work.parts[:] = before[6:]
+            self._state, self._fresh, self._due, counted = before
+            for name, values in zip(COUNTED, counted, strict=True):
+                getattr(self._work, name)[:] = values
         self._give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [

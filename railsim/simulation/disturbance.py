@@ -10,7 +10,7 @@ from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
-from railsim.notation import SIDES
+from railsim.notation import COMPONENTS, SIDES
 
 Floats = NDArray[np.float64]
 
@@ -68,15 +68,11 @@ def disturb(model: Model, Q0: Floats, settings: Settings, state: Floats) -> tupl
     return tuple(remarks)
 
 
-def _add(model: Model, name: str, change: InitialState, state: Floats) -> None:
-    first = model.index.coordinate(name, 0)
+def _add(model: Model, body: str, change: InitialState, state: Floats) -> None:
+    first = model.index.coordinate(body, 0)
     rate = 6 * model.index.n_bodies + first
-    state[first : first + 6] += (
-        change.x, change.y, change.z, change.roll, change.pitch, change.yaw,
-    )  # fmt: skip
-    state[rate : rate + 6] += (
-        change.vx, change.vy, change.vz, change.vroll, change.vpitch, change.vyaw,
-    )  # fmt: skip
+    state[first : first + 6] += [getattr(change, name) for name in COMPONENTS]
+    state[rate : rate + 6] += [getattr(change, f"v{name}") for name in COMPONENTS]
 
 
 def _wheel_loads(model: Model, state: Floats) -> Floats | None:

@@ -51,9 +51,7 @@ Group = TypeVar("Group", bound=tuple[Any, ...])
 # the grid of the contact tables, which a system has but one of
 GRID = ("y0", "dy", "roll0", "droll")
 # statuses that concern a wheelset
-OF_WHEELSET = (
-    DERAILED, BESIDE_RAIL, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES,
-)  # fmt: skip
+OF_WHEELSET = (DERAILED, BESIDE_RAIL, INWARD_RANGE, WHEEL_LIFT, ROLL_RANGE, YAW_RANGE, STRIKES)
 
 
 def contact_grid(model: Model) -> tuple[float | int, ...]:

@@ -161,8 +161,10 @@ def begin(
     # which holds neither the sink nor the run: a circle would keep the tables in memory
     largest, extremes, Q0 = stored.largest, run.extremes, prepared.balance.Q0
     stored.remark = lambda: lost_peak(
-        largest, run_extremes(extremes, Q0), output_words(settings),
+        largest,
+        run_extremes(extremes, Q0),
+        output_words(settings),
         filtered=settings.outputs.low_pass is not None,
-    )  # fmt: skip
+    )
     run.remarks.extend(filter(None, [low_pass_remark(settings)]))
     return run

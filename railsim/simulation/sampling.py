@@ -32,9 +32,12 @@ def filtering(sink: Sink, settings: Settings) -> Sink:
     if asked is None:
         return sink
     return LowPassSink(
-        sink, instants_for_each(settings), settings.output_rate, asked.frequency,
+        sink,
+        instants_for_each(settings),
+        settings.output_rate,
+        asked.frequency,
         causal=asked.phase == "causal",
-    )  # fmt: skip
+    )
 
 
 def low_pass_remark(settings: Settings) -> str:
