@@ -233,25 +233,25 @@ def _named(
     return wheels, profiles[1:] or rails
 
 
-def _check_counts(**given: Sequence[Any]) -> None:
+def _check_counts(**options: Sequence[Any]) -> None:
     """Refuse more values than there are sides."""
     from railsim.errors import Fault, InputError
 
     faults = [
         Fault(f"--{name}", "", f"given {len(values)} times", "give it once, or for left and right")
-        for name, values in given.items()
+        for name, values in options.items()
         if len(values) > 2
     ]
     if faults:
         raise InputError(faults)
 
 
-def _check_ranges(**given: float | Sequence[float]) -> None:
+def _check_ranges(**options: float | Sequence[float]) -> None:
     """Refuse numbers that mean nothing, all at once."""
     from railsim.errors import Fault, InputError
 
     faults = []
-    for name, values in given.items():
+    for name, values in options.items():
         low, high, unit = RANGES[name]
         for value in values if isinstance(values, Sequence) else (values,):
             if not low <= value <= high:
