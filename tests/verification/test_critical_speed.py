@@ -7,7 +7,8 @@ from dynamics import load_track, load_vehicle
 from selection import points
 
 from railsim.linear.modes import modes
-from railsim.stability.branches import THRESHOLD, lowest_of
+from railsim.stability.branches import THRESHOLD, Branch, Point, first_beyond, lowest_of
+from railsim.stability.continuation import settled_to
 from railsim.stability.critical_speed import critical_speed
 from railsim.stability.diagram import diagram
 from railsim.stability.ramp import ramp
@@ -188,3 +189,40 @@ def test_critical_speed_over_amplitude_and_its_smallest():
     assert np.all(np.diff(line.speed) > 0.0)
     assert line.smallest[0] == min(line.speed)
     assert line.speed[0] == pytest.approx(found.linear.speed, rel=0.03)
+
+
+@pytest.mark.further
+def test_where_friction_sticks_only_hunting_counts():
+    """The sway of a wagon on links is undamped as long as they stick: that is no critical speed."""
+    found = critical_speed(
+        load_vehicle("wagon_uic_link"),
+        RIGID,
+        methods=("linear",),
+        low=10.0,
+        high=25.0,
+        over_amplitude=False,
+    )
+    assert found.linear.mode.endswith("hunting")
+    assert any("lower sway" in remark and "not counted" in remark for remark in found.remarks)
+
+
+def test_limits_are_passed_between_points_of_one_motion():
+    """Linear between 10 and 20 kN on one branch; none where the branch jumps."""
+    points = [Point(60.0, 2e-3, 5.0, 10e3), Point(70.0, 2.2e-3, 5.0, 20e3)]
+    jump = [Point(50.0, 1e-3, 5.0, 10e3), Point(50.1, 6e-3, 5.0, 40e3)]
+    assert first_beyond([Branch("up", points)], 15e3, "sum_Y_rms", 80.0).speed == 65.0
+    assert first_beyond([Branch("up", jump)], 15e3, "sum_Y_rms", 80.0).speed == 50.1
+    none = first_beyond([Branch("up", points)], 30e3, "sum_Y_rms", 80.0)
+    assert (none.speed, none.reached, none.searched_to) == (None, False, 80.0)
+
+
+def test_pieces_of_a_branch_end_at_its_jumps():
+    """A motion of continuation is stable where runs settle to it, whatever its multipliers."""
+    run = Branch("down", [Point(v, 6e-3, 5.0) for v in (80.0, 72.0, 71.1)])
+    run.points += [Point(v, 1.9e-3 * (v - 66.0) / 5.0, 5.8) for v in (71.0, 70.2, 69.4, 68.6)]
+    slow, fast = run.pieces()
+    assert (slow[0].speed, slow[-1].speed, fast[0].speed) == (68.6, 71.0, 71.1)
+    shot = Branch("continuation", [Point(69.0, 1.14e-3, 5.8, stable=False)])
+    assert settled_to(shot, [slow, fast]).points[0].stable
+    shot = Branch("continuation", [Point(75.0, 4e-3, 5.0, stable=False)])
+    assert not settled_to(shot, [slow, fast]).points[0].stable
