@@ -16,7 +16,7 @@ from railsim.errors import ModelError
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import FREE, N_SCALARS, WHEELSET, Drive, System
+from railsim.kernels.system import FREE, N_SCALARS, SPEED, WHEELSET, Drive, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.system import Linearisation, jacobian
 from railsim.model.assembly import Model
@@ -242,8 +242,10 @@ class FreeVehicle:
             solved = np.linalg.solve(matrix[np.ix_(w, w)], matrix[np.ix_(w, y)])
             # their rate stands in the equations of the displacements as well as in all others
             matrix = matrix[np.ix_(y, y)] - matrix[np.ix_(y, w)] @ solved
-            return Linearisation(tuple(c.names[k] for k in y), matrix, x[y], float(self.state[-1]))
-        return Linearisation(c.names, matrix, x, float(self.state[-1]))
+            return Linearisation(
+                tuple(c.names[k] for k in y), matrix, x[y], float(self.state[SPEED])
+            )
+        return Linearisation(c.names, matrix, x, float(self.state[SPEED]))
 
     def linearised(self) -> Linearisation:
         """Linearise about the state of steady rolling; the parameter is the speed."""

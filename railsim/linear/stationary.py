@@ -15,7 +15,7 @@ from railsim.constants import CANT_BASE
 from railsim.definitions.track import Track
 from railsim.kernels.aligned import aligned
 from railsim.kernels.contact_columns import W_Q, W_Y
-from railsim.kernels.system import FORCE, MOMENT, System
+from railsim.kernels.system import ARC_LENGTH, FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
 from railsim.linear.circle import POSITION, circle
 from railsim.linear.steady import SteadyRolling, led
@@ -133,7 +133,7 @@ def on_twist(
 
 def _placed(balance: Equilibrium) -> Floats:
     state = balance.state.copy()
-    state[-2] = POSITION
+    state[ARC_LENGTH] = POSITION
     return state
 
 

@@ -23,7 +23,7 @@ from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import RATE, REFERENCE_MASS
-from railsim.kernels.system import AXLEBOX, WHEELSET, System
+from railsim.kernels.system import AXLEBOX, SPEED, WHEELSET, System
 from railsim.kernels.track_frame import OMEGA
 from railsim.linear.coordinates import track_indices
 from railsim.model.assembly import Model
@@ -141,7 +141,7 @@ class SteadyRolling:
         spins = 6 * n + 6 * self._wheelsets + 4
         before = float(guess[-1])
         state[6 * n : 12 * n] = 0.0
-        state[-1] = speed
+        state[SPEED] = speed
         rolling = -speed / self.system.bodies.radius[self._wheelsets]
         state[spins] = guess[spins] * speed / before if np.all(guess[spins]) else rolling
         self.evaluate(state)  # the frames

@@ -29,7 +29,16 @@ from railsim.kernels.internal import AIR
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING, STATUS
 from railsim.kernels.support import DOF, K_BALLAST_Z, K_PAD_Z, RAIL_DOF, RATE, SUPPORT_SIZE
-from railsim.kernels.system import AXLEBOX, FIXED, N_SCALARS, RIGID, WHEELSET, System
+from railsim.kernels.system import (
+    ARC_LENGTH,
+    AXLEBOX,
+    FIXED,
+    N_SCALARS,
+    RIGID,
+    SPEED,
+    WHEELSET,
+    System,
+)
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.kernels.track_frame import MU_LEFT, OMEGA
 from railsim.model.assembly import Model
@@ -183,7 +192,7 @@ def _with_friction(level: System, system: System):  # type: ignore[no-untyped-de
 def _first_guess(model: Model, level: System) -> Floats:
     """Nominal position, every wheelset pressed into its rails by its share of the weight."""
     state = np.zeros(model.n_state)
-    state[-1] = 1.0
+    state[SPEED] = 1.0
     bodies, contact = level.bodies, level.contact
     weight = float(np.sum(bodies.mass)) * level.gravity / len(contact.body)
     iy = round(-contact.y0 / contact.dy)
@@ -256,8 +265,8 @@ class _Balance:
     def solve(self, guess: Floats) -> Floats:
         """Return the balanced state; raise ModelError with the unbalanced components."""
         state = guess.copy()
-        state[-1] = self.speed
-        state[-2] = 0.0
+        state[SPEED] = self.speed
+        state[ARC_LENGTH] = 0.0
         self._start_rolling(state)
         rest = self._accelerations(state)
         change = np.zeros(len(self._unknowns))
@@ -420,9 +429,9 @@ def initial_state(model: Model, balance: Equilibrium, s: float, frames: Floats) 
         Track frames at the bodies' positions for this `s`.
     """
     state = balance.state.copy()
-    state[-2] = s
+    state[ARC_LENGTH] = s
     n = model.index.n_bodies
-    speed = state[-1]
+    speed = state[SPEED]
     for body, kind in enumerate(model.system.bodies.kind):
         if kind == AXLEBOX:
             continue

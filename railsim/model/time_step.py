@@ -20,7 +20,7 @@ from railsim.kernels.recording import Recorder
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
 from railsim.kernels.support import LEARNT, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS, PARTS, SHARE, SIDEWAYS, System, Work
+from railsim.kernels.system import N_SCALARS, PARTS, SHARE, SIDEWAYS, SPEED, System, Work
 from railsim.kernels.time_loop import FAST, RK4, Chunk, time_loop
 from railsim.model.assembly import Model
 from railsim.model.work import work_arrays
@@ -136,7 +136,7 @@ class Stability:
         longest, travel = LONGEST_STEP, LONGEST_TRAVEL
         if system.support.elastic:
             longest, travel = LONGEST_STEP_ELASTIC, LONGEST_TRAVEL_ELASTIC
-        self.longest = min(longest[scheme], travel / float(state[-1]))
+        self.longest = min(longest[scheme], travel / float(state[SPEED]))
 
     def choose(self, interval: float) -> float:
         """Longest stable step that divides the output interval, with the margin.

@@ -23,7 +23,7 @@ from railsim.errors import RailsimError
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import AGAIN, N_PARTS
+from railsim.kernels.system import AGAIN, ARC_LENGTH, N_PARTS, SPEED, TIME
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.kernels.vibration import VIBRATION
 from railsim.model.assembly import Model
@@ -92,8 +92,8 @@ class Preparation:
 
     def left(self, state: Floats) -> float:
         """Time from `state` to the end of the run at the present speed [s]."""
-        by_distance = (self.end_distance - state[-2]) / state[-1]
-        return float(min(self.end_time - state[-3], by_distance))
+        by_distance = (self.end_distance - state[ARC_LENGTH]) / state[SPEED]
+        return float(min(self.end_time - state[TIME], by_distance))
 
 
 @dataclass(eq=False)
@@ -236,7 +236,7 @@ class _Convoy:
         self._derivative = np.zeros_like(self._state)
         self._stages = np.zeros((3, len(self._state)))
         self._fresh, self._due = runs[0].fresh, runs[0].due
-        self._evaluates = self._state[-3] >= runs[0].prepared.evaluation - ROUND_OFF
+        self._evaluates = self._state[TIME] >= runs[0].prepared.evaluation - ROUND_OFF
         self._varies = runs[0].prepared.steps.varies
         # equal steps of distance while the speed changes: every interval is a chunk of its own
         self._spacing = settings.output_spacing if self._varies else None
@@ -285,13 +285,13 @@ class _Convoy:
             return []
         if self._spacing is not None:
             right_hand_sides(self._system, self._work, self._state[None], self._derivative[None])
-        speed, rate = self._state[-1], self._derivative[-1]
+        speed, rate = self._state[SPEED], self._derivative[SPEED]
         choices = []
         for run in self._runs:
             try:
                 choices.append(run.prepared.steps.at(speed, rate))
             except RailsimError as error:  # no equilibrium at this speed, or no stable step
-                if self._state[-3] > run.prepared.state[-3]:
+                if self._state[TIME] > run.prepared.state[TIME]:
                     run.stopped = f"the run cannot go on at {speed:.3g} m/s: {error}"
                 else:
                     run.error = error
@@ -306,15 +306,17 @@ class _Convoy:
         at_most = max(1, STEPS // (every * len(self._runs)))
         intervals = 1 if self._varies else min(ROWS, at_most)
         if not self._evaluates:  # whose begin is the end of a chunk
-            before = self._runs[0].prepared.evaluation - self._state[-3]
+            before = self._runs[0].prepared.evaluation - self._state[TIME]
             intervals = min(intervals, max(1, math.ceil(before / (step * every) - ROUND_OFF)))
         n_steps = min(intervals * every, math.ceil(self._left() / step * (1.0 - 1e-9)))
         last = int(self._spacing is not None and n_steps == every)
-        goal = self._state[-2] + (self._spacing or 0.0)
+        goal = self._state[ARC_LENGTH] + (self._spacing or 0.0)
         status, where, steps, rows = self._call(step, 0, n_steps - last, every)
         if last and status == RUNNING:
             # the last step of an interval of distance ends where the interval ends
-            rest = duration(goal - self._state[-2], self._state[-1], self._derivative[-1])
+            rest = duration(
+                goal - self._state[ARC_LENGTH], self._state[SPEED], self._derivative[SPEED]
+            )
             status, where, more, first = self._call(rest, steps, 1, every)
             steps, rows = steps + more, rows + first
         self._due = status == RUNNING and steps % every == 0
@@ -322,7 +324,7 @@ class _Convoy:
 
     def _begin_evaluation(self) -> None:
         """Begin with new extremes where the part of the run begins that is evaluated."""
-        if self._evaluates or self._state[-3] < self._runs[0].prepared.evaluation - ROUND_OFF:
+        if self._evaluates or self._state[TIME] < self._runs[0].prepared.evaluation - ROUND_OFF:
             return
         for run, part in zip(self._runs, self._ensemble.parts, strict=True):
             _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.vehicle import Vehicle
 from railsim.kernels.status import DERAILED, NOT_FINITE, STATUS
-from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS
+from railsim.kernels.system import DIVIDED, EVALUATIONS, STEPS, TIME
 from railsim.model.assembly import Model
 from railsim.result import Result
 from railsim.result.hunting import hunting
@@ -28,9 +28,9 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
     """Close a run: its result, with all facts about it."""
     began = time.perf_counter()
     prepared, settings = run.prepared, inputs.settings
-    simulated = float(run.state[-3] - prepared.state[-3])
+    simulated = float(run.state[TIME] - prepared.state[TIME])
     # a run that ended before its evaluation began is evaluated as a whole
-    evaluates = run.state[-3] > prepared.evaluation
+    evaluates = run.state[TIME] > prepared.evaluation
     of_peaks = run.evaluated if evaluates else run.extremes
     swings = hunting(run.swings.close({}), run.plan.irregularity)
     attributes: dict[str, str | float | int] = {
@@ -42,7 +42,7 @@ def end(run: Run, vehicle: Vehicle, inputs: Inputs, before: Floats | None) -> Re
         "speed": float(inputs.speed),
         "start": float(inputs.start),
         "duration": simulated,
-        "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[-3]),
+        "evaluation_start": prepared.evaluation if evaluates else float(prepared.state[TIME]),
         **{
             f"requested_{name}": float(value)
             for name, value in (("duration", inputs.duration), ("until", inputs.until))

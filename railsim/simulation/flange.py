@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.track import Track
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import System
+from railsim.kernels.system import LAST_STEP, System
 from railsim.kernels.time_loop import FAST
 from railsim.model.assembly import Model
 from railsim.model.work import CONSTANT_SPEED, without_loads
@@ -92,5 +92,5 @@ def in_flange_contact(
     steps = math.floor(auxiliary.length / speed / short)
     DOING.info("settling in flange contact, for judging the time step")
     status = advance(model, damped, state, short, steps, FAST, progress)
-    state[-4] = 0.0  # of the last step's length: steps of any length are judged from here
+    state[LAST_STEP] = 0.0  # of the last step's length: steps of any length are judged from here
     return (smooth, state) if status == RUNNING else None

@@ -13,6 +13,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
+from railsim.kernels.system import TIME
 from railsim.model.assembly import Model, SharedTables, assemble
 from railsim.model.equilibrium import stored_equilibrium
 from railsim.model.plausibility import vehicle_remarks
@@ -81,7 +82,7 @@ def prepare(
         model,
         balance,
         state,
-        end_time=math.inf if duration is None else float(state[-3]) + duration,
+        end_time=math.inf if duration is None else float(state[TIME]) + duration,
         end_distance=track.length if until is None else until,
         steps=steps,
         fresh=before is None,
@@ -92,7 +93,7 @@ def prepare(
 
 def _evaluation(prepared: Preparation, settings: Settings) -> float:
     """Time from which on peaks are evaluated: without the start, but not where a run goes on."""
-    begin = float(prepared.state[-3])
+    begin = float(prepared.state[TIME])
     if not prepared.fresh:
         return begin
     asked = settings.outputs.evaluate_after

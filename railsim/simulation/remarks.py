@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.system import UNSETTLED
+from railsim.kernels.system import TIME, UNSETTLED
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
 from railsim.result.hunting import Hunting
@@ -43,7 +43,7 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
         *run.prepared.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
         *lifted_wheels(extremes, run.unloaded, wheelsets),
-        *stability(swings, extremes, float(run.state[-3] - run.prepared.state[-3])),
+        *stability(swings, extremes, float(run.state[TIME] - run.prepared.state[TIME])),
         *vibration(
             run.vibration,
             Q0,

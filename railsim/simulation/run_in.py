@@ -37,7 +37,7 @@ from railsim.kernels.rails import (
 )
 from railsim.kernels.rhs import locate_frames
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import System, Work
+from railsim.kernels.system import ARC_LENGTH, SPEED, System, Work
 from railsim.kernels.time_loop import FAST
 from railsim.linear.circle import POSITION, circle
 from railsim.linear.steady import NotConverged, led
@@ -99,7 +99,7 @@ def start_state(
     ModelError
         The vehicle is longer than the track's table.
     """
-    speed = float(balance.state[-1])
+    speed = float(balance.state[SPEED])
     steps = _approach(model, track, start, speed, step)
     whole = math.floor(start / (speed * step))
     try:
@@ -122,7 +122,7 @@ def _arrived(
     remark: Callable[[str], None] | None,
 ) -> Floats:
     """State at `start` after so many steps over the real track."""
-    speed = float(balance.state[-1])
+    speed = float(balance.state[SPEED])
     s = start - steps * speed * step
     before = 0.0
 
@@ -142,7 +142,7 @@ def _arrived(
     if state is None:
         work = _located(model, s)
         state = initial_state(model, balance, s, work.frames)
-    state[-2] = s
+    state[ARC_LENGTH] = s
     if steps:
         follow_rails(model, state)
         system = without_loads(model.system)._replace(drive=CONSTANT_SPEED)
@@ -231,8 +231,8 @@ def _located(model: Model, s: float) -> Work:
 
 def follow_rails(model: Model, state: Floats) -> None:
     """Put the wheelsets on irregular rails, moving as the rails lead them."""
-    speed, n = state[-1], model.index.n_bodies
-    plane = _located(model, float(state[-2])).plane
+    speed, n = state[SPEED], model.index.n_bodies
+    plane = _located(model, float(state[ARC_LENGTH])).plane
     for w, body in enumerate(model.system.contact.body):
         first, rate = 6 * body, 6 * n + 6 * body
         height = model.system.bodies.nominal[body, 1]
@@ -267,7 +267,7 @@ def _run(
                     "start",
                     "",
                     f"the vehicle does not stay on the track at s = {start:g} m, "
-                    f"{where}, at {state[-1]:g} m/s",
+                    f"{where}, at {state[SPEED]:g} m/s",
                     "a start on straight track or a lower speed",
                 )
             ]
@@ -299,7 +299,7 @@ def _steady(
             "The run begins with a run-in: what friction elements hold depends on the way there."
         )
         return None
-    level, speed, friction = model.system, float(balance.state[-1]), _friction(track, start)
+    level, speed, friction = model.system, float(balance.state[SPEED]), _friction(track, start)
     level = level._replace(support=level.support._replace(variation=level.support.variation[:0]))
 
     def along(share: float) -> tuple[System, float]:
@@ -349,7 +349,7 @@ def settled(
     curvature, cant = _curve(track, start)
     if not (curvature or cant):
         return None
-    speed = float(balance.state[-1])
+    speed = float(balance.state[SPEED])
     auxiliary = curve_to_settle_in(
         model, track, speed, curvature, cant, _friction(track, start), TIMES
     )

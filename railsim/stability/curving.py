@@ -24,7 +24,7 @@ from railsim.errors import InputError, ModelError, argument_fault
 from railsim.kernels.contact_columns import C_Y, NORMAL, W_Q, W_T_GAMMA, W_Y
 from railsim.kernels.internal import PAD
 from railsim.kernels.status import RUNNING
-from railsim.kernels.system import System
+from railsim.kernels.system import ARC_LENGTH, System
 from railsim.kernels.time_loop import FAST, Chunk, time_loop
 from railsim.linear.circle import POSITION, circle
 from railsim.linear.coordinates import coordinates
@@ -381,7 +381,7 @@ class _Search:
         stages, recorder = np.zeros((3, len(state))), empty_recorder(self.model, 1)
         before = np.zeros_like(self.Q0)
         for second in range(int(SETTLING)):
-            state[-2] = POSITION
+            state[ARC_LENGTH] = POSITION
             status, *_ = time_loop(
                 system,
                 work,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from railsim.errors import ModelError
 from railsim.kernels.contact_columns import W_Y
 from railsim.kernels.status import RUNNING, STATUS
-from railsim.kernels.system import TABLE, Drive, System
+from railsim.kernels.system import TABLE, TIME, Drive, System
 from railsim.kernels.time_loop import Chunk, time_loop
 from railsim.linear.circle import POSITION
 from railsim.linear.eigenmodes import Eigenmodes
@@ -142,7 +142,7 @@ class VehicleMotion:
         """State of steady rolling with a disturbance that moves a wheelset by `amplitude` [m]."""
         state = self.prepared.steady(speed).state.copy()
         state[self._disturbed] += amplitude * self._shape
-        state[-3] = -1.0  # marks a state without memory
+        state[TIME] = -1.0  # marks a state without memory
         return state
 
     def stretch(self, state: Floats, begin: float, end: float, duration: float) -> Stretch:

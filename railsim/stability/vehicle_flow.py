@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from railsim.kernels.support import DOF, LEARNT, SUPPORT_SIZE
-from railsim.kernels.system import N_SCALARS
+from railsim.kernels.system import N_SCALARS, SPEED
 from railsim.kernels.time_loop import Chunk
 from railsim.linear.circle import POSITION
 from railsim.model.work import CONSTANT_SPEED
@@ -75,7 +75,7 @@ class VehicleFlow:
     def reduced(self, state: Floats) -> Floats:
         """Moving entries of a state of the time loop."""
         full = state.copy()
-        full[self._spins] -= self._per_speed * state[-1]
+        full[self._spins] -= self._per_speed * state[SPEED]
         return np.asarray(full[self._indices])
 
     def full(self, reduced: Floats, speed: float) -> Floats:
