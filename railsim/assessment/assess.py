@@ -151,6 +151,7 @@ def assess(
     causal: bool = False,
     coarse: bool = False,
     all_sections: bool = False,
+    law: str | None = None,
 ) -> list[Assessment]:
     """Assess results: one assessment for each vehicle among them.
 
@@ -171,6 +172,8 @@ def assess(
         Accept results with fewer than 1000 samples per second that were not low-pass filtered.
     all_sections : bool
         Include sections outside the conditions of their zones.
+    law : str, optional
+        Of ``wear``: one of `railsim.assessment.wear.LAWS`, or a file of one; by default all.
 
     Returns
     -------
@@ -203,15 +206,15 @@ def assess(
     found = []
     for runs in groups.values():
         if standard in RUNNING:
-            law = limits_checked(load_running_limits(limits or standard), str(limits or standard))
-            if law.standard != standard:
-                fault = Fault(str(limits), "standard", repr(law.standard), f"wanted: '{standard}'")
+            name = str(limits or standard)
+            known = limits_checked(load_running_limits(limits or standard), name)
+            if known.standard != standard:
+                fault = Fault(name, "standard", repr(known.standard), f"wanted: '{standard}'")
                 raise InputError([fault])
             options = Options(method, causal, coarse, all_sections)
-            done = assessed_runs(runs, law, service, options)
-            found.append(_running(runs, law, done))
+            found.append(_running(runs, known, assessed_runs(runs, known, service, options)))
         else:
-            found.append(_other(runs, standard, limits, coarse))
+            found.append(_other(runs, standard, limits, law, coarse))
     return found
 
 
@@ -233,7 +236,11 @@ def _running(runs: Mapping[str, Result], limits: RunningLimits, done: Running) -
 
 
 def _other(
-    runs: Mapping[str, Result], standard: str, limits: str | Path | None, coarse: bool
+    runs: Mapping[str, Result],
+    standard: str,
+    limits: str | Path | None,
+    law: str | None,
+    coarse: bool,
 ) -> Assessment:
     """Comfort, wear or safety, run by run."""
     vehicle = next(iter(runs.values())).vehicle().name
@@ -243,19 +250,19 @@ def _other(
                 for name, r in runs.items() if r.status != "complete"]  # fmt: skip
     names = tuple(runs)
     if standard == "wear":
-        wear = {name: wear_report(record) for name, record in records.items()}
+        wear = {name: wear_report(record, law=law) for name, record in records.items()}
         return Assessment(vehicle, standard, names, wear=wear, remarks=tuple(remarks))
     if standard == "safety":
         safety = {name: safety_report(record) for name, record in records.items()}
         return Assessment(vehicle, standard, names, safety=safety, remarks=tuple(remarks))
-    law = load_comfort_limits(limits or "comfort")
+    classes = load_comfort_limits(limits or "comfort")
     comfort = {name: comfort_report(record) for name, record in records.items()}
     for name, points in comfort.items():
         said = short_of_blocks(points), caused_by_hunting(records[name], points)
         remarks += [f"{name}: {sentence}" for sentence in said if sentence]
-    if not law.mean_comfort.checked:
-        remarks.append(f"classes of {law.edition} not checked against the printed standard")
+    if not classes.mean_comfort.checked:
+        remarks.append(f"classes of {classes.edition} not checked against the printed standard")
     return Assessment(
         vehicle, standard, names, comfort=comfort, remarks=tuple(dict.fromkeys(remarks)),
-        limits=law,
+        limits=classes,
     )  # fmt: skip

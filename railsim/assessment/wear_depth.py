@@ -1,20 +1,24 @@
-"""Depth of wear over a wheel profile, and the worn profile after a distance.
+"""Depth of wear over the profile of a wheel or a rail, and the worn profile.
 
 At each instant every contact patch wears after a law of `railsim.assessment.wear.LAWS`; the worn
 area is distributed across the patch as a half ellipse, at the position of the patch on the
-profile.  The wheel stays round: the depth is uniform
-over the circumference.
+profile.  The wheel stays round: the depth is uniform over the circumference.  The rail loses the
+volume that a law gives for the wheel, pi D times the worn area of its profile: the laws are those
+of wheel and rail of like hardness.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from railsim.assessment.wear import DEFAULT_LAW, LAWS, Patches, WearLaw
-from railsim.contact.curves import tape_circle_position
+from railsim.contact.curves import inclined_to_track, tape_circle_position
 from railsim.definitions.flatten import flatten
+from railsim.definitions.vehicle_tables import Wheelset
 from railsim.errors import Fault, InputError
 from railsim.profiles import Profile
+from railsim.profiles.profile import FLANGE_BACK
 from railsim.result import Result
 from railsim.result.filters import Floats
 
@@ -69,6 +73,42 @@ def worn_depth(
     ------
     InputError : the result lacks a quantity.
     """
+    areas, ways, across, widths, wheel = _patches(result, wheelset, side, law)
+    centres = (-1.0, 1.0)[side] * across - tape_circle_position(wheel.back_to_back)
+    return spread(centres, widths, areas * ways[:, None]) / float(np.sum(ways))
+
+
+def rail_depth(
+    result: Result, wheelset: int, side: int, law: WearLaw = LAWS[DEFAULT_LAW]
+) -> Floats:
+    """Depth of wear of a rail profile per passing wheelset, over `grid` from the rail's middle.
+
+    Mean over the distance of the run.  Arguments and errors as of `worn_depth`.
+
+    Returns
+    -------
+    float64[position]
+        [m]; its integral over the grid is the worn area of a passage.
+    """
+    areas, ways, _, widths, wheel = _patches(result, wheelset, side, law)
+    at, track = (slice(None), wheelset, side), result.track()
+    body = result.bodies.index(result.wheelsets[wheelset])
+    across = result["patch_y"][at] + result["body_position"][:, body, 1, None]
+    for moved in ("rail_lateral", "rail_deflection_lateral"):
+        if moved in result:
+            across = across - result[moved][at][:, None]
+    rail = result.profiles[track.rail[side]]
+    head = upper_side(rail)
+    y = inclined_to_track(rail, track.gauge, track.inclination)[0][head]
+    centres = np.interp((-1.0, 1.0)[side] * across, y, rail.y[head])
+    areas = areas * np.pi * 2.0 * wheel.radius[side]
+    return spread(centres, widths, areas * ways[:, None]) / float(np.sum(ways))
+
+
+def _patches(
+    result: Result, wheelset: int, side: int, law: WearLaw
+) -> tuple[Floats, Floats, Floats, Floats, Wheelset]:
+    """Worn areas, distances, positions across in the wheelset's axes, half widths; wheelset."""
     missing = [name for name in NEEDED if name not in result]
     if missing:
         allowed = "run it with settings.outputs.contact_patches=true"
@@ -76,7 +116,6 @@ def worn_depth(
     wheel = flatten(result.vehicle()).of_kind("wheelset")[wheelset].wheelset
     if wheel is None:  # a body of this kind has its definition
         raise InputError([Fault("result", "wheelset", f"no wheelset {wheelset}", "")])
-    tape = tape_circle_position(wheel.back_to_back)
     at = (slice(None), wheelset, side)
     ways = np.gradient(result["distance"])
     size = np.pi * result["patch_a"][at] * result["patch_b"][at]
@@ -85,14 +124,23 @@ def worn_depth(
         result["patch_T_gamma"][at], size, 2.0 * wheel.radius[side], result["patch_N"][at],
         result["patch_friction"][at], speed,
     )  # fmt: skip
-    areas = law.worn_area(patches)
     body = result.bodies.index(result.wheelsets[wheelset])
     roll = result["body_position"][:, body, 3, None]
     # from the axes of the track to those of the wheelset
     across = result["patch_y"][at] + roll * result["patch_z"][at]
-    centres = (-1.0, 1.0)[side] * across - tape
     widths = result["patch_b"][at] * np.abs(np.cos(result["patch_angle"][at]))
-    return spread(centres, widths, areas * ways[:, None]) / float(np.sum(ways))
+    return law.worn_area(patches), ways, across, widths, wheel
+
+
+def upper_side(profile: Profile) -> slice:
+    """Points of a profile that contact can reach: y increases from one to the next."""
+    if profile.kind == "wheel":
+        return slice(None)
+    top = int(np.argmin(profile.z))
+    back = np.diff(profile.y) <= 0.0
+    first = int(np.flatnonzero(back[:top])[-1]) + 1 if back[:top].any() else 0
+    last = top + int(np.argmax(back[top:])) + 1 if back[top:].any() else len(profile.y)
+    return slice(first, last)
 
 
 def spread(centres: Floats, widths: Floats, areas: Floats) -> Floats:
@@ -129,7 +177,7 @@ def scattered(profile: Profile, depth: Floats) -> Floats:
     Parameters
     ----------
     profile : Profile
-        A wheel.
+        A wheel or a rail.
     depth : float64[position]
         Depth in the direction z over `grid` [m].
 
@@ -146,7 +194,8 @@ def scattered(profile: Profile, depth: Floats) -> Floats:
 
 def _lengths(profile: Profile) -> Floats:
     """Length of the contour in each cell of `grid` [m]."""
-    z = np.interp(grid(), profile.y, profile.z)
+    side = upper_side(profile)
+    z = np.interp(grid(), profile.y[side], profile.z[side])
     return np.asarray(np.hypot(SPACING, np.gradient(z)))
 
 
@@ -179,7 +228,7 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
     Parameters
     ----------
     profile : Profile
-        A wheel.
+        A wheel; or a rail, whose amount of traffic stands for the distance.
     depth : float64[position]
         Depth per distance over `grid` [m/m].
     distance : float
@@ -201,9 +250,9 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
         found = f"{1e-3 * distance:g} km wear {1e3 * most:.3g} mm deep"
         raise InputError([Fault("wear", "step", found, allowed)])
     smooth = scattered(profile, worn)
-    y = np.asarray(profile.y)
-    lost = np.interp(y, grid(), smooth, left=0.0, right=0.0)
-    area, kept = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, y))
+    side, lost = upper_side(profile), np.zeros(len(profile.y))
+    lost[side] = np.interp(profile.y[side], grid(), smooth, left=0.0, right=0.0)
+    area, kept = SPACING * float(np.sum(worn)), float(np.trapezoid(lost, profile.y))
     if area > 0.0:
         if abs(kept / area - 1.0) > ROUNDING:
             found = f"its points resolve {100.0 * kept / area:.0f} % of the worn area"
@@ -211,7 +260,58 @@ def worn_profile(profile: Profile, depth: Floats, distance: float) -> Profile:
         lost *= area / kept
     words = f"worn by {1e6 * area:.2f} mm2"
     name = f"{profile.name.removesuffix(WORN)}{WORN}"
+    # z points down: a wheel loses height, a rail gains depth
+    z = profile.z + lost if profile.kind == "rail" else profile.z - lost
     return Profile(
-        name, profile.kind, y, np.asarray(profile.z) - lost, f"{profile.source}; {words}",
+        name, profile.kind, profile.y, z, f"{profile.source}; {words}",
         profile.inclination, (*profile.notes, words),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WheelDimensions:
+    """Dimensions of a wheel profile (EN 15313), in [m].
+
+    Attributes
+    ----------
+    flange_height : float
+        Sh: tip of the flange below the nominal rolling circle.
+    flange_thickness : float
+        Sd: of the flange, 10 mm below the nominal rolling circle.
+    flange_slope : float
+        qR: along the axle, from there to 2 mm above the tip.
+    hollow : float
+        Deepest place of the tread above what is farther out.
+    """
+
+    flange_height: float
+    flange_thickness: float
+    flange_slope: float
+    hollow: float
+
+
+def wheel_dimensions(profile: Profile) -> WheelDimensions:
+    """Dimensions of a wheel profile; z = 0 need not be on the rolling circle.
+
+    Examples
+    --------
+    >>> from railsim.profiles import load_profile
+    >>> found = wheel_dimensions(load_profile("S1002"))
+    >>> [round(1e3 * v, 1) for v in (found.flange_height, found.flange_thickness)]
+    [28.0, 32.5]
+    """
+    y, z = np.asarray(profile.y), np.asarray(profile.z) - np.interp(0.0, profile.y, profile.z)
+    tip = int(np.argmax(z))
+    tread, field = y >= y[tip], y > 0.0
+
+    def face(depth: float) -> float:
+        """Innermost place of the flange's face at a depth."""
+        below = int(np.argmax(z[tread] < depth))
+        pair = slice(below - 1, below + 1)
+        return float(np.interp(-depth, -z[tread][pair], y[tread][pair]))
+
+    thick, outer = face(0.010), np.maximum.accumulate(z[field][::-1])[::-1]
+    return WheelDimensions(
+        float(z[tip]), thick - FLANGE_BACK, thick - face(z[tip] - 0.002),
+        float(np.max(outer - z[field])),
     )  # fmt: skip

@@ -12,6 +12,7 @@ from railsim.assessment.wear import (
     Patches,
     WholeLifeRailModel,
     surface_fatigue_index,
+    wear_law,
 )
 from railsim.definitions.flatten import flatten
 from railsim.notation import SIDES
@@ -36,7 +37,7 @@ class WheelWear:
     bound : float
         Largest deviation of a percentile from that of the whole record [N].
     worn_area : dict of str to float or None
-        Worn area of the wheel profile per distance by each law of `railsim.assessment.wear.LAWS`,
+        Worn area of the wheel profile per distance by each law, by its name or file,
         sum over the contact patches [m2/m].  Of a result without them that of Pearce and Sherratt
         is the one of `T_gamma`, as if all forces acted in one patch, and the others are None.
     rail_damage : float
@@ -68,6 +69,7 @@ class WheelWear:
 def wear_report(
     record: Record,
     *,
+    law: str | None = None,
     model: WholeLifeRailModel | None = None,
     all_forces: bool = False,
     yield_in_shear: float = YIELD_IN_SHEAR,
@@ -78,6 +80,8 @@ def wear_report(
     ----------
     record : Record
         Run with `T_gamma`, `xi_x`; with `contact_patches` also USFD and the fatigue index.
+    law : str, optional
+        Only this law of `LAWS`, or that of a file, which needs `contact_patches`; by default all.
     model : WholeLifeRailModel, optional
     all_forces : bool
         Include forces on the rail in the direction of travel.
@@ -94,8 +98,12 @@ def wear_report(
     damage: Floats = np.zeros((*shape, 1))
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
-    patches = all(name in record.result for name in (*PATCHES, "patch_T_gamma"))
-    worn = {name: np.zeros(shape) for name in LAWS if patches or name == DEFAULT_LAW}
+    laws = dict(LAWS) if law is None else {law: wear_law(law)}
+    needed = (*PATCHES, "patch_T_gamma", "patch_friction")
+    if any(one.constants for one in laws.values()):
+        record.need(needed, "settings.outputs.contact_patches=true")
+    patches = all(name in record.result for name in needed)
+    worn = {n: np.zeros(shape) for n in laws if patches or laws[n] is LAWS[DEFAULT_LAW]}
     way = np.gradient(record.distance)
     for rows, counted in record.pieces(0.0):
         rows = slice(rows.start + counted.start, rows.start + counted.stop)
@@ -108,16 +116,20 @@ def wear_report(
                 stream.add(T_gamma[:, w, side])
         # the force on the rail has the sign of the creepage
         area = np.zeros_like(T_gamma)[..., None]
+        load = mu = np.full_like(area, np.nan)
         each, along = T_gamma[..., None], record.result.part("xi_x", rows)[..., None]
         if patches:
             each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
             area, fatigue = _patches(record, rows, yield_in_shear)
+            load, mu = (record.result.part(f"patch_{name}", rows) for name in ("N", "friction"))
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
         against = np.ones_like(each, dtype=bool) if all_forces else along < 0.0
         passes = np.where(against, model(each), 0.0) * ways[..., None]
         damage = damage + np.sum(passes, axis=0)
+        speed = (way / np.gradient(record.time))[rows, None, None, None]
+        of_patches = Patches(each, area, 2.0 * radii[..., None], load, mu, speed)
         for name in worn:
-            lost = LAWS[name].worn_area(Patches(each, area, 2.0 * radii[..., None]))
+            lost = laws[name].worn_area(of_patches)
             worn[name] += np.sum(lost.sum(axis=-1) * ways, axis=0)
     if not length > 0.0:
         found = f"{record.time[-1] - record.time[0]:.3g} s"
@@ -129,7 +141,7 @@ def wear_report(
             percentiles={f"{p:g}": streams[w][k].percentile(p) for p in (50.0, 95.0, 99.85)},
             bound=streams[w][k].width,
             worn_area={
-                name: float(worn[name][w, k] / length) if name in worn else None for name in LAWS
+                name: float(worn[name][w, k] / length) if name in worn else None for name in laws
             },
             rail_damage=float(damage[w, k, np.argmax(np.abs(damage[w, k]))] / length),
             fatigue_index=float(worst[0, w, k]) if patches else None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, output_options, print_json, show, text_table
+from railsim.cli.common import echo, output_options, print_json, show
 from railsim.files import check_folder, make_folder, whole_file
 from railsim.text import spreadsheet_cell
 
@@ -14,13 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from railsim.assessment import Assessment
-    from railsim.assessment.zones import Assessed
     from railsim.definitions.vehicle_tables import Service
     from railsim.result import Result
-    from railsim.table import Table
 
 STANDARDS = ("en14363", "uic518", "comfort", "wear", "safety")
-SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
 FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sections.png",
          "assessment_regression.png")  # fmt: skip
 
@@ -32,6 +29,9 @@ FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sect
     help="What to assess.",
 )  # fmt: skip
 @click.option("--limits", metavar="F", help="Limits file, or the name of a shipped one.")
+@click.option(
+    "--law", metavar="NAME_OR_FILE", help="Law of wear; by default all that need no constants."
+)
 @click.option(
     "--method", type=click.Choice(["normal", "simplified"]), default="normal", show_default=True,
     help="With wheel forces, or with accelerations only.",
@@ -90,7 +90,7 @@ def command(
         print_json([assessment.record() for assessment in assessments])
     else:
         for assessment in assessments:
-            show(*assessment_lines(assessment, quiet=quiet))
+            show_assessment(assessment, quiet=quiet)
         for path in written:
             echo(str(path))
     return LIMIT_EXCEEDED if fail and any(a.exceeded for a in assessments) else DONE
@@ -219,104 +219,29 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def assessment_lines(assessment: "Assessment", *, quiet: bool = False) -> "list[str | Table]":
-    """Return an assessment as lines for a screen."""
+def show_assessment(assessment: "Assessment", *, quiet: bool = False) -> None:
+    """Print an assessment."""
+    from railsim.assessment.tables import tables
+
     edition = f", {assessment.limits.edition}" if assessment.limits else ""
     runs = f"{len(assessment.runs)} run{'s' * (len(assessment.runs) > 1)}"
-    lines: list[str | Table] = [f"{assessment.vehicle}{edition}, {runs}"]
-    lines += _verdict_lines(assessment)
-    for zone in assessment.zones:
-        header = [
-            f"{zone.title}: {len(zone.values)} of {zone.needed} sections", "location", "unit",
-            "N", "mean", "s", "method", "estimate", "limit", "% of limit",
-        ]  # fmt: skip
-        rows = [_row(row) for row in zone.nearest]
-        lines += ["", text_table(header, rows, numbers=3)]
-    lines += _comfort_lines(assessment) + _wear_lines(assessment) + _safety_lines(assessment)
+    show(f"{assessment.vehicle}{edition}, {runs}", *_verdict_lines(assessment))
+    for table in tables(assessment):
+        show("", table)
     if not quiet:
-        lines += ["", *(f"note: {remark}" for remark in assessment.remarks)]
-    return lines
+        show("", *(f"note: {remark}" for remark in assessment.remarks))
 
 
-def _verdict_lines(assessment: "Assessment") -> "list[str | Table]":
+def _verdict_lines(assessment: "Assessment") -> list[str]:
     """Overall verdict, and each of its parts with its reasons; a reason of several parts once."""
     from railsim.assessment.criteria import WORDS
 
     if not assessment.verdict:
         return []
     deciding = getattr(assessment.limits, "deciding", ())
-    lines: list[str | Table] = [f"verdict: {assessment.verdict}"]
+    lines = [f"verdict: {assessment.verdict}"]
     for name, verdict in assessment.verdicts.items():
         told = "" if name in deciding else " (for information)"
         lines.append(f"  {WORDS[name]}{told}: {verdict.value}")
     lines += [f"    {reason}" for reason in assessment.reasons]
-    return lines
-
-
-def _row(row: "Assessed") -> list[str]:
-    estimate, shown = row.estimate, row.criterion.text
-    value = shown(estimate.value)
-    if row.uncorrected is not None:
-        value += f" (uncorrected {shown(row.uncorrected.value)})"
-    return [
-        row.criterion.words, row.place, row.criterion.unit, str(estimate.N), shown(estimate.mean),
-        shown(estimate.deviation), SHORT[estimate.method], value,
-        "" if row.limit != row.limit else shown(row.limit),
-        "" if row.limit != row.limit else f"{100.0 * row.share:.1f}",
-    ]  # fmt: skip
-
-
-def _comfort_lines(assessment: "Assessment") -> "list[str | Table]":
-    lines: list[str | Table] = []
-    for run, points in assessment.comfort.items():
-        header = [run, "x (m)", "N_MV", "N_VA", "N_VD", "ISO a_v (m/s2)", "Wz lateral",
-                  "Wz vertical", "P_CT standing (%)", "P_DE standing (%)"]  # fmt: skip
-        rows = []
-        for point in points:
-            most = max((t.standing for t in point.transitions), default=None)
-            total = float((point.iso_rms**2).sum() ** 0.5)
-            rows.append([
-                point.sensor, f"{point.place:.2f}", f"{point.mean.N_MV:.2f}",
-                f"{point.mean.N_VA:.2f}", f"{point.mean.N_VD:.2f}", f"{total:.3f}",
-                f"{point.sperling['lateral']:.2f}", f"{point.sperling['vertical']:.2f}",
-                "" if most is None else f"{most:.1f}", f"{point.events['standing']:.1f}",
-            ])  # fmt: skip
-        lines += ["", text_table(header, rows)]
-    return lines
-
-
-def _wear_lines(assessment: "Assessment") -> "list[str | Table]":
-    from railsim.assessment.wear import LAWS
-
-    columns = [f"{law.name} (mm2/1000 km)" for law in LAWS.values()]
-    lines: list[str | Table] = []
-    for run, wheels in assessment.wear.items():
-        header = [run, "T_gamma (N)", "95 %", "99.85 %", *columns, "WLRM (1e-6)",
-                  "FI_surf"]  # fmt: skip
-        rows = [
-            [
-                w.place, f"{w.T_gamma:.1f}", f"{w.percentiles['95']:.0f}",
-                f"{w.percentiles['99.85']:.0f}",
-                *("" if area is None else f"{1e12 * area:.2f}" for area in w.worn_area.values()),
-                f"{1e6 * w.rail_damage:.2f}",
-                "" if w.fatigue_index is None else f"{w.fatigue_index:.3f}",
-            ]
-            for w in wheels
-        ]  # fmt: skip
-        lines += ["", text_table(header, rows)]
-    return lines
-
-
-def _safety_lines(assessment: "Assessment") -> "list[str | Table]":
-    lines: list[str | Table] = []
-    for run, report in assessment.safety.items():
-        header = [run, "Nadal", "largest Y/Q", "climb (m)", "rise (mm)"]
-        rows = [
-            [w.place, f"{w.limit:.3f}", "lifted" if w.Y_over_Q != w.Y_over_Q else
-             f"{w.Y_over_Q:.3f}", f"{w.climb_distance:.2f}", f"{1e3 * w.rise:.2f}"]
-            for w in report.wheels
-        ]  # fmt: skip
-        lines += ["", text_table(header, rows), ""]
-        rows = [[name, f"{value:.3f}"] for name, value in report.overturning.items()]
-        lines.append(text_table(["bogie", "overturning"], rows))
     return lines

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from railsim.cli.common import echo, print_json, show
+from railsim.cli.common import echo, print_json
 from railsim.cli.progress import progress_bar
 
 
@@ -22,7 +22,7 @@ def run_campaign(
 ) -> int:
     """Run a scenario for vehicles, print and write its assessment; return the exit status."""
     from railsim.cli import DONE
-    from railsim.cli.assess import assessment_lines, write_assessments
+    from railsim.cli.assess import show_assessment, write_assessments
     from railsim.errors import Fault, InputError
     from railsim.studies.campaign import campaign
 
@@ -52,7 +52,8 @@ def run_campaign(
         })  # fmt: skip
         return DONE
     for assessment in done.assessments:
-        show("", *assessment_lines(assessment, quiet=quiet))
+        echo()
+        show_assessment(assessment, quiet=quiet)
     for path in written:
         echo(str(path))
     return DONE

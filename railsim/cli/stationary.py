@@ -1,15 +1,13 @@
 """``railsim stationary``: stationary tests on twisted and canted track."""
 
-import math
 from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import load_option, output_options, print_json, set_option, show, text_table
+from railsim.cli.common import load_option, output_options, print_json, set_option, show
 
 if TYPE_CHECKING:
     from railsim.studies.stationary import Stationary
-    from railsim.table import Table
 
 FILES = ("stationary.json",)
 
@@ -70,27 +68,15 @@ def command(
     if as_json:
         print_json(found.record())
     else:
-        show(*_lines(found, quiet=quiet))
+        _show(found, quiet=quiet)
         folder.tell()
     return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
 
 
-def _lines(found: "Stationary", *, quiet: bool) -> "list[str | Table]":
-    lines: list[str | Table] = [f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}"]
-    lines += [f"  {reason}" for reason in found.reasons]
-    rows = []
-    for value in found.values:
-        in_degrees = value.quantity.startswith("angle")
-        shown = [
-            "" if v is None or math.isnan(v) else f"{math.degrees(v):.2f} deg"
-            if in_degrees else f"{v:.3f}" for v in (value.value, value.limit)
-        ]  # fmt: skip
-        rows.append([value.case, value.quantity, value.place, *shown])
-    header = ["standing on", "quantity", "location", "value", "limit"]
-    lines += ["", text_table(header, rows, numbers=3)]
+def _show(found: "Stationary", *, quiet: bool) -> None:
+    show(f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}")
+    show(*(f"  {reason}" for reason in found.reasons), "", found.table())
     if not quiet:
-        how = "held across the track" if found.held else "free across the track"
-        lines += ["", f"note: wheelsets {how}"]
+        show("", f"note: wheelsets {'held' if found.held else 'free'} across the track")
         if not all(v.checked for v in found.values if v.limit is not None):
-            lines.append("note: limits not checked against the standard")
-    return lines
+            show("note: limits not checked against the standard")

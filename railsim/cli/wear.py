@@ -1,6 +1,8 @@
-"""``railsim wear``: wheel profile over the distance run, with updates of the worn profile."""
+"""``railsim wear``, ``railsim rail-wear``: profiles over distance or tonnage as they wear."""
 
 import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,7 +16,6 @@ from railsim.cli.common import (
     print_json,
     set_option,
     show,
-    text_table,
 )
 from railsim.cli.progress import progress_bar
 
@@ -23,12 +24,18 @@ if TYPE_CHECKING:
 
     from railsim.cli.analysis import Folder
     from railsim.profiles import Profile
-    from railsim.studies.wear_loop import Route, WearStep
-    from railsim.table import Table
+    from railsim.studies.wear_loop import WearStep
 
-FILES = ("wear.json", "wear.png")
-STEPS = "steps"  # folder of the finished steps
+RECORD, PICTURE, STEPS = "wear.json", "wear.png", "steps"
 MOST_STEPS = 1000
+
+law_option = click.option(
+    "--law", default="pearce_sherratt", show_default=True, metavar="NAME_OR_FILE",
+    help="Law of wear; a wrong name shows all.",
+)  # fmt: skip
+settings_option = click.option(
+    "--settings", metavar="F", help="Settings file: creep law and contact."
+)
 
 
 @click.command()
@@ -43,55 +50,150 @@ MOST_STEPS = 1000
     "--step", required=True, type=float, metavar="KM",
     help="Distance in km between two updates of the wheel profile.",
 )  # fmt: skip
+@law_option
 @click.option(
-    "--law", default="pearce_sherratt", show_default=True, metavar="NAME_OR_FILE",
-    help="Law of wear; a wrong name shows all.",
+    "--limits", default="wheel", show_default=True, metavar="F",
+    help="Limits of flange and tread at which the loop ends.",
 )  # fmt: skip
 @click.option("--out", metavar="DIR", help="Folder for wear.json, wear.png and the profiles.")
-@click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
+@settings_option
 @load_option
 @set_option
 @output_options
 def command(
     vehicle: str,
     routes: tuple[tuple[str, float, float], ...],
-    distance: float,
-    step: float,
-    law: str,
-    out: str | None,
     settings: str | None,
     load: str | None,
     assignments: tuple[str, ...],
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
+    limits: str,
+    **how: Any,
 ) -> None:
     """Compute the wear of the wheels of a vehicle on several tracks, updating the profile.
 
     Each step runs every track once with the wheel profile of the step, averages the wear of all
     wheels and subtracts it from the profile.  With --out finished steps are kept: the same command
     continues after them, and so does one with a longer distance and --overwrite.  A loop that ends
-    early, since a run does or a step wears too much, writes what was done.
+    early, at a limit of the wheel, or since a run does or a step wears too much, writes what was
+    done.
 
     \b
     Example:
       railsim wear coach_manchester --route curve_r500 20 0.3 --route straight 40 0.7 \\
           --distance 6000 --step 1000 --out worn
     """  # noqa: D301 - click reads the escape
-    from railsim.assessment.wear import wear_law
-    from railsim.cli.analysis import Folder, load_inputs
-    from railsim.errors import RailsimError
-    from railsim.studies.wear_loop import Route, WearStep, wear_loop, wear_rows
+    from railsim.cli.analysis import load_inputs
+    from railsim.definitions.loading import load_wheel_limits
+    from railsim.studies.wear_loop import Route, wear_loop, wear_rows
 
-    steps = _number_of_steps(distance, step)
     inputs = [load_inputs(vehicle, name, settings, assignments, load) for name, _, _ in routes]
-    ways = [
-        Route(one.track, speed, share)
-        for one, (_, speed, share) in zip(inputs, routes, strict=True)
-    ]
-    profiles = [_file_name(1e3 * step * (number + 1)) for number in range(steps)]
-    folder = Folder(out, (*FILES, *profiles), overwrite)
-    coach = inputs[0].vehicle
+    ways = [Route(one.track, v, share) for one, (_, v, share) in zip(inputs, routes, strict=True)]
+    coach, ends = inputs[0].vehicle, load_wheel_limits(limits)
+    of = Wearing(
+        coach.name, "km", 1e3, "--distance",
+        {"vehicle": coach.name, "routes": [
+            {"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways
+        ]},
+        [(w.track.name, w.speed, w.share) for w in ways],
+        "mean of all wheels; y from the nominal rolling circle, negative towards the flange",
+        lambda **more: wear_loop(coach, ways, limits=ends, settings=inputs[0].settings, **more),
+        lambda found: {"rows": wear_rows(found, coach, ways[0].track)},
+    )  # fmt: skip
+    _carry_out(of, **how)
+
+
+@click.command()
+@click.argument("track", metavar="TRACK", shell_complete=names_of("track"))
+@click.option(
+    "--traffic", required=True, multiple=True, type=(str, Speed(), float),
+    metavar="VEHICLE V SHARE", help="A vehicle, its speed in m/s or with a unit, and its share of "
+    "the tonnage in any unit; may be repeated.",
+)  # fmt: skip
+@click.option("--tonnage", "distance", required=True, type=float, metavar="MT", help="In Mt.")
+@click.option(
+    "--step", required=True, type=float, metavar="MT",
+    help="Tonnage in Mt between two updates of the rail profiles.",
+)  # fmt: skip
+@law_option
+@click.option("--out", metavar="DIR", help="Folder for wear.json and the profiles.")
+@settings_option
+@set_option
+@output_options
+def rails(
+    track: str,
+    traffic: tuple[tuple[str, float, float], ...],
+    settings: str | None,
+    assignments: tuple[str, ...],
+    **how: Any,
+) -> None:
+    """Compute the wear of both rails of a track under a mix of traffic, updating their profiles.
+
+    The mean over the track is worn off: let it be of one curvature.  The laws are those of the
+    wheels; the wheels do not wear.  Steps, kept steps and ends are those of `railsim wear`.
+
+    \b
+    Example:
+      railsim rail-wear curve_r500 --traffic coach_manchester 20 3 --traffic wagon_y25 20 1 \\
+          --tonnage 20 --step 5 --out worn
+    """  # noqa: D301 - click reads the escape
+    from railsim.cli.analysis import load_inputs
+    from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
+
+    inputs = [load_inputs(name, track, settings, assignments) for name, _, _ in traffic]
+    mix = [Traffic(i.vehicle, v, share) for i, (_, v, share) in zip(inputs, traffic, strict=True)]
+    of = Wearing(
+        inputs[0].track.name, "Mt", 1e9, "--tonnage",
+        {"track": inputs[0].track.name, "traffic": [
+            {"vehicle": t.vehicle.name, "speed": t.speed, "share": t.share} for t in mix
+        ]},
+        [(t.vehicle.name, t.speed, t.share) for t in mix],
+        "both rails; y from the middle of the rail, negative towards the gauge side",
+        lambda **more: rail_wear(inputs[0].track, mix, settings=inputs[0].settings, **more),
+        rail_rows,
+    )  # fmt: skip
+    _carry_out(of, **how)
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """What wears, and how it is shown.
+
+    Attributes
+    ----------
+    name, unit, scale, option : str, str, float, str
+        Heading; unit of distance or tonnage, its factor to SI, and the option that gives it.
+    record : dict
+        What stands first in the record.
+    shares : sequence of (str, float, float)
+        Runs, speeds and shares.
+    note : str
+        What is averaged, and where y begins.
+    loop, rows : callable
+        The study; its steps to the rows of each profile.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    option: str
+    record: Mapping[str, Any]
+    shares: Sequence[tuple[str, float, float]]
+    note: str
+    loop: "Callable[..., list[WearStep]]"
+    rows: "Callable[[list[WearStep]], Mapping[str, list[dict[str, float | None]]]]"
+
+
+def _carry_out(
+    of: Wearing, *, distance: float, step: float, law: str, out: str | None, overwrite: bool,
+    as_json: bool, quiet: bool,
+) -> None:  # fmt: skip
+    from railsim.assessment.wear import wear_law
+    from railsim.cli.analysis import Folder
+    from railsim.errors import RailsimError
+
+    steps = _number_of_steps(of, distance, step)
+    amounts = [of.scale * step * (number + 1) for number in range(steps)]
+    folder = Folder(out, (RECORD, PICTURE, *(_file_name(of, at) for at in amounts)), overwrite)
     found: list[WearStep] = []
     remarks: list[str] = []
 
@@ -102,27 +204,22 @@ def command(
     ended = None
     try:
         with progress_bar("wear", quiet=quiet) as progress:
-            wear_loop(
-                coach, ways, step=1e3 * step, steps=steps, law=law, settings=inputs[0].settings,
-                folder=None if folder.path is None else folder.path / STEPS, progress=progress,
+            of.loop(
+                step=of.scale * step, steps=steps, law=law, progress=progress,
+                folder=None if folder.path is None else folder.path / STEPS,
                 on_step=found.append, on_remark=remark,
             )  # fmt: skip
     except RailsimError as error:
         if not found:
             raise
         ended = error
-    record: dict[str, Any] = {
-        "vehicle": coach.name,
-        "routes": [{"track": w.track.name, "speed": w.speed, "share": w.share} for w in ways],
-        "step": 1e3 * step,
-        "law": law,
-        "rows": wear_rows(found, coach, ways[0].track),
-        "remarks": remarks,
-        "ended": None if ended is None else str(ended),
-    }
-    _write(folder, record, found)
+    rows = of.rows(found)
+    end = None if ended is None else str(ended)
+    record = {**of.record, "step": of.scale * step, "law": law, **rows, "remarks": remarks,
+              "ended": end}  # fmt: skip
+    _write(folder, of, record, found)
     if not as_json:
-        show(*_lines(coach.name, ways, wear_law(law).source, record["rows"]))
+        _show(of, wear_law(law).source, rows)
         folder.tell()
     elif ended is None:
         print_json(record)
@@ -130,44 +227,50 @@ def command(
         raise ended
 
 
-def _write(folder: "Folder", record: "dict[str, Any]", found: "list[WearStep]") -> None:
-    """Write record, profiles and picture of what was done."""
-    folder.write_json(FILES[0], record)
+def _write(
+    folder: "Folder", of: Wearing, record: Mapping[str, Any], found: "list[WearStep]"
+) -> None:
+    """Write record, profiles and, of wheels, the picture of what was done."""
+    folder.write_json(RECORD, record)
     if folder.path is None:
         return
-    from railsim.plot.wear import wear_figure
+    for done in found:
+        for side, worn in done.worn_profiles.items():
+            name = _file_name(of, done.distance + done.length, side)
+            folder.written.append(_write_profile(folder.path / name, worn))
+    if "rows" in record:
+        from railsim.plot.wear import wear_figure
 
-    wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
-    for distance, worn in wheels[1:]:
-        folder.written.append(_write_profile(folder.path / _file_name(distance), worn))
-    title = f"{record['vehicle']}: wear of the wheels"
-    folder.write_picture(FILES[1], wear_figure(wheels, record["rows"], title))
+        wheels = [(0.0, found[0].profile), *((w.distance + w.length, w.worn) for w in found)]
+        title = f"{of.name}: wear of the wheels"
+        folder.write_picture(PICTURE, wear_figure(wheels, record["rows"], title))
 
 
-def _file_name(distance: float) -> str:
-    return f"wheel_{1e-3 * distance:g}_km.csv"
+def _file_name(of: Wearing, amount: float, side: str = "wheel") -> str:
+    return f"{side}_{amount / of.scale:g}_{of.unit}.csv"
 
 
-def _number_of_steps(distance: float, step: float) -> int:
+def _number_of_steps(of: Wearing, distance: float, step: float) -> int:
     from railsim.errors import Fault, InputError
 
     faults = [
         Fault(option, "", f"found {value:g}", "above 0")
-        for option, value in (("--distance", distance), ("--step", step))
+        for option, value in ((of.option, distance), ("--step", step))
         if not 0.0 < value < float("inf")
     ]
     if faults:
         raise InputError(faults)
     steps = round(min(distance / step, MOST_STEPS + 1.0))
     if not 1 <= steps <= MOST_STEPS or abs(steps * step - distance) > 1e-9 * distance:
-        found = f"found {step:g} km with a distance of {distance:g} km"
-        allowed = f"the distance divided by a whole number from 1 to {MOST_STEPS}"
+        whole = of.option.removeprefix("--")
+        found = f"found {step:g} {of.unit} with a {whole} of {distance:g} {of.unit}"
+        allowed = f"the {whole} divided by a whole number from 1 to {MOST_STEPS}"
         raise InputError([Fault("--step", "", found, allowed)])
     return steps
 
 
 def _write_profile(path: "Path", profile: "Profile") -> "Path":
-    """Write a profile so that it can stand in a vehicle file."""
+    """Write a profile so that it can stand in a vehicle or track file."""
     from railsim.files import whole_file
 
     lines = [f"# {profile.name}", *(f"# {json.dumps(note)}" for note in profile.notes), "y_mm,z_mm"]
@@ -177,25 +280,23 @@ def _write_profile(path: "Path", profile: "Profile") -> "Path":
     return path
 
 
-def _lines(
-    vehicle: str, ways: "list[Route]", source: str, rows: "list[dict[str, float | None]]"
-) -> "list[str | Table]":
-    total = sum(way.share for way in ways)
-    shares = ", ".join(
-        f"{way.share / total:.0%} {way.track.name} at {way.speed:g} m/s" for way in ways
-    )
-    cells = []
-    for row in rows:
-        conicity = row["equivalent_conicity"]
-        worn = bool(row["area"])
-        cells.append([
-            f"{1e-3 * (row['distance'] or 0.0):g}",
-            f"{1e6 * (row['area'] or 0.0):.2f}",
-            f"{1e3 * (row['deepest'] or 0.0):.3f}",
-            f"{1e3 * (row['deepest_y'] or 0.0):.1f}" if worn else "",
-            "" if conicity is None else f"{conicity:.3f}",
-        ])  # fmt: skip
-    header = ["distance (km)", "worn area (mm2)", "deepest (mm)", "at y (mm)", "conicity at 3 mm"]
-    note = f"{source}, mean of all wheels; y from the nominal rolling circle, "
-    note += "negative towards the flange"
-    return [vehicle, f"  {shares}", f"  {note}", "", text_table(header, cells, numbers=0)]
+def _show(of: Wearing, source: str, rows: "Mapping[str, list[dict[str, float | None]]]") -> None:
+    from railsim.table import Column, Table
+
+    total = sum(share for _, _, share in of.shares)
+    shares = ", ".join(f"{share / total:.0%} {name} at {v:g} m/s" for name, v, share in of.shares)
+    show(of.name, f"  {shares}", f"  {source}, {of.note}")
+    columns = [
+        Column("distance", "distance" if of.unit == "km" else "tonnage", of.unit, "g"),
+        Column("area", "worn area", "mm2", ".2f"),
+        Column("deepest", "", "mm", ".3f"),
+        Column("deepest_y", "at y", "mm", ".1f"),
+        Column("equivalent_conicity", "conicity at 3 mm", "", ".3f"),
+        Column("flange_thickness", "flange thickness", "mm", ".2f"),
+        Column("flange_height", "flange height", "mm", ".2f"),
+        Column("hollow", "hollow", "mm", ".2f"),
+    ]
+    for side, of_side in rows.items():
+        shown = [row if row["area"] else row | {"deepest_y": None} for row in of_side]
+        known = [column for column in columns if column.name in shown[0]]
+        show("", Table(known, shown, "" if side == "rows" else f"{side} rail"))

@@ -428,3 +428,34 @@ class StationaryLimits(FileDefinition):
     """(Q0 - Q)/Q0 of the least loaded wheel on a cant equal to the admissible cant deficiency"""
     lean_angle: Value
     """Angle of the floor from horizontal on it [rad]"""
+
+
+class WheelLimits(FileDefinition):
+    """Dimensions at which a worn wheel goes out of service."""
+
+    KIND: ClassVar = "limits"
+
+    format: Literal["railsim-wheel-limits/1"]
+    """Kind and version of the file"""
+    edition: Text
+    """Edition of the standard"""
+    flange_thickness: Value
+    """Sd, smallest [m]"""
+    flange_height: Value
+    """Sh, largest [m]"""
+    flange_slope: Value
+    """qR, smallest [m]"""
+    hollow: Value
+    """Of the tread, largest [m]"""
+
+    def reached(self, dimensions: Mapping[str, float]) -> str:
+        """Return which limits are reached, in words; empty for none."""
+        found = []
+        for name, value in dimensions.items():
+            limit = getattr(self, name).value
+            largest = name in ("flange_height", "hollow")
+            if (value >= limit) if largest else (value <= limit):
+                found.append(
+                    f"{name.replace('_', ' ')} {1e3 * value:.1f} mm, limit {1e3 * limit:g}"
+                )
+        return "; ".join(found)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from railsim.definitions import sources
 from railsim.definitions.file_definition import FileDefinition, format_fault, loaded
 from railsim.definitions.flatten import wrong_type
-from railsim.definitions.limits import ComfortLimits, RunningLimits, StationaryLimits
+from railsim.definitions.limits import ComfortLimits, RunningLimits, StationaryLimits, WheelLimits
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.published import Published
 from railsim.definitions.scenario import Scenario
@@ -44,6 +44,7 @@ FORMATS: dict[str, type[FileDefinition]] = {
         Study,
         StationaryLimits,
         WearLawFile,
+        WheelLimits,
     )
 }
 """Every definition of a file by its `format` key."""
@@ -135,6 +136,11 @@ def load_comfort_limits(path: str | Path, overrides: Overrides = ()) -> ComfortL
 def load_stationary_limits(path: str | Path, overrides: Overrides = ()) -> StationaryLimits:
     """Load the limits of stationary tests, or shipped ones by their name; as `load_vehicle`."""
     return _load(StationaryLimits, path, overrides)
+
+
+def load_wheel_limits(path: str | Path, overrides: Overrides = ()) -> WheelLimits:
+    """Load the limits of worn wheels, or shipped ones by their name; as `load_vehicle`."""
+    return _load(WheelLimits, path, overrides)
 
 
 def load_wear_law(path: str | Path) -> WearLawFile:

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from railsim.assessment import Assessment
 from railsim.assessment.criteria import WORDS
@@ -62,6 +63,7 @@ def _limits_figure(assessments: Sequence[Assessment]) -> Figure:
     axes[0].invert_yaxis()
     for ax in axes:
         ax.set_xlim(0.0, min(most, LONGEST_BAR))
+        ax.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))  # apart from the next axes' 0
     edition = next((a.limits.edition for a in assessments if a.limits), "")
     figure.suptitle(edition, x=0.012, ha="left", fontsize=10)
     figure.legend(loc="outside lower left")
@@ -140,6 +142,7 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
     zones = sorted({zone for own in chosen for zone in own})
     if not zones:
         return None
+    names = list(dict.fromkeys(z.population.name for a in assessments for z in a.zones))
     with styled():
         figure = Picture(
             figsize=(max(6.8, 1.2 + 2.8 * len(zones)), 1.4 + 2.6 * len(assessments)),
@@ -147,7 +150,6 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
         )
         grid = figure.subplots(len(assessments), len(zones), squeeze=False)
         for axes, assessment, own in zip(grid, assessments, chosen, strict=True):
-            names = list(dict.fromkeys(z.population.name for z in assessment.zones))
             for ax, zone in zip(axes, zones, strict=True):
                 if zone not in own:
                     ax.set_axis_off()
@@ -162,14 +164,14 @@ def regression_figure(assessments: Sequence[Assessment]) -> Figure | None:
                 unit = row.criterion.unit.replace("-", "1")
                 ax.set_ylabel(f"{row.criterion.words},\n{row.place} ({unit})", fontsize=8)
             axes[0].set_title(f"{assessment.vehicle}\n", loc="left", fontsize=9)
-            handles = [
-                Line2D([], [], marker="o", ls="", color=DISTINCT[k % len(DISTINCT)], label=name)
-                for k, name in enumerate(names)
-            ]
-            if any(names):
-                axes[0].legend(handles=handles, loc="best", fontsize=7)
         for ax in grid[-1]:
             ax.set_xlabel("cant deficiency (mm)")
+        handles = [
+            Line2D([], [], marker="o", ls="", color=DISTINCT[k % len(DISTINCT)], label=name)
+            for k, name in enumerate(names)
+        ]
+        if any(names):  # beside the axes, where it hides no value
+            figure.legend(handles=handles, loc="outside lower left", ncols=len(names))
     return figure
 
 

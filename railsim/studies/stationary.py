@@ -18,7 +18,7 @@ import numpy as np
 from railsim.cant import cant_deficiency
 from railsim.constants import CANT_BASE
 from railsim.definitions.flatten import FlatVehicle, flatten
-from railsim.definitions.limits import Constant, StationaryLimits
+from railsim.definitions.limits import StationaryLimits, Value
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
@@ -29,6 +29,7 @@ from railsim.model.assembly import assemble
 from railsim.model.equilibrium import equilibrium
 from railsim.result.filters import Floats
 from railsim.stability.curving import FAILED, curving
+from railsim.table import Amount, Column, Table
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,23 @@ class Stationary:
         if any(value.exceeded for value in self.values):
             return "fail"
         return "incomplete" if self.reasons else "pass"
+
+    def table(self) -> Table:
+        """Return the values with their limits; a value without a steady state is left open."""
+        columns = [Column("case", "standing on"), Column("quantity"), Column("place", "location"),
+                   Column("value", format=">"), Column("limit", format=">")]  # fmt: skip
+        number, angle = Column("", format=".3f"), Column("", format=".2f")
+
+        def shown(quantity: str, value: float | None) -> object:
+            if value is None or np.isnan(value):
+                return None
+            if quantity.startswith("angle"):
+                return f"{angle.text(float(np.degrees(value)))} deg"
+            return Amount(value, number)
+
+        rows = [[v.case, v.quantity, v.place, shown(v.quantity, v.value),
+                 shown(v.quantity, v.limit)] for v in self.values]  # fmt: skip
+        return Table(columns, rows)
 
     def record(self) -> dict[str, object]:
         """Return the tests as plain numbers and strings, SI."""
@@ -266,7 +284,7 @@ def _climbing(
     )  # fmt: skip
 
 
-def _unloading(case: str, stands: Sequence[Standing | None], limit: Constant) -> StationaryValue:
+def _unloading(case: str, stands: Sequence[Standing | None], limit: Value) -> StationaryValue:
     """Return the worst wheel over some states; nan if one of them was not found."""
     worst, label = -np.inf, ""
     for standing in stands:

@@ -1,4 +1,4 @@
-"""Wear of wheel profiles over distance, with an update of the profile at each step.
+"""Wear of wheels over distance and of rails over tonnage, with an update of the profiles.
 
 All wheels have the same profile: their wear is averaged, as on a train that runs in both directions
 and is turned.
@@ -8,8 +8,8 @@ import hashlib
 import json
 import logging
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -18,9 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from railsim.assessment.wear import DEFAULT_LAW, WearLaw, wear_law
-from railsim.assessment.wear_depth import parts_of_step, worn_depth, worn_profile
+from railsim.assessment.wear_depth import parts_of_step, wheel_dimensions, worn_depth, worn_profile
 from railsim.contact import contact_geometry
 from railsim.definitions.flatten import flatten
+from railsim.definitions.limits import WheelLimits
 from railsim.definitions.settings import InitialState, Settings
 from railsim.definitions.track import Track
 from railsim.definitions.track_tables import Straight
@@ -38,13 +39,23 @@ AMPLITUDE = 3e-3  # m, at which EN 15302 compares equivalent conicities
 DISTURBED = 6e-3  # m, of the leading wheelset, about the play in the track
 TESTED = 20.0  # s, of a disturbed run
 ROOM = 100.0  # m of its track, for the vehicle
-KEPT = 2  # layout of stored steps
+KEPT = 3  # layout of stored steps
+WHEEL = "wheel"
 _LOG = logging.getLogger(__name__)
 
 
 class Route(NamedTuple):
     """A track, the speed on it [m/s] and its share of the distance, in any unit."""
 
+    track: Track
+    speed: float
+    share: float
+
+
+class Run(NamedTuple):
+    """One of the runs that are averaged, with its share."""
+
+    vehicle: Vehicle
     track: Track
     speed: float
     share: float
@@ -57,54 +68,54 @@ class WearStep:
     Attributes
     ----------
     distance, length : float
-        Distance run before the step, and in the step [m].
-    profile, worn : Profile
-        Wheel profile in this step, and after it.
-    depth : float64[position]
-        Depth of wear per distance, mean of all wheels and over the step, on `wear_depth.grid`
-        [m/m].
+        Distance run before the step, and in the step [m]; of rails the tonnage [kg].
+    profiles, worn_profiles : dict
+        By side of the rail, or ``wheel``: in this step, and after it.
+    depths : dict
+        Depth of wear per distance or tonnage, mean of all wheels, tracks or vehicles and over the
+        step, on `wear_depth.grid` [m/m] or [m/kg].
     """
 
     distance: float
     length: float
-    profile: Profile
-    worn: Profile
-    depth: Floats
+    profiles: Mapping[str, Profile]
+    worn_profiles: Mapping[str, Profile]
+    depths: Mapping[str, Floats]
+
+    @property
+    def profile(self) -> Profile:
+        """Of the wheels, in this step."""
+        return self.profiles[WHEEL]
+
+    @property
+    def worn(self) -> Profile:
+        """Of the wheels, after it."""
+        return self.worn_profiles[WHEEL]
+
+    @property
+    def depth(self) -> Floats:
+        """Of the wheels."""
+        return self.depths[WHEEL]
 
 
 class _Wear(NamedTuple):
-    """Mean depth of wear per distance [m/m]; sentences on hunting by track and speed."""
+    """Mean depth of wear per distance or tonnage; sentences on hunting by track and speed."""
 
-    depth: Floats
+    depths: dict[str, Floats]
     hunts: dict[str, str]
 
 
-def wear_loop(
-    vehicle: Vehicle,
-    routes: Sequence[tuple[Track, float, float]],
-    *,
-    step: float,
-    steps: int,
-    law: str = DEFAULT_LAW,
-    settings: Settings | None = None,
-    folder: Path | None = None,
-    on_step: Callable[[WearStep], None] | None = None,
-    on_remark: Callable[[str], None] | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> list[WearStep]:
-    """Wear of the wheels of a vehicle over distance, with an update of the profile at each step.
+@dataclass(frozen=True)
+class Loop:
+    """How a loop is carried out.
 
-    Parameters
+    Attributes
     ----------
-    vehicle : Vehicle
-        Vehicle whose wheels all have the same profile.
-    routes : sequence of Route or (Track, float, float)
-        Tracks with their speeds [m/s] and shares of the distance.
     step : float
-        Distance between two reported profiles [m].  Within a step the profile is updated as
-        often as it has worn by 0.1 mm.
+        Distance [m] or tonnage [kg] between two reported profiles.  Within a step the profiles are
+        updated as often as one has worn by 0.1 mm.
     steps : int
-        Number of updates.
+        Number of steps.
     law : str
         Name of a law of `railsim.assessment.wear.LAWS`, or the path of a file of one.
     settings : Settings, optional
@@ -114,11 +125,42 @@ def wear_loop(
     on_step : callable, optional
         Called after each step; before an error also with the part of the step that was finished.
     on_remark : callable, optional
-        Called with a sentence on every stored step that is damaged and computed again, and on
-        every route on which the vehicle hunts: it wears as no service does.  By default these
-        sentences are logged.
+        Called with a sentence on every stored step that is damaged and computed again, on every
+        route on which the vehicle hunts (it wears as no service does), and on the limit at which
+        the loop ends.  By default these sentences are logged.
     progress : callable, optional
         Called repeatedly with the finished fraction.
+    """
+
+    step: float
+    steps: int
+    law: str = DEFAULT_LAW
+    settings: Settings | None = None
+    folder: Path | None = None
+    on_step: Callable[[WearStep], None] | None = None
+    on_remark: Callable[[str], None] | None = None
+    progress: Callable[[float], None] | None = None
+
+
+def wear_loop(
+    vehicle: Vehicle,
+    routes: Sequence[tuple[Track, float, float]],
+    *,
+    limits: WheelLimits | None = None,
+    **how: Any,
+) -> list[WearStep]:
+    """Wear of the wheels of a vehicle over distance, with an update of the profile at each step.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Vehicle whose wheels all have the same profile.
+    routes : sequence of Route or (Track, float, float)
+        Tracks with their speeds [m/s] and shares of the distance.
+    limits : WheelLimits, optional
+        Dimensions of the wheel at which the loop ends.
+    how
+        `Loop`: ``step`` and ``steps`` are required.
 
     Raises
     ------
@@ -127,51 +169,102 @@ def wear_loop(
     ModelError : a run ended early; names profile, distance and track.
     """
     name = _profile_name(vehicle)
-    ways = [Route(*route) for route in routes]
-    _check(ways, step, steps)
-    chosen = wear_law(law)
-    given = settings or Settings()
-    outputs = given.outputs.model_copy(update={"contact_patches": True})
-    given = given.model_copy(update={"outputs": outputs})
-    tell, remark = progress or (lambda _: None), on_remark or _LOG.warning
-    profile, whole = load_profile(name), steps * step
+    runs = [Run(vehicle, *route) for route in routes]
+
+    def depths(result: Result, law: WearLaw) -> dict[str, Floats]:
+        wheels = product(range(len(result.wheelsets)), (0, 1))
+        of_wheels = [worn_depth(result, wheelset, side, law) for wheelset, side in wheels]
+        return {WHEEL: np.asarray(np.mean(of_wheels, axis=0))}
+
+    def ended(worn: Mapping[str, Profile]) -> str:
+        return limits.reached(asdict(wheel_dimensions(worn[WHEEL]))) if limits else ""
+
+    wearing = Wearing(runs, {WHEEL: load_profile(name)}, {WHEEL: name}, depths, ended)
+    return carry_out(wearing, Loop(**how))
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """What wears.
+
+    Attributes
+    ----------
+    runs : sequence of Run
+    new : mapping of str to Profile
+        Profiles at the beginning.
+    names : mapping of str to str
+        Names by which vehicle or track call them.
+    depths : callable
+        A result and a law to the depth of each profile per distance or tonnage.
+    ended : callable
+        Worn profiles to the sentence why the loop ends; empty while it goes on.
+    unit, scale : str, float
+        In which messages give distance or tonnage, and its factor from SI.
+    """
+
+    runs: Sequence[Run]
+    new: Mapping[str, Profile]
+    names: Mapping[str, str]
+    depths: Callable[[Result, WearLaw], dict[str, Floats]]
+    ended: Callable[[Mapping[str, Profile]], str] = lambda _: ""
+    unit: str = "km"
+    scale: float = 1e-3
+
+    def amount(self, at: float) -> str:
+        """Return a distance or tonnage as messages give it."""
+        return f"{self.scale * at:.4g} {self.unit}"
+
+
+def carry_out(wearing: Wearing, how: Loop) -> list[WearStep]:
+    """Run, subtract what has worn, and run again."""
+    _check(wearing.runs, how)
+    law, outputs = wear_law(how.law), {"contact_patches": True}
+    settings = how.settings or Settings()
+    settings = settings.model_copy(update={"outputs": settings.outputs.model_copy(update=outputs)})
+    tell, remark = how.progress or (lambda _: None), how.on_remark or _LOG.warning
+    profiles, whole = dict(wearing.new), how.steps * how.step
     found: list[WearStep] = []
     hunting: set[str] = set()
 
-    def finish(start: float, length: float, worn: Profile, lost: Floats) -> None:
-        found.append(WearStep(start, length, profile, worn, lost / length))
-        if on_step is not None:
-            on_step(found[-1])
+    def finish(at: float, length: float, worn: dict[str, Profile], lost: dict[str, Floats]) -> None:
+        mean = {name: depth / length for name, depth in lost.items()}
+        found.append(WearStep(at, length, profiles, worn, mean))
+        if how.on_step is not None:
+            how.on_step(found[-1])
 
-    for number in range(steps):
-        start = at = number * step
-        worn, left, lost = profile, step, np.zeros(1)
+    for number in range(how.steps):
+        start = at = number * how.step
+        worn, left = profiles, how.step
+        lost = {name: np.zeros(1) for name in profiles}
         try:
             while left > 0.0:
                 part = partial(_tell_part, tell, at / whole, left / whole)
-                file = _file_name(vehicle, ways, given, step, chosen, worn)
-                path = None if folder is None else folder / file
-                wear = _kept(path, remark) or _wear(
-                    vehicle, ways, given, chosen, {name: worn}, at, part
+                path = how.folder and how.folder / _file_name(
+                    wearing, settings, how.step, law, worn
                 )
+                wear = _kept(path, remark) or _wear(wearing, settings, law, worn, at, part)
                 if path is not None and not path.exists():
-                    facts = {"distance": at, **wear._asdict(), "depth": wear.depth.tolist()}
-                    write_record(path, facts)
+                    depths = {name: depth.tolist() for name, depth in wear.depths.items()}
+                    write_record(path, {"distance": at, "depths": depths, "hunts": wear.hunts})
                 for route, words in wear.hunts.items():
                     if route not in hunting:
-                        remark(f"after {1e-3 * at:.4g} km on {route}: {words}")
+                        remark(f"after {wearing.amount(at)} on {route}: {words}")
                 hunting |= wear.hunts.keys()
-                length = left / parts_of_step(worn, wear.depth, left)
-                worn = worn_profile(worn, wear.depth, length)
-                lost = lost + wear.depth * length
+                length = left / max(parts_of_step(worn[k], wear.depths[k], left) for k in worn)
+                worn = {k: worn_profile(worn[k], wear.depths[k], length) for k in worn}
+                lost = {k: lost[k] + wear.depths[k] * length for k in worn}
                 at, left = at + length, left - length
+                if why := wearing.ended(worn):
+                    remark(f"after {wearing.amount(at)}: {why}: the loop ends")
+                    finish(start, at - start, worn, lost)
+                    return found
         except RailsimError:
             if at > start:
                 finish(start, at - start, worn, lost)
             raise
-        finish(start, step, worn, lost)
-        tell((number + 1) / steps)
-        profile = worn
+        finish(start, how.step, worn, lost)
+        tell((number + 1) / how.steps)
+        profiles = worn
     return found
 
 
@@ -196,32 +289,42 @@ def wear_rows(
     list of dict
         The new wheel, then the wheel after each step: `distance` [m], `area` [m2], `deepest` [m]
         and its position `deepest_y` from the nominal rolling circle [m], all since the beginning,
-        and `equivalent_conicity` at 3 mm (EN 15302), None if it does not exist.
+        `equivalent_conicity` at 3 mm (EN 15302), None if it does not exist, and the dimensions of
+        `wear_depth.WheelDimensions` [m].
     """
+    (wheelset, *_) = (body.wheelset for body in flatten(vehicle).bodies if body.wheelset)
+    rails = load_profile(track.rail[0]), load_profile(track.rail[1])
+    rows = []
+    for distance, worn, lost in since_new(found, WHEEL):
+        geometry = contact_geometry(
+            worn, rails, wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
+        )
+        (conicity,) = geometry.equivalent_conicity([AMPLITUDE])
+        rows.append({
+            **row(distance, worn, lost),
+            "equivalent_conicity": float(conicity) if math.isfinite(conicity) else None,
+            **asdict(wheel_dimensions(worn)),
+        })  # fmt: skip
+    return rows
+
+
+def since_new(found: Sequence[WearStep], name: str) -> list[tuple[float, Profile, Floats]]:
+    """Return distance, profile and its loss in z since it was new: at first, after each step."""
     if not found:
         return []
-    new = found[0].profile
-    wheels = [(0.0, new), *((done.distance + done.length, done.worn) for done in found)]
-    return [_row(distance, new, worn, vehicle, track) for distance, worn in wheels]
+    new = found[0].profiles[name]
+    wheels = [(0.0, new), *((s.distance + s.length, s.worn_profiles[name]) for s in found)]
+    return [(at, worn, np.abs(np.asarray(new.z) - np.asarray(worn.z))) for at, worn in wheels]
 
 
-def _row(
-    distance: float, new: Profile, worn: Profile, vehicle: Vehicle, track: Track
-) -> dict[str, float | None]:
-    lost = np.asarray(new.z) - np.asarray(worn.z)
+def row(distance: float, worn: Profile, lost: Floats) -> dict[str, float | None]:
+    """Worn area, largest depth and where it is."""
     at = int(np.argmax(lost))
-    (wheelset, *_) = (body.wheelset for body in flatten(vehicle).bodies if body.wheelset)
-    left, right = (load_profile(rail) for rail in track.rail)
-    geometry = contact_geometry(
-        worn, (left, right), wheelset.radius, track.gauge, track.inclination, wheelset.back_to_back
-    )  # fmt: skip
-    (conicity,) = geometry.equivalent_conicity([AMPLITUDE])
     return {
         "distance": distance,
-        "area": float(np.trapezoid(lost, new.y)),
+        "area": float(np.trapezoid(lost, worn.y)),
         "deepest": float(lost[at]),
-        "deepest_y": float(new.y[at]),
-        "equivalent_conicity": float(conicity) if math.isfinite(conicity) else None,
+        "deepest_y": float(worn.y[at]),
     }
 
 
@@ -233,39 +336,41 @@ def _profile_name(vehicle: Vehicle) -> str:
     return names.pop()
 
 
-def _check(routes: Sequence[Route], step: float, steps: int) -> None:
+def _check(runs: Sequence[Run], how: Loop) -> None:
     faults = []
-    if not routes:
+    if not runs:
         faults.append(Fault("wear", "routes", "no route", "at least one"))
-    for route in routes:
-        if not (route.share > 0.0 and math.isfinite(route.share)):
-            name = route.track.name
-            faults.append(Fault("wear", "share", f"found {route.share:g} for {name}", "above 0"))
-    if not (step > 0.0 and math.isfinite(step)):
-        faults.append(Fault("wear", "step", f"found {step:g} m", "above 0"))
-    if steps < 1:
-        faults.append(Fault("wear", "steps", f"found {steps}", "1 or more"))
+    for run in runs:
+        if not (run.share > 0.0 and math.isfinite(run.share)):
+            faults.append(
+                Fault("wear", "share", f"found {run.share:g} for {run.track.name}", "above 0")
+            )
+    if not (how.step > 0.0 and math.isfinite(how.step)):
+        faults.append(Fault("wear", "step", f"found {how.step:g} m", "above 0"))
+    if how.steps < 1:
+        faults.append(Fault("wear", "steps", f"found {how.steps}", "1 or more"))
     if faults:
         raise InputError(faults)
 
 
 def _file_name(
-    vehicle: Vehicle,
-    routes: Sequence[Route],
-    settings: Settings,
-    step: float,
-    law: WearLaw,
-    profile: Profile,
+    wearing: Wearing, settings: Settings, step: float, law: WearLaw, worn: Mapping[str, Profile]
 ) -> str:
     """Name of the file of a step: a hash of all its inputs."""
-    rails = {rail for route in routes for rail in route.track.rail}
     inputs: list[Any] = [
-        __version__, KEPT, law.name, law.constants, step,
-        vehicle.to_toml(), settings.to_toml(), profile.key().hex(),
-        [(route.track.to_toml(), route.speed, route.share) for route in routes],
-        [load_profile(rail).key().hex() for rail in sorted(rails)],
+        __version__, KEPT, law.name, law.constants, step, settings.to_toml(),
+        [profile.key().hex() for profile in worn.values()],
+        [(r.vehicle.to_toml(), r.track.to_toml(), r.speed, r.share) for r in wearing.runs],
+        sorted(profile.key().hex() for r in wearing.runs for profile in _others(wearing, r)),
     ]  # fmt: skip
     return f"{hashlib.sha256(json.dumps(inputs).encode()).hexdigest()[:24]}.json"
+
+
+def _others(wearing: Wearing, run: Run) -> list[Profile]:
+    """Profiles of a run that do not wear."""
+    wheels = [n for w in flatten(run.vehicle).bodies if w.wheelset for n in w.wheelset.profile]
+    names = {*wheels, *run.track.rail} - set(wearing.names.values())
+    return [load_profile(name) for name in names]
 
 
 def _kept(path: Path | None, remark: Callable[[str], None]) -> _Wear | None:
@@ -278,42 +383,45 @@ def _kept(path: Path | None, remark: Callable[[str], None]) -> _Wear | None:
         remark(f"{error.faults[0]}: it is computed again")
         path.unlink()
         return None
-    return _Wear(np.asarray(record["depth"], dtype=np.float64), record["hunts"])
+    depths = {name: np.asarray(depth) for name, depth in record["depths"].items()}
+    return _Wear(depths, record["hunts"])
 
 
 def _wear(
-    vehicle: Vehicle,
-    routes: Sequence[Route],
+    wearing: Wearing,
     settings: Settings,
     law: WearLaw,
-    worn: dict[str, Profile],
+    worn: Mapping[str, Profile],
     at: float,
     progress: Callable[[float], None],
 ) -> _Wear:
-    """Mean of all wheels and of the routes weighted by their shares."""
-    total = sum(route.share for route in routes)
+    """Mean of the runs weighted by their shares."""
+    total = sum(run.share for run in wearing.runs)
     depths, hunts = [], dict[str, str]()
-    for number, (track, speed, share) in enumerate(routes):
+    given = {wearing.names[name]: profile for name, profile in worn.items()}
+    for number, run in enumerate(wearing.runs):
 
         def part(done: float, before: int = number) -> None:
-            progress((before + done) / len(routes))
+            progress((before + done) / len(wearing.runs))
 
-        rails = {rail: load_profile(rail) for rail in track.rail}
+        known = given | {rail: load_profile(rail) for rail in run.track.rail if rail not in given}
         try:
             result = simulate(
-                vehicle, track, speed=speed, settings=settings, profiles=rails | worn, progress=part
-            )
-            depths.append(share / total * _mean_depth(result, law))
-            words = _hunting(result) or _hunting_when_disturbed(
-                vehicle, routes[number], settings, rails | worn
-            )
+                run.vehicle, run.track, speed=run.speed, settings=settings, profiles=known,
+                progress=part,
+            )  # fmt: skip
+            if result.status != "complete":
+                raise ModelError(f"{result.status}, {result.attributes['status_reason']}")
+            of_run = wearing.depths(result, law)
+            depths.append({k: run.share / total * depth for k, depth in of_run.items()})
+            words = _hunting(result) or _hunting_when_disturbed(run, settings, known)
         except ModelError as error:
-            (wheel,) = worn.values()
-            place = f"wheel {wheel.name} after {1e-3 * at:.4g} km on {track.name}"
+            names = ", ".join(profile.name for profile in worn.values())
+            place = f"{names} after {wearing.amount(at)} on {run.track.name}"
             raise ModelError(f"{place}: {error}") from None
         if words:
-            hunts[f"{track.name} at {speed:g} m/s"] = words
-    return _Wear(np.asarray(np.sum(depths, axis=0)), hunts)
+            hunts[f"{run.track.name} at {run.speed:g} m/s"] = words
+    return _Wear({k: np.asarray(np.sum([d[k] for d in depths], axis=0)) for k in worn}, hunts)
 
 
 def _hunting(result: Result) -> str | None:
@@ -321,31 +429,22 @@ def _hunting(result: Result) -> str | None:
 
 
 def _hunting_when_disturbed(
-    vehicle: Vehicle, route: Route, settings: Settings, profiles: dict[str, Profile]
+    run: Run, settings: Settings, profiles: Mapping[str, Profile]
 ) -> str | None:
     """Say whether the vehicle hunts on the straights of a route: nothing disturbs it there."""
-    track = route.track
-    if not any(isinstance(element, Straight) for element in track.plan):
+    if not any(isinstance(element, Straight) for element in run.track.plan):
         return None
-    plain = track.replace(
-        plan=[{"type": "STR", "length": route.speed * TESTED + ROOM}],
+    plain = run.track.replace(
+        plan=[{"type": "STR", "length": run.speed * TESTED + ROOM}],
         cant=[], vertical=[], irregularities=[], gauge_widening=None,
     )  # fmt: skip
-    leading = flatten(vehicle).of_kind("wheelset")[0].name
-    given = settings.model_copy(update={"initial": {leading: InitialState(y=DISTURBED)}})
+    leading = flatten(run.vehicle).of_kind("wheelset")[0].name
+    disturbed = settings.model_copy(update={"initial": {leading: InitialState(y=DISTURBED)}})
     result = simulate(
-        vehicle, plain, speed=route.speed, duration=TESTED, settings=given, profiles=profiles
+        run.vehicle, plain, speed=run.speed, duration=TESTED, settings=disturbed, profiles=profiles
     )
     how = f"disturbed by {1e3 * DISTURBED:g} mm"
     if result.status != "complete":
         return f"A run {how} is {result.status}, {result.attributes['status_reason']}"
     words = _hunting(result)
     return words and f"{words.split(', from s')[0]}, {how}."
-
-
-def _mean_depth(result: Result, law: WearLaw) -> Floats:
-    if result.status != "complete":
-        raise ModelError(f"{result.status}, {result.attributes['status_reason']}")
-    wheels = product(range(len(result.wheelsets)), (0, 1))
-    depths = [worn_depth(result, wheelset, side, law) for wheelset, side in wheels]
-    return np.asarray(np.mean(depths, axis=0))

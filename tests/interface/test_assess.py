@@ -364,3 +364,40 @@ def test_hunting_is_named_as_the_cause_of_discomfort():
     share = next(p.hunting for p in found.comfort["fast"] if p.sensor == "floor_middle")
     assert share == pytest.approx(five**2 / (five**2 + one**2), abs=0.03)
     assert any("hunting at 5.0 Hz makes up" in remark for remark in found.remarks)
+
+
+ARCHARD = """format = "railsim-wear-law/1"
+name = "our rig"
+source = "made up"
+[archard]
+hardness = 2e9
+pressure = 0.8
+speeds = [0.2, 0.7]
+slow = 1e-4
+medium = 1e-4
+fast = 1e-4
+seizure = 1e-4
+"""
+
+
+def test_law_of_a_file_in_the_assessment(tmp_path, capsys):
+    """Archard with one coefficient: k T_gamma/(mu H) over the circumference, patch by patch."""
+    law = tmp_path / "rig.toml"
+    law.write_text(ARCHARD)
+    run = railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"), speed=20.0,
+        duration=4.0, settings=railsim.load_settings(
+            None, ["output_rate=1000", "outputs.contact_patches=true"]),
+    )  # fmt: skip
+    (found,) = assess(run, "wear", law=str(law))
+    wheel = next(iter(found.wear.values()))[0]
+    (area,) = wheel.worn_area.values()
+    mu = run.track().friction[0]
+    expected = 1e-4 * wheel.T_gamma / mu / 2e9 / (np.pi * 0.92)
+    assert area == pytest.approx(expected, rel=2e-2)  # patches with spin against creepage wear none
+    path = str(run.to_hdf5(tmp_path / "run.h5"))
+    assert main(["assess", path, "--standard", "wear", "--law", str(law)]) == 0
+    assert "rig.toml (mm2/1000 km)" in capsys.readouterr().out
+    assert main(["assess", path, "--standard", "wear", "--law", "nothing"]) == 2
+    with pytest.raises(InputError, match="contact_patches"):
+        assess(made(track(STRAIGHT), FAST), "wear", law=str(law))

@@ -1,0 +1,104 @@
+"""Assessments as tables: estimates of each zone, comfort, wear and safety of each run."""
+
+from collections.abc import Sequence
+
+from railsim.assessment.assess import Assessment
+from railsim.assessment.comfort_report import PointComfort
+from railsim.assessment.safety_report import SafetyReport
+from railsim.assessment.wear import LAWS
+from railsim.assessment.wear_report import WheelWear
+from railsim.assessment.zones import Assessed, ZoneReport
+from railsim.table import Amount, Column, Table
+
+SHORT = {"one": "1-dim.", "two": "2-dim.", "largest": "largest", "smallest": "smallest"}
+
+
+def tables(assessment: Assessment) -> list[Table]:
+    """Return the tables of an assessment."""
+    return [
+        *map(zone_table, assessment.zones),
+        *(_comfort(run, points) for run, points in assessment.comfort.items()),
+        *(_wear(run, wheels) for run, wheels in assessment.wear.items()),
+        *(table for run, report in assessment.safety.items() for table in _safety(run, report)),
+    ]
+
+
+def zone_table(zone: ZoneReport) -> Table:
+    """Of each quantity the estimate that is nearest to its limit."""
+    title = f"{zone.title}: {len(zone.values)} of {zone.needed} sections"
+    columns = [
+        Column("quantity", title), Column("location"), Column("unit"), Column("N", format="d"),
+        Column("mean", format=">"), Column("s", format=">"), Column("method"),
+        Column("estimate", format=">"), Column("limit", format=">"),
+        Column("share", "% of limit", format=".1f"),
+    ]  # fmt: skip
+    return Table(columns, map(_row, zone.nearest))
+
+
+def _row(row: Assessed) -> list[object]:
+    about, estimate = row.criterion, row.estimate
+    limited = row.limit == row.limit
+    column = Column(about.name, unit=about.unit, format=".3f" if about.scale == 1.0 else ".2f")
+    value: object = Amount(estimate.value, column)
+    if row.uncorrected is not None:
+        value = f"{about.text(estimate.value)} (uncorrected {about.text(row.uncorrected.value)})"
+    return [
+        about.words, row.place, about.unit, estimate.N, Amount(estimate.mean, column),
+        Amount(estimate.deviation, column), SHORT[estimate.method], value,
+        Amount(row.limit if limited else None, column), 100.0 * row.share if limited else None,
+    ]  # fmt: skip
+
+
+def _comfort(run: str, points: Sequence[PointComfort]) -> Table:
+    columns = [
+        Column("place", run), Column("x", unit="m", format=".2f"),
+        *(Column(name, format=".2f") for name in ("N_MV", "N_VA", "N_VD")),
+        Column("iso2631_total", "ISO a_v", "m/s2", ".3f"),
+        Column("lateral", "Wz lateral", format=".2f"),
+        Column("vertical", "Wz vertical", format=".2f"),
+        Column("P_CT", "P_CT standing (%)", format=".1f"),
+        Column("P_DE", "P_DE standing (%)", format=".1f"),
+    ]  # fmt: skip
+    rows = [
+        {
+            "place": p.sensor, "x": p.place, "N_MV": p.mean.N_MV, "N_VA": p.mean.N_VA,
+            "N_VD": p.mean.N_VD, "iso2631_total": float((p.iso_rms**2).sum() ** 0.5), **p.sperling,
+            "P_CT": max((t.standing for t in p.transitions), default=None),
+            "P_DE": p.events["standing"],
+        }
+        for p in points
+    ]  # fmt: skip
+    return Table(columns, rows)
+
+
+def _wear(run: str, wheels: Sequence[WheelWear]) -> Table:
+    columns = [
+        Column("place", run), Column("T_gamma", unit="N", format=".1f"),
+        Column("95", "95 %", format=".0f"), Column("99.85", "99.85 %", format=".0f"),
+        *(Column(law, f"{LAWS[law].name if law in LAWS else law} (mm2/1000 km)", format=".2f")
+          for law in wheels[0].worn_area),
+        Column("rail_damage", "WLRM (1e-6)", format=".2f"),
+        Column("fatigue_index", "FI_surf", format=".3f"),
+    ]  # fmt: skip
+    rows = [
+        {
+            **w.record(), **w.percentiles, "rail_damage": 1e6 * w.rail_damage,
+            **{law: None if area is None else 1e12 * area for law, area in w.worn_area.items()},
+        }
+        for w in wheels
+    ]  # fmt: skip
+    return Table(columns, rows)
+
+
+def _safety(run: str, report: SafetyReport) -> list[Table]:
+    wheels = [
+        Column("place", run), Column("limit", "Nadal", format=".3f"),
+        Column("Y_over_Q", "largest Y/Q", format=".3f"),
+        Column("climb_distance", "climb", "m", ".2f"), Column("rise", unit="mm", format=".2f"),
+    ]  # fmt: skip
+    rows = [
+        w.record() | ({} if w.Y_over_Q == w.Y_over_Q else {"Y_over_Q": "lifted"})
+        for w in report.wheels
+    ]
+    bogies = [Column("bogie"), Column("overturning", format=".3f")]
+    return [Table(wheels, rows), Table(bogies, list(report.overturning.items()))]

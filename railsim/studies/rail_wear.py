@@ -1,0 +1,73 @@
+"""Wear of rails over the tonnage of a mix of traffic, updated at each step."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from railsim.assessment.wear import WearLaw
+from railsim.assessment.wear_depth import rail_depth
+from railsim.constants import GRAVITY
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.notation import SIDES
+from railsim.profiles import load_profile
+from railsim.result import Result
+from railsim.result.filters import Floats
+from railsim.studies.wear_loop import Loop, Run, Wearing, WearStep, carry_out, row, since_new
+
+
+class Traffic(NamedTuple):
+    """A vehicle, its speed [m/s] and its share of the tonnage, in any unit."""
+
+    vehicle: Vehicle
+    speed: float
+    share: float
+
+
+def rail_wear(
+    track: Track, traffic: Sequence[tuple[Vehicle, float, float]], **how: Any
+) -> list[WearStep]:
+    """Wear of both rails of a track under a mix of traffic, profiles an update at each step.
+
+    The mean over the track is worn off: let it be of one curvature.  The wheels remain as they are.
+
+    Parameters
+    ----------
+    track : Track
+    traffic : sequence of Traffic or (Vehicle, float, float)
+        Vehicles with their speeds [m/s] and shares of the tonnage.
+    how
+        `Loop`: ``step`` [kg] and ``steps`` are required.
+
+    Raises
+    ------
+    InputError, ModelError : as of `wear_loop`.
+    """
+    sides = {side: f"{rail}, {side}" for side, rail in zip(SIDES, track.rail, strict=True)}
+    new = {
+        s: replace(load_profile(r), name=sides[s]) for s, r in zip(SIDES, track.rail, strict=True)
+    }
+    # the two rails wear apart, so they have names of their own
+    apart = track.replace(rail=list(sides.values()))
+    runs = [Run(vehicle, apart, speed, share) for vehicle, speed, share in traffic]
+
+    def depths(result: Result, law: WearLaw) -> dict[str, Floats]:
+        load = float(np.sum(result["Q0"])) / GRAVITY
+        passes = range(len(result.wheelsets))
+        return {
+            side: np.asarray(sum(rail_depth(result, w, k, law) for w in passes) / load)
+            for k, side in enumerate(SIDES)
+        }
+
+    return carry_out(Wearing(runs, new, sides, depths, unit="Mt", scale=1e-9), Loop(**how))
+
+
+def rail_rows(found: Sequence[WearStep]) -> dict[str, list[dict[str, float | None]]]:
+    """Wear of both rails after each step of `rail_wear`, by side.
+
+    `distance` is the tonnage [kg]; `area`, `deepest` and `deepest_y` (from the rail's middle, field
+    side positive) as of `wear_rows`.
+    """
+    return {side: [row(*of) for of in since_new(found, side)] for side in SIDES}

@@ -1,0 +1,98 @@
+"""Wear of rails: volume of the laws, position on the head, tonnage, both hands."""
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.assessment.wear_depth import SPACING, grid, rail_depth, wheel_dimensions, worn_profile
+from railsim.assessment.wear_depth import worn_depth as wheel_depth
+from railsim.constants import GRAVITY
+from railsim.definitions.settings import Settings
+from railsim.profiles import load_profile
+from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
+
+SETTINGS = Settings(start_state="steady")
+pytestmark = pytest.mark.usefixtures("small_contact_tables")
+
+
+def curve(hand=1):
+    return railsim.load_track("curve_r250").replace(
+        plan=[{"type": "CIR", "length": 6.0, "radius": 500.0 * hand}],
+        cant=[{"type": "CST", "length": 6.0, "cant": 0.1 * hand}],
+    )
+
+
+@pytest.fixture(scope="module")
+def run():
+    outputs = {"contact_patches": True}
+    return railsim.simulate(railsim.load_vehicle("coach_manchester"), curve(), speed=20.0,
+                            settings=SETTINGS.model_copy(update={"outputs": Settings(
+                                outputs=outputs).outputs}))  # fmt: skip
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_rail_loses_the_volume_of_the_wheel_where_it_is_touched(run, side):
+    worn, wheel = rail_depth(run, 0, side), wheel_depth(run, 0, side)
+    assert np.sum(worn) == pytest.approx(np.sum(wheel) * np.pi * 0.92, rel=1e-6)
+    middle = np.sum(worn * grid()) / np.sum(worn)
+    # the outer rail, the left one, on its gauge side; the inner one on its head
+    assert middle < -0.015 if side == 0 else abs(middle) < 0.03
+
+
+@pytest.mark.parametrize("place", [-0.034, -0.02, 0.0, 0.02])
+def test_worn_rail_loses_the_area_and_nothing_below_its_head(place):
+    from railsim.assessment.wear_depth import spread
+
+    new = load_profile("60E1")
+    worn = worn_profile(new, spread(np.array([place]), np.array([4e-3]), np.array([5e-7])), 1.0)
+    y = np.concatenate([new.y, np.asarray(worn.y)[::-1]])
+    z = np.concatenate([new.z, np.asarray(worn.z)[::-1]])
+    between = 0.5 * abs(np.sum(y * np.roll(z, -1) - z * np.roll(y, -1)))
+    assert between == pytest.approx(5e-7, rel=1e-4)
+    assert np.min(worn.z - new.z) >= 0.0
+
+
+def test_rails_wear_over_the_tonnage_of_a_mix():
+    coach, told = railsim.load_vehicle("coach_manchester"), []
+    mix = [Traffic(coach, 20.0, 3.0), Traffic(coach, 18.0, 1.0)]
+    (step,) = rail_wear(curve(), mix, step=5e6, steps=1, settings=SETTINGS, on_step=told.append)
+    assert told == [step]
+    rows = rail_rows([step])
+
+    # a train of all its axles passes for every mass of the coach
+    def passed(speed):
+        run = railsim.simulate(coach, curve(), speed=speed, settings=Settings(
+            start_state="steady", outputs={"contact_patches": True}))  # fmt: skip
+        trains = 5e6 / (float(np.sum(run["Q0"])) / GRAVITY)
+        return [sum(rail_depth(run, w, side) for w in range(4)) * trains for side in (0, 1)]
+
+    fast, slow = passed(20.0), passed(18.0)
+    for k, side in enumerate(("left", "right")):
+        expected = 0.75 * fast[k] + 0.25 * slow[k]
+        np.testing.assert_allclose(step.depths[side] * 5e6, expected, rtol=1e-9, atol=1e-15)
+        assert [row["distance"] for row in rows[side]] == [0.0, 5e6]
+        assert rows[side][1]["area"] == pytest.approx(SPACING * np.sum(expected), rel=1e-4)
+        worn = step.worn_profiles[side]
+        assert (worn.kind, worn.name) == ("rail", f"60E1, {side} worn")
+
+
+def test_left_hand_curve_wears_the_other_rail_alike():
+    coach = railsim.load_vehicle("coach_manchester")
+    (right,), (left,) = (
+        rail_wear(curve(hand), [(coach, 20.0, 1.0)], step=5e6, steps=1, settings=SETTINGS)
+        for hand in (1, -1)
+    )
+    np.testing.assert_allclose(
+        left.depths["right"], right.depths["left"], atol=1e-3 * np.max(right.depths["left"])
+    )
+
+
+def test_dimensions_of_the_wheel():
+    found = wheel_dimensions(load_profile("S1002"))
+    assert found.flange_height == pytest.approx(28e-3, abs=0.05e-3)
+    assert found.flange_thickness == pytest.approx(32.5e-3, abs=0.05e-3)
+    assert found.flange_slope == pytest.approx(10.8e-3, abs=0.05e-3)
+    assert found.hollow == 0.0
+    hollow = wheel_dimensions(load_profile("S1002_hollow"))
+    assert 0.2e-3 < hollow.hollow < 0.9e-3
+    assert hollow.flange_height > found.flange_height
