@@ -36,7 +36,6 @@ DONE, FAILED, WRONG_INPUT, ENDED_EARLY, LIMIT_EXCEEDED = 0, 1, 2, 3, 4
 
 # name of a command, and what it does
 COMMANDS = {
-<<<<<<< HEAD
     "run": "One vehicle on one track: one HDF5 file and a table of peak values.",
     "study": "Every combination of vehicles, tracks and speeds.",
     "optimise": "Parameters of a vehicle against objectives and constraints.",
@@ -51,6 +50,7 @@ COMMANDS = {
     "curving": "Steady curving over radius, cant deficiency and friction.",
     "stationary": "Standing on twisted track and on cant, against limits.",
     "wear": "Wheel profile over the distance run, with the worn profile run again.",
+    "rail-wear": "Rail profiles over the tonnage of a mix of traffic.",
     "contact": "Contact geometry of a wheel on a rail, equivalent conicity.",
     "spring": "Trailing-arm suspension: design and verify its coil springs.",
     "mechanism": "Planar linkages: kinematics, forces, optimisation.",
@@ -58,30 +58,6 @@ COMMANDS = {
     "validate": "Check files and list every fault.",
     "info": "Contents of a vehicle, track or result file on one screen.",
     "bench": "The runtime benchmark on this machine.",
-=======
-    "run": ("run", "One vehicle on one track: one HDF5 file and a table of peak values."),
-    "study": ("study", "Every combination of vehicles, tracks and speeds."),
-    "optimise": ("optimise", "Parameters of a vehicle against objectives and constraints."),
-    "compare": ("compare", "Results side by side: tables and overlaid plots."),
-    "plot": ("plot", "Time histories of a result; a track in plan."),
-    "animate": ("animate", "A vehicle and its contacts moving along the track."),
-    "report": ("report", "One page of inputs, tables against limits and plots."),
-    "export": ("export", "A result as CSV, for MATLAB, or as Parquet."),
-    "assess": ("assess", "Running safety and ride comfort of results."),
-    "modes": ("modes", "Eigenfrequencies, damping and mode shapes of a vehicle."),
-    "critical-speed": ("critical_speed", "Linear and non-linear critical speed."),
-    "curving": ("curving", "Steady curving over radius, cant deficiency and friction."),
-    "stationary": ("stationary", "Standing on twisted track and on cant, against limits."),
-    "wear": ("wear", "Wheel profile over the distance run, with the worn profile run again."),
-    "rail-wear": ("rail_wear", "Rail profiles over the tonnage of a mix of traffic."),
-    "contact": ("contact", "Contact geometry of a wheel on a rail, equivalent conicity."),
-    "spring": ("spring", "Trailing-arm suspension: design and verify its coil springs."),
-    "mechanism": ("mechanism", "Planar linkages: kinematics, forces, optimisation."),
-    "list": ("library", "Available vehicles, tracks, profiles and design files."),
-    "validate": ("validate", "Check files and list every fault."),
-    "info": ("info", "Contents of a vehicle, track or result file on one screen."),
-    "bench": ("bench", "The runtime benchmark on this machine."),
->>>>>>> 611e06f (Rail wear over a traffic mix; wheel dimensions and limits end the wear loop; laws of wear from files in assess; tables of assessments are values)
 }
 MODULES = {"list": "library"}  # others are called as their commands
 
