@@ -99,9 +99,10 @@ def wear_report(
     # largest index of each wheel, with the coordinates of its patch in the shakedown map
     worst, length = np.full((3, *shape), -np.inf), 0.0
     laws = dict(LAWS) if law is None else {law: wear_law(law)}
-    needed = (*PATCHES, "patch_T_gamma", "patch_friction")
-    if any(one.constants for one in laws.values()):
-        record.need(needed, "settings.outputs.contact_patches=true")
+    needed = (*PATCHES, "patch_T_gamma")
+    of_file = any(one.constants for one in laws.values())
+    if of_file:
+        record.need((*needed, "patch_friction"), "settings.outputs.contact_patches=true")
     patches = all(name in record.result for name in needed)
     worn = {n: np.zeros(shape) for n in laws if patches or laws[n] is LAWS[DEFAULT_LAW]}
     way = np.gradient(record.distance)
@@ -121,7 +122,8 @@ def wear_report(
         if patches:
             each, along = (record.result.part(f"patch_{name}", rows) for name in ("T_gamma", "T_x"))
             area, fatigue = _patches(record, rows, yield_in_shear)
-            load, mu = (record.result.part(f"patch_{name}", rows) for name in ("N", "friction"))
+            load = record.result.part("patch_N", rows)
+            mu = record.result.part("patch_friction", rows) if of_file else mu
             worst = np.where(fatigue[0] > worst[0], fatigue, worst)
         against = np.ones_like(each, dtype=bool) if all_forces else along < 0.0
         passes = np.where(against, model(each), 0.0) * ways[..., None]
