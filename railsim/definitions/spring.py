@@ -5,7 +5,7 @@ belong to one command (`[target]` to design, `[fatigue]` to fatigue, `[vehicle]`
 `[search]` and `[tolerances]` to the search).  Lengths in m, forces in N, stresses in Pa.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
@@ -345,95 +345,72 @@ class TrailingArmSuspension(FileDefinition):
 
 def spring_faults(suspension: TrailingArmSuspension) -> list[Fault]:
     """Faults between the parts of a valid spring file: names of loads, springs that do not fit."""
-    faults = _load_name_faults(suspension)
-    if suspension.inner is None:
-        return faults
-    if suspension.engagement < -1e-9:
-        faults.append(
-            Fault(
-                "",
-                "inner.seat_height",
-                f"the inner spring would touch {-suspension.engagement * 1e3:.1f} mm before the "
-                "outer one",
-                "lower inner.seat_height or inner.free_height by as much: the outer spring must "
-                "be the first to work",
-            )
-        )
-    elif suspension.seat_heights[1] < 0.0:
-        faults.append(
-            Fault(
-                "",
-                "inner.free_height",
-                f"the inner spring would stand {-suspension.seat_heights[1] * 1e3:.1f} mm below "
-                "the axle centre",
-                "shorten inner.free_height, or raise arm.seat_height or outer.free_height",
-            )
-        )
-    return faults + _radial_faults(suspension)
+    return [*_load_faults(suspension), *_inner_faults(suspension)]
 
 
-def spring_remarks(suspension: TrailingArmSuspension) -> list[Remark]:
-    """What is allowed in a spring file but unusual."""
-    remarks = []
-    for name, spring in suspension.springs.items():
-        if spring.wire_diameter is not None:
-            index = spring.mean_diameter / spring.wire_diameter
-            if not 3.0 <= index <= 12.0:
-                remarks.append(
-                    Remark(
-                        f"{name}.mean_diameter",
-                        f"spring index D/d is {index:.2f}; EN 13906-1 covers 3 to 12 for hot "
-                        "coiled springs",
-                    )
-                )
-        if spring.active_coils is not None and spring.active_coils < 3.0:
-            remarks.append(
-                Remark(f"{name}.active_coils", "EN 13906-1 covers hot coiled springs from 3 on")
-            )
-    return remarks
-
-
-def _load_name_faults(suspension: TrailingArmSuspension) -> list[Fault]:
-    named: dict[str, str | None] = {"checks.solid_load": suspension.checks.solid_load}
+def _load_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
+    loads, fatigue = suspension.loads, suspension.fatigue
+    named = [(f"load_notes.{name}", name) for name in suspension.load_notes]
+    if suspension.checks.solid_load is not None:
+        named.append(("checks.solid_load", suspension.checks.solid_load))
     if suspension.vehicle is not None:
-        named["vehicle.load"] = suspension.vehicle.load
-    fatigue = suspension.fatigue
-    if fatigue is not None and None in (fatigue.max_load, fatigue.min_load):
-        named["fatigue.tare"] = fatigue.tare
-    faults = [
-        Fault("", key, f"no load '{name}' in [loads]", nearest(name, suspension.loads))
-        for key, name in named.items()
-        if name is not None and name not in suspension.loads
-    ]
-    faults += [
-        Fault("", f"load_notes.{name}", "no such load in [loads]", nearest(name, suspension.loads))
-        for name in suspension.load_notes
-        if name not in suspension.loads
-    ]
-    if fatigue is None or fatigue.max_load is None or fatigue.min_load is None:
-        return faults
-    if fatigue.max_load <= fatigue.min_load:
-        found = f"{fatigue.max_load:g} N is not above fatigue.min_load {fatigue.min_load:g} N"
-        faults.append(Fault("", "fatigue.max_load", found, "the highest dynamic load"))
-    return faults
+        named.append(("vehicle.load", suspension.vehicle.load))
+    if fatigue is not None:
+        highest, lowest = fatigue.max_load, fatigue.min_load
+        if highest is None or lowest is None:
+            named.append(("fatigue.tare", fatigue.tare))
+        elif highest <= lowest:
+            found = f"{highest:g} N is not above fatigue.min_load {lowest:g} N"
+            yield Fault("", "fatigue.max_load", found, "the highest dynamic load")
+    for key, name in named:
+        if name not in loads:
+            yield Fault("", key, f"no load '{name}' in [loads]", nearest(name, loads))
 
 
-def _radial_faults(suspension: TrailingArmSuspension) -> list[Fault]:
+def _inner_faults(suspension: TrailingArmSuspension) -> Iterator[Fault]:
+    """Faults of where the inner spring stands."""
     outer, inner = suspension.outer, suspension.inner
     if inner is None:
-        return []
+        return
+    early, below = -suspension.engagement, -suspension.seat_heights[1]
+    if early > 1e-9:
+        yield Fault(
+            "",
+            "inner.seat_height",
+            f"the inner spring would touch {early * 1e3:.1f} mm before the outer one",
+            "lower inner.seat_height or inner.free_height by as much: the outer spring must be the "
+            "first to work",
+        )
+    elif below > 0.0:
+        yield Fault(
+            "",
+            "inner.free_height",
+            f"the inner spring would stand {below * 1e3:.1f} mm below the axle centre",
+            "shorten inner.free_height, or raise arm.seat_height or outer.free_height",
+        )
     clearance = radial_clearance(outer, inner)
-    if clearance > 0.0:
-        return []
-    return [
-        Fault(
+    if clearance <= 0.0:
+        yield Fault(
             "",
             "inner.mean_diameter",
             f"the inner spring does not fit into the outer one: radial clearance "
             f"{clearance * 1e3:.1f} mm",
             "reduce inner.mean_diameter or a wire diameter, or raise outer.mean_diameter",
         )
-    ]
+
+
+def spring_remarks(suspension: TrailingArmSuspension) -> list[Remark]:
+    """What is allowed in a spring file but unusual."""
+    remarks = []
+    for name, spring in suspension.springs.items():
+        wire = spring.wire_diameter
+        if wire is not None and not 3.0 <= (index := spring.mean_diameter / wire) <= 12.0:
+            text = f"spring index D/d is {index:.2f}; EN 13906-1 covers 3 to 12, hot coiled"
+            remarks.append(Remark(f"{name}.mean_diameter", text))
+        if spring.active_coils is not None and spring.active_coils < 3.0:
+            text = "EN 13906-1 covers hot coiled springs from 3 on"
+            remarks.append(Remark(f"{name}.active_coils", text))
+    return remarks
 
 
 def radial_clearance(outer: HelicalSpring, inner: HelicalSpring) -> float:
