@@ -428,7 +428,7 @@ def test_grid_may_vary_values_in_tables(tmp_path):
             [COACH], [CURVE], [20.0], {"settings.drive.speed_table.2.1": ["9"]}, settings=settings
         )
     assert str(caught.value).startswith(
-        "--grid: settings.drive.speed_table.2.1: no member '2' in drive.speed_table; allowed"
+        "grid: settings.drive.speed_table.2.1: no member '2' in drive.speed_table; allowed"
     )
 
 
