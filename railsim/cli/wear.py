@@ -134,7 +134,7 @@ def rails(
     \b
     Example:
       railsim rail-wear curve_r500 --traffic coach_manchester 20 3 --traffic wagon_y25 20 1 \\
-          --tonnage 20 --step 5 --out worn
+          --tonnage 0.1 --step 0.05 --out worn
     """  # noqa: D301 - click reads the escape
     from railsim.cli.analysis import load_inputs
     from railsim.studies.rail_wear import Traffic, rail_rows, rail_wear
