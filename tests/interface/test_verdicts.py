@@ -249,6 +249,17 @@ def test_result_without_static_wheel_loads_is_an_input_error():
         assess(bare)
 
 
+@pytest.mark.parametrize("name", ["Q", "Y"])
+def test_values_that_are_no_numbers_are_an_input_error(name):
+    def broken(t, s):
+        values = np.full((*s.shape, 2), Q0)
+        values[20_000, 0, 0] = np.nan
+        return values
+
+    with pytest.raises(InputError, match=f"{name}: holds values that are no numbers"):
+        assess(made(ON_ZONE_4, 23.0, **{name: broken}))
+
+
 # for information ----------------------------------------------------------------------------------
 
 
