@@ -278,10 +278,3 @@ def shakedown_limit(mu_u: Floats) -> Floats:
     """
     mu = np.asarray(mu_u, dtype=np.float64)
     return np.minimum(4.0, 1.0 / np.maximum(mu, 1e-9))
-
-
-def mean_damage(T_gamma: Floats, counted: Floats, model: WholeLifeRailModel) -> float:
-    """Mean over time of the damage of one passing axle, zero where not `counted` [1]."""
-    if not np.size(T_gamma):
-        return math.nan
-    return float(np.mean(np.where(counted, model(T_gamma), 0.0)))
