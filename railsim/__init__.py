@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from railsim.simulation import simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
-    from railsim.studies import study
+    from railsim.studies.study import study
     from railsim.studies.optimise import optimise
 
 _HOMES = {

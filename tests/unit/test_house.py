@@ -68,15 +68,18 @@ def test_no_module_is_longer_than_five_hundred_lines():
     assert {name for name, size in sizes.items() if size > MODULE} <= set(LARGER)
 
 
-def test_only_one_module_uses_the_inside_of_numba():
-    """Beside `cgutils`, which numba's manual tells those to use who write instructions."""
+def test_only_two_modules_use_the_inside_of_numba():
+    """Beside `cgutils`, which numba's manual tells those to use who write instructions.
+
+    `record` has the types of records, `compiler` all else.
+    """
     users = set()
     for name, tree in modules().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("numba.core"):
                 names = {alias.name for alias in node.names}
                 users |= {name} if names != {"cgutils"} else set()
-    assert users == {"kernels/compiler.py"}
+    assert users == {"kernels/compiler.py", "kernels/record.py"}
 
 
 def test_every_kernel_module_is_in_the_table_of_the_manual():
