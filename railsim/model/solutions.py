@@ -23,7 +23,7 @@ MOST_STORED = 1000
 """Solutions on disk; the older half of more goes."""
 MOST_NEW = 50
 """Solutions that a process stores: each run of a large study has an equilibrium of its own."""
-_SOURCES = ("contact", "definitions", "model", "profiles", "simulation", "track")
+_SOURCES = ("contact", "definitions", "linear", "model", "profiles", "simulation", "track")
 _new: list[Path] = []
 
 
