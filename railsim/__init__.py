@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from railsim.simulation import simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
-    from railsim.studies.study import study
     from railsim.studies.optimise import optimise
+    from railsim.studies.study import study
 
 _HOMES = {
     "Assessment": "railsim.assessment",

@@ -123,9 +123,12 @@ class ContactPath:
             if (body, y) not in self._slopes or size > SLOW * before:
                 ends = [rest(pose + STEP * unit) - rest(pose - STEP * unit) for unit in np.eye(2)]
                 self._slopes[body, y] = np.transpose(ends) / (2.0 * STEP)
-            pose, before = pose - np.linalg.solve(self._slopes[body, y], value), size
+            try:
+                pose, before = pose - np.linalg.solve(self._slopes[body, y], value), size
+            except np.linalg.LinAlgError:  # a wheelset off its rails has no slopes
+                raise ModelError("no contact path") from None
         else:
-            raise ModelError("no contact path at this amplitude; try a smaller one")
+            raise ModelError("no contact path")
         x = base.copy()
         x[indices] += (y, *pose)
         return x, pose

@@ -269,7 +269,7 @@ def with_these_preloads(model: Model, tension: Floats, preload: Floats) -> Model
     links = model.system.links._replace(row=aligned(model.system.links.row))
     mounts = model.system.mounts._replace(row=aligned(model.system.mounts.row))
     links.spring[:, 2] = tension
-    mounts.preload[:] = preload
+    mounts.preload[:] = np.reshape(preload, mounts.preload.shape)  # there may be none
     return replace(model, system=model.system._replace(links=links, mounts=mounts))
 
 

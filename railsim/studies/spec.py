@@ -199,11 +199,12 @@ def checked(model: type[M], data: Any, file: str) -> M:
     except ValidationError as error:
         details = error.errors(include_url=False)[:MOST_FAULTS]
         raise InputError(
-            Fault(
-                file,
-                ".".join(map(str, detail["loc"])),
-                repr(detail["input"])[:60],
-                detail["msg"].lower(),
-            )
+            Fault(file, ".".join(map(str, detail["loc"])), *_found_and_allowed(detail))
             for detail in details
         ) from None
+
+
+def _found_and_allowed(detail: Any) -> tuple[str, str]:
+    if detail["type"] == "too_long":
+        return "too many", f"{detail['ctx']['max_length']} at most"
+    return repr(detail["input"])[:60], detail["msg"].lower()

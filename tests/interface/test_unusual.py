@@ -92,7 +92,7 @@ def test_equal_findings_are_one_line_with_a_count():
     assert [r.key for r in below] == ["box_0, box_1, box_2 and 17 more"]
 
 
-def test_they_are_shown_by_validate_info_and_at_the_start_of_a_run(tmp_path, capsys):
+def test_they_are_shown_by_validate_info_and_once_by_a_run(tmp_path, capsys):
     path = tmp_path / "upside_down.toml"
     path.write_text(vehicle(body={"position": [0.0, 0.0, 1.2]}).to_toml())
     for command in ("validate", "info"):
@@ -102,7 +102,7 @@ def test_they_are_shown_by_validate_info_and_at_the_start_of_a_run(tmp_path, cap
     cli.main(
         ["run", str(path), "straight", "--speed", "10", "--duration", "0.1", "--out", str(out)]
     )
-    assert capsys.readouterr().err.count("frame: below the rails") == 1
+    assert capsys.readouterr().out.count("frame: below the rails") == 1
     assert any("below the rails" in remark for remark in railsim.open_result(out).remarks)
 
 

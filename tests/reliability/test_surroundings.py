@@ -81,7 +81,7 @@ def test_unforeseen_error_is_a_line_with_a_report(monkeypatch, capsys, tmp_path)
     def trouble(*_):
         raise ZeroDivisionError("trouble\x1b[31m")
 
-    monkeypatch.setattr(railsim.cli.info, "_description", trouble)
+    monkeypatch.setattr("railsim.description.describe", trouble)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     mine = tmp_path / "mine.toml"

@@ -80,7 +80,7 @@ def test_end_of_a_run_between_two_instants_is_left_out():
     ({"low_pass": {"frequency": 40.0, "phase": "causal"}}, 200.0, "'output_rate' must be 268"),
 ])  # fmt: skip
 def test_a_rate_that_folds_back_is_refused(outputs, rate, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(InputError, match=message):
         Settings(outputs=outputs, output_rate=rate)
 
 
