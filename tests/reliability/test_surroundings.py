@@ -11,7 +11,6 @@ import matplotlib
 import pytest
 from selection import points
 
-import railsim.cli.info
 from railsim.cli import main
 from railsim.cli.assess import assessment_csv
 
