@@ -3,7 +3,7 @@
     python benchmarks/whole.py [--out bench.json] [--small]
 
 The runs of `railsim bench` and more; the parts of a step; FASTSIM over its grid; many runs in one
-call; one core and two; whole commands, cold and warm.  `--small` runs 10 m once.
+call; one core and two; whole commands, cold and warm.  `--small` runs 10 m of each.
 """
 
 import argparse
@@ -27,7 +27,7 @@ Rows = tuple[list[str], list[list[str]]]
 def measure(*, small: bool) -> dict[str, Any]:
     """Measure everything: plain numbers and strings, SI."""
     until = 10.0 if small else None
-    runs = [replace(run, until=until) for run in ((*STUDY, *OTHERS) if not small else STUDY[:1])]
+    runs = [replace(run, until=until) for run in (*STUDY, *OTHERS)]
     repetitions = 2 if small else 5
     of_parts = 3 if small else REPETITIONS
     found = benchmark(runs, repetitions)

@@ -16,7 +16,7 @@ from railsim.cli.common import echo
 from railsim.cli.interrupts import raise_pending_signal
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing
-COMPILING = "preparing: compiling (after an installation; one to three minutes, kept for later)"
+COMPILING = "preparing: compiling (after an installation; about a minute, kept for later)"
 CAUSES = {
     "numba.core.compiler_machinery": COMPILING,  # runs the passes; loading is elsewhere
     "railsim.contact.table": "preparing: the contact table of new profiles (kept for later)",
