@@ -115,7 +115,7 @@ def page(
         sections.append(spread)
     if published := _published(results):
         sections.append(published)
-    sections.append(_what_was_run(results, inputs or {}))
+    sections.append(_what_was_run(records, results, inputs or {}))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report",
@@ -274,16 +274,20 @@ def _published(results: Mapping[str, Result]) -> Section | None:
     return Section("published", "Comparison with published values", tables=tables)
 
 
-def _what_was_run(results: Mapping[str, Result], inputs: Mapping[str, Any]) -> Section:
+def _what_was_run(
+    records: Sequence[Record], results: Mapping[str, Result], inputs: Mapping[str, Any]
+) -> Section:
     section = Section("inputs", "Inputs")
+    labels = {record["name"]: record["labels"] for record in records}
     vehicles: dict[str, Any] = {}
     tracks: dict[str, list[Track]] = {}
-    for result in results.values():
+    for name, result in results.items():
+        own = labels.get(name, {})  # two files may hold vehicles of one name
         vehicle, track = result.vehicle(), result.track()
-        vehicles.setdefault(vehicle.name, vehicle)
-        tracks.setdefault(track.name, []).append(track)
+        vehicles.setdefault(str(own.get("vehicle", vehicle.name)), vehicle)
+        tracks.setdefault(str(own.get("track", track.name)), []).append(track)
     for name, vehicle in vehicles.items():
-        words = vehicle.source or ""
+        words = f"{vehicle.name}. {vehicle.source or ''}"
         section.drawings.append(
             Drawing(
                 printable(name),
@@ -296,7 +300,7 @@ def _what_was_run(results: Mapping[str, Result], inputs: Mapping[str, Any]) -> S
         rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
         values = sorted({mu for track in variants for mu in track.friction})
         friction = ", ".join(f"{mu:g}" for mu in values)
-        words = f"Friction {friction}; rails {rails}."
+        words = f"{variants[0].name}. Friction {friction}; rails {rails}."
         drawing = _svg(track_svg(variants[0]))
         section.drawings.append(Drawing(printable(name), printable(words), drawing))
     section.details += _at_rest(results)

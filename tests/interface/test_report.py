@@ -292,6 +292,15 @@ def test_spread_has_the_values_of_every_run():
     assert worst_runs(runs, 9) == ["run0", "run1", "run2", "run3"]
 
 
+def test_vehicles_of_one_name_from_two_files_are_shown_apart():
+    runs = records(2)
+    runs[1] = {**runs[1], "labels": {**runs[1]["labels"], "vehicle": "softer_coach"}}
+    text = page("t", runs, {"run0": example_result(), "run1": example_result()})
+    assert "Differences between the vehicles" in text
+    assert "<b>coach</b>" in text
+    assert "<b>softer_coach</b>" in text
+
+
 def test_failures_and_remarks_are_told_and_names_are_shown_literally():
     runs = records(3)
     runs[0]["remarks"] = runs[1]["remarks"] = ["A wheel lifts <b>off</b>."]

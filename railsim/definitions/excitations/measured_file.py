@@ -242,14 +242,8 @@ def _row_faults(
     faults = []
     if before and row[0] <= before[-1][0]:
         found = f"s = {row[0]:g} m does not increase"
-        faults.append(
-            Fault(
-                str(path),
-                line,
-                found,
-                "arc lengths that increase from row to row; or falling_mileage = true",
-            )
-        )
+        allowed = "arc lengths that increase from row to row; or falling_mileage = true"
+        faults.append(Fault(str(path), line, found, allowed))
     elif before:
         steepest = max(abs(new - old) for new, old in zip(row[1:], before[-1][1:], strict=True))
         if steepest > STEEPEST * (row[0] - before[-1][0]):
