@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from railsim.description import Description, describe
     from railsim.errors import InputError, ModelError
     from railsim.linear.modes import modes, root_locus
+    from railsim.measurement import Measurement, load_measurement
     from railsim.model.statics import StaticLoads, static_loads
     from railsim.profiles import Profile, load_profile
     from railsim.result import Result, mid_curves, open_result, peaks
@@ -51,6 +52,7 @@ _HOMES = {
     "Assessment": "railsim.assessment",
     "Description": "railsim.description",
     "InputError": "railsim.errors",
+    "Measurement": "railsim.measurement",
     "Mechanism": "railsim.definitions.mechanism",
     "ModelError": "railsim.errors",
     "Profile": "railsim.profiles",
@@ -65,6 +67,7 @@ _HOMES = {
     "curving": "railsim.stability.curving",
     "describe": "railsim.description",
     "load_comfort_limits": "railsim.definitions.loading",
+    "load_measurement": "railsim.measurement",
     "load_mechanism": "railsim.definitions.loading",
     "load_profile": "railsim.profiles",
     "load_running_limits": "railsim.definitions.loading",
@@ -89,6 +92,7 @@ __all__ = [
     "Assessment",
     "Description",
     "InputError",
+    "Measurement",
     "Mechanism",
     "ModelError",
     "Profile",
@@ -104,6 +108,7 @@ __all__ = [
     "curving",
     "describe",
     "load_comfort_limits",
+    "load_measurement",
     "load_mechanism",
     "load_profile",
     "load_running_limits",

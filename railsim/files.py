@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO, Self
 
 from railsim.errors import Fault, InputError, argument_fault
 from railsim.text import LONGEST_FILE, shortened
@@ -171,8 +171,27 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
 
     Raises
     ------
-    InputError : it cannot be read, is larger, or is a folder, a device, a pipe or a file of the
-        system's (/proc, /sys, /dev).
+    InputError : as `open_regular`; or it is larger.
+    """
+    path = Path(path)
+    with open_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > limit:
+            found, allowed = f"{size / 1e6:.1f} MB", f"{limit / 1e6:g} MB at most"
+            raise InputError([Fault(str(path), "", found, allowed)])
+        try:
+            return file.read(limit)
+        except OSError as error:
+            raise _unreadable(path, error) from None
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """Open a regular file for reading, to be closed by the caller; a link may lead to it.
+
+    Raises
+    ------
+    InputError : it cannot be read, or is a folder, a device, a pipe or a file of the system's
+        (/proc, /sys, /dev).
     """
     path = Path(path)
     try:
@@ -181,17 +200,18 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
         if system and not resolved.is_relative_to(_SHARED_MEMORY):
             raise InputError([Fault(str(path), "", "a file of the system", "give one of your own")])
         # a pipe would wait for its writer
-        with open(os.open(path, os.O_RDONLY | _NO_WAITING), "rb") as file:
-            facts = os.fstat(file.fileno())
-            if not stat.S_ISREG(facts.st_mode):
-                raise InputError([Fault(str(path), "", "not a regular file", "give a file")])
-            if facts.st_size > limit:
-                found, allowed = f"{facts.st_size / 1e6:.1f} MB", f"{limit / 1e6:g} MB at most"
-                raise InputError([Fault(str(path), "", found, allowed)])
-            return file.read(limit)
+        file = open(os.open(path, os.O_RDONLY | _NO_WAITING), "rb")  # noqa: SIM115
     except (OSError, ValueError, RuntimeError) as error:
-        words = getattr(error, "strerror", None) or str(error)
-        raise InputError([Fault(str(path), "", f"cannot be read ({words})", "")]) from None
+        raise _unreadable(path, error) from None
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise InputError([Fault(str(path), "", "not a regular file", "give a file")])
+    return file
+
+
+def _unreadable(path: Path, error: Exception) -> InputError:
+    words = getattr(error, "strerror", None) or str(error)
+    return InputError([Fault(str(path), "", f"cannot be read ({words})", "")])
 
 
 def read_text(path: str | Path, limit: int) -> str:

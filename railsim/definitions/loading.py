@@ -13,6 +13,7 @@ from railsim.definitions import sources
 from railsim.definitions.file_definition import FileDefinition, format_fault, loaded
 from railsim.definitions.flatten import wrong_type
 from railsim.definitions.limits import ComfortLimits, RunningLimits, StationaryLimits, WheelLimits
+from railsim.definitions.measurement import MeasurementFile
 from railsim.definitions.mechanism import Mechanism
 from railsim.definitions.published import Published
 from railsim.definitions.scenario import Scenario
@@ -45,6 +46,7 @@ FORMATS: dict[str, type[FileDefinition]] = {
         StationaryLimits,
         WearLawFile,
         WheelLimits,
+        MeasurementFile,
     )
 }
 """Every definition of a file by its `format` key."""

@@ -1,0 +1,15 @@
+"""Measured runs: files of a test to arrays over time and arc length.
+
+==================  ============================================================================
+`reading.py`        `load_measurement`: a measurement file and its data to a `Measurement`
+`columns.py`        columns of CSV, Parquet, MATLAB and HDF5 files, in pieces
+`clock.py`          equal time steps, gaps, delays
+`position.py`       arc length from mileage, distance or speed
+`data.py`           `Measurement`: channels over time, arc length and speed
+==================  ============================================================================
+"""
+
+from railsim.measurement.data import Measurement
+from railsim.measurement.reading import load_measurement
+
+__all__ = ["Measurement", "load_measurement"]

@@ -1,0 +1,168 @@
+"""Equal time steps: the clock of a record, its gaps, channels that lag behind it.
+
+A clock that is written with few digits is a straight line over the number of the value, as long as
+it leaves this line by less than a quarter of a step; where values are missing, the line begins
+anew on the same grid.  Other records are interpolated linearly onto the median step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import Fault, InputError
+
+Floats = NDArray[np.float64]
+JUMP = 1.5  # steps, from which on a time step is a gap
+ROUNDED = 0.25  # steps
+MOST_LOST = 50.0  # times the values that there are
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Equal time steps, and where the values of a record lie on them.
+
+    Attributes
+    ----------
+    time : float64[time]
+        Equal steps [s].
+    rate : float
+        Values per second [1/s].
+    places : int64[value] or None
+        Instant of each value; None where values are interpolated.
+    written : float64[value]
+        Times as the file has them [s].
+    remarks : tuple of str
+    """
+
+    time: Floats
+    rate: float
+    places: NDArray[np.int64] | None
+    written: Floats
+    remarks: tuple[str, ...] = ()
+
+    def on_grid(self, x: Floats) -> Floats:
+        """Return values of the file at the equal steps, NaN where there are none."""
+        if self.places is not None:
+            if len(self.places) == len(self.time):
+                return x
+            found = np.full(len(self.time), np.nan)
+            found[self.places] = x
+            return found
+        known = np.isfinite(x)
+        if known.sum() < 2:
+            return np.full(len(self.time), np.nan)
+        t = self.written[known]
+        found = np.interp(self.time, t, x[known], np.nan, np.nan)
+        after = np.clip(np.searchsorted(t, self.time), 1, len(t) - 1)
+        found[t[after] - t[after - 1] > 2.0 * JUMP / self.rate] = np.nan
+        return found
+
+
+def clock_of(file: str, written: Floats) -> Clock:
+    """Return the clock of a record from the times that it holds [s].
+
+    Raises
+    ------
+    InputError : a time that is missing or does not rise; gaps much longer than the record.
+    """
+    steps = np.diff(written)
+    wrong = np.flatnonzero(~(steps > 0.0))
+    if not np.isfinite(written).all() or len(wrong):
+        row = int(wrong[0]) + 2 if len(wrong) else 1
+        found = f"time {written[row - 1]:g} s of value {row} does not rise"
+        raise InputError([Fault(file, "time", found, "times that rise from value to value")])
+    median = float(np.median(steps))
+    ends = np.flatnonzero(steps > JUMP * median)
+    smooth = steps[steps <= JUMP * median]
+    step = float(smooth.mean())
+    span = float(written[-1] - written[0])
+    if span / step > MOST_LOST * len(written):
+        found = f"a gap of {steps.max():g} s"
+        raise InputError([Fault(file, "time", found, "a record in one piece, or two files")])
+    places, begin = np.zeros(len(written), dtype=np.int64), 0
+    off = 0.0
+    for end in [*ends.tolist(), len(written) - 1]:
+        own = written[begin : end + 1]
+        count = np.arange(len(own))
+        offset = float(np.mean(own - count * step))
+        first = round((offset - written[0]) / step)
+        places[begin : end + 1] = first + count
+        off = max(off, float(np.abs(own - written[0] - (first + count) * step).max()))
+        begin = end + 1
+    rising = bool((np.diff(places) > 0).all())
+    lost = f"{len(ends)} gaps, together {steps[ends].sum():.3g} s" if len(ends) else ""
+    remarks = [f"The record has {lost}."] if lost else []
+    exact = rising and off < (ROUNDED + 0.5 * bool(len(ends))) * step
+    if not exact:
+        step = median
+        remarks.append(
+            f"The time steps are unequal ({steps.min():.3g} to {steps.max():.3g} s); the channels "
+            f"are interpolated to {1.0 / step:.6g} values per second."
+        )
+        grid = np.arange(round(span / step) + 1)
+        return Clock(written[0] + step * grid, 1.0 / step, None, written, tuple(remarks))
+    time = written[0] + step * np.arange(places[-1] - places[0] + 1)
+    return Clock(time, 1.0 / step, places - places[0], written, tuple(remarks))
+
+
+def joined(parts: list[Floats]) -> tuple[Floats, int]:
+    """Return the times of several files as one record, and how many files begin their clock anew.
+
+    A file whose clock does not continue that of the one before follows it after one step.
+    """
+    found, anew = parts[0], 0
+    for part in parts[1:]:
+        if len(part) and len(found) and part[0] <= found[-1]:
+            step = float(np.median(np.diff(part))) if len(part) > 1 else 0.0
+            part = part - part[0] + found[-1] + step
+            anew += 1
+        found = np.concatenate([found, part])
+    return found, anew
+
+
+def delayed(x: Floats, steps: float) -> Floats:
+    """Return values taken from later steps: those of a channel that lags by `steps`.
+
+    Cubic polynomials through four neighbours (Lagrange); NaN where one of them is missing.
+
+    Examples
+    --------
+    >>> delayed(np.arange(6.0), 1.5).tolist()
+    [1.5, 2.5, 3.5, nan, nan, nan]
+    """
+    whole = int(np.floor(steps))
+    f = steps - whole
+    weights = {
+        -1: -f * (f - 1.0) * (f - 2.0) / 6.0,
+        0: (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0,
+        1: -(f + 1.0) * f * (f - 2.0) / 2.0,
+        2: (f + 1.0) * f * (f - 1.0) / 6.0,
+    }
+    if f == 0.0:
+        weights = {0: 1.0}
+    found = np.zeros(len(x))
+    for k, weight in weights.items():
+        found += weight * _from_later(x, whole + k)
+    return found
+
+
+def _from_later(x: Floats, steps: int) -> Floats:
+    found = np.full(len(x), np.nan)
+    if abs(steps) < len(x):
+        found[max(0, -steps) : len(x) - max(0, steps)] = x[max(0, steps) : len(x) + min(0, steps)]
+    return found
+
+
+def bridged(x: Floats, longest: int) -> Floats:
+    """Return values with gaps of up to `longest` values filled by straight lines."""
+    unknown = np.isnan(x)
+    if not longest or not unknown.any() or unknown.all():
+        return x
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], unknown.view(np.int8), [0]])))
+    found = x.copy()
+    for begin, end in edges.reshape(-1, 2):
+        if begin > 0 and end < len(x) and end - begin <= longest:
+            t = np.arange(1, end - begin + 1) / (end - begin + 1)
+            found[begin:end] = x[begin - 1] + t * (x[end] - x[begin - 1])
+    return found

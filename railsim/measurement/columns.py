@@ -1,0 +1,225 @@
+"""Columns of data files, read in pieces: CSV, Parquet, MATLAB arrays, HDF5.
+
+Only the columns that are asked for are kept, as float64 with NaN where there is no value.  MATLAB
+files are read for numeric arrays alone: structures and objects are refused, not opened.
+"""
+
+import io
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.measurement import MeasurementFile
+from railsim.errors import Fault, InputError, nearest, optional_package
+from railsim.files import open_regular
+
+Floats = NDArray[np.float64]
+Wanted = Mapping[str, tuple[str, tuple[int, ...]]]
+"""Name of the column in the file, and index beyond time, by our names."""
+Piece = dict[str, Floats]
+ROWS = 50_000
+NUMERIC = {"double", "single", "logical"} | {
+    f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
+}
+
+
+def pieces(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
+    """Yield pieces of the columns of a file, one behind the other.
+
+    Raises
+    ------
+    InputError : no such file or column; not what its ending says; something else than numbers.
+    """
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        found = f"the name ends in '{path.suffix}'"
+        raise InputError([Fault(str(path), "", found, "one of " + ", ".join(_READERS))])
+    open_regular(path).close()
+    if path.suffix.lower() in (".csv", ".txt") and any(index for _, index in wanted.values()):
+        raise InputError([Fault(str(path), "", "a table with 'index'", "leave 'index' out")])
+    yield from reader(path, wanted, how)
+
+
+def _fault(path: Path, key: str, found: str, allowed: str = "") -> InputError:
+    return InputError([Fault(str(path), key, found, allowed)])
+
+
+def _named(path: Path, wanted: Wanted, known: Sequence[str]) -> None:
+    """Refuse columns that the file does not have, all at once."""
+    missing = [theirs for theirs, _ in wanted.values() if theirs not in known]
+    if missing:
+        raise InputError(
+            Fault(str(path), "columns", f"no column '{name}'", nearest(name, known))
+            for name in dict.fromkeys(missing)
+        )
+
+
+def _csv(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
+    try:
+        with io.TextIOWrapper(open_regular(path), encoding=how.encoding) as text:
+            lines = _lines(text, how.skip)
+            _, head = next(lines, (0, ""))
+            if not head:
+                raise _fault(path, "", "empty", "names of columns and rows of numbers")
+            delimiter = next((d for d in (";", "\t") if d in head), ",")
+            names = [cell.strip().strip('"') for cell in head.split(delimiter)]
+            _named(path, wanted, names)
+            where = {name: names.index(theirs) for name, (theirs, _) in wanted.items()}
+            if how.units_row:
+                next(lines, None)
+            while rows := list(islice(lines, ROWS)):
+                yield _rows(path, rows, where, delimiter, len(names))
+    except LookupError:
+        allowed = "a name such as utf-8, latin-1 or utf-16"
+        raise _fault(path, "encoding", f"unknown encoding '{how.encoding}'", allowed) from None
+    except UnicodeDecodeError as error:
+        found = f"byte {error.start} is not {error.encoding}"
+        raise _fault(path, "", found, 'its encoding, such as encoding = "latin-1"') from None
+
+
+def _lines(text: io.TextIOWrapper, skip: int) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(text, start=1):
+        if number > skip and line.strip() and not line.startswith("#"):
+            yield number, line.rstrip("\r\n")
+
+
+def _rows(
+    path: Path, rows: list[tuple[int, str]], where: Mapping[str, int], delimiter: str, width: int
+) -> Piece:
+    """Return the columns of some lines; `where` their places, `width` the number of columns."""
+    if delimiter != ",":
+        rows = [(number, line.replace(",", ".")) for number, line in rows]  # a decimal comma
+    places = sorted(set(where.values()))
+    written = [line for _, line in rows]
+    try:
+        if any(line.count(delimiter) != width - 1 for line in written):
+            raise ValueError("another number of columns")
+        table = np.loadtxt(written, delimiter=delimiter, usecols=places, ndmin=2, comments=None)
+        return {name: table[:, places.index(place)] for name, place in where.items()}
+    except ValueError:  # an empty cell, or what is named below
+        table = np.empty((len(rows), len(places)))
+    for k, (number, line) in enumerate(rows):
+        cells = line.split(delimiter)
+        if len(cells) != width:
+            found, allowed = f"{len(cells)} values", f"{width} values as in the header"
+            raise _fault(path, f"line {number}", found, allowed)
+        try:
+            table[k] = [float(cells[p].strip() or "nan") for p in places]
+        except ValueError as error:
+            found = f"not a number ({error})".replace("could not convert string to float: ", "")
+            raise _fault(path, f"line {number}", found, "numbers, or nothing in a gap") from None
+    return {name: table[:, places.index(place)] for name, place in where.items()}
+
+
+def _parquet(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
+    parquet = optional_package("pyarrow.parquet", "reading Parquet", "'railsim[parquet]'")
+    try:
+        file = parquet.ParquetFile(path)
+        _named(path, wanted, file.schema_arrow.names)
+        theirs = list(dict.fromkeys(column for column, _ in wanted.values()))
+        for batch in file.iter_batches(ROWS, columns=theirs):
+            yield {
+                name: np.array(batch.column(column).cast("float64"), dtype=np.float64)
+                for name, (column, _) in wanted.items()
+            }
+    except InputError:
+        raise
+    except Exception as error:  # pyarrow's own errors have no common base
+        words = str(error).partition("\n")[0][:100]
+        raise _fault(
+            path, "", f"cannot be read as Parquet ({words})", "columns of numbers"
+        ) from None
+
+
+def _hdf5(path: Path, wanted: Wanted, _: MeasurementFile) -> Iterator[Piece]:
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            known: list[str] = []
+            file.visititems(
+                lambda name, node: known.append(name) if isinstance(node, h5py.Dataset) else None
+            )
+            _named(path, wanted, known)
+            arrays = {name: file[column] for name, (column, _) in wanted.items()}
+            yield from _slices(path, arrays, wanted)
+    except OSError as error:
+        words = str(error).partition("(")[2].rstrip(")") or str(error)
+        raise _fault(path, "", f"cannot be read as HDF5 ({words})") from None
+
+
+def _matlab(path: Path, wanted: Wanted, how: MeasurementFile) -> Iterator[Piece]:
+    from scipy import io as matlab
+    from scipy.io.matlab import MatReadError
+
+    with open_regular(path) as file:
+        newer = file.read(10) == b"MATLAB 7.3"
+    if newer:  # HDF5 under another name
+        yield from _hdf5(path, wanted, how)
+        return
+    theirs = list(dict.fromkeys(column for column, _ in wanted.values()))
+    try:
+        kinds = {name: kind for name, _, kind in matlab.whosmat(path)}
+        _named(path, wanted, list(kinds))
+        for name in theirs:
+            if kinds[name] not in NUMERIC:
+                raise _fault(path, name, f"a {kinds[name]}", "an array of numbers")
+        arrays = matlab.loadmat(path, variable_names=theirs, squeeze_me=False)
+    except InputError:
+        raise
+    except (ValueError, TypeError, OSError, NotImplementedError, zlib.error, MatReadError) as error:
+        words = str(error).partition("\n")[0][:100]
+        raise _fault(path, "", f"cannot be read as MATLAB ({words})") from None
+    yield from _slices(path, {n: arrays[column] for n, (column, _) in wanted.items()}, wanted)
+
+
+def _slices(path: Path, arrays: Mapping[str, Any], wanted: Wanted) -> Iterator[Piece]:
+    """Yield pieces of arrays with time first; a single row or column is a series."""
+    lengths = {name: _length(path, array, *wanted[name]) for name, array in arrays.items()}
+    if len(set(lengths.values())) > 1:
+        first = next(iter(lengths))
+        name = next(name for name in lengths if lengths[name] != lengths[first])
+        found = f"{lengths[name]} values, '{wanted[first][0]}' has {lengths[first]}"
+        raise _fault(path, wanted[name][0], found, "arrays of one length")
+    count = next(iter(lengths.values()))
+    for begin in range(0, count, ROWS):
+        rows = slice(begin, min(begin + ROWS, count))
+        piece = {}
+        for name, array in arrays.items():
+            index = wanted[name][1]
+            if not index and array.ndim == 2 and array.shape[0] == 1:
+                piece[name] = np.asarray(array[0, rows], dtype=np.float64)
+            elif not index and array.ndim == 2:
+                piece[name] = np.asarray(array[rows, 0], dtype=np.float64)
+            else:
+                piece[name] = np.asarray(array[(rows, *index)], dtype=np.float64)
+        yield piece
+
+
+def _length(path: Path, array: Any, column: str, index: tuple[int, ...]) -> int:
+    """Return the number of values of a series in an array; refuse what holds none."""
+    shape = tuple(array.shape)
+    if array.dtype.kind not in "fiub":
+        raise _fault(path, column, "holds no real numbers", "an array of numbers")
+    if not index and (len(shape) == 1 or (len(shape) == 2 and 1 in shape)):
+        return int(max(shape))
+    if len(index) != len(shape) - 1 or any(k >= n for k, n in zip(index, shape[1:], strict=True)):
+        sizes = " x ".join(map(str, shape)) or "one number"
+        example = ", ".join("0" for _ in shape[1:])
+        raise _fault(path, column, f"an array of {sizes}", f"index = [{example}] or others")
+    return int(shape[0])
+
+
+_READERS: dict[str, Callable[[Path, Wanted, MeasurementFile], Iterator[Piece]]] = {
+    ".csv": _csv,
+    ".txt": _csv,
+    ".parquet": _parquet,
+    ".mat": _matlab,
+    ".h5": _hdf5,
+    ".hdf5": _hdf5,
+}

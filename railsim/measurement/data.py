@@ -1,0 +1,169 @@
+"""A measured run: channels over time, arc length and speed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.measurement import Channel, MeasurementFile
+from railsim.errors import nearest
+from railsim.result.filters import band_passed, low_passed
+from railsim.table import Table
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """A measured run; everything over equal time steps, in SI, with railsim's signs.
+
+    Attributes
+    ----------
+    definition : MeasurementFile
+        What the file says.
+    time : float64[time]
+        [s]
+    distance : float64[time]
+        Arc length of the reference body along the track [m].
+    speed : float64[time]
+        [m/s]
+    channels : mapping of str to float64[time]
+        By names of the file; NaN where there is no value.
+    remarks : tuple of str
+        What a reader should know about the data.
+    """
+
+    definition: MeasurementFile
+    time: Floats
+    distance: Floats
+    speed: Floats
+    channels: Mapping[str, Floats]
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        """What the run is called."""
+        return self.definition.name
+
+    @property
+    def rate(self) -> float:
+        """Values per second [1/s]."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+    @property
+    def quantities(self) -> dict[str, str]:
+        """Quantity with its labels by channel: ``Q:1:left``."""
+        return {name: self.definition.channels[name].quantity for name in self.channels}
+
+    def channel(self, name: str) -> Channel:
+        """Return what the file says about a channel, by its name or quantity."""
+        return self.definition.channels[self._called(name)]
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return the values of a channel, by its name or its quantity [SI]."""
+        return self.channels[self._called(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.channels or name in self.quantities.values()
+
+    def _called(self, name: str) -> str:
+        if name in self.channels:
+            return name
+        for own, quantity in self.quantities.items():
+            if quantity == name:
+                return own
+        known = [*self.channels, *self.quantities.values()]
+        raise KeyError(f"no channel '{name}'; {nearest(name, known)}")
+
+    def part(self, begin: float, end: float) -> "Measurement":
+        """Return the values between two arc lengths [m]."""
+        low, high = np.searchsorted(self.distance, [begin, end])
+        return self._rows(slice(int(low), int(high)))
+
+    def _rows(self, rows: slice) -> "Measurement":
+        return replace(
+            self,
+            time=self.time[rows],
+            distance=self.distance[rows],
+            speed=self.speed[rows],
+            channels={name: x[rows] for name, x in self.channels.items()},
+        )
+
+    def resampled(self, rate: float) -> "Measurement":
+        """Return the run at another rate [1/s]; filtered before where it becomes lower.
+
+        The low pass has its corner at 0.4 times the new rate; values next to a gap are lost with
+        it.
+        """
+        count = int((self.time[-1] - self.time[0]) * rate * (1.0 + 1e-12)) + 1
+        time = self.time[0] + np.arange(count) / rate
+        lower = rate < self.rate * (1.0 - 1e-9)
+
+        def taken(x: Floats) -> Floats:
+            unknown = np.isnan(x)
+            if unknown.all():
+                return np.full(count, np.nan)
+            index = np.arange(len(x))
+            whole = np.interp(index, index[~unknown], x[~unknown]) if unknown.any() else x
+            whole = low_passed(whole, self.rate, 0.4 * rate) if lower else whole
+            found: Floats = np.interp(time, self.time, whole)
+            lost = np.interp(time, self.time, unknown.astype(float)) > 0.0
+            found[lost] = np.nan
+            return found
+
+        return replace(
+            self,
+            time=time,
+            distance=np.interp(time, self.time, self.distance),
+            speed=np.interp(time, self.time, self.speed),
+            channels={name: taken(x) for name, x in self.channels.items()},
+        )
+
+    def filtered(self, low: float = 0.0, high: float = np.inf) -> "Measurement":
+        """Return the run with all channels through a Butterworth band pass without phase [Hz].
+
+        Gaps are bridged for the filter and left out again.
+        """
+
+        def passed(x: Floats) -> Floats:
+            unknown = np.isnan(x)
+            if unknown.all():
+                return x
+            index = np.arange(len(x))
+            found = np.interp(index, index[~unknown], x[~unknown]) if unknown.any() else x
+            found = _passed(found, self.rate, low, high)
+            return np.where(unknown, np.nan, found)
+
+        return replace(self, channels={name: passed(x) for name, x in self.channels.items()})
+
+    def moved(self, shift: float, stretch: float = 0.0) -> "Measurement":
+        """Return the run with other arc lengths: s + shift + stretch (s - s of the first value)."""
+        s = self.distance
+        distance = s + shift + stretch * (s - s[0])
+        return replace(self, distance=distance, speed=(1.0 + stretch) * self.speed)
+
+    def _table(self) -> Table:
+        """Return the table of the channels that a notebook shows."""
+        rows: list[list[object]] = []
+        for name, x in self.channels.items():
+            known = x[np.isfinite(x)]
+            spread = [known.min(), known.max()] if len(known) else [np.nan, np.nan]
+            share = 100.0 * (1.0 - len(known) / len(x))
+            rows.append([name, self.quantities[name], *spread, share])
+        return Table(["channel", "quantity", "least (SI)", "largest (SI)", "missing (%)"], rows)
+
+    def _repr_html_(self) -> str:
+        table = self._table()
+        table.caption = self.name
+        return table.html()
+
+    def __repr__(self) -> str:
+        length = (self.distance[-1] - self.distance[0]) / 1e3
+        return f"<Measurement {self.name!r}: {len(self.channels)} channels, {length:.3g} km>"
+
+
+def _passed(x: Floats, rate: float, low: float, high: float) -> Floats:
+    if high < np.inf:
+        return band_passed(x, rate, low, high)
+    return x - low_passed(x, rate, low) if low > 0.0 else x

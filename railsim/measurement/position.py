@@ -1,0 +1,112 @@
+"""Arc length and speed of a measured run, from distance, mileage or speed.
+
+A counter of distance has coarse steps: between the places where it moves on it is linear.  Where
+speed and distance are both measured they are held against each other: what differs is said.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.measurement import MeasurementFile
+from railsim.errors import Fault, InputError
+
+Floats = NDArray[np.float64]
+BACKWARDS = 1.0  # m, by which a counter may step back
+APART = 0.005  # of the distance: remarked on
+WRONG = 0.5  # of the distance: refused
+
+
+def position(
+    file: str,
+    how: MeasurementFile,
+    time: Floats,
+    axes: dict[str, Floats],
+    mileage: tuple[float, bool] | None,
+) -> tuple[Floats, Floats, list[str]]:
+    """Return arc length [m], speed [m/s] and remarks of a run.
+
+    Parameters
+    ----------
+    file : str
+        For messages.
+    how : MeasurementFile
+    time : float64[time]
+        Equal steps [s].
+    axes : dict of str to float64[time]
+        ``distance``, ``mileage``, ``speed``, as far as they are measured [SI].
+    mileage : (float, bool) or None
+        Mileage of s = 0 of the track and whether it falls, where the track is known.
+
+    Raises
+    ------
+    InputError : a distance that does not rise; distance and speed that contradict each other.
+    """
+    remarks: list[str] = []
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    speed = axes.get("speed")
+    if speed is None and how.speed is not None and not {"distance", "mileage"} & {*axes}:
+        speed = np.full(len(time), how.speed)
+    if speed is not None:
+        speed = _known(file, "speed", time, speed, remarks)
+    driven = None if speed is None else _integral(step, speed)
+    counter = axes.get("distance")
+    if counter is None and "mileage" in axes:
+        counter = axes["mileage"]
+        known = counter[np.isfinite(counter)]
+        falls = bool(len(known) and known[-1] < known[0]) if mileage is None else mileage[1]
+        origin = known[0] if mileage is None and len(known) else (mileage or (0.0,))[0]
+        counter = (-1.0 if falls else 1.0) * (counter - origin)
+        if mileage is None:
+            counter = counter + how.start
+    if counter is None:
+        assert driven is not None  # by the definition
+        assert speed is not None
+        return how.start + driven, speed, remarks
+    s = _rising(file, time, counter, remarks)
+    if driven is None or speed is None:
+        return s, np.gradient(s, step), remarks
+    share = (s[-1] - s[0]) / driven[-1] - 1.0 if driven[-1] > 0.0 else np.inf
+    if not abs(share) < WRONG:
+        found = f"{s[-1] - s[0]:.6g} m by distance, {driven[-1]:.6g} m by speed"
+        raise InputError([Fault(file, "speed", found, "the same; are the units right?")])
+    if abs(share) > APART:
+        remarks.append(
+            f"Distance and speed run apart by {100 * share:+.2f} % ({s[-1] - s[0]:.1f} m by "
+            f"distance, {driven[-1]:.1f} m by speed); the distance is used."
+        )
+    return s, speed, remarks
+
+
+def _integral(step: float, speed: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
+
+
+def _known(file: str, name: str, time: Floats, x: Floats, remarks: list[str]) -> Floats:
+    """Return an axis without gaps."""
+    known = np.isfinite(x)
+    if known.sum() < 2:
+        raise InputError([Fault(file, name, "no values", "a channel with values")])
+    if not known.all():
+        remarks.append(f"The {name} has gaps ({100 * np.mean(~known):.2g} %): linear over them.")
+        x = np.interp(time, time[known], x[known])
+    if name == "speed" and x.min() < -0.1:
+        raise InputError([Fault(file, name, f"{x.min():.3g} m/s", "speeds forwards; 'reverse'?")])
+    return x
+
+
+def _rising(file: str, time: Floats, counter: Floats, remarks: list[str]) -> Floats:
+    """Return a distance that rises strictly."""
+    s = _known(file, "distance", time, counter, remarks)
+    highest = np.maximum.accumulate(s)
+    back = float(np.max(highest - s))
+    if back > BACKWARDS or s[-1] <= s[0]:
+        found = f"falls by {back:.3g} m" if s[-1] > s[0] else "does not rise"
+        allowed = "a distance that rises; a mileage may fall (quantity = 'mileage')"
+        raise InputError([Fault(file, "distance", found, allowed)])
+    moved = np.concatenate([[True], np.diff(highest) > 0.0])
+    if not moved.all():
+        s = np.interp(time, time[moved], s[moved])
+        tail = ~moved & (time > time[moved][-1])
+        speed = (s[moved][-1] - s[0]) / (time[moved][-1] - time[0])
+        s[tail] += speed * (time[tail] - time[moved][-1])
+    return s

@@ -1,0 +1,267 @@
+"""From a measurement file and its data to arrays with railsim's units and signs."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.constants import GRAVITY
+from railsim.definitions import sources
+from railsim.definitions.file_definition import loaded
+from railsim.definitions.loading import load_track
+from railsim.definitions.measurement import AXES, FEWEST, Channel, MeasurementFile, quantity_of
+from railsim.errors import Fault, InputError, nearest
+from railsim.measurement.clock import Clock, bridged, clock_of, delayed, joined
+from railsim.measurement.columns import pieces
+from railsim.measurement.data import Measurement
+from railsim.measurement.position import position
+
+Floats = NDArray[np.float64]
+MOST_VALUES = 200_000_000  # of all channels: 1.6 GB
+LARGEST = {
+    "Q": 1e6, "Y": 1e6, "sum_Y": 2e6, "sum_abs_Y": 2e6, "Y_over_Q": 10.0, "speed": 170.0,
+    "curvature": 0.2, "yaw_rate": 10.0, "sensor_acceleration": 5000.0,
+    "sensor_absolute_acceleration": 5000.0, "sensor_displacement": 1.0, "sensor_velocity": 50.0,
+    "sensor_roll_rate": 20.0, "wheelset_lateral": 0.2, "element_deflection": 2.0,
+}  # fmt: skip
+"""Values [SI] that no vehicle on a track reaches."""
+SMALLEST = {"Q": 500.0, "speed": 0.1}
+"""Largest values [SI] that are too small for any run."""
+EQUAL_ENDS, OFTEN = 3, 3  # values in a row at the largest or smallest one, and how often
+
+
+def load_measurement(
+    path: str | Path, overrides: Iterable[str] | str = (), *, channels: Sequence[str] | None = None
+) -> Measurement:
+    """Load a measured run: its file and the data that it names.
+
+    Parameters
+    ----------
+    path : str or Path
+        Measurement file.
+    overrides : iterable of str
+        Assignments ``key.path=value`` with the file's own keys.
+    channels : sequence of str, optional
+        Names or quantities of the channels that are read; by default all.  A long record takes
+        8 bytes for each value of a channel.
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    InputError
+        Everything that is wrong in the files: missing columns, text, times or distances that do
+        not rise, values that no vehicle reaches.
+    """
+    source = sources.read_source(sources.find_file(path, "measurement"), "measurement")
+    _beside(source)
+    how = loaded(MeasurementFile, source, overrides)
+    wanted = _wanted(str(path), how, channels)
+    raw = _read(how, wanted)
+    times = [name for name in wanted if how.channels[name].quantity == "time"]
+    remarks: list[str] = []
+    if times:
+        channel = how.channels[times[0]]
+        parts = [channel.factor * (part - channel.offset) for part in raw.parts[times[0]]]
+        written, anew = joined(parts)
+        if anew:
+            remarks.append(f"The clock begins anew in {anew} files; they follow each other.")
+        clock = clock_of(how.file[0], written)
+    else:
+        count = sum(map(len, raw.parts[wanted[0]]))
+        assert how.rate is not None  # by the definition
+        clock = Clock(np.arange(count) / how.rate, how.rate, np.arange(count), np.empty(0))
+    remarks += clock.remarks
+    values, faults = {}, []
+    for name in wanted:
+        if name in times:
+            del raw.parts[name]
+            continue
+        x = np.concatenate(raw.parts.pop(name))
+        values[name] = _channel(name, how, x, clock, remarks)
+        faults += _implausible(how, name, values[name])
+    if faults:
+        raise InputError(faults)
+    return _measurement(str(path), how, clock, values, remarks)
+
+
+def _beside(source: sources.Source) -> None:
+    """Names of vehicle and track files beside the measurement count from its folder."""
+    folder = Path(source.file).parent
+    for key in ("vehicle", "track"):
+        name = source.data.get(key)
+        if isinstance(name, str) and name and (folder / name).is_file():
+            source.data[key] = str((folder / name).resolve())
+
+
+def _wanted(file: str, how: MeasurementFile, asked: Sequence[str] | None) -> list[str]:
+    """Return the names of the channels to read: those asked for, and time and place."""
+    names = list(how.channels)
+    if asked is None:
+        return names
+    by_quantity = {channel.quantity: name for name, channel in how.channels.items()}
+    found = {name for name in names if how.channels[name].quantity in AXES}
+    faults = []
+    for one in asked:
+        name = one if one in how.channels else by_quantity.get(one)
+        if name is None:
+            known = nearest(one, [*names, *by_quantity])
+            faults.append(Fault(file, "channels", f"no channel '{one}'", known))
+        else:
+            found.add(name)
+    if faults:
+        raise InputError(faults)
+    return [name for name in names if name in found]
+
+
+@dataclass
+class _Raw:
+    """Values as the files have them: for each channel an array for each file."""
+
+    parts: dict[str, list[Floats]] = field(default_factory=dict)
+
+
+def _read(how: MeasurementFile, wanted: list[str]) -> _Raw:
+    columns = {n: (how.channels[n].column or n, how.channels[n].index) for n in wanted}
+    raw = _Raw({name: [] for name in wanted})
+    count = 0
+    for file in how.file:
+        own: dict[str, list[Floats]] = {name: [] for name in wanted}
+        for piece in pieces(Path(file), columns, how):
+            for name, x in piece.items():
+                own[name].append(np.ascontiguousarray(x))
+            count += len(x) * len(piece)
+            if count > MOST_VALUES:
+                found, allowed = "too many values", f"{MOST_VALUES:g} at most; name fewer channels"
+                raise InputError([Fault(file, "", found, allowed)])
+        for name, parts in own.items():
+            raw.parts[name].append(np.concatenate(parts) if parts else np.empty(0))
+    rows = sum(map(len, raw.parts[wanted[0]]))
+    if rows < FEWEST:
+        raise InputError([Fault(how.file[0], "", f"{rows} values", f"{FEWEST} at least")])
+    return raw
+
+
+def _channel(
+    name: str, how: MeasurementFile, x: Floats, clock: Clock, remarks: list[str]
+) -> Floats:
+    """Return a channel at the equal time steps, in SI, with railsim's sign."""
+    channel = how.channels[name]
+    x = np.where(np.isinf(x), np.nan, x)
+    for value in how.missing:
+        x[x == value] = np.nan
+    if channel.range is not None:
+        outside = (x <= channel.range[0]) | (x >= channel.range[1])
+        if outside.any():
+            remarks.append(f"{name}: {outside.sum()} values at the ends of its range left out.")
+            x[outside] = np.nan
+    elif clipped := _clipped(x):
+        remarks.append(f"{name} {clipped}: give its range to leave these values out.")
+    x = clock.on_grid(channel.factor * (x - channel.offset))
+    if channel.delay:
+        x = delayed(x, channel.delay * clock.rate)
+    x = bridged(x, round(how.longest_gap * clock.rate))
+    unknown = float(np.mean(np.isnan(x)))
+    if unknown and channel.quantity not in AXES:
+        remarks.append(f"{name}: {100.0 * unknown:.2g} % of the values are missing.")
+    return x
+
+
+def _zero(name: str, how: MeasurementFile, channel: Channel, x: Floats, time: Floats) -> float:
+    if channel.zero is None:
+        return 0.0
+    inside = (time >= channel.zero[0]) & (time <= channel.zero[1]) & np.isfinite(x)
+    if not inside.any():
+        found = f"no value between {channel.zero[0]:g} and {channel.zero[1]:g} s"
+        allowed = f"times from {time[0]:g} to {time[-1]:g} s"
+        raise InputError([Fault(how.name, f"channels.{name}.zero", found, allowed)])
+    return float(x[inside].mean())
+
+
+def _clipped(x: Floats) -> str:
+    """Return how often a channel rests at its largest or smallest value, if it looks clipped."""
+    known = x[np.isfinite(x)]
+    if len(known) < FEWEST or known.min() == known.max():
+        return ""
+    for value, word in ((known.max(), "largest"), (known.min(), "smallest")):
+        at = np.concatenate([[0], (known == value).view(np.int8), [0]])
+        edges = np.flatnonzero(np.diff(at)).reshape(-1, 2)
+        lengths = edges[:, 1] - edges[:, 0]
+        if np.count_nonzero(lengths >= EQUAL_ENDS) >= OFTEN and value != 0.0:
+            return f"rests {len(lengths)} times at its {word} value {value:g} and looks clipped"
+    return ""
+
+
+def _implausible(how: MeasurementFile, name: str, x: Floats) -> list[Fault]:
+    """Return what no vehicle can do: mostly a wrong unit."""
+    quantity = how.channels[name].quantity
+    known = np.abs(x[np.isfinite(x)])
+    kind = quantity_of(quantity)
+    if not len(known) or kind is None:
+        return []
+    largest, base = float(known.max()), quantity.partition(":")[0]
+    key = f"channels.{name}"
+    if largest > LARGEST.get(base, np.inf):
+        found = f"{largest:.4g} {kind.unit}"
+        allowed = f"{LARGEST[base]:g} {kind.unit} at most; 'unit', 'range' or 'missing'?"
+        return [Fault(how.file[0], key, found, allowed)]
+    if 0.0 < largest < SMALLEST.get(base, 0.0):
+        found = f"{largest:.4g} {kind.unit} at most"
+        return [Fault(how.file[0], key, found, "larger values; is its 'unit' another?")]
+    return []
+
+
+def _measurement(
+    path: str, how: MeasurementFile, clock: Clock, values: dict[str, Floats], remarks: list[str]
+) -> Measurement:
+    axes = {
+        how.channels[name].quantity: values.pop(name)
+        for name in list(values)
+        if how.channels[name].quantity in ("distance", "mileage", "speed")
+    }
+    mileage = None
+    if "mileage" in axes and how.track is not None:
+        track = load_track(how.track)
+        mileage = track.mileage, track.falling_mileage
+    s, speed, said = position(path, how, clock.time, axes, mileage)
+    values = _mounted(how, values, remarks)
+    values = {
+        name: x - _zero(name, how, how.channels[name], x, clock.time) for name, x in values.items()
+    }
+    return Measurement(how, clock.time, s, speed, values, (*remarks, *said))
+
+
+def _mounted(
+    how: MeasurementFile, values: dict[str, Floats], remarks: list[str]
+) -> dict[str, Floats]:
+    """Return the channels with the accelerations at points of `mounting` turned back.
+
+    A sensor turned by the small angles p reads f' = f - p x f in its own axes, f = a - g; so
+    f' + p x f' is what it would read along those of the body.  Axes that are not measured count
+    as zero acceleration.
+    """
+    found = dict(values)
+    for point, angles in how.mounting.items():
+        names = {
+            axis: name
+            for name in values
+            for axis in "xyz"
+            if how.channels[name].quantity == f"sensor_acceleration:{point}:{axis}"
+        }
+        if not names:
+            allowed = "a point with channels of sensor_acceleration"
+            raise InputError([Fault(how.name, f"mounting.{point}", "no channel there", allowed)])
+        still = np.zeros(len(next(iter(values.values()))))
+        read = [values[names[axis]] if axis in names else still for axis in "xyz"]
+        read[2] = read[2] - GRAVITY  # what is taken out of the reading at rest
+        turned = np.cross(np.array(angles), np.stack(read, axis=-1))
+        for k, axis in enumerate("xyz"):
+            if axis in names:
+                found[names[axis]] = values[names[axis]] + turned[:, k]
+        if missing := [axis for axis in "xyz" if axis not in names]:
+            remarks.append(f"{point}: {', '.join(missing)} is not measured, taken as zero.")
+    return found

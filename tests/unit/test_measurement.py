@@ -1,0 +1,218 @@
+"""Measured runs: what files say becomes channels in SI, or one clear fault."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+import railsim
+from railsim.measurement.clock import clock_of, delayed
+
+RATE, COUNT = 500.0, 3000
+HEAD = """format = "railsim-measurement/1"
+name = "run"
+speed = 50.0
+"""
+CHANNELS = """[channels]
+t = { quantity = "time" }
+box = { quantity = "sensor_acceleration:axlebox_1_left:z", unit = "g", reverse = true }
+load = { quantity = "Q:1:left", unit = "kN", offset = 1.5 }
+"""
+t = np.arange(COUNT) / RATE
+BOX = 5.0 * np.sin(2 * np.pi * 7.0 * t)  # m/s2
+LOAD = 60e3 + 5e3 * np.cos(2 * np.pi * 3.0 * t)  # N
+
+
+def written(folder: Path, *, cell=lambda row, name, text: text, delimiter=",", text=CHANNELS):
+    """Write a CSV and its measurement file; `cell` may spoil cells."""
+    columns = {"t": t, "box": -BOX / 9.81, "load": LOAD / 1e3 + 1.5}
+    lines = [delimiter.join(columns)]
+    for k in range(COUNT):
+        cells = [cell(k, name, f"{column[k]:.9f}") for name, column in columns.items()]
+        lines.append(delimiter.join(cells))
+    body = "\n".join(lines)
+    (folder / "a.csv").write_text(body.replace(".", ",") if delimiter == ";" else body)
+    (folder / "m.toml").write_text(HEAD + 'file = "a.csv"\n' + text)
+    return folder / "m.toml"
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_units_signs_and_offsets(tmp_path, delimiter):
+    run = railsim.load_measurement(written(tmp_path, delimiter=delimiter))
+    assert run["box"] == pytest.approx(BOX, abs=1e-7)
+    assert run["Q:1:left"] == pytest.approx(LOAD, abs=1e-4)
+    assert run.distance == pytest.approx(50.0 * t)
+    assert run.rate == pytest.approx(RATE)
+    assert run.remarks == ()
+
+
+def test_binary_files_give_what_csv_gives(tmp_path):
+    path = written(tmp_path)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"], file["box"] = t, np.stack([BOX, -BOX / 9.81], axis=1)
+        file["load"] = (LOAD / 1e3 + 1.5)[None]
+    savemat(tmp_path / "a.mat", {"t": t, "box": -BOX[:, None] / 9.81, "load": LOAD / 1e3 + 1.5})
+    for name, index in (("a.h5", "[1]"), ("a.mat", "[]")):
+        overrides = [f"file={tmp_path / name}", f"channels.box.index={index}"]
+        run = railsim.load_measurement(path, overrides)
+        assert run["box"] == pytest.approx(BOX), name
+        assert run["load"] == pytest.approx(LOAD), name
+
+
+def test_parquet_in_pieces(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    frame = pandas.DataFrame({"t": t, "box": -BOX / 9.81, "load": LOAD / 1e3 + 1.5, "note": "x"})
+    frame.loc[10, "box"] = None
+    path = written(tmp_path)
+    frame.to_parquet(tmp_path / "a.parquet", row_group_size=700)
+    run = railsim.load_measurement(path, [f"file={tmp_path / 'a.parquet'}"])
+    assert np.flatnonzero(np.isnan(run["box"])).tolist() == [10]
+    assert run["load"] == pytest.approx(LOAD)
+
+
+def test_matlab_structures_are_not_opened(tmp_path):
+    path = written(tmp_path)
+    savemat(tmp_path / "a.mat", {"t": t, "box": {"values": BOX}, "load": LOAD})
+    with pytest.raises(railsim.InputError, match="a struct; an array of numbers"):
+        railsim.load_measurement(path, [f"file={tmp_path / 'a.mat'}"])
+
+
+def test_gaps_are_nan_bridged_only_where_short(tmp_path):
+    def cell(row, name, text):
+        hole = row in (50, 51) or 100 <= row < 120
+        return "" if name == "box" and hole else "-9999" if name == "load" and row == 7 else text
+
+    path = written(tmp_path, cell=cell)
+    run = railsim.load_measurement(path, ["missing=[-9999.0]", "longest_gap=0.004"])
+    assert np.flatnonzero(np.isnan(run["box"])).tolist() == list(range(100, 120))
+    curvature = 5.0 * (2 * np.pi * 7.0) ** 2
+    assert run["box"][50:52] == pytest.approx(BOX[50:52], abs=curvature * 0.006**2 / 8)
+    assert np.isfinite(run["load"]).all()
+    assert any("box" in remark and "missing" in remark for remark in run.remarks)
+
+
+def test_lost_lines_leave_a_gap_in_time(tmp_path):
+    path = written(tmp_path)
+    lines = (tmp_path / "a.csv").read_text().split("\n")
+    (tmp_path / "a.csv").write_text("\n".join(lines[:1000] + lines[1010:]))
+    run = railsim.load_measurement(path)
+    assert len(run.time) == COUNT
+    assert np.flatnonzero(np.isnan(run["box"])).tolist() == list(range(999, 1009))
+    assert run["box"][2000] == pytest.approx(BOX[2000])
+    assert any("gap" in remark for remark in run.remarks)
+
+
+def test_a_clock_with_few_digits_is_a_line():
+    exact = np.arange(5000) / 300.0
+    clock = clock_of("a.csv", np.round(exact, 3))
+    assert clock.rate == pytest.approx(300.0, rel=1e-3 / exact[-1])
+    assert clock.places is not None
+    assert np.abs(clock.time - exact).max() < 1e-3
+
+
+def test_unequal_steps_are_interpolated_and_said():
+    rng = np.random.default_rng(1)
+    exact = np.cumsum(0.002 * rng.uniform(0.6, 1.4, 5000))
+    clock = clock_of("a.csv", exact)
+    assert "unequal" in clock.remarks[0]
+    assert np.abs(clock.on_grid(np.sin(exact)) - np.sin(clock.time))[:-1].max() < 1e-5
+
+
+def test_a_channel_that_lags_is_put_right(tmp_path):
+    path = written(tmp_path)
+    run = railsim.load_measurement(path, ["channels.box.delay=0.0033"])
+    later = 5.0 * np.sin(2 * np.pi * 7.0 * (t + 0.0033))
+    assert np.nanmax(np.abs(run["box"] - later)) < 1e-4
+    # of a cubic of the index, exactly
+    x = np.arange(20.0) ** 3
+    assert delayed(x, -0.3)[5] == pytest.approx(4.7**3)
+
+
+def test_two_files_follow_each_other(tmp_path):
+    path = written(tmp_path)
+    both = f"file=[{str(tmp_path / 'a.csv')!r}, {str(tmp_path / 'a.csv')!r}]"
+    run = railsim.load_measurement(path, [both])
+    assert len(run.time) == 2 * COUNT
+    assert run.distance[-1] == pytest.approx(50.0 * (2 * COUNT - 1) / RATE)
+    assert "begins anew" in run.remarks[0]
+
+
+def test_coarse_mileage_against_speed(tmp_path):
+    text = CHANNELS + 'km = { quantity = "mileage", unit = "km", column = "km" }\n'
+    path = written(tmp_path, text=text)
+    lines = (tmp_path / "a.csv").read_text().split("\n")
+    counter = np.floor((7000.0 - 50.0 * t) / 5.0) * 5e-3  # falls, steps of 5 m
+    rows = [f"{line},{km:.3f}" for line, km in zip(lines[1:], counter, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([lines[0] + ",km", *rows]))
+    run = railsim.load_measurement(path, ["start=100.0"])
+    assert np.abs(run.distance - 100.0 - 50.0 * t).max() < 5.0
+    assert np.diff(run.distance).min() > 0.0
+
+
+def test_mounting_takes_gravity_back(tmp_path):
+    """A floor sensor rolled by 20 mrad reads -g p in y and turns the z motion into it."""
+    p = 0.02
+    z, y = BOX, 0.3 * np.ones(COUNT)
+    read_y, read_z = y + p * (z - 9.81), z - p * y
+    rows = [f"{a:.9f},{b:.9f}" for a, b in zip(read_y, read_z, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["y,z", *rows]))
+    (tmp_path / "m.toml").write_text(
+        HEAD + 'file = "a.csv"\nrate = 500.0\nmounting = { floor_front = [0.02, 0.0, 0.0] }\n'
+        '[channels]\ny = { quantity = "sensor_acceleration:floor_front:y" }\n'
+        'z = { quantity = "sensor_acceleration:floor_front:z" }\n'
+    )
+    run = railsim.load_measurement(tmp_path / "m.toml")
+    assert run["y"] == pytest.approx(y, abs=1.5 * p**2 * 15.0)
+    assert run["z"] == pytest.approx(z, abs=1.5 * p**2 * 15.0)
+
+
+def test_clipped_signals_are_said_and_left_out(tmp_path):
+    def cell(row, name, text):
+        return f"{np.clip(float(text), -0.4, 0.4):.9f}" if name == "box" else text
+
+    path = written(tmp_path, cell=cell)
+    assert "looks clipped" in railsim.load_measurement(path).remarks[0]
+    run = railsim.load_measurement(path, ["channels.box.range=[-0.4, 0.4]"])
+    inside = np.isfinite(run["box"])
+    assert run["box"][inside] == pytest.approx(BOX[inside], abs=1e-7)
+    assert 0.4 < inside.mean() < 0.6
+
+
+def test_resampling_keeps_what_is_slow_and_folds_nothing(tmp_path):
+    run = railsim.load_measurement(written(tmp_path)).resampled(50.0)
+    inner = slice(20, -20)
+    assert run.rate == pytest.approx(50.0)
+    assert run["load"][inner] == pytest.approx(LOAD[::10][inner], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("channels.load.unit=N", "65 N at most; larger values; is its 'unit' another"),
+        ("channels.load.unit=mm", "no unit of Q: N, kN"),
+        ("channels.load.column=Q1", "no column 'Q1'"),
+        ("channels.box.quantity=sensor_acceleration:axlebox_1_left", "a label for each"),
+        ("channels.box.quantity=time", "two channels of time"),
+        ("file=gone.csv", "cannot be read"),
+        ("file=m.toml", "the name ends in '.toml'"),
+        ("rate=100.0", "either a channel of the quantity 'time' or 'rate'"),
+        ("channels.box.zero=[100.0, 200.0]", "no value between 100 and 200 s"),
+        ("channels.box.range=[1.0, -1.0]", "'range' must rise"),
+        ("encoding=klingon", "unknown encoding"),
+        ("channels.box.index=[0]", "leave 'index' out"),
+    ],
+)
+def test_bad_input_is_one_clear_line(tmp_path, override, words):
+    with pytest.raises(railsim.InputError) as caught:
+        railsim.load_measurement(written(tmp_path), [override])
+    assert len(caught.value.faults) == 1
+    assert words in str(caught.value)
+
+
+def test_text_among_numbers_names_its_line(tmp_path):
+    path = written(tmp_path, cell=lambda row, name, text: "off" if row == 70 else text)
+    with pytest.raises(railsim.InputError, match="line 72: not a number"):
+        railsim.load_measurement(path)
