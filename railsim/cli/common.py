@@ -69,8 +69,8 @@ def names_of(kind: str) -> Callable[..., list[Any]]:
     return complete
 
 
-def remarks_on(definition: "FileDefinition") -> list["Remark"]:
-    """Return what is allowed but unusual in a definition; a vehicle's statics are looked at too."""
+def remarks_on(definition: "FileDefinition", *, supports: bool = True) -> list["Remark"]:
+    """Return what is allowed but unusual in a definition, and in a vehicle's `supports` at rest."""
     from railsim.definitions.track import Track
     from railsim.definitions.vehicle import Vehicle
 
@@ -78,7 +78,7 @@ def remarks_on(definition: "FileDefinition") -> list["Remark"]:
     if isinstance(definition, Vehicle):
         from railsim.model.plausibility import vehicle_remarks
 
-        found = [*found, *vehicle_remarks(definition)]
+        found = [*found, *vehicle_remarks(definition, supports=supports)]
     if isinstance(definition, Track):
         from railsim.definitions.base import Remark
         from railsim.track.irregularity import measured_remarks

@@ -90,7 +90,9 @@ def command(
             chosen = rest.data[definition.load or "design"]
             data = {**found.data, "static": chosen, "load_cases": rest.data}
             found = Description(data, [*found.parts, *rest.parts])
-        remarks = [] if as_json else [f"remark: {one}" for one in remarks_on(definition)]
+        remarks = (
+            [] if as_json else [f"remark: {one}" for one in remarks_on(definition, supports=static)]
+        )
     if as_json:
         print_json(found.data)
     else:

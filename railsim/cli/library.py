@@ -2,6 +2,7 @@
 
 import re
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -81,18 +82,29 @@ def _entries(kind: str) -> list[dict[str, Any]]:
             }
             for name, p in profiles.items()
         ]
-    from railsim.definitions.sources import library_files, read_toml
+    from railsim.definitions.sources import library_files
 
+    word = _kinds()[kind]
     return [
         {
             "kind": kind,
             "name": name,
-            "title": str(read_toml(path).get("name", "")),
-            "trust": trust(text_with_bases(path, _kinds()[kind])),
+            "title": str(_text_and_data(path)[1].get("name", "")),
+            "trust": trust(text_with_bases(path, word)),
             "file": str(path),
         }
-        for name, path in library_files(_kinds()[kind]).items()
+        for name, path in library_files(word).items()
     ]
+
+
+@cache
+def _text_and_data(path: Path) -> tuple[str, dict[str, Any]]:
+    """Text of a file and what it says; many files extend the same one."""
+    from railsim.definitions.sources import parse_toml
+    from railsim.files import DEFINITION_BYTES, read_text
+
+    text = read_text(path, DEFINITION_BYTES)
+    return text, parse_toml(text, str(path))
 
 
 def trust(text: str) -> str:
@@ -111,13 +123,12 @@ def trust(text: str) -> str:
 
 def text_with_bases(path: Path, kind: str) -> str:
     """Return the text of a file with those of all files that it extends."""
-    from railsim.definitions.sources import find_file, parse_toml
-    from railsim.files import DEFINITION_BYTES, read_text
+    from railsim.definitions.sources import find_file
 
     texts: dict[Path, str] = {}
     while path.resolve() not in texts:  # a circle is reported where the file is loaded
-        text = texts[path.resolve()] = read_text(path, DEFINITION_BYTES)
-        base = parse_toml(text, str(path)).get("extends")
+        texts[path.resolve()], data = _text_and_data(path)
+        base = data.get("extends")
         if not isinstance(base, str):
             break
         path = find_file(base, kind, path)

@@ -29,7 +29,3 @@ schema         JSON Schemas and the manual's key tables
 creep_law      the creep laws: names, numbers, labels
 =============  ==================================================================================
 """
-
-from railsim.definitions import loading
-
-__all__ = ["loading"]

@@ -5,50 +5,73 @@ its `format` key.  What is checked beyond the single values stands in each defin
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from railsim.definitions import sources
 from railsim.definitions.file_definition import FileDefinition, format_fault, loaded
 from railsim.definitions.flatten import wrong_type
-from railsim.definitions.limits import ComfortLimits, RunningLimits, StationaryLimits, WheelLimits
-from railsim.definitions.measurement import MeasurementFile
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.published import Published
-from railsim.definitions.scenario import Scenario
 from railsim.definitions.settings import Settings
 from railsim.definitions.sources import Source
-from railsim.definitions.spring import TrailingArmSuspension
-from railsim.definitions.study import Study
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.definitions.wear_law import WearLawFile
 from railsim.errors import Fault, InputError
 from railsim.files import is_file
+
+if TYPE_CHECKING:
+    from railsim.definitions.limits import (
+        ComfortLimits,
+        RunningLimits,
+        StationaryLimits,
+        WheelLimits,
+    )
+    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.published import Published
+    from railsim.definitions.scenario import Scenario
+    from railsim.definitions.spring import TrailingArmSuspension
+    from railsim.definitions.study import Study
+    from railsim.definitions.wear_law import WearLawFile
 
 D = TypeVar("D", bound=FileDefinition)
 Overrides = Iterable[str] | str
 
-FORMATS: dict[str, type[FileDefinition]] = {
-    model.format_name(): model
-    for model in (
-        Vehicle,
-        Track,
-        Settings,
-        TrailingArmSuspension,
-        Mechanism,
-        RunningLimits,
-        Scenario,
-        ComfortLimits,
-        Published,
-        Study,
-        StationaryLimits,
-        WearLawFile,
-        WheelLimits,
-        MeasurementFile,
-    )
+_HOMES = {
+    "railsim-vehicle/1": ("vehicle", "Vehicle"),
+    "railsim-track/1": ("track", "Track"),
+    "railsim-settings/1": ("settings", "Settings"),
+    "railsim-spring/1": ("spring", "TrailingArmSuspension"),
+    "railsim-mechanism/1": ("mechanism", "Mechanism"),
+    "railsim-limits/1": ("limits", "RunningLimits"),
+    "railsim-scenario/1": ("scenario", "Scenario"),
+    "railsim-comfort-limits/1": ("limits", "ComfortLimits"),
+    "railsim-published/1": ("published", "Published"),
+    "railsim-study/1": ("study", "Study"),
+    "railsim-stationary-limits/1": ("limits", "StationaryLimits"),
+    "railsim-wear-law/1": ("wear_law", "WearLawFile"),
+    "railsim-wheel-limits/1": ("limits", "WheelLimits"),
+    "railsim-measurement/1": ("measurement", "MeasurementFile"),
 }
+
+
+class _Formats(Mapping[str, type[FileDefinition]]):
+    """Definitions by their `format` key, each imported when it is asked for."""
+
+    def __getitem__(self, key: str) -> type[FileDefinition]:
+        module, name = _HOMES[key]
+        home = import_module(f"railsim.definitions.{module}")
+        kind: type[FileDefinition] = getattr(home, name)
+        return kind
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_HOMES)
+
+    def __len__(self) -> int:
+        return len(_HOMES)
+
+
+FORMATS = _Formats()
 """Every definition of a file by its `format` key."""
 
 
@@ -95,12 +118,14 @@ def load_settings(path: str | Path | None = None, overrides: Overrides = ()) -> 
     return _load(Settings, path, overrides)
 
 
-def load_spring(path: str | Path, overrides: Overrides = ()) -> TrailingArmSuspension:
+def load_spring(path: str | Path, overrides: Overrides = ()) -> "TrailingArmSuspension":
     """Load a spring file, or a shipped one by its name; as `load_vehicle`."""
+    from railsim.definitions.spring import TrailingArmSuspension
+
     return _load(TrailingArmSuspension, path, overrides)
 
 
-def load_mechanism(path: str | Path, overrides: Overrides = ()) -> Mechanism:
+def load_mechanism(path: str | Path, overrides: Overrides = ()) -> "Mechanism":
     """Load a mechanism file, or a shipped one by its name; as `load_vehicle`.
 
     Parameters that the overrides set are listed in `provenance.set`.
@@ -117,40 +142,54 @@ def load_mechanism(path: str | Path, overrides: Overrides = ()) -> Mechanism:
         beside = Path(source.file_of(("optimise", "reference"))).parent / name
         if is_file(beside):
             optimise["reference"] = str(beside.resolve())
+    from railsim.definitions.mechanism import Mechanism
+
     return loaded(Mechanism, source, overrides)
 
 
-def load_scenario(path: str | Path, overrides: Overrides = ()) -> Scenario:
+def load_scenario(path: str | Path, overrides: Overrides = ()) -> "Scenario":
     """Load a scenario, or a shipped one by its name; as `load_vehicle`."""
+    from railsim.definitions.scenario import Scenario
+
     return _load(Scenario, path, overrides)
 
 
-def load_running_limits(path: str | Path, overrides: Overrides = ()) -> RunningLimits:
+def load_running_limits(path: str | Path, overrides: Overrides = ()) -> "RunningLimits":
     """Load the limits of running tests, or shipped ones by their name; as `load_vehicle`."""
+    from railsim.definitions.limits import RunningLimits
+
     return _load(RunningLimits, path, overrides)
 
 
-def load_comfort_limits(path: str | Path, overrides: Overrides = ()) -> ComfortLimits:
+def load_comfort_limits(path: str | Path, overrides: Overrides = ()) -> "ComfortLimits":
     """Load classes of comfort, or shipped ones by their name; as `load_vehicle`."""
+    from railsim.definitions.limits import ComfortLimits
+
     return _load(ComfortLimits, path, overrides)
 
 
-def load_stationary_limits(path: str | Path, overrides: Overrides = ()) -> StationaryLimits:
+def load_stationary_limits(path: str | Path, overrides: Overrides = ()) -> "StationaryLimits":
     """Load the limits of stationary tests, or shipped ones by their name; as `load_vehicle`."""
+    from railsim.definitions.limits import StationaryLimits
+
     return _load(StationaryLimits, path, overrides)
 
 
-def load_wheel_limits(path: str | Path, overrides: Overrides = ()) -> WheelLimits:
+def load_wheel_limits(path: str | Path, overrides: Overrides = ()) -> "WheelLimits":
     """Load the limits of worn wheels, or shipped ones by their name; as `load_vehicle`."""
+    from railsim.definitions.limits import WheelLimits
+
     return _load(WheelLimits, path, overrides)
 
 
-def load_wear_law(path: str | Path) -> WearLawFile:
+def load_wear_law(path: str | Path) -> "WearLawFile":
     """Load a law of wear with constants of the user's own."""
+    from railsim.definitions.wear_law import WearLawFile
+
     return loaded(WearLawFile, sources.read_source(Path(path), "limits"), ())
 
 
-def load_study(path: str | Path, overrides: Overrides = ()) -> Study:
+def load_study(path: str | Path, overrides: Overrides = ()) -> "Study":
     """Load a study file, or a shipped one by its name; as `load_vehicle`.
 
     Names of files that lie beside it count from its folder.
@@ -163,6 +202,8 @@ def load_study(path: str | Path, overrides: Overrides = ()) -> Study:
             data[key] = [_beside(folder, name) for name in data[key]]
     if "settings" in data:
         data["settings"] = _beside(folder, data["settings"])
+    from railsim.definitions.study import Study
+
     return loaded(Study, source, overrides)
 
 
@@ -172,8 +213,10 @@ def _beside(folder: Path, name: Any) -> Any:
     return name
 
 
-def load_published(path: str | Path, overrides: Overrides = ()) -> Published:
+def load_published(path: str | Path, overrides: Overrides = ()) -> "Published":
     """Load published values, or shipped ones by their name; as `load_vehicle`."""
+    from railsim.definitions.published import Published
+
     return _load(Published, path, overrides)
 
 

@@ -7,16 +7,21 @@ came from, so that a fault can be reported where it was written.
 import itertools
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from railsim.definitions.paths import descend, key_path
 from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.files import DEFINITION_BYTES, is_file, read_text
 from railsim.text import shortened
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 PACKAGE = Path(__file__).resolve().parent.parent
 FOLDERS = {
@@ -103,14 +108,19 @@ def library_folders(kind: str) -> Iterator[Path]:
     for folder in filter(None, os.environ.get("RAILSIM_PATH", "").split(os.pathsep)):
         yield Path(folder) / FOLDERS[kind]
     yield shipped_folder(kind)
-    # last and imported here: reading the metadata of all installed packages takes some 50 ms
-    from importlib.metadata import entry_points
-
-    for entry in entry_points(group="railsim.library"):
+    for entry in _installed_libraries(tuple(sys.path)):  # last: it takes some 50 ms
         library = entry.load()
         # a module stands for the folder that holds it
         root = Path(library.__file__).parent if hasattr(library, "__file__") else Path(library)
         yield root / FOLDERS[kind]
+
+
+@cache
+def _installed_libraries(_: tuple[str, ...]) -> "tuple[EntryPoint, ...]":
+    """Entry points of libraries in the packages on a path."""
+    from importlib.metadata import entry_points
+
+    return tuple(entry_points(group="railsim.library"))
 
 
 def library_files(kind: str) -> dict[str, Path]:

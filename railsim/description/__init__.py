@@ -8,26 +8,26 @@
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from railsim.definitions.file_definition import FileDefinition
-from railsim.definitions.loading import FORMATS
-from railsim.definitions.mechanism import Mechanism
-from railsim.definitions.spring import TrailingArmSuspension
-from railsim.definitions.study import Study
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.description.design_files import mechanism_parts, spring_parts
 from railsim.description.tracks import describe_track
 from railsim.description.values import Description
 from railsim.description.vehicles import describe_vehicle
-from railsim.result.data import Result
 from railsim.table import Table
+
+if TYPE_CHECKING:
+    from railsim.definitions.mechanism import Mechanism
+    from railsim.definitions.spring import TrailingArmSuspension
+    from railsim.definitions.study import Study
+    from railsim.result import Result
 
 __all__ = ["Description", "describe"]
 
 
-def describe(item: FileDefinition | Result, speeds: Sequence[float] = ()) -> Description:
+def describe(item: "FileDefinition | Result", speeds: Sequence[float] = ()) -> Description:
     """Return what a vehicle, track, spring, mechanism, study, settings or result holds.
 
     Parameters
@@ -37,25 +37,30 @@ def describe(item: FileDefinition | Result, speeds: Sequence[float] = ()) -> Des
     speeds : sequence of float
         Of a track: speeds for which the cant deficiency in its curves is given [m/s].
     """
-    if isinstance(item, Result):
+    if not isinstance(item, FileDefinition):
         return _result(item)
     if isinstance(item, Track):
         return describe_track(item, speeds)
     if isinstance(item, Vehicle):
         return describe_vehicle(item)
     content = item.model_dump()
-    data = {"kind": FORMATS[content["format"]].KIND, **content}
-    if isinstance(item, TrailingArmSuspension):
-        return Description(data, spring_parts(item))
-    if isinstance(item, Mechanism):
-        return Description(data, mechanism_parts(item))
-    if isinstance(item, Study):
-        data = {"kind": "study", "runs": item.runs, **item.model_dump(exclude_none=True)}
-        return Description(data, [f"{item.name}: {item.runs} runs", "", item.to_toml().rstrip()])
+    data = {"kind": item.KIND, **content}
+    if item.KIND == "spring":
+        from railsim.description.design_files import spring_parts
+
+        return Description(data, spring_parts(cast("TrailingArmSuspension", item)))
+    if item.KIND == "mechanism":
+        from railsim.description.design_files import mechanism_parts
+
+        return Description(data, mechanism_parts(cast("Mechanism", item)))
+    if item.KIND == "study":
+        study = cast("Study", item)
+        data = {"kind": "study", "runs": study.runs, **study.model_dump(exclude_none=True)}
+        return Description(data, [f"{study.name}: {study.runs} runs", "", study.to_toml().rstrip()])
     return Description(data, [item.to_toml().rstrip()])
 
 
-def _result(result: Result) -> Description:
+def _result(result: "Result") -> Description:
     """Return what a result holds, without its arrays."""
     inputs = ("vehicle_toml", "track_toml", "settings_json")
     attributes = {k: v for k, v in result.attributes.items() if k not in (*inputs, "remarks")}

@@ -6,6 +6,7 @@ on their springs with the wheelsets held, and how the weight is shared by the su
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,9 @@ from railsim.definitions.elements.spring_damper import SpringDamper
 from railsim.definitions.flatten import FlatElement, FlatVehicle, flatten
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import ModelError
-from railsim.model.assembly import Model, without_rails
-from railsim.model.preloads import static_shares
+
+if TYPE_CHECKING:
+    from railsim.model.assembly import Model
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +39,9 @@ SPRING_TRAVEL = 0.7
 """Static compression of a spring over its free length, coils on each other."""
 
 
-def vehicle_remarks(vehicle: Vehicle, balanced: Model | None = None) -> list[Remark]:
+def vehicle_remarks(
+    vehicle: Vehicle, balanced: "Model | None" = None, *, supports: bool = True
+) -> list[Remark]:
     """Return what is unlike all experience in a vehicle, equal findings as one line.
 
     Parameters
@@ -45,6 +49,8 @@ def vehicle_remarks(vehicle: Vehicle, balanced: Model | None = None) -> list[Rem
     vehicle : Vehicle
     balanced : Model, optional
         Its model with preloads, where there is one.
+    supports : bool
+        Whether the weight on each support is computed too; it needs the compiler's import.
 
     Examples
     --------
@@ -55,7 +61,8 @@ def vehicle_remarks(vehicle: Vehicle, balanced: Model | None = None) -> list[Rem
     """
     flat = flatten(vehicle) if balanced is None else balanced.flat
     found = [*_below_the_rails(flat), *_wheel_load(flat), *_vertical_modes(flat)]
-    return [*found, *_pulling(flat), *_supports(vehicle, balanced)]
+    found += _pulling(flat)
+    return [*found, *_supports(vehicle, balanced)] if supports else found
 
 
 def gathered(what: str, names: Sequence[str]) -> Remark:
@@ -180,8 +187,11 @@ def _pulling(flat: FlatVehicle) -> list[Remark]:
     return [gathered(text, parts) for text, parts in names.items()]
 
 
-def _supports(vehicle: Vehicle, balanced: Model | None) -> list[Remark]:
+def _supports(vehicle: Vehicle, balanced: "Model | None") -> list[Remark]:
     """Remarks on how the springs share the weight at rest."""
+    from railsim.model.assembly import without_rails
+    from railsim.model.preloads import static_shares
+
     try:
         model = balanced or without_rails(vehicle)
         shares = static_shares(model, solved=balanced is not None and _as_they_are(balanced))
@@ -192,7 +202,7 @@ def _supports(vehicle: Vehicle, balanced: Model | None) -> list[Remark]:
     return [*_pulled(model.flat, supports), *_idle(supports), *_other_loads(supports)]
 
 
-def _as_they_are(balanced: Model) -> bool:
+def _as_they_are(balanced: "Model") -> bool:
     """Whether the preloads of a model with preloads carry it in its nominal position."""
     return balanced.design is None and not any(
         element.definition.has_free_length for element in balanced.flat.elements
