@@ -35,6 +35,10 @@ GOOD, BAD = ("pass", "complete"), ("fail", "failed", "derailed", "exceeded", "wa
 """Cells that a terminal shows in green, in red; the rows of the latter have a class in pages."""
 
 
+NARROWEST = 6
+"""Width to which columns of texts shrink on a terminal [characters]."""
+
+
 @dataclass(frozen=True)
 class Column:
     """A quantity in a table.
@@ -193,21 +197,20 @@ class Table:
         from rich.table import Table as Drawn
         from rich.text import Text
 
-        drawn = Drawn(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-        longest = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        fits = sum(longest) + 2 * len(longest) <= width
-        for k, (column, heading) in enumerate(zip(self.columns, cells[0], strict=True)):
-            # headings are broken between words, texts anywhere, numbers nowhere
-            parts = [*heading.split(), *(row[k] for row in cells[1:])]
-            least = None if fits or not column.format else max(map(len, parts), default=None)
+        numbers = [bool(column.format) for column in self.columns]
+        gap, widths = _fitted(cells, numbers, width)
+        drawn = Drawn(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
+        for column, heading, least in zip(self.columns, cells[0], widths, strict=True):
             justify: Any = "right" if column.format else "left"
-            drawn.add_column(Text(heading), justify=justify, overflow="fold", width=least)
+            folded = Text(_folded(heading, least))
+            drawn.add_column(folded, justify=justify, overflow="fold", width=least)
         for row in cells[1:]:
-            drawn.add_row(*(Text(cell, _style(cell)) for cell in row))
+            parts = zip(row, widths, strict=True)
+            drawn.add_row(*(Text(_folded(cell, least), _style(cell)) for cell, least in parts))
         stream = io.StringIO()
         console = Console(
             file=stream,
-            width=width,
+            width=max(width, sum(widths) + gap * len(widths)),
             force_terminal=colour,
             color_system="standard" if colour else None,
             legacy_windows=False,
@@ -250,6 +253,51 @@ class Table:
         for record in self.records():
             writer.writerow(map(spreadsheet_cell, record.values()))
         return text.getvalue()
+
+
+def _fitted(
+    cells: Sequence[Sequence[str]], numbers: Sequence[bool], width: int
+) -> tuple[int, list[int]]:
+    """Return the gap between columns and their widths, in characters.
+
+    Headings and texts are broken between words and within dotted names, numbers nowhere.  Columns
+    share what is left; where even that is too little, texts are broken anywhere.
+    """
+    columns = list(zip(*cells, strict=True))
+    wanted = [max(1, *map(len, column)) for column in columns]
+    least = []
+    for number, (heading, *texts) in zip(numbers, columns, strict=True):
+        parts = texts if number else [part for text in texts for part in _parts(text)]
+        least.append(max(1, *(len(part.strip()) for part in [*_parts(heading), *parts])))
+    gap = 2 if sum(least) + 2 * len(least) <= width else 1
+    room = width - gap * len(least)
+    if sum(wanted) <= room:
+        return gap, wanted
+    texts = [k for k, number in enumerate(numbers) if not number]
+    while sum(least) > room and any(least[k] > NARROWEST for k in texts):
+        least[max(texts, key=least.__getitem__)] -= 1
+    widths = list(least)
+    by_need = sorted(range(len(widths)), key=lambda k: wanted[k] - widths[k])
+    for rank, k in enumerate(by_need):
+        share = max(room - sum(widths), 0) // (len(by_need) - rank)
+        widths[k] += min(wanted[k] - widths[k], share)
+    return gap, widths
+
+
+def _parts(text: str) -> list[str]:
+    """Return the parts between which a text may be broken, with the spaces before them."""
+    return re.split(r"(?=\s)(?<=\S)|(?<=[._/])(?=[A-Za-z])", text)
+
+
+def _folded(text: str, width: int) -> str:
+    """Return a text in lines of a width, broken where words and dotted names allow."""
+    lines = [""]
+    for part in _parts(text) if len(text) > width else [text]:
+        if lines[-1] and len(lines[-1]) + len(part) > width:
+            lines.append(part.lstrip())
+        else:
+            lines[-1] += part
+    return "\n".join(lines)
 
 
 def _style(cell: str) -> str:

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,15 +45,26 @@ def echo(text: object = "", *, err: bool = False) -> None:
 
 
 def show(*parts: "str | Table") -> None:
-    """Print lines and tables; a terminal gets tables of its width, coloured unless ``NO_COLOR``."""
+    """Print lines and tables; a terminal gets both in its width, coloured unless ``NO_COLOR``."""
     terminal = sys.stdout.isatty()
     width = shutil.get_terminal_size().columns if terminal else None
     for part in parts:
         if isinstance(part, str):
-            echo(part)
+            for line in part.split("\n"):
+                echo(in_width(line, width))
         else:  # texts of tables are literal already
             lines = part.lines(width, colour=terminal and not os.environ.get("NO_COLOR"))
             click.echo("\n".join(lines))
+
+
+def in_width(line: str, width: int | None) -> str:
+    """Return a line, in several ones where a terminal is narrower, under its first word."""
+    if width is None or len(line) <= width or not line.strip():
+        return line
+    indent = " " * (len(line) - len(line.lstrip()) + 2)
+    return textwrap.fill(
+        line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def names_of(kind: str) -> Callable[..., list[Any]]:

@@ -8,17 +8,17 @@ from typing import Any
 
 import click
 
-from railsim.cli.common import echo, json_option, overwrite_option, print_json, show
+from railsim.cli.common import json_option, overwrite_option, print_json, show
 
 PROFILES = "profiles"
 # Letters of source quality beside a number, as the shipped files explain them: read, re-entered,
 # computed, recalled, assumed; a short name of the source may follow, [D G].
 MARK = re.compile(r"\[(D|R|C|M|A|assumed)(?: \w+)?\]")
 MEANING = {
-    "D": "data sheet or printed table, read",
-    "R": "re-entered in public code that names its source",
+    "D": "data sheet or printed table",
+    "R": "taken from public code that names its source",
     "C": "computed",
-    "M": "recalled",
+    "M": "from memory, unverified",
     "A": "assumed",
 }
 
@@ -59,12 +59,13 @@ def command(kinds: tuple[str, ...], draw: str | None, overwrite: bool, as_json: 
         print_json(entries)
         return
     for kind in kinds or known:
-        rows = (entry for entry in entries if entry["kind"] == kind)
-        columns = [Column("name"), Column("trust", "source quality"), Column("title", " ")]
-        show(kind, Table(columns, rows), "")
+        rows = [entry for entry in entries if entry["kind"] == kind]
+        graded = any(entry["trust"] for entry in rows)
+        quality = [Column("trust", "source quality")] * graded
+        show(kind, Table([Column("name"), *quality, Column("title", " ")], rows), "")
     if any(entry["trust"] for entry in entries):
         meanings = ", ".join(f"{letter} {meaning}" for letter, meaning in MEANING.items())
-        echo(f"source quality, the most frequent first: {meanings}")
+        show(f"source quality, the most frequent first: {meanings}")
 
 
 def _entries(kind: str) -> list[dict[str, Any]]:
@@ -89,12 +90,17 @@ def _entries(kind: str) -> list[dict[str, Any]]:
         {
             "kind": kind,
             "name": name,
-            "title": str(_text_and_data(path)[1].get("name", "")),
+            "title": _title(_text_and_data(path)[1]),
             "trust": trust(text_with_bases(path, word)),
             "file": str(path),
         }
         for name, path in library_files(word).items()
     ]
+
+
+def _title(data: dict[str, Any]) -> str:
+    """Name of a definition, or the edition of the standard that it follows."""
+    return str(data.get("name", data.get("edition", "")))
 
 
 @cache

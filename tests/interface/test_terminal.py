@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from railsim.cli import main
-from railsim.cli.common import show
+from railsim.cli.common import in_width, show
 from railsim.table import Table
 
 TABLE = Table(["quantity", "verdict"], [["a\x1b[31mname", "fail"], ["of " * 40, "pass"]])
@@ -27,6 +27,11 @@ def test_a_terminal_gets_tables_of_its_width(columns, colours, capsys, monkeypat
     assert any("\x1b[31mfail" in line for line in lines) == colours
     assert any("\x1b" in line for line in lines) == colours
     assert max(len(re.sub(r"\x1b\[\d+m", "", line)) for line in lines) <= columns
+
+
+def test_long_lines_are_folded_between_words_under_their_beginning():
+    assert in_width("  source: of the number", 16) == "  source: of the\n    number"
+    assert in_width("  source: of the number", None) == "  source: of the number"
 
 
 def test_a_file_gets_whole_lines(capsys):

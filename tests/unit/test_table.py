@@ -115,3 +115,14 @@ def test_units_of_the_quantities_are_those_of_tables():
             assert column.text(1.0) == quantity.text(1.0)
             assert column.si_unit in (quantity.unit, "" if quantity.unit == "1" else None)
     assert all(scale > 0.0 for _, scale in SHOWN_UNITS.values())
+
+
+def test_names_are_broken_at_their_dots_and_numbers_nowhere():
+    rows = [["front.outer.wheelset", -10.78, "stiffness 31.391e6"]]
+    table = Table(["body", Column("x", unit="m", format=".3f"), "values"], rows)
+    assert [line.split() for line in table.lines(32)[1:]] == [
+        ["front.", "-10.780", "stiffness"],
+        ["outer.", "31.391e6"],
+        ["wheelset"],
+    ]
+    assert any("-10.780" in line for line in table.lines(12))
