@@ -4,6 +4,9 @@ A vehicle may be called ``$x^$``, ``=1+1`` or hold escape sequences; wherever it
 these characters and does nothing.  For pages see `railsim.page`.
 """
 
+import re
+from collections.abc import Iterable
+
 LONGEST_VALUE, LONGEST_FILE = 60, 300  # characters of a value, of a file's name, in a message
 
 
@@ -61,3 +64,39 @@ def spreadsheet_cell(value: object) -> object:
     except ValueError:
         return f"'{value}"
     return value
+
+
+_VARYING = re.compile(r"\w+(?:\.\w+)+|\d+(?:\.\d+)?(?:e[+-]?\d+)?|\b(?:left|right)\b")
+
+
+def counted_remarks(remarks: Iterable[tuple[str, str]]) -> list[str]:
+    """Return remarks on runs, those that differ in numbers and names alone as one with a count.
+
+    Parameters
+    ----------
+    remarks : iterable of (str, str)
+        Name of the run, or nothing; remark.
+
+    Examples
+    --------
+    >>> counted_remarks([("a", "hunts at 5 Hz"), ("b", "hunts at 6 Hz"), ("c", "is too long")])
+    ['a: hunts at 5 Hz (and 1 similar, in 2 runs altogether)', 'c: is too long']
+    >>> counted_remarks([("a", "is too long"), ("b", "is too long")])
+    ['2 runs: is too long']
+    """
+    alike: dict[str, dict[tuple[str, str], None]] = {}
+    for run, text in remarks:
+        alike.setdefault(_VARYING.sub("#", text), {})[run, text] = None
+    found = []
+    for group in alike.values():
+        run, text = next(iter(group))
+        runs = len({name for name, _ in group if name})
+        if runs > 1 and len({text for _, text in group}) == 1:
+            found.append(f"{runs} runs: {text}")
+            continue
+        where = f", in {runs} runs altogether" if runs > 1 else ""
+        more = f" (and {len(group) - 1} similar{where})" if len(group) > 1 else ""
+        found.append(
+            (f"{run}: " if run else "") + (text.removesuffix(".") if more else text) + more
+        )
+    return found

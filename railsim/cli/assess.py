@@ -8,7 +8,7 @@ import click
 
 from railsim.cli.common import echo, output_options, print_json, show
 from railsim.files import check_folder, make_folder, whole_file
-from railsim.text import spreadsheet_cell
+from railsim.text import counted_remarks, spreadsheet_cell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -229,7 +229,8 @@ def show_assessment(assessment: "Assessment", *, quiet: bool = False) -> None:
     for table in tables(assessment):
         show("", table)
     if not quiet:
-        show("", *(f"note: {remark}" for remark in assessment.remarks))
+        notes = counted_remarks(("", remark) for remark in assessment.remarks)
+        show("", *(f"note: {one}" for one in notes))
 
 
 def _verdict_lines(assessment: "Assessment") -> list[str]:

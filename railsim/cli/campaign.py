@@ -1,10 +1,9 @@
 """``railsim study --scenario``: a campaign of runs that ends in its assessment."""
 
 from pathlib import Path
-from typing import Any
 
 from railsim.cli.common import echo, print_json
-from railsim.cli.progress import progress_bar
+from railsim.cli.progress import RunLines, progress_bar
 
 
 def run_campaign(
@@ -29,19 +28,12 @@ def run_campaign(
     if not vehicles:
         raise InputError([Fault("--vehicles", "", "not given", "give one vehicle at least")])
 
-    def tell(record: dict[str, Any]) -> None:
-        from tqdm import tqdm
-
-        with tqdm.external_write_mode():
-            echo(f"{record['name']}  {record['status']}")
-            for remark in record.get("remarks", ()):
-                echo(f"  remark: {remark}")
-
+    lines = RunLines()
     with progress_bar(scenario, quiet=quiet) as progress:
         done = campaign(
             scenario, list(vehicles), out=out, assignments=assignments, workers=workers,
             scheduler=scheduler, resume=resume, overwrite=overwrite, progress=progress,
-            on_record=None if quiet or as_json else tell,
+            on_record=None if quiet or as_json else lines,
             on_remark=lambda text: echo(f"remark: {text}", err=True),
         )  # fmt: skip
     written = write_assessments(Path(out), done.assessments)
@@ -51,6 +43,7 @@ def run_campaign(
             "assessments": [assessment.record() for assessment in done.assessments],
         })  # fmt: skip
         return DONE
+    lines.end(remarks=False)  # the assessments repeat them
     for assessment in done.assessments:
         echo()
         show_assessment(assessment, quiet=quiet)

@@ -7,13 +7,14 @@ Whoever tells its progress also hears of an interrupt that was lost, see `railsi
 
 import logging
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread, main_thread
 from typing import Any
 
 from railsim.cli.common import echo
 from railsim.cli.interrupts import raise_pending_signal
+from railsim.text import counted_remarks
 
 PATIENCE = 2.0  # seconds between looks at what the program is doing
 COMPILING = "preparing: compiling (after an installation; about a minute, kept for later)"
@@ -105,3 +106,75 @@ class _Words(logging.Handler):
         """Show a record; an empty one stands for what the bar is about."""
         parts = [part for part in (self._words, record.getMessage()) if part]
         self._bar.set_description_str(", ".join(parts), refresh=False)
+
+
+class RunLines:
+    """Lines about the runs of a study as they end: one each, later one for every ten.
+
+    Runs that do not reach their end always have a line.  Remarks are counted, and stand once at the
+    end.
+    """
+
+    EACH = 20  # runs with a line of their own
+    SHOWN = (("dQ_over_Q0", "dQ/Q0"), ("Y_over_Q", "Y/Q"), ("sum_Y", "sum Y"))
+
+    def __init__(self) -> None:
+        self._number = 0
+        self._last: list[Mapping[str, Any]] = []  # without a line yet
+        self._remarks: list[tuple[str, str]] = []
+
+    def __call__(self, record: Mapping[str, Any]) -> None:
+        """Take the record of a run that has ended."""
+        self._number += 1
+        name, status = record["name"], record["status"]
+        self._remarks += [(name, str(remark)) for remark in record.get("remarks", ())]
+        if status != "complete":
+            _print(f"{name}  {status} ({record['status_reason']})", *self._values([record]))
+        elif self._number <= self.EACH:
+            _print(f"{name}  {status}", *self._values([record]))
+        if self._number > self.EACH:
+            self._last.append(record)
+        if len(self._last) == 10:
+            self._print_last()
+
+    def end(self, *, remarks: bool = True) -> None:
+        """Print what is left: the last runs, and the remarks with the number of runs."""
+        self._print_last()
+        for text in counted_remarks(self._remarks) if remarks else ():
+            echo(f"remark: {text}")
+
+    def _print_last(self) -> None:
+        if not self._last:
+            return
+        first = self._number - len(self._last) + 1
+        complete = sum(record["status"] == "complete" for record in self._last)
+        values = self._values(self._last)
+        largest = "largest " if values else ""
+        values[:1] = [largest + value for value in values[:1]]
+        _print(f"runs {first} to {self._number}  {complete} complete", *values)
+        self._last = []
+
+    def _values(self, records: Sequence[Mapping[str, Any]]) -> list[str]:
+        """Largest peaks of some runs, by magnitude; of dQ/Q0 the largest load."""
+        from railsim.notation import QUANTITIES
+
+        texts = []
+        for name, words in self.SHOWN:
+            found = [
+                peak["value"]
+                for record in records
+                for peak in record.get("peaks", ())
+                if peak["quantity"] == name and peak["kind"] != "min"
+            ]
+            if found:
+                quantity = QUANTITIES[name]
+                unit = "" if quantity.shown_unit == "-" else f" {quantity.shown_unit}"
+                texts.append(f"{words} {quantity.text(max(found, key=abs))}{unit}")
+        return texts
+
+
+def _print(*parts: str) -> None:
+    from tqdm import tqdm
+
+    with tqdm.external_write_mode():
+        echo("  ".join(parts))

@@ -18,12 +18,11 @@ from railsim.cli.common import (
     set_option,
     with_load,
 )
-from railsim.cli.progress import progress_bar
+from railsim.cli.progress import RunLines, progress_bar
 from railsim.processes import begin_server
 
 if TYPE_CHECKING:
     from railsim.studies import Outcome
-    from railsim.studies.records import Record
     from railsim.studies.spec import StudySpec
 
 OF_STUDY = ("settings", "start", "duration", "until", "quantities", "keep", "compress", "single")
@@ -226,11 +225,9 @@ def command(
                 )
     else:
         spec = _asked(file, {**of_study, **given})
+    lines = RunLines()
     execution = Execution(
-        **how,
-        resume=resume,
-        on_record=None if quiet or as_json else _print_record,
-        on_remark=_print_remark,
+        **how, resume=resume, on_record=None if quiet or as_json else lines, on_remark=_print_remark
     )
     # names of files in a study that goes on count from where it was started
     with chdir(base), progress_bar("study", quiet=quiet) as progress:
@@ -239,6 +236,7 @@ def command(
     if as_json:
         print_json({"folder": str(outcome.folder), "runs": list(outcome.records)})
     else:
+        lines.end()
         _print_end(outcome)
         if page is not None:
             echo(str(page))
@@ -358,27 +356,6 @@ def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[s
 
 def _print_remark(text: str) -> None:
     echo(f"remark: {text}", err=True)
-
-
-def _print_record(record: "Record") -> None:
-    from tqdm import tqdm
-
-    from railsim.notation import QUANTITIES
-
-    shown = {peak["quantity"]: peak for peak in record.get("peaks", ()) if peak["kind"] != "min"}
-    values = []
-    for name, words in (("dQ_over_Q0", "dQ/Q0"), ("Y_over_Q", "Y/Q"), ("sum_Y", "sum Y")):
-        if name in shown:
-            quantity = QUANTITIES[name]
-            unit = "" if quantity.shown_unit == "-" else f" {quantity.shown_unit}"
-            values.append(f"{words} {quantity.text(shown[name]['value'])}{unit}")
-    status = record["status"]
-    if status != "complete":
-        status += f" ({record['status_reason']})"
-    with tqdm.external_write_mode():
-        echo("  ".join([record["name"], status, *values]))
-        for remark in record.get("remarks", ()):
-            echo(f"  remark: {remark}")
 
 
 def _print_end(outcome: "Outcome") -> None:

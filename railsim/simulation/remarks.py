@@ -164,10 +164,14 @@ def unsettled_rails(evaluations: int) -> tuple[str, ...]:
     if evaluations == 0:
         return ()
     return (
-        f"In {evaluations} evaluations the forces between wheels and elastic rails took all "
-        f"{MOST_CORRECTIONS} corrections without converging; their error may exceed {SETTLED:.2%} "
-        "of the static wheel load: --check-step shows whether that matters.",
+        f"In {_evaluations(evaluations)} the forces between wheels and elastic rails used all "
+        f"{MOST_CORRECTIONS} iterations and may not have converged; their error may exceed "
+        f"{SETTLED:.2%} of the static wheel load: --check-step shows whether that matters.",
     )
+
+
+def _evaluations(number: int) -> str:
+    return f"{number} evaluation{'s' * (number > 1)}"
 
 
 def creep_range(outside: int, patches: int) -> tuple[str, ...]:
@@ -192,7 +196,7 @@ def yaw_range(look_ups: int) -> tuple[str, ...]:
     if look_ups == 0:
         return ()
     return (
-        f"In {look_ups} evaluations a wheel was yawed against its rail by more than "
+        f"In {_evaluations(look_ups)} a wheel was yawed against its rail by more than "
         f"{1e3 * YAW_MAX:g} mrad, where the contact table ends: it was continued linearly in the "
         "square of the yaw.",
     )

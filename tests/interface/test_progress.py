@@ -41,3 +41,30 @@ def test_nothing_is_said_where_nothing_is_prepared(capsys):
     with progress.progress_bar("run", quiet=True):
         work("numba.core.compiler_machinery")
     assert capsys.readouterr().err == ""
+
+
+def record(number, status="complete", value=1e3):
+    peaks = [{"quantity": "sum_Y", "kind": "abs", "value": value}]
+    remarks = [f"hunts at {number} Hz", "is too long"]
+    return {"name": f"run{number}", "status": status, "status_reason": "off its rails",
+            "peaks": peaks, "remarks": remarks}  # fmt: skip
+
+
+def test_ten_runs_share_a_line_in_large_studies(capsys):
+    lines = progress.RunLines()
+    for number in range(1, 46):
+        lines(record(number, "derailed" if number == 33 else "complete", value=-1e3 * number))
+    lines.end()
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 20 + 1 + 3 + 2
+    assert printed[0] == "run1  complete  sum Y -1.00 kN"
+    assert printed[20] == "runs 21 to 30  10 complete  largest sum Y -30.00 kN"
+    assert printed[21] == "run33  derailed (off its rails)  sum Y -33.00 kN"
+    assert printed[22:24] == [
+        "runs 31 to 40  9 complete  largest sum Y -40.00 kN",
+        "runs 41 to 45  5 complete  largest sum Y -45.00 kN",
+    ]
+    assert printed[24:] == [
+        "remark: run1: hunts at 1 Hz (and 44 similar, in 45 runs altogether)",
+        "remark: 45 runs: is too long",
+    ]
