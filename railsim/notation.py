@@ -306,6 +306,22 @@ QUANTITIES = {
             "of the most loaded patch: about the normal into the rail",
         ),
         _row(
+            "contact_y",
+            "lateral position of contact",
+            "y_c",
+            "mm",
+            _WHEEL,
+            "of the most loaded patch: from the wheelset's centre in track axes, to the right",
+        ),
+        _row(
+            "contact_z",
+            "depth of contact",
+            "z_c",
+            "mm",
+            _WHEEL,
+            "of the most loaded patch: from the wheelset's centre in track axes, down",
+        ),
+        _row(
             "T_gamma",
             "wear number",
             r"T\gamma",

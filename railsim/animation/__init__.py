@@ -2,6 +2,7 @@
 
 ==============  ============================================================================
 `scene.py`      a result, or a mode of ``railsim modes``, as bodies, poses, track and forces
+`wheels.py`     wheels on their rails: sections, points of contact, seats
 `page.py`       a scene as one self-contained HTML page (``page.html``, ``.css``, ``.js``)
 `movie.py`      a scene as GIF or MP4
 ==============  ============================================================================

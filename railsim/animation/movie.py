@@ -18,6 +18,7 @@ from railsim.result.data import Array
 
 AZIMUTH, ELEVATION = -0.75, 0.3  # rad, of the view
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+SIDES = ("#004a80", "#b8450a")
 COLOURS = {"car": ((0.34, 0.66, 0.88, 0.22), "#004a80"), "frame": ((0.94, 0.63, 0.24, 0.8),
            "#b8450a"), "wheelset": ((0.28, 0.3, 0.32, 0.85), "#222222")}  # fmt: skip
 ENDINGS = (".gif", ".mp4")
@@ -127,14 +128,12 @@ def _polygons(scene: Scene, frame: int, gain: float) -> list[tuple[float, Array,
 
 def _shape(body: Drawn) -> list[Array]:
     """Polygons of a body in its own axes."""
-    a, b, c, down = body.box
+    a, b, c, *middle = body.box
     if body.kind == "wheelset":
         t = np.linspace(0.0, 2.0 * np.pi, 25)
         rims = [np.column_stack([a * np.cos(t), np.full(25, y), a * np.sin(t)]) for y in (-b, b)]
         return [*rims, np.array([[0.0, -b, 0.0], [0.0, b, 0.0], [0.0, b, 0.02], [0.0, -b, 0.02]])]
-    corners = np.array(
-        [[x, y, z + down] for x in (-a, a) for y in (-b, b) for z in (-c, c)]
-    )  # fmt: skip
+    corners = np.array([[x, y, z] for x in (-a, a) for y in (-b, b) for z in (-c, c)]) + middle
     return [corners[list(face)] for face in FACES]
 
 
@@ -180,21 +179,26 @@ def _seen(points: Array, at: tuple[float, float, float, float]) -> tuple[Array, 
 
 def _draw_section(axes: Axes, scene: Scene, frame: int, side: int) -> None:
     axes.clear()
-    section = scene.sections[side]
+    assert scene.seats is not None  # as there are sections
+    assert scene.contact is not None
+    section = scene.sections[0][side]
     k = next(i for i, body in enumerate(scene.bodies) if body.kind == "wheelset")
-    body, q = scene.bodies[k], scene.pose[frame, k]
+    q, (height, wider) = scene.pose[frame, k], scene.seats[frame, 0]
     wheel_y = q[1] + section["wheel_y"] - q[3] * section["wheel_z"]
-    wheel_z = body.z + q[2] + section["wheel_z"] + q[3] * section["wheel_y"]
-    axes.plot(1e3 * section["rail_y"], 1e3 * section["rail_z"], color="#8a7a5c", lw=1.4)
-    axes.plot(1e3 * wheel_y, 1e3 * wheel_z, color="#004a80", lw=1.4)
+    wheel_z = height + section["wheel_z"] + q[3] * section["wheel_y"]
+    rail_y = section["rail_y"] + (side - 0.5) * wider
+    axes.plot(1e3 * rail_y, 1e3 * section["rail_z"], color="#8a7a5c", lw=1.4)
+    axes.plot(1e3 * wheel_y, 1e3 * wheel_z, color="0.2", lw=1.4)
     middle = -750.0 if side == 0 else 750.0
     axes.set(xlim=(middle - 80.0, middle + 80.0), ylim=(45.0, -35.0), aspect="equal")
     axes.tick_params(labelsize=6)
     if scene.Q is None or scene.Y is None:
         return
     Q, Y = 1e-3 * scene.Q[frame, 0, side], 1e-3 * scene.Y[frame, 0, side]
-    start = (middle, 0.0)
-    for end, colour in (((middle, 0.35 * Q), "#004a80"), ((middle + 0.9 * Y, 0.0), "#b8450a")):
-        axes.annotate("", xy=end, xytext=start,
-                      arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4})  # fmt: skip
     axes.set_title(f"{('left', 'right')[side]} wheel 1: Q {Q:.1f} kN, Y {Y:.1f} kN", fontsize=7)
+    _, y, z = scene.contact[frame, 0, side]
+    y, z = 1e3 * (q[1] + y), 1e3 * (height + z)
+    for end in ((y, z + 0.35 * Q), (y + 0.7 * Y, z)):
+        if np.isfinite(z):
+            arrow = {"arrowstyle": "-|>", "color": SIDES[side], "lw": 1.4}
+            axes.annotate("", xy=end, xytext=(y, z), arrowprops=arrow)

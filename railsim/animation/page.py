@@ -7,6 +7,7 @@ import numpy as np
 
 from railsim.animation.scene import Scene
 from railsim.files import check_file, whole_file
+from railsim.notation import QUANTITIES
 from railsim.page import rendered
 
 
@@ -26,6 +27,7 @@ def write_page(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Pa
         styles=["page.css"],
         scripts=["page.js"],
         data=scene_data(scene),
+        schemes="light dark",
     )
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -48,14 +50,24 @@ def scene_data(scene: Scene) -> dict[str, Any]:
              "box": list(b.box)}
             for b in scene.bodies
         ],
+        "words": {name: _words(name) for name in ("Q", "Y", "wheelset_lateral")},
         "time": _list(scene.time, 4),
         "distance": _list(scene.distance, 3),
         "pose": _list(scene.pose, 5),
         "track": {name: _list(values, 5) for name, values in scene.track.items()},
         "forces": forces,
-        "sections": [{k: _list(v, 5) for k, v in section.items()} for section in scene.sections],
+        "contact": None if scene.contact is None else _list(scene.contact, 5),
+        "sections": [[{k: _list(v, 5) for k, v in section.items()} for section in pair]
+                     for pair in scene.sections],
+        "seats": None if scene.seats is None else _list(scene.seats, 5),
         "patches": patches,
     }  # fmt: skip
+
+
+def _words(name: str) -> str:
+    """A quantity as in printed tables: symbol, unit, words."""
+    quantity = QUANTITIES[name]
+    return f"{quantity.symbol} ({quantity.shown_unit}): {quantity.long_name}"
 
 
 def _list(values: Any, decimals: int) -> Any:

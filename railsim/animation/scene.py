@@ -1,7 +1,6 @@
 """What an animation shows: bodies with their shapes, poses over time, the track, wheel forces.
 
-Shapes are boxes made from the vehicle file: the car body spans its wheelsets and an overhang, a
-bogie frame its wheelsets; wheels have their radii.
+Bodies are the boxes of `railsim.definitions.outlines`; wheels have their radii.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from railsim.contact.curves import rail_curve, tape_circle_position
+from railsim.animation.wheels import contact_points, seats, sections
 from railsim.definitions.flatten import FlatVehicle, flatten
+from railsim.definitions.outlines import body_boxes
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, argument_fault, nearest
 from railsim.result import Result
@@ -23,7 +23,6 @@ FRAMES = 600
 TRACK_STEP = 1.0  # m
 AROUND = 60.0  # m of track ahead and behind
 NEEDED = ("body_position", "Q", "Y")
-OVERHANG, WIDTH, ROOF = 3.2, 2.8, 3.9  # m, of a car body whose shape is not specified
 LARGEST = 0.05  # displacement of a mode over the vehicle's length
 
 
@@ -40,8 +39,8 @@ class Drawn:
     y, z : float
         Nominal position of its centre of gravity in the track frame [m].
     box : tuple of float
-        Half length, half width, half height and height of the box's middle below the centre of
-        gravity [m]; of a wheelset its radius, half the wheels' distance, 0, 0.
+        Half length, half width and half height, and the middle of the box from the centre of
+        gravity, x, y, z [m]; of a wheelset its radius, half the wheels' distance, and zeros.
     """
 
     name: str
@@ -49,7 +48,7 @@ class Drawn:
     offset: float
     y: float
     z: float
-    box: tuple[float, float, float, float]
+    box: tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,16 @@ class Scene:
         ``s``, ``x``, ``y``, ``heading``, ``cant`` along the track [m], [rad].
     Q, Y : float64[frame, wheelset, 2] or None
         Wheel forces on the rail [N]; None for a mode.
-    sections : tuple of dict
-        Wheel and rail profiles of the leading wheelset, left and right, track axes [m].
+    contact : float64[frame, wheelset, 2, 3] or None
+        Where they act: of the most loaded patch, from the wheelset's centre, NaN without contact;
+        of results without it the nominal rolling circles [m].
+    sections : tuple of pairs of dict
+        Wheel and rail profiles of each wheelset, left and right, see `railsim.animation.wheels`.
+    seats : float64[frame, wheelset, 2] or None
+        Height of the wheelsets' centres, z, at which their wheels touch the drawn rails, and by how
+        much these stand further apart than the gauge [m].
     patches : dict or None
-        ``y``, ``z`` [m] and ``N`` [N] of the patches of the leading wheelset, [frame, side, patch].
+        ``y``, ``z`` [m] and ``N`` [N] of all patches, [frame, wheelset, side, patch].
     """
 
     title: str
@@ -83,7 +88,9 @@ class Scene:
     track: Mapping[str, Array]
     Q: Array | None
     Y: Array | None
-    sections: tuple[Mapping[str, Array], ...]
+    contact: Array | None
+    sections: tuple[tuple[Mapping[str, Array], ...], ...]
+    seats: Array | None
     patches: Mapping[str, Array] | None
 
 
@@ -127,20 +134,22 @@ def result_scene(
     speed = f"{result.speed:.4g} m/s ({3.6 * result.speed:.4g} km/h)"
     patches = None
     if "patch_N" in result:
-        patches = {
-            "y": result["patch_y"][rows, 0], "z": result["patch_z"][rows, 0],
-            "N": result["patch_N"][rows, 0],
-        }  # fmt: skip
+        patches = {name: result[f"patch_{name}"][rows] for name in "yzN"}
+    poses = _poses(result, rows)
+    wheelsets = [result.bodies.index(name) for name in result.wheelsets]
+    profiles = sections(result, flat)
     return Scene(
         title=f"{vehicle.name} · {result.track().name} · {speed}",
         bodies=drawn,
         time=result["time"][rows],
         distance=distance[rows],
-        pose=_poses(result, rows)[:, columns],
+        pose=poses[:, columns],
         track=_track(Alignment(result.track()), distance[rows]),
         Q=result["Q"][rows],
         Y=result["Y"][rows],
-        sections=_sections(result, flat),
+        contact=contact_points(result, rows, profiles),
+        sections=profiles,
+        seats=seats(result, rows, profiles, poses[:, wheelsets]),
         patches=patches,
     )
 
@@ -205,43 +214,37 @@ def mode_scene(
               f"damping {100.0 * float(mode['damping_ratio']):.3g} %",
         bodies=drawn, time=time, distance=np.zeros(len(time)),
         pose=np.real(shape[None] * np.exp(1j * phase)[:, None, None]),
-        track=flat_track, Q=None, Y=None, sections=(), patches=None,
+        track=flat_track, Q=None, Y=None, contact=None, sections=(), seats=None, patches=None,
     )  # fmt: skip
 
 
 def _largest(body: Drawn, shape: np.ndarray) -> float:
     """Largest displacement of a body's corners in a mode, over all phases along each axis [m]."""
-    a, b, c, down = body.box
-    half, low = (c, down) if body.kind != "wheelset" else (a, 0.0)
-    corners = np.array([
-        [x, y, low + z] for x in (-a, a) for y in (-b, b) for z in (-half, half)
-    ])  # fmt: skip
-    moved = shape[:3] + np.cross(shape[3:], corners)
+    a, b, c, *middle = body.box
+    half = a if body.kind == "wheelset" else c
+    corners = np.array([[x, y, z] for x in (-a, a) for y in (-b, b) for z in (-half, half)])
+    moved = shape[:3] + np.cross(shape[3:], corners + middle)
     return float(np.max(np.abs(moved)))
 
 
 def _drawn(flat: FlatVehicle) -> tuple[Drawn, ...]:
     """Bodies with boxes; axleboxes are not drawn."""
-    wheelsets = flat.of_kind("wheelset")
-    reference = next(b for b in flat.bodies if b.name == flat.reference)
-    xs = [w.position[0] for w in wheelsets]
+    boxes = body_boxes(flat)
+    reference = flat.body(flat.reference).position[0]
     found = []
     for body in flat.bodies:
         x, y, z = body.position
-        offset = x - reference.position[0]
         if body.kind == "wheelset" and body.wheelset:
             radius = float(np.mean(body.wheelset.radius))
-            box = (radius, 0.5 * body.wheelset.tape_circle_distance, 0.0, 0.0)
-            found.append(Drawn(body.name, "wheelset", offset, y, z, box))
-        elif body.kind == "body" and body is reference:
-            half = 0.5 * (max(xs) - min(xs)) + OVERHANG
-            floor = 1.1
-            box = (half, 0.5 * WIDTH, 0.5 * (ROOF - floor), -0.5 * (ROOF + floor) - z)
-            found.append(Drawn(body.name, "car", offset, y, z, box))
-        elif body.kind == "body":
-            own = [v for v in xs if abs(v - x) < 3.0]
-            half = 0.5 * (max(own) - min(own)) + 0.35 if own else 0.5
-            found.append(Drawn(body.name, "frame", offset, y, z, (half, 1.0, 0.12, 0.0)))
+            box = (radius, 0.5 * body.wheelset.tape_circle_distance, 0.0, 0.0, 0.0, 0.0)
+            found.append(Drawn(body.name, "wheelset", x - reference, y, z, box))
+        elif body.name in boxes:
+            low, high = map(np.array, boxes[body.name])
+            sizes = [*0.5 * (high - low), *0.5 * (high + low) - body.position]
+            kind = "car" if body.name == flat.reference else "frame"
+            a, b, c, *middle = map(float, sizes)
+            box = (a, b, c, middle[0], middle[1], middle[2])
+            found.append(Drawn(body.name, kind, x - reference, y, z, box))
     return tuple(found)
 
 
@@ -258,34 +261,6 @@ def _track(alignment: Alignment, distance: Array) -> dict[str, Array]:
         "y": np.concatenate([[0.0], np.cumsum(y)]), "heading": heading,
         "cant": alignment.cant_angle(s),
     }  # fmt: skip
-
-
-def _sections(result: Result, flat: FlatVehicle) -> tuple[Mapping[str, Array], ...]:
-    """Profiles of the leading wheelset on their rails.
-
-    Wheels in the wheelset's axes (y from its middle, z from its axis), rails in track axes.
-    """
-    wheelset = flat.of_kind("wheelset")[0].wheelset
-    track = result.track()
-    found: list[Mapping[str, Array]] = []
-    for side, sign in ((0, -1.0), (1, 1.0)):
-        if wheelset is None:
-            continue
-        wheel = result.profiles[wheelset.profile[side]]
-        rail = rail_curve(result.profiles[track.rail[side]], track.gauge, track.inclination)
-        tape = tape_circle_position(wheelset.back_to_back)
-        thin = slice(None, None, max(1, rail.z.size // 150))
-        found.append({
-            "wheel_y": sign * (tape + _thinned(wheel.y)),
-            "wheel_z": wheelset.radius[side] + _thinned(wheel.z),
-            "rail_y": sign * rail.Y[thin], "rail_z": rail.z[thin],
-        })  # fmt: skip
-    return tuple(found)
-
-
-def _thinned(values: Array, points: int = 150) -> Array:
-    rows = np.unique(np.linspace(0, len(values) - 1, min(points, len(values))).astype(int))
-    return np.asarray(values[rows], dtype=np.float64)
 
 
 def chosen_mode(

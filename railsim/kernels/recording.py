@@ -18,7 +18,7 @@ class Recorder(NamedTuple):
     state : float64[r, n_state]
     rates : float64[r, 6 n]           rates of the coordinates
     acceleration : float64[r, n, 6]   absolute, in body axes
-    wheel : float64[r, w, 2, 8]       see `wheel_rail`
+    wheel : float64[r, w, 2, WHEEL_COLUMNS]  see `contact_columns`
     patch : float64[r, w, 2, 3, PATCH_ROWS]  contact patches, or of length 0
     chosen : int64[e, 2]              elements to record, see `element_outputs`
     element : float64[r, e, ELEMENT_COLUMNS]

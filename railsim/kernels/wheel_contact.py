@@ -19,6 +19,8 @@ from railsim.kernels.contact_columns import (
     NORMAL_DAMPING,
     NORMAL_STIFFNESS,
     PENETRATION,
+    W_C_Y,
+    W_C_Z,
     W_LIFT,
     W_NORMAL,
     W_PHI,
@@ -261,6 +263,8 @@ def clear_wheel(wheel, w, side, lift):
     wheel[w, side, W_T_GAMMA] = 0.0
     wheel[w, side, W_T_GAMMA_SPIN] = 0.0
     wheel[w, side, W_LIFT] = lift
+    wheel[w, side, W_C_Y] = 0.0
+    wheel[w, side, W_C_Z] = 0.0
 
 
 @compiled(python=False)

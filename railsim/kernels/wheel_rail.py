@@ -45,6 +45,8 @@ from railsim.kernels.contact_columns import (
     T_Y,
     TURN_Y,
     TURN_Z,
+    W_C_Y,
+    W_C_Z,
     W_NORMAL,
     W_PHI,
     W_Q,
@@ -105,6 +107,8 @@ def add_creep_forces(system, work, n, speed, state):
             wheel[w, side, W_XI_X] = scale * patch[XI_X, k]
             wheel[w, side, W_XI_Y] = scale * patch[XI_Y, k]
             wheel[w, side, W_PHI] = scale * patch[PHI, k]
+            wheel[w, side, W_C_Y] = cy
+            wheel[w, side, W_C_Z] = cz
         along, across = patch[SLOPE_ALONG, k], patch[SLOPE_ACROSS, k]
         if system.support.elastic:
             add_slopes(work, w, side, k, across)

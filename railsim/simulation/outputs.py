@@ -14,6 +14,9 @@ from railsim.kernels import contact_columns as patch
 from railsim.kernels import element_outputs as element
 from railsim.kernels import extremes as seen
 from railsim.kernels.contact_columns import (
+    W_C_Y,
+    W_C_Z,
+    W_NORMAL,
     W_PHI,
     W_Q,
     W_T_GAMMA,
@@ -61,8 +64,9 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
     axles = model.system.contact.body
     Q, Y = wheel[..., W_Q], wheel[..., W_Y]
     outwards = np.array([-1.0, 1.0])
-    # a wheel that carries nothing has no derailment quotient
+    # a wheel that carries nothing has no derailment quotient and no point of contact
     loaded = np.where(Q > 0.0, Q, np.nan)
+    there = np.where(wheel[..., W_NORMAL] > 0.0, 1.0, np.nan)
     offsets = model.system.frame_offset[model.system.bodies.frame[axles]]
     on_rails = against_rails(model, state)
     return {
@@ -81,6 +85,8 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "xi_x": wheel[..., W_XI_X],
         "xi_y": wheel[..., W_XI_Y],
         "phi": wheel[..., W_PHI],
+        "contact_y": there * wheel[..., W_C_Y],
+        "contact_z": there * wheel[..., W_C_Z],
         "T_gamma": wheel[..., W_T_GAMMA],
         "T_gamma_spin": wheel[..., W_T_GAMMA_SPIN],
         "body_position": position,

@@ -72,6 +72,8 @@ def arrays(speed=20.0, duration=49.0, rate=50.0, gain=1.0):
         "xi_x": 2e-3 * np.stack([ramp, -ramp], axis=-1),
         "xi_y": 5e-3 * np.stack([ramp * lead, ramp * lead], axis=-1),
         "phi": 0.1 * np.stack([1.0 - ramp, ramp - 1.0], axis=-1),
+        "contact_y": np.stack([-0.75 + 0.03 * ramp * lead, 0.75 + 0.01 * ramp * lead], axis=-1),
+        "contact_z": 0.46 + 0.003 * np.stack([ramp * lead, 0.0 * ramp], axis=-1),
         "T_gamma": 200.0 * np.stack([ramp * lead, ramp * lead], axis=-1),
         "T_gamma_spin": 2.0 * np.stack([ramp * lead, ramp * lead], axis=-1),
         "body_position": body,

@@ -13,6 +13,8 @@ import railsim
 from railsim.animation import mode_scene, result_scene, write_movie, write_page
 from railsim.animation.page import scene_data
 from railsim.cli import main
+from railsim.definitions.flatten import flatten
+from railsim.definitions.outlines import body_boxes
 from railsim.errors import InputError
 from railsim.profiles import load_profile
 
@@ -46,7 +48,7 @@ def test_scene_holds_the_vehicle_and_its_way(result):
 def test_wheels_stand_on_their_rails(result):
     """At rest the tread near the nominal rolling circle touches the rail's top within 0.2 mm."""
     scene = result_scene(result, frames=5)
-    for section in scene.sections:
+    for section in scene.sections[0]:
         y = np.abs(section["wheel_y"])
         tread = (y > 0.73) & (y < 0.76)
         wheel = section["wheel_z"][tread] - 0.46
@@ -82,6 +84,46 @@ def test_page_needs_nothing_from_elsewhere(result, tmp_path):
     assert data["forces"]["Q"][0][0] == [68.8, 68.8]
 
 
+def test_bodies_are_boxes_around_what_is_attached_to_them():
+    vehicle = flatten(railsim.load_vehicle("wagon_c62a"))
+    boxes = body_boxes(vehicle)
+    assert set(boxes) == {body.name for body in vehicle.of_kind("body")}
+    for element in vehicle.elements:
+        for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
+            if name in boxes and name != vehicle.reference and point[2] < -0.1:
+                assert np.all(np.array(boxes[name].low) <= point), element.name
+                assert np.all(np.array(boxes[name].high) >= point), element.name
+
+
+def test_arrows_begin_at_the_contact_and_wheels_without_contact_have_none(result):
+    """Of results without `contact_y`, those of earlier versions, at the nominal circles."""
+    arrays = {name: result[name] for name in result}
+    arrays["contact_y"] = np.where(
+        result["time"][:, None, None] == 0.0, np.nan, arrays["contact_y"]
+    )
+    before = {name: arrays[name] for name in arrays if not name.startswith("contact")}
+    new, old = (
+        result_scene(
+            railsim.Result(
+                kept,
+                {name: result.quantities[name] for name in kept},
+                result.coordinates,
+                result.attributes,
+                PROFILES,
+            ),
+            frames=5,
+        )
+        for kept in (arrays, before)
+    )
+    np.testing.assert_allclose(old.contact[..., 1], [[[-0.75, 0.75]] * 4] * 5)
+    np.testing.assert_allclose(old.contact[..., 2], 0.46, atol=2e-4)
+    assert np.isnan(new.contact[0, ..., 1]).all()
+    np.testing.assert_array_equal(new.contact[1:, ..., 2], result["contact_z"][612::612][:4])
+    data = scene_data(new)
+    assert data["contact"][0][0][0][1] == 0.0
+    assert data["words"]["Q"] == "Q (kN): vertical wheel force"  # as in the tables
+
+
 def test_part_of_a_run(result):
     scene = result_scene(result, between=(340.0, 420.0))
     assert scene.distance[0] >= 340.0
@@ -99,7 +141,7 @@ def test_mode_moves_by_five_per_cent_of_the_length_with_its_phases():
     scene = mode_scene(railsim.load_vehicle("coach_manchester"), MODE)
     car = scene.bodies[0]
     # the roof moves most: y - roll z at the box's upper edge, z down
-    roof = car.box[3] - car.box[2]
+    roof = car.box[5] - car.box[2]
     moved = abs(1.0 - (0.4 + 0.1j) * roof)
     largest = np.max(np.abs(scene.pose[:, 0, 1] - roof * scene.pose[:, 0, 3]))
     assert largest == pytest.approx(0.05 * 21.56, rel=1e-2)

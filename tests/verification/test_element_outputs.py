@@ -8,6 +8,7 @@ from test_loads import GRAVITY, MASS, wagon
 from test_one_sided import with_elements
 
 import railsim
+from railsim.animation import result_scene
 from railsim.definitions.settings import Settings
 from railsim.definitions.support import PRESETS
 
@@ -196,6 +197,29 @@ def test_patches_lie_on_the_rails(curving):
     assert np.abs(away[loaded]).max() < 3e-4
     # the outer wheel of the leading axle touches on its tread or at the gauge corner, not elsewhere
     assert 0.71 < y[loaded].min() < y[loaded].max() < 0.79
+
+
+def test_point_of_contact_is_that_of_the_most_loaded_patch(curving):
+    """And where it is drawn, to what the slope of the profile changes within a patch."""
+    most = np.argmax(curving.patch_N, axis=-1)[..., None]
+    x, y, z = (np.take_along_axis(curving[f"patch_{c}"], most, axis=-1)[..., 0] for c in "xyz")
+    np.testing.assert_array_equal(curving.contact_y, y)
+    np.testing.assert_array_equal(curving.contact_z, z)
+    scene = result_scene(curving, frames=20)
+    rows = np.searchsorted(curving.time, scene.time)
+    np.testing.assert_allclose(scene.contact, np.stack([x, y, z], axis=-1)[rows], atol=6e-4)
+    lead = x + curving.wheelset_yaw[..., None] * y  # ahead of the axle
+    assert lead[:, 0, 0].min() > 2e-3
+    # sections meet: the point lies on the drawn rail, up to the width of a patch
+    for w, pair in enumerate(scene.sections):
+        pose = scene.pose[:, [body.name for body in scene.bodies].index(curving.wheelsets[w])]
+        height, wider = scene.seats[:, w].T
+        for side, section in enumerate(pair):
+            across = pose[:, 1] + scene.contact[:, w, side, 1] - (side - 0.5) * wider
+            rail = np.interp(across, section["rail_y"], section["rail_z"])
+            assert np.abs(height + scene.contact[:, w, side, 2] - rail).max() < 8e-4
+        widening = np.diff(curving.rail_deflection_lateral[rows, w], axis=-1)[:, 0]
+        assert np.abs(wider - widening).max() < 2e-3  # what the drawing makes of touching alone
 
 
 def test_rails_yield_as_their_pads_and_ballast_are_stiff(curving):
