@@ -4,12 +4,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import load_option, output_options, print_json, set_option, show
+from railsim.cli.common import load_option, output_options, set_option
 
 if TYPE_CHECKING:
     from railsim.studies.stationary import Stationary
+    from railsim.table import Table
 
-FILES = ("stationary.json",)
+FILES = ("stationary.json", "stationary.png")
 
 
 @click.command()
@@ -23,7 +24,7 @@ FILES = ("stationary.json",)
 @click.option("--track", metavar="F", help="Rails, gauge, friction, support; default straight.")
 @click.option("--settings", metavar="F", help="Settings file: creep law and contact.")
 @click.option("--fail", is_flag=True, help="Exit status 4 where a limit is exceeded.")
-@click.option("--out", metavar="DIR", help="Folder for stationary.json.")
+@click.option("--out", metavar="DIR", help="Folder for stationary.json and stationary.png.")
 @load_option
 @set_option
 @output_options
@@ -44,9 +45,9 @@ def command(
 ) -> int:
     """Put a vehicle on twisted track and on cant, and compare wheel loads and floor with limits.
 
-    Unloading on the twists of EN 14363, 6.1, guiding force in a level curve of R 150 m over the
-    least load on them, unloading and angle of the floor on a cant equal to the admissible cant
-    deficiency, and the roll coefficient.
+    Unloading on the twists of EN 14363, 6.1, with dry friction from both directions, guiding force
+    in a level curve of R 150 m over the least load on them, unloading and angle of the floor on a
+    cant equal to the admissible cant deficiency, and the roll coefficient.
 
     \b
     Example:
@@ -64,19 +65,20 @@ def command(
         inputs.vehicle, inputs.track, load_stationary_limits(limits), cant=cant, held=not rolling,
         settings=inputs.settings,
     )  # fmt: skip
-    folder.write_json(FILES[0], found.record())
-    if as_json:
-        print_json(found.record())
-    else:
-        _show(found, quiet=quiet)
-        folder.tell()
+    folder.finish(found.record(), found.plot, lambda: _parts(found, quiet=quiet), as_json=as_json)
     return LIMIT_EXCEEDED if fail and found.verdict == "fail" else DONE
 
 
-def _show(found: "Stationary", *, quiet: bool) -> None:
-    show(f"{found.vehicle}, {found.edition}", f"verdict: {found.verdict}")
-    show(*(f"  {reason}" for reason in found.reasons), "", found.table())
+def _parts(found: "Stationary", *, quiet: bool) -> "list[str | Table]":
+    parts: list[str | Table] = [
+        f"{found.vehicle}, {found.edition}",
+        f"verdict: {found.verdict}",
+        *(f"  {reason}" for reason in found.reasons),
+        "",
+        found.table(),
+    ]
     if not quiet:
-        show("", f"note: wheelsets {'held' if found.held else 'free'} across the track")
+        parts += ["", f"note: wheelsets {'held' if found.held else 'free'} across the track"]
         if not all(v.checked for v in found.values if v.limit is not None):
-            show("note: limits not checked against the standard")
+            parts.append("note: limits not checked against the standard")
+    return parts

@@ -5,7 +5,7 @@ where straight level track has them: what the lateral forces of the wheelsets ad
 the closed formulas of EN 14363 and EN 15273.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,8 @@ from railsim.kernels.contact_columns import W_Q, W_Y
 from railsim.kernels.system import ARC_LENGTH, FORCE, MOMENT, System
 from railsim.kernels.track_frame import PHI
 from railsim.linear.circle import POSITION, circle
-from railsim.linear.steady import SteadyRolling, led
+from railsim.linear.sliding import Placed, SlidingPath, has_pads
+from railsim.linear.steady import NotConverged, SteadyRolling, led
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.work import level_track
@@ -27,6 +28,9 @@ from railsim.track.tables import track_tables
 Floats = NDArray[np.float64]
 
 WALKING_PACE = 1.0  # m/s
+PARTS = 8  # steps to a twist where friction follows
+MOST_CYCLES = 6  # of loading and unloading until the loop closes ...
+CLOSED = 1e-3  # ... to this part of the load
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,86 @@ def roll_coefficient(model: Model, standing: Standing, cant: float, body: str) -
     return float(roll / np.arcsin(cant / CANT_BASE))
 
 
+@dataclass(frozen=True)
+class TwistLoop:
+    """Wheel loads while a twist grows from level track, and goes to and fro until the loop closes.
+
+    Attributes
+    ----------
+    share : float64[k]
+        Of the twist, from 1/n over 1 to -1 and back, as often as it takes [1].
+    Q : float64[k, wheelset, side]
+        Wheel loads [N].
+    Q0 : float64[wheelset, side]
+        On straight level track [N].
+    """
+
+    share: Floats
+    Q: Floats
+    Q0: Floats
+
+    @property
+    def unloading(self) -> Floats:
+        """dQ/Q0 of all wheels, float64[k, wheelset, side] [1]."""
+        return np.asarray((self.Q0 - self.Q) / self.Q0)
+
+    @property
+    def worst(self) -> tuple[int, int]:
+        """Wheelset and side of the wheel that is unloaded most."""
+        _, wheelset, side = np.unravel_index(np.argmax(self.unloading), self.Q.shape)
+        return int(wheelset), int(side)
+
+    @property
+    def on_level(self) -> tuple[float, float]:
+        """dQ/Q0 of that wheel on level track, on the way to its unloading and back [1]."""
+        level = np.flatnonzero(self.share == 0.0)[-2:]
+        if not len(level):
+            return 0.0, 0.0
+        left = self.unloading[level][(slice(None), *self.worst)]
+        return float(np.max(left)), float(np.min(left))
+
+
+def twist_loop(
+    balance: Equilibrium, track: Track, heights: Sequence[float] | Floats, *, held: bool = False
+) -> TwistLoop:
+    """Return the loads on twisted track from both directions: up to it, to the opposite and back.
+
+    Without dry friction both directions give the same, and only the two twists are computed.
+
+    Parameters
+    ----------
+    balance, track, heights, held
+        As in `on_twist`.
+
+    Raises
+    ------
+    NotConverged
+        There is no steady state on the way, or the loop does not close.
+    """
+    raised = np.asarray(heights, dtype=float)
+    if not has_pads(balance.model):
+        both = [on_twist(balance, track, sign * raised, held=held) for sign in (1.0, -1.0)]
+        return TwistLoop(np.array([1.0, -1.0]), np.array([s.Q for s in both]), balance.Q0)
+    path = _path(balance, track, raised, 0.0, held)
+    shares, loads = [], []
+
+    def go(*goals: float) -> None:
+        for goal in goals:
+            for share in np.linspace(path.share, goal, PARTS + 1)[1:]:
+                path.to(float(share))
+                path.solver.evaluate(path.state)
+                shares.append(float(share))
+                loads.append(_loads(path.solver, held))
+
+    go(1.0)
+    for _ in range(MOST_CYCLES):
+        before = loads[-1]
+        go(0.0, -1.0, 0.0, 1.0)
+        if np.max(np.abs(loads[-1] - before) / balance.Q0) < CLOSED:
+            return TwistLoop(np.array(shares), np.array(loads), balance.Q0)
+    raise NotConverged(f"loading and unloading form no closed loop within {MOST_CYCLES} cycles")
+
+
 def on_twist(
     balance: Equilibrium,
     track: Track,
@@ -98,6 +182,8 @@ def on_twist(
 ) -> Standing:
     """Return the vehicle standing on twisted track (EN 14363, 6.1), or rolling in a twisted curve.
 
+    Dry friction follows the way from straight level track.
+
     Parameters
     ----------
     balance, track, held
@@ -107,28 +193,70 @@ def on_twist(
     curvature : float
         1/radius, positive to the right, of a curve that wheelsets roll through [1/m].
     """
-    model, start = balance.model, _placed(balance)
     raised = np.asarray(heights, dtype=float)
-
-    def flat(share: float) -> System:
-        curve = circle(track, curvature=share * curvature)
-        return model.system._replace(track=track_tables(curve))
-
-    if held:
-        level = flat(0.0)
-        solver = SteadyRolling(model, level_track(level), held=True)
-        for body, height in zip(level.contact.body, raised, strict=True):
-            start[6 * body + 3] += height / CANT_BASE
-        start[-2] = 0.0
-        state = solver.solve(start, WALKING_PACE).state
-        solver.evaluate(state)
+    solver: SteadyRolling
+    if held or has_pads(balance.model):
+        path = _loaded(lambda: _path(balance, track, raised, curvature, held))
+        state, solver = path.state, path.solver
     else:
-        found, solver = led(
-            model, lambda share: (_twisted(flat(share), share * raised), WALKING_PACE), start
+        placed = _placing(balance, track, raised, curvature, held)
+        start = _placed(balance)
+        found, rolling = led(
+            balance.model, lambda share: (placed(share, start)[0], WALKING_PACE), start
         )
-        state = found.state
+        state, solver = found.state, rolling
+    solver.evaluate(state)
     Y = None if held else np.asarray(solver.work.wheel[:, :, W_Y].copy())
     return Standing(state, _loads(solver, held), balance.Q0, Y)
+
+
+def _loaded(begin: Callable[[], SlidingPath]) -> SlidingPath:
+    """A path at its full load, in as many steps as lead there: a long one may pass a gap."""
+    for parts in (PARTS, 2, 1):
+        path = begin()
+        try:
+            for share in np.linspace(0.0, 1.0, parts + 1)[1:]:
+                path.to(float(share))
+        except NotConverged:
+            if parts == 1:
+                raise
+            continue
+        break
+    return path
+
+
+def _path(
+    balance: Equilibrium, track: Track, heights: Floats, curvature: float, held: bool
+) -> SlidingPath:
+    """The way from straight level track to a twist, and to a curve."""
+    placed = _placing(balance, track, heights, curvature, held)
+    return SlidingPath(balance.model, placed, _placed(balance), WALKING_PACE, held=held)
+
+
+def _placing(
+    balance: Equilibrium, track: Track, heights: Floats, curvature: float, held: bool
+) -> Placed:
+    """System and held wheelsets at a share of twist and curvature."""
+    model = balance.model
+    if not held:
+
+        def rolling(share: float, state: Floats) -> tuple[System, Floats]:
+            curve = circle(track, curvature=share * curvature)
+            system = model.system._replace(track=track_tables(curve))
+            return _twisted(system, share * heights), state
+
+        return rolling
+    level = level_track(model.system._replace(track=track_tables(circle(track))))
+    rolls = 6 * np.asarray(level.contact.body) + 3
+    upright = balance.state[rolls]
+
+    def standing(share: float, state: Floats) -> tuple[System, Floats]:
+        placed = state.copy()
+        placed[rolls] = upright + share * heights / CANT_BASE
+        placed[ARC_LENGTH] = 0.0
+        return level, placed
+
+    return standing
 
 
 def _placed(balance: Equilibrium) -> Floats:

@@ -217,9 +217,9 @@ class SteadyRolling:
         n = self.model.index.n_bodies
         rest = forces / self._inertias
         parts = []
-        for k in np.argsort(-np.abs(rest))[:3]:
-            if self._equations[k] >= 12 * n:
-                continue  # of a track or an air spring, which follow the bodies
+        # those of a track or an air spring follow the bodies
+        of_bodies = np.flatnonzero(self._equations < 12 * n)
+        for k in of_bodies[np.argsort(-np.abs(rest[of_bodies]))[:3]]:
             body, component = divmod(int(self._equations[k]) - 6 * n, 6)
             name = self.model.index.bodies[body]
             parts.append(f"{name} {COMPONENTS[component]}'' = {rest[k]:.3g}")

@@ -1,17 +1,21 @@
 """Stationary tests: unloading and guiding on twisted track (EN 14363, 6.1), roll coefficient.
 
-Each case is solved by Newton's method (`railsim.linear.stationary`), twists to both sides.  A case
-without a steady state is reported, and the verdict is then not a pass.
+Each case is solved by Newton's method (`railsim.linear.stationary`), twists to both sides, of
+vehicles with dry friction from both directions.  A case without a steady state is reported, and the
+verdict is then not a pass.
 
 Guiding (EN 14363, 6.1, the method with two separate tests): the guiding force Y_a of the leading
-outer wheel at walking pace in a level curve of R 150 m (`railsim.stability.curving`), over the
-smallest wheel load of that wheelset on the twists, Y_a/Q_a <= 1.2; and Y/Q of this wheel rolling
-through the curve of R 150 m with both twists, to either side.  Dry friction of the suspension is in
-one state only: the hysteresis between loading and unloading is not followed.
+outer wheel at walking pace in a level curve of R 150 m, over the smallest wheel load of that
+wheelset on the twists, Y_a/Q_a <= 1.2; and Y/Q of this wheel rolling through the curve of R 150 m
+with both twists, to either side.  Dry friction follows the way from straight level track.  On cant
+it holds nothing: the mean of both directions.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -23,13 +27,29 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError
-from railsim.linear.stationary import WALKING_PACE, Standing, on_cant, on_twist, roll_coefficient
+from railsim.linear.sliding import has_pads
+from railsim.linear.stationary import (
+    WALKING_PACE,
+    Standing,
+    TwistLoop,
+    on_cant,
+    on_twist,
+    roll_coefficient,
+    twist_loop,
+)
 from railsim.linear.steady import NotConverged
-from railsim.model.assembly import assemble
-from railsim.model.equilibrium import equilibrium
+from railsim.model.assembly import Model, assemble
+from railsim.model.equilibrium import Equilibrium, equilibrium
+from railsim.notation import SIDES
 from railsim.result.filters import Floats
 from railsim.stability.curving import FAILED, curving
 from railsim.table import Amount, Column, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+S = TypeVar("S")
+UNLOADING = "unloading (Q0 - Q)/Q0"
 
 
 @dataclass(frozen=True)
@@ -78,6 +98,8 @@ class Stationary:
     values : tuple of StationaryValue
     reasons : tuple of str
         Cases without a steady state, a sentence each.
+    loops : dict of str to TwistLoop
+        Wheel loads on the way to each twist, to the opposite one and back, by its name.
     """
 
     vehicle: str
@@ -85,6 +107,7 @@ class Stationary:
     held: bool
     values: tuple[StationaryValue, ...]
     reasons: tuple[str, ...]
+    loops: dict[str, TwistLoop] = field(default_factory=dict)
 
     @property
     def verdict(self) -> str:
@@ -110,12 +133,30 @@ class Stationary:
                  shown(v.quantity, v.limit)] for v in self.values]  # fmt: skip
         return Table(columns, rows)
 
+    def plot(
+        self, path: str | Path | None = None, *, title: str = "", overwrite: bool = False
+    ) -> "Figure":
+        """Draw unloading over twist from both directions; to a file too if a path is given."""
+        from railsim.plot.stationary import twist_figure
+        from railsim.plot.style import save
+
+        limit = next(v.limit for v in self.values if v.quantity == UNLOADING)
+        words = title or f"{self.vehicle}: wheels unloaded by twist"
+        figure = twist_figure(self.loops, limit or 0.0, words)
+        if path is not None:
+            save(figure, path, overwrite=overwrite)
+        return figure
+
     def record(self) -> dict[str, object]:
         """Return the tests as plain numbers and strings, SI."""
         values = [{**v.__dict__, "exceeded": v.exceeded} for v in self.values]
+        loops = {
+            name: {"share": loop.share.tolist(), "Q": loop.Q.tolist(), "Q0": loop.Q0.tolist()}
+            for name, loop in self.loops.items()
+        }
         return {
             "vehicle": self.vehicle, "edition": self.edition, "verdict": self.verdict,
-            "reasons": list(self.reasons), "held": self.held, "values": values,
+            "reasons": list(self.reasons), "held": self.held, "values": values, "loops": loops,
         }  # fmt: skip
 
 
@@ -152,46 +193,45 @@ def stationary(
         cant = _admissible_cant(vehicle)
     if not 0.0 < cant <= 0.5:
         raise InputError([Fault("cant", "", f"{cant:g} m", "above 0, up to 0.5 m")])
-    height = cant
     twists = twist_heights(flat, limits)
     balance = equilibrium(assemble(vehicle, track, settings or Settings()), WALKING_PACE)
     values: list[StationaryValue] = []
     reasons: list[str] = []
 
-    def found(case: str, stand: Callable[[], Standing]) -> Standing | None:
+    def found(case: str, stand: Callable[[], S]) -> S | None:
         try:
             return stand()
         except NotConverged as error:
             reasons.append(f"{case}: {error}")
             return None
 
-    def twisted(case: str, heights: Floats) -> Standing | None:
-        return found(case, lambda: on_twist(balance, track, heights, held=held))
+    def rolling(case: str, heights: Floats) -> Standing | None:
+        bend = 1.0 / limits.guiding.radius
+        return found(case, lambda: on_twist(balance, track, heights, curvature=bend))
 
-    loads = []
+    loops: dict[str, TwistLoop] = {}
     for name, heights in twists.items():
-        stands = [twisted(name, heights), twisted(name, -heights)]
-        values.append(_unloading(name, stands, limits.unloading))
-        loads += [np.nan if stand is None else float(stand.Q[0].min()) for stand in stands]
-    values.append(_guiding(vehicle, track, limits, float(np.min(loads)), settings, reasons))
-    curve, bend = f"R {limits.guiding.radius:g} m, {name}", 1.0 / limits.guiding.radius
-
-    def rolling(heights: Floats) -> Standing | None:
-        return found(curve, lambda: on_twist(balance, track, heights, curvature=bend))
-
-    values.append(_climbing(curve, [rolling(heights), rolling(-heights)], limits))
-    name = f"cant {1e3 * height:g} mm"
-    standing = found(name, lambda: on_cant(balance, track, height, held=held))
-    values.append(_unloading(name, [standing], limits.lean_unloading))
-    body, slope = flat.reference, float(np.arcsin(height / CANT_BASE))
-    share = roll_coefficient(balance.model, standing, height, body) if standing else float("nan")
-    lean = limits.lean_angle
-    values.append(StationaryValue(
-        name, "angle of the floor", slope * (1.0 + share), lean.value, body, lean.source,
-        lean.checked,
-    ))  # fmt: skip
-    values.append(StationaryValue(name, "roll coefficient", share, None, body))
-    return Stationary(vehicle.name, limits.edition, held, tuple(values), tuple(reasons))
+        loop = found(name, partial(twist_loop, balance, track, heights, held=held))
+        if loop is not None:
+            loops[name] = loop
+        values += _unloading(name, loop, limits.unloading, has_pads(balance.model))
+    whole = len(loops) == len(twists)
+    load = min(float(loop.Q[:, 0].min()) for loop in loops.values()) if whole else np.nan
+    curve = f"R {limits.guiding.radius:g} m"
+    force = found(f"{curve}, level", lambda: _force(vehicle, balance, track, settings, limits))
+    force = np.nan if force is None else force
+    values.append(_guiding(f"{curve}, level", "guiding Y/Q", float(force / load), limits))
+    quotients = [
+        np.nan if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
+        for state in (rolling(f"{curve}, {name}", sign * heights) for sign in (1.0, -1.0))
+    ]
+    values.append(
+        _guiding(f"{curve}, {name}", "guiding Y/Q, combined", float(np.max(quotients)), limits)
+    )
+    name = f"cant {1e3 * cant:g} mm"
+    standing = found(name, lambda: on_cant(balance, track, cant, held=held))
+    values += _lean(name, balance.model, flat.reference, standing, cant, limits)
+    return Stationary(vehicle.name, limits.edition, held, tuple(values), tuple(reasons), loops)
 
 
 def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floats]:
@@ -238,65 +278,87 @@ def _admissible_cant(vehicle: Vehicle) -> float:
     return vehicle.service.cant_deficiency
 
 
-def _guiding(
-    vehicle: Vehicle,
-    track: Track,
-    limits: StationaryLimits,
-    load: float,
-    settings: Settings | None,
-    reasons: list[str],
-) -> StationaryValue:
-    """Guiding force in the tight curve over the smallest wheel load of the leading wheelset."""
-    limit = limits.guiding
-    case = f"R {limit.radius:g} m, level"
-    deficiency = cant_deficiency(WALKING_PACE, 1.0 / abs(limit.radius), 0.0)
-    found = curving(
-        vehicle,
-        radius=[limit.radius],
-        cant=0.0,
-        cant_deficiency=[deficiency],
-        track=track,
-        settings=settings,
-    )
-    quotient = float("nan")
-    if found.converged.item() == FAILED:
-        reasons.append(f"{case}: no steady state in the curve")
+def _unloading(
+    case: str, loop: TwistLoop | None, limit: Value, friction: bool
+) -> list[StationaryValue]:
+    """The worst wheel of a loop, and both branches on level track; nan without a loop."""
+    level = "on level track, twist rising", "on level track, twist falling"
+    if loop is None:
+        wheel, worst, left = "", np.nan, (np.nan, np.nan)
     else:
-        outer = 0  # left in a right-hand curve
-        quotient = abs(float(found.Y.reshape(-1, 2)[0, outer])) / load
+        wheelset, side = loop.worst
+        wheel = f"wheelset {wheelset + 1} {SIDES[side]}"
+        worst, left = float(np.max(loop.unloading)), loop.on_level
+    values = [
+        StationaryValue(case, UNLOADING, worst, limit.value, wheel, limit.source, limit.checked)
+    ]
+    if friction:
+        values += [
+            StationaryValue(case, name, value, None, wheel)
+            for name, value in zip(level, left, strict=True)
+        ]
+    return values
+
+
+def _force(
+    vehicle: Vehicle,
+    balance: Equilibrium,
+    track: Track,
+    settings: Settings | None,
+    limits: StationaryLimits,
+) -> float:
+    """Guiding force of the leading outer wheel in the level curve [N].
+
+    Where Newton's method fails, a run on the circle finds it (`railsim.stability.curving`).
+    """
+    curvature, level = 1.0 / limits.guiding.radius, np.zeros(len(balance.Q0))
+    try:
+        Y = on_twist(balance, track, level, curvature=curvature).Y
+    except NotConverged:
+        found = curving(
+            vehicle, radius=[limits.guiding.radius], cant=0.0,
+            cant_deficiency=[cant_deficiency(WALKING_PACE, curvature, 0.0)], track=track,
+            settings=settings,
+        )  # fmt: skip
+        if found.converged.item() == FAILED:
+            raise
+        Y = found.Y.reshape(-1, 2)
+    return float("nan") if Y is None else -float(Y[0, 0])
+
+
+def _guiding(
+    case: str, quantity: str, quotient: float, limits: StationaryLimits
+) -> StationaryValue:
+    """Y/Q of the leading outer wheel, the left one in a right-hand curve."""
+    limit = limits.guiding
     return StationaryValue(
-        case, "guiding Y/Q", quotient, limit.value, "wheelset 1 outer", limit.source, limit.checked
+        case, quantity, quotient, limit.value, "wheelset 1 outer", limit.source, limit.checked
     )
 
 
-def _climbing(
-    case: str, rolling: Sequence[Standing | None], limits: StationaryLimits
-) -> StationaryValue:
-    """Largest Y/Q of the leading outer wheel, the left one, over some states."""
-    quotients = [
-        float("nan") if state is None or state.Y is None else -state.Y[0, 0] / state.Q[0, 0]
-        for state in rolling
-    ]
-    limit = limits.guiding
-    return StationaryValue(
-        case, "guiding Y/Q, combined", float(np.max(quotients)), limit.value, "wheelset 1 outer",
-        limit.source, limit.checked,
-    )  # fmt: skip
-
-
-def _unloading(case: str, stands: Sequence[Standing | None], limit: Value) -> StationaryValue:
-    """Return the worst wheel over some states; nan if one of them was not found."""
-    worst, label = -np.inf, ""
-    for standing in stands:
-        if standing is None:
-            worst, label = np.nan, ""
-            break
+def _lean(
+    case: str,
+    model: Model,
+    body: str,
+    standing: Standing | None,
+    cant: float,
+    limits: StationaryLimits,
+) -> list[StationaryValue]:
+    """Unloading, angle of the floor and roll coefficient on a cant [m]; nan without a state."""
+    unloading, angle = limits.lean_unloading, limits.lean_angle
+    worst, wheel, share = np.nan, "", np.nan
+    if standing is not None:
         shares = (standing.Q0 - standing.Q) / standing.Q0
         w, side = np.unravel_index(int(np.argmax(shares)), shares.shape)
-        if shares[w, side] > worst:
-            worst = float(shares[w, side])
-            label = f"wheelset {w + 1} {('left', 'right')[side]}"
-    words = "unloading (Q0 - Q)/Q0"
-    return StationaryValue(
-        case, words, float(worst), limit.value, label, limit.source, limit.checked
-    )
+        worst, wheel = float(shares[w, side]), f"wheelset {w + 1} {SIDES[side]}"
+        share = roll_coefficient(model, standing, cant, body)
+    floor = float(np.arcsin(cant / CANT_BASE)) * (1.0 + share)
+    return [
+        StationaryValue(
+            case, UNLOADING, worst, unloading.value, wheel, unloading.source, unloading.checked
+        ),
+        StationaryValue(
+            case, "angle of the floor", floor, angle.value, body, angle.source, angle.checked
+        ),
+        StationaryValue(case, "roll coefficient", share, None, body),
+    ]

@@ -60,6 +60,21 @@ def test_exceeded_limit_fails(tmp_path, capsys):
     assert [v["exceeded"] for v in record["values"][:3]] == [False, True, True]
 
 
+def test_both_branches_of_a_wagon_are_told_and_drawn(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["stationary", "wagon_uic_link_empty", "--out", str(out), "--fail"]) == 4
+    shown = capsys.readouterr().out
+    assert "on level track, twist rising" in shown
+    assert "on level track, twist falling" in shown
+    record = json.loads((out / "stationary.json").read_text())
+    (loop,) = record["loops"].values()
+    # 0.598 without friction; the loop begins at level track and ends where the twist is full again
+    assert record["values"][0]["value"] > 0.6
+    assert loop["share"][-1] == 1.0 > loop["share"][0]
+    assert len(loop["Q"]) == len(loop["share"])
+    assert (out / "stationary.png").stat().st_size > 5000
+
+
 def test_case_without_steady_state_is_no_pass(monkeypatch):
     def never(*_, **__):
         raise NotConverged("no steady state was found")

@@ -1,0 +1,155 @@
+"""Quasi-static states with dry friction that follows the displacement.
+
+`SteadyRolling` holds the forces of friction pads.  Here they follow the deflection d of their
+elements from the last known state on, T = T_0 + k (d - d_0), brought back to their limits as in the
+time loop (`railsim.kernels.internal`; Masing 1926): a step of an elastic-plastic structure with the
+return to the yield surface at its end (Simo, Hughes 1998, 3).  Friction that falls with the sliding
+speed is that at rest.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from railsim.kernels.internal import PAD
+from railsim.kernels.rhs import right_hand_sides
+from railsim.kernels.status import RUNNING, STATUS
+from railsim.kernels.step_rk4 import settle_limits
+from railsim.kernels.system import System
+from railsim.linear.steady import Floats, NotConverged, SteadyRolling
+from railsim.model.assembly import Model
+
+SMALLEST = 1.0 / 256.0  # part of the way between two states at which a path ends
+
+
+@dataclass(frozen=True)
+class Grip:
+    """Deflections of all pads in a state [m], and the forces that they have there [N]."""
+
+    deflection: Floats
+    force: Floats
+
+
+class Sliding(SteadyRolling):
+    """Newton's method for steady states whose friction forces follow the displacement.
+
+    Parameters
+    ----------
+    model, system, held
+        As of `SteadyRolling`.
+    since : Grip, optional
+        Of the last known state; without it friction elements hold the forces that a state has.
+    """
+
+    def __init__(
+        self, model: Model, system: System, since: Grip | None = None, *, held: bool = False
+    ) -> None:
+        super().__init__(model, system, held=held)
+        mounts, internal = system.mounts, system.internal
+        kinds = np.append(internal.kind, -1)  # of an axis without internal state
+        self._mounts, self._axes = np.nonzero(kinds[mounts.internal] == PAD)
+        self._pads = mounts.internal[self._mounts, self._axes]
+        self._first = 12 * model.index.n_bodies
+        self._since = since
+
+    def _evaluated(self, states: Floats) -> Floats:
+        """Derivatives of several states, one a row; friction forces are put into the states."""
+        derivatives = np.empty_like(states)
+        for state, derivative in zip(states, derivatives, strict=True):
+            self._evaluate_one(state, derivative)
+            if self._since is not None and len(self._pads):
+                stiffness = self.system.internal.parameter[self._pads, 0]
+                moved = self.deflection() - self._since.deflection
+                state[self._first + self._pads] = self._since.force + stiffness * moved
+                settle_limits(
+                    self.system.internal, self.system.curves, self._first, self.work.drive, state
+                )
+                self._evaluate_one(state, derivative)
+        return derivatives
+
+    def _evaluate_one(self, state: Floats, derivative: Floats) -> None:
+        status, where, self.patches = right_hand_sides(
+            self.system, self.work, state[None], derivative[None]
+        )
+        if status != RUNNING:
+            sentence = STATUS[status][1].format(where=self.model.index.wheelsets[where])
+            raise NotConverged(f"no steady state: {sentence}")
+
+    def deflection(self) -> Floats:
+        """Deflections of the pads in the state evaluated last, float64[pad] [m]."""
+        mounts, pose = self.system.mounts, self.work.pose
+        bodies, points = mounts.body[self._mounts], mounts.point[self._mounts]
+        attitude, centre = pose[bodies, :9].reshape(-1, 2, 3, 3), pose[bodies, 9:12]
+        ends = centre + np.einsum("peij,pej->pei", attitude, points)
+        along = attitude[np.arange(len(bodies)), 0, :, self._axes]
+        return np.asarray(np.einsum("pi,pi->p", along, ends[:, 1] - ends[:, 0]))
+
+    def grip(self, state: Floats) -> Grip:
+        """Deflections and forces of the pads in a state."""
+        self.evaluate(state)
+        return Grip(self.deflection(), state[self._first + self._pads].copy())
+
+
+Placed = Callable[[float, Floats], tuple[System, Floats]]
+
+
+class SlidingPath:
+    """A way through quasi-static states, friction following it.
+
+    Parameters
+    ----------
+    model : Model
+        With preloads.
+    placed : callable
+        Share of the load and a state to the system under it and that state, with held wheelsets
+        where the load has them.
+    start : float64[n_state]
+        At the share 0, friction forces included.
+    speed : float
+        [m/s].
+    held : bool
+        Whether the wheelsets are held.
+    """
+
+    def __init__(
+        self, model: Model, placed: Placed, start: Floats, speed: float, *, held: bool = False
+    ) -> None:
+        self._model, self._placed, self._speed, self._held = model, placed, speed, held
+        system, guess = placed(0.0, start)
+        self.solver = Sliding(model, system, held=held)
+        self.state = self.solver.prepared(guess, speed)
+        self.share = 0.0
+        self._grip = self.solver.grip(self.state)
+
+    def to(self, goal: float) -> None:
+        """Go to another share of the load in one step, or in halves of it.
+
+        Raises
+        ------
+        NotConverged
+            Says at which share; state and share are those reached.
+        """
+        step = goal - self.share
+        while self.share != goal:
+            ahead = self.share + step
+            if abs(goal - ahead) < SMALLEST:
+                ahead = goal
+            system, guess = self._placed(ahead, self.state)
+            solver = Sliding(self._model, system, self._grip, held=self._held)
+            try:
+                state = solver.solve(guess, self._speed).state
+            except NotConverged as error:
+                step *= 0.5
+                if abs(step) < SMALLEST:
+                    raise NotConverged(
+                        f"{error} ({100.0 * self.share:.0f} % of the load)"
+                    ) from None
+                continue
+            self.state, self.share, self.solver = state, ahead, solver
+            self._grip = solver.grip(state)
+
+
+def has_pads(model: Model) -> bool:
+    """Whether a vehicle has dry friction."""
+    return bool(np.any(model.system.internal.kind == PAD))
