@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from railsim.definitions.base import Vector
 from railsim.definitions.elements.base import Element
+from railsim.definitions.excitations.single import OTHER_RAIL
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.definitions.vehicle_tables import Assembly, Axlebox, Body, Placement, Wheelset
@@ -55,7 +56,14 @@ def _mirrored_group(group: Group) -> Group:
         "bodies": {name: _moved(body) for name, body in group.bodies.items()},
         "wheelsets": {
             name: _moved(w).model_copy(
-                update={"radius": w.radius[::-1], "profile": w.profile[::-1]}
+                update={
+                    "radius": w.radius[::-1],
+                    "profile": w.profile[::-1],
+                    "out_of_round": {
+                        key: part.model_copy(update={"wheel": OTHER_RAIL[part.wheel]})
+                        for key, part in w.out_of_round.items()
+                    },
+                }
             )
             for name, w in group.wheelsets.items()
         },

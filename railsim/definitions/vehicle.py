@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 from railsim.definitions.flatten import flatten, position_faults
 from railsim.definitions.names import name_faults
+from railsim.definitions.section_files import embed_wheel_sections
 from railsim.definitions.vehicle_tables import VehicleTables
 from railsim.errors import Fault
 from railsim.plottable import Plottable
@@ -20,6 +21,11 @@ class Vehicle(VehicleTables, Plottable):
     def mass(self) -> float:
         """Mass of all bodies in the load case [kg]."""
         return flatten(self).mass
+
+    @classmethod
+    def complete(cls, tables: dict[str, Any]) -> list[Fault]:
+        """Put the sections of wheels that are not round into the tables."""
+        return embed_wheel_sections(tables)
 
     @classmethod
     def table_faults(cls, tables: Mapping[str, Any]) -> list[Fault]:

@@ -24,6 +24,7 @@ from railsim.definitions.base import (
 from railsim.definitions.elements import AnyElement
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.loads import LoadCase, LoadName
+from railsim.definitions.out_of_round import OutOfRound
 
 
 class Body(Definition):
@@ -57,6 +58,8 @@ class Wheelset(Definition):
     """Distance between the wheels' backs [m]"""
     tape_circle_distance: Positive = 1.5
     """Distance between the nominal rolling circles [m]"""
+    out_of_round: dict[Name, OutOfRound] = Field(default_factory=dict)
+    """How its wheels deviate from circles, by names"""
 
 
 class Axlebox(Definition):

@@ -88,6 +88,8 @@ MOTION, PADS, BALLAST = DOF, DOF + 11, DOF + 12
 BEFORE, RELAXATION, PENDING = DOF + 13, DOF + 17, DOF + 19
 # whether its contact is not to be evaluated again
 SKIP = DOF + 20
+# heights of wheels that are not round, left and right, and their rates
+HEIGHTS = DOF + 21
 SUPPORT_STEP = 32
 # share of the creep law's slope that what is learnt may take away: a rail stays damped
 LEAST_SHARE = 0.8

@@ -42,6 +42,7 @@ from railsim.kernels.support import (
     F_Z,
     FOOT_Y_STIFFNESS,
     FOOT_Z_STIFFNESS,
+    HEIGHTS,
     K_PAD_Y,
     K_PAD_Z,
     L_ERROR_Y,
@@ -80,6 +81,7 @@ from railsim.kernels.support import (
 )
 from railsim.kernels.system import AGAIN, ARC_LENGTH, LAST_STEP, SPEED, WHOLE, WHOLE_TOLERANCE, Z_0
 from railsim.kernels.track_frame import cell_of
+from railsim.kernels.wheel_surface import foreseen_heights
 
 # `learn`: scales of way and slip [m, m/s] in a step of this length [s]; share of an error that is
 # learnt, what is added to the squares of way and slip, what a step forgets; share of the static
@@ -155,6 +157,8 @@ def note_wheelset(system, work, state, w):
     track[MOTION + 7] = work.rail[w, 1, ASIDE]
     track[MOTION + 8] = speed * (work.rail[w, 0, RAIL_SLOPE] - state[q + 5])
     track[MOTION + 9] = speed * (work.rail[w, 1, RAIL_SLOPE] - state[q + 5])
+    if system.contact.surface_of.shape[0] > 0:
+        foreseen_heights(system, work, state, w, track, HEIGHTS)
 
 
 @compiled(python=False)
@@ -172,6 +176,7 @@ def step_support(system, work, state, h, last):
         track = work.support_step[w]
         for k in range(10):
             before[k] = track[MOTION + k]
+        heights = track[HEIGHTS], track[HEIGHTS + 1], track[HEIGHTS + 2], track[HEIGHTS + 3]
         if system.track.has_irregularity:
             f = system.bodies.frame[b]
             cell, cell_u = cell_of(system.track, state[ARC_LENGTH] + system.frame_offset[f])
@@ -198,7 +203,8 @@ def step_support(system, work, state, h, last):
             slip = track[MOTION + 8 + side] - before[8 + side]
             v_y = y_rate + state[i + RATE] + g * state[i + MEAN_RATE]
             v_z = z_rate + state[i + RATE + 1] + g * state[i + MEAN_RATE + 1]
-            k_y, k_z = product(contact, K, y, z, roll)
+            v_z += track[HEIGHTS + 2 + side] - heights[2 + side]
+            k_y, k_z = product(contact, K, y, z + track[HEIGHTS + side] - heights[side], roll)
             d_y, d_z = product(contact, D, v_y, v_z, roll_rate)
             track[2 * side] += contact[F_Y] + k_y + d_y + contact[D_Y_SLIP] * slip
             track[2 * side + 1] += contact[F_Z] + k_z + d_z + contact[D_Z_SLIP] * slip

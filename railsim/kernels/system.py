@@ -136,6 +136,9 @@ class Contact(NamedTuple):
     kalker : float64[k, 4]       c11 c22 c23 c33 over (a - b)/(a + b)
     law : CreepLaw               creep law with its material, its grid and its data
     friction_rest, friction_decay : float   friction falling with slip [1], [s/m]
+    surface_of : int64[w, 2, 3]  surface of each wheel that is not round, by patch, -1 where round;
+                             w = 0 where all wheels are round, see `wheel_surface`
+    surface_row : float64[k, SURFACE_ROW];  surface : float64[..., 4];  flat_ahead : float64[...]
     """
 
     body: np.ndarray
@@ -154,6 +157,10 @@ class Contact(NamedTuple):
     law: CreepLaw
     friction_rest: float
     friction_decay: float
+    surface_of: np.ndarray
+    surface_row: np.ndarray
+    surface: np.ndarray
+    flat_ahead: np.ndarray
 
 
 @record
@@ -416,6 +423,7 @@ class Work(NamedTuple):
     extremes : float64[6, w, EXTREMES]  see `extremes`
     present : float64[EXTREMES] scratch of the extremes
     unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]
+    bump : float64[p, BUMP_SIZE]  heights of the wheel at hand by patch, see `wheel_surface`
     decay_part : float64[m]     as `decay` for a part of a step
     """
 
@@ -455,4 +463,5 @@ class Work(NamedTuple):
     extremes: np.ndarray
     present: np.ndarray
     unloaded: np.ndarray
+    bump: np.ndarray
     decay_part: np.ndarray

@@ -92,8 +92,16 @@ from railsim.kernels.status import (
     YAW_RANGE,
 )
 from railsim.kernels.support import SKIP
-from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, Y_0, Z_0
+from railsim.kernels.system import AHEAD, COS_ROLL, SIDEWAYS, SIN_ROLL, SPEED, Y_0, Z_0
 from railsim.kernels.track_frame import OMEGA
+from railsim.kernels.wheel_surface import (
+    B_ACROSS,
+    B_CHANGE,
+    B_HEIGHT,
+    B_LEAD,
+    B_RATE,
+    note_surfaces,
+)
 
 # a wheel as far as this above its rail is followed to see whether it strikes within a step (m)
 NEAR = 2e-3
@@ -152,7 +160,7 @@ def normal_contact(system, work, speed, state):
         if ahead > 0.0 and system.track.has_irregularity:
             predict_rate_changes(system, work, w, state)
         for side in range(2):
-            status, n = wheel_contact(system, work, w, side, speed, n)
+            status, n = wheel_contact(system, work, w, side, state, n)
             if status != RUNNING:
                 return status, w, n
         # from the plane to the track's axes; -dU/ds instead of the force along the track
@@ -207,7 +215,7 @@ def wheel_on_rail(work, w, side, speed):
 
 
 @compiled(python=False)
-def wheel_contact(system, work, w, side, speed, n):
+def wheel_contact(system, work, w, side, state, n):
     """Normal forces of one wheel, added to its wheelset's generalised ones in `work.rail_force`.
 
     `work.above` holds the wheelset in the plane of its rails, `n` counts the active patches so far.
@@ -218,8 +226,10 @@ def wheel_contact(system, work, w, side, speed, n):
     """
     contact, above = system.contact, work.above
     approach = work.approach
-    wheel = wheel_on_rail(work, w, side, speed)
+    wheel = wheel_on_rail(work, w, side, state[SPEED])
     table = contact.table[w, side]
+    bumpy = contact.surface_of.shape[0] > 0
+    highest = note_surfaces(system, work, state, w, side, wheel) if bumpy else 0.0
     where, iy, ir, iw, ty, tr, tw = locate(
         contact, table, wheel.y, wheel.roll, wheel.sign * above[8], wheel.yaw * wheel.yaw
     )
@@ -233,10 +243,12 @@ def wheel_contact(system, work, w, side, speed, n):
         work.stiffness[patch] = 0.0
         work.stiffness[N_PATCH + patch] = 0.0
         approach[patch] = -1.0
-        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z):
+        if is_far(contact, table, patch, iy, ir, iw, tr, tw, wheel.z + highest):
             continue
         first = patch * LOOK_UP_SIZE
         look_up(contact, table, patch, iy, ir, iw, tw, work.weights, work.look_up, first)
+        if bumpy:
+            raise_gap(work.look_up, first, work.bump, patch, contact.shear[table])
         work.stiffness[patch] = work.look_up[first + 1]
         work.stiffness[N_PATCH + patch] = work.look_up[first + 2]
         approach[patch] = wheel.z - work.look_up[first]
@@ -249,6 +261,14 @@ def wheel_contact(system, work, w, side, speed, n):
     if lift > LIFT_RANGE and all_far(contact, table, iy, ir, iw, tr, wheel.z):
         return WHEEL_LIFT, n
     return RUNNING, n
+
+
+@compiled(inline=True)
+def raise_gap(look_up, first, bump, patch, shear):
+    """Take the height of a wheel that is not round from the gap of a patch and its gradients."""
+    look_up[first] -= bump[patch, B_HEIGHT]
+    look_up[first + G_Y] -= bump[patch, B_ACROSS]
+    look_up[first + G_ROLL] += shear * bump[patch, B_ACROSS]
 
 
 @compiled(python=False)
@@ -283,10 +303,12 @@ def patch_contact(system, work, w, side, patch, wheel, n):
         - t[k + G_Y] * wheel.y_rate
         - t[k + G_ROLL] * wheel.roll_rate
         - t[k + G_W] * 2.0 * wheel.yaw * wheel.yaw_rate
+        + work.bump[patch, B_RATE]
     )
     p_change = rate_change[side, CHANGE_Z] - wheel.sign * (
         t[k + G_Y] * rate_change[side, CHANGE_Y] + t[k + G_ROLL] * rate_change[side, CHANGE_ROLL]
     )
+    p_change += work.bump[patch, B_CHANGE]
     ahead = work.watch[AHEAD]
     deepest = p + ahead * (p_rate + max(p_change, 0.0))
     soon, elastic = 0.0, 0.0
@@ -307,6 +329,8 @@ def patch_contact(system, work, w, side, patch, wheel, n):
         fade = min(1.0, p / FADE)
         vertical = max(0.0, elastic + contact.damping * cos_2 * fade * p_rate)
         add_normal_force(work, contact.body[w], w, side, wheel, p, k, vertical)
+        # moment about the axle
+        work.rail_force[contact.body[w], 4] += vertical * work.bump[patch, B_LEAD]
         cos_g = sqrt(cos_2)
         N = vertical / cos_g
         if N > 0.0:
@@ -320,9 +344,9 @@ def patch_contact(system, work, w, side, patch, wheel, n):
             # the normal meets the axle: c + lambda n lies on it, and n does not point along
             per_yaw = wheel.sign * (c_z * tangent - c_y)
             column[FOOT_X_PER_YAW, n] = per_yaw
-            column[FOOT_X, n] = wheel.yaw * per_yaw
+            column[FOOT_X, n] = wheel.yaw * per_yaw + work.bump[patch, B_LEAD]
             column[FOOT_Y, n] = wheel.sign * c_y
-            column[FOOT_Z, n] = c_z
+            column[FOOT_Z, n] = c_z + work.bump[patch, B_HEIGHT]
             column[PENETRATION, n] = p
             column[NORMAL_STIFFNESS, n] = root * (1.5 * t[k + 1] + 2.0 * root * t[k + 2]) / cos_2
             column[NORMAL_DAMPING, n] = contact.damping * fade
@@ -401,7 +425,7 @@ def complete_normal_force(system, work, b, state):
 
     The wheelset's axes are C = Rz(yaw) Rx(roll); roll turns about its first axis, yaw about the
     track's normal: Q_roll = M_1, Q_yaw = M_2 sin roll + M_3 cos roll, and the normal force does no
-    work on the spin, M_2 = 0.
+    work on the spin, M_2 = 0, unless the wheel is not round, see `wheel_surface`.
 
     The potential does not depend on the position along a smooth track.  Moving along it with all
     relative coordinates held, v = e_x + omega x r and u = omega per metre, the contact does no
@@ -409,11 +433,11 @@ def complete_normal_force(system, work, b, state):
     twisted track the wheels climb the rails.  `force[b, 0]` brings the share of irregular rails.
     """
     bodies, frames, C, force = system.bodies, work.frames, work.relative, work.rail_force
-    m1 = force[b, 3]
-    m3 = force[b, 5] / C[b, COS_ROLL]
-    mx = C[b, 0] * m1 + C[b, 2] * m3
-    my = C[b, 3] * m1 + C[b, 5] * m3
-    mz = C[b, 6] * m1 + C[b, 8] * m3
+    m1, m2 = force[b, 3], force[b, 4]
+    m3 = (force[b, 5] - m2 * C[b, SIN_ROLL]) / C[b, COS_ROLL]
+    mx = C[b, 0] * m1 + C[b, 1] * m2 + C[b, 2] * m3
+    my = C[b, 3] * m1 + C[b, 4] * m2 + C[b, 5] * m3
+    mz = C[b, 6] * m1 + C[b, 7] * m2 + C[b, 8] * m3
     f = bodies.frame[b]
     w1, w2, w3 = frames[f, OMEGA], frames[f, OMEGA + 1], frames[f, OMEGA + 2]
     x = state[6 * b]

@@ -45,6 +45,7 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.element_arrays import ElementArrays
+from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
 from railsim.model.work import CONSTANT_SPEED
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
@@ -99,6 +100,8 @@ class Model:
         Profiles used, by name.
     design : Model or None
         The vehicle in its design load, whose preloads these are, where a load case is in force.
+    wheels : UnevenWheels
+        Wheels that are not round, which `system` leaves out: see `railsim.model.uneven_wheels`.
     """
 
     system: System
@@ -107,6 +110,7 @@ class Model:
     tables: tuple[ContactTable, ...]
     profiles: Mapping[str, Profile]
     design: "Model | None" = None
+    wheels: UnevenWheels = ROUND
 
     @property
     def n_state(self) -> int:
@@ -167,7 +171,8 @@ def assemble(
     if vehicle.load is not None:
         unloaded = vehicle.model_copy(update={"load": None})
         design = assemble(unloaded, track, settings, profiles, shared)
-    return Model(system, index, flat, tables, book.used, design)
+    wheels = uneven_wheels(flat, track, book.used)
+    return Model(system, index, flat, tables, book.used, design, wheels)
 
 
 def without_rails(vehicle: Vehicle) -> Model:
@@ -453,6 +458,7 @@ def _contact(
         law=_creep_law(settings, track),
         friction_rest=falling.rest if falling else 1.0,
         friction_decay=falling.decay if falling else 0.0,
+        **ROUND._asdict(),
     )
     return contact, tuple(tables)
 

@@ -82,7 +82,7 @@ def empty_recorder(
     )
 
 
-def divide_strikes(work: Work, scheme: int, step: float) -> None:
+def divide_strikes(work: Work, scheme: int, step: float, longest: float = math.inf) -> None:
     """Have the time loop divide the steps over which a wheel lifts or strikes.
 
     Parameters
@@ -91,9 +91,11 @@ def divide_strikes(work: Work, scheme: int, step: float) -> None:
         With which the loop is called.
     scheme, step : int, float
         FAST or RK4; time step [s].
+    longest : float
+        Longest part that follows what the wheels pass over [s].
     """
     elastic = len(work.support) > 0
-    part = PART_ELASTIC if elastic and scheme == FAST else PART[scheme]
+    part = min(longest, PART_ELASTIC if elastic and scheme == FAST else PART[scheme])
     parts = math.ceil(step / part * (1.0 - 1e-9))
     work.parts[PARTS] = parts if parts > 1 else 0
     work.watch[SHARE] = FORCE_CHANGE_ELASTIC if elastic else FORCE_CHANGE

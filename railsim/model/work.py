@@ -26,6 +26,7 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import FRAME_SIZE, MU_LEFT, MU_RIGHT, TrackTables
 from railsim.kernels.vibration import VIBRATION
+from railsim.kernels.wheel_surface import BUMP_SIZE
 
 Floats = NDArray[np.float64]
 
@@ -85,6 +86,7 @@ def work_arrays(system: System) -> Work:
         extremes=no_extremes(n_wheelsets),
         present=aligned_zeros(EXTREMES),
         unloaded=aligned_zeros((n_wheelsets, 2)),
+        bump=aligned_zeros((N_PATCH, BUMP_SIZE)),
         decay_part=aligned_zeros(len(system.internal.kind)),
     )
 

@@ -29,6 +29,7 @@ from railsim.kernels.vibration import VIBRATION
 from railsim.model.assembly import Model
 from railsim.model.equilibrium import Equilibrium
 from railsim.model.time_step import SCHEMES, divide_strikes
+from railsim.model.uneven_wheels import longest_part
 from railsim.model.work import no_extremes, work_arrays
 from railsim.result import MemorySink, Sink
 from railsim.result.hunting import SEEN, thinned
@@ -342,7 +343,8 @@ class _Convoy:
     ) -> tuple[int, int, int, int]:
         begin = time.thread_time()  # a library's idle threads may still be spinning
         most = max(1, STEPS // len(self._runs))
-        divide_strikes(self._work, self._scheme, step)
+        longest = longest_part(self._system, self._state[SPEED])
+        divide_strikes(self._work, self._scheme, step, longest)
         at, end, rows = first, first + n_steps, 0
         while True:
             # more than one call only within one output interval, which records at its begin:

@@ -43,6 +43,7 @@ from railsim.kernels.system import (
     mount_laws,
 )
 from railsim.model.assembly import Model, side_by_side
+from railsim.model.uneven_wheels import joined, rolling
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -112,7 +113,8 @@ class Ensemble:
             for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
         )
         if len(models) == 1:
-            self.system, self.recorder = systems[0], recorders[0]
+            self.system = rolling(systems[0], models[0].wheels)
+            self.recorder = recorders[0]
             return
         self.system = joined_system(models)
         n_state = 18 * n + 2 * m + track * wheelsets[-1].stop + N_SCALARS
@@ -265,6 +267,7 @@ def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
         values=side_by_side(values) if len(rows) > len(models[0].tables) else contacts[0].values,
         shear=np.array(shear),
         coupling=np.array(coupling),
+        **joined([model.wheels for model in models], [len(c.body) for c in contacts])._asdict(),
     )
 
 

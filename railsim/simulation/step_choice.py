@@ -81,6 +81,8 @@ class StepChoice:
         key = class_speed(speed) if self.varies else speed
         longest = self._known.get(key) or self._choose(key, interval)
         self._known[key] = longest
+        if self._settings.step is None:
+            longest = min(longest, self._model.wheels.longest_step(speed))
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
         self.smallest = min(self.smallest, interval / every)
         return interval / every, every

@@ -1,0 +1,248 @@
+"""Lists of profile sections along a rail or around a wheel: `.slcs`, `.slcw`, CSV.
+
+The first two are those of the program CONTACT (user guide, "variable profiles"): offset and scale
+of the positions, number of sections, numbers of features, kinks and accelerations, kind of
+interpolation, then position and file of each section, and for each section where along its contour
+the features lie.  The project's own list is a CSV with the columns `s` (m) or `angle` (rad), and
+`file`.  A section's file has two columns y, z; values beyond 1 are taken for millimetres.
+"""
+
+import csv
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import Fault, InputError
+from railsim.files import TABLE_BYTES, is_file, read_text
+from railsim.text import LONGEST_FILE, shortened
+
+Array = NDArray[np.float64]
+
+MOST_SECTIONS = 2000
+FEWEST_POINTS = 8
+WIDEST = 0.4  # m, of a section
+ABSENT = -1.0  # of a feature that a section lacks
+NARROWEST = 0.01  # m
+
+
+@dataclass(frozen=True, eq=False)
+class SectionList:
+    """Sections in the order of their positions.
+
+    Attributes
+    ----------
+    positions : ndarray, shape (n,)
+        Arc length [m] or angle [rad].
+    points : tuple of ndarray, shape (2, k)
+        y, z along the contour of each section [m].
+    features : ndarray, shape (n, m)
+        Lengths along the contours at which features lie [m], nan where a section lacks one; m = 0
+        where no features are given.
+    """
+
+    positions: Array
+    points: tuple[Array, ...]
+    features: Array
+
+
+def read_sections(path: str | Path, kind: str) -> SectionList:
+    """Read a list of sections and its files.
+
+    Parameters
+    ----------
+    path : str or Path
+        `.slcs`, `.slcw` or `.csv`; names of sections count from its folder.
+    kind : "rail" or "wheel"
+        What the sections are of.
+
+    Raises
+    ------
+    InputError
+        A file is missing or no such list; positions do not increase; a section is no contour.
+    """
+    path = Path(path)
+    suffix, own = path.suffix.lower(), ".slcs" if kind == "rail" else ".slcw"
+    if suffix not in (own, ".csv"):
+        raise _wrong(path, "", f"unknown kind of file '{path.suffix}'", f"{own} or .csv")
+    text = read_text(path, TABLE_BYTES)
+    positions, names, features = _own_list(path, text, kind) if suffix == ".csv" else _slc(
+        path, text, 1.0 if kind == "wheel" else 1e-3
+    )
+    if len(positions) < 2 or len(positions) > MOST_SECTIONS:
+        raise _wrong(path, "", f"{len(positions)} sections", f"2 to {MOST_SECTIONS}")
+    for before, after in pairwise(positions):
+        if after <= before:
+            raise _wrong(path, "", f"position {after:g} after {before:g}", "rising positions")
+    known: dict[str, Array] = {}
+    for name in names:
+        if name not in known:
+            known[name] = _section(path, name)
+    return SectionList(np.array(positions), tuple(known[name] for name in names), features)
+
+
+def _wrong(path: Path, key: str, found: str, allowed: str) -> InputError:
+    return InputError([Fault(str(path), key, found, allowed)])
+
+
+def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Array]:
+    """Positions [m or rad], files and features of a list of the program CONTACT."""
+    lines = [
+        (number, stripped)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if (stripped := line.split("%")[0].strip())
+    ]
+    rows = iter(lines)
+
+    def numbers(what: str, least: int, row: tuple[int, str] | None = None) -> list[float]:
+        number, line = row or next(rows, (0, ""))
+        found: list[float] = []
+        for word in re.split(r"[\s,]+", line):
+            try:
+                found.append(float(word))
+            except ValueError:
+                break
+        if len(found) < least or not np.isfinite(found).all():
+            shown = shortened(line) if line else "the end of the file"
+            raise _wrong(path, f"line {number}" if number else "", f"'{shown}'", what)
+        return found
+
+    offset, scale = numbers("offset and scale of the positions", 2)[:2]
+    if scale == 0.0:
+        raise _wrong(path, "", "scale 0", "the scale of the positions, not zero")
+    n = int(numbers("the number of sections", 1)[0])
+    n_features = int(numbers("the numbers of features, kinks and accelerations", 3)[0])
+    numbers("the kind of interpolation", 1)
+    positions, names = [], []
+    for _ in range(n):
+        row = next(rows, (0, ""))
+        quoted = re.search(r"'([^']*)'", row[1])
+        if quoted is None:
+            shown = shortened(row[1]) or "the end of the file"
+            raise _wrong(path, f"line {row[0]}", f"'{shown}'", f"position and 'file', {n} times")
+        positions.append(unit * scale * (offset + numbers("a position", 1, row)[0]))
+        names.append(quoted.group(1))
+    features = np.full((n, 0), np.nan)
+    if n_features > 1:
+        last = [row for row in rows if len(row[1].split()) >= n_features + 1]
+        if len(last) != n:
+            found = f"{len(last)} rows of {n_features} features"
+            raise _wrong(path, "", found, f"{n}, one of every section")
+        table = [numbers("a position and features", n_features + 1, row) for row in last]
+        features = np.array(table)[:, 1 : n_features + 1]
+        features = np.where(features == ABSENT, np.nan, 1e-3 * features)
+    return positions, names, features
+
+
+def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[str], Array]:
+    """Positions and files of the project's own list."""
+    key = "s" if kind == "rail" else "angle"
+    rows = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    reader = csv.DictReader(rows, skipinitialspace=True)
+    if not {key, "file"} <= set(reader.fieldnames or ()):
+        raise _wrong(path, "line 1", f"columns {reader.fieldnames}", f"{key}, file")
+    positions, names = [], []
+    for row in reader:
+        try:
+            positions.append(float(row[key]))
+        except (TypeError, ValueError):
+            raise _wrong(path, "", f"{key} '{row[key]}'", "a number") from None
+        names.append((row["file"] or "").strip())
+    return positions, names, np.full((len(names), 0), np.nan)
+
+
+def _section(path: Path, name: str) -> Array:
+    """Points y, z of a section [m]."""
+    file = path.parent / name
+    if not name or not is_file(file):
+        shown = shortened(name, LONGEST_FILE)
+        raise _wrong(path, "", f"no file '{shown}'", f"a section beside {path.name}")
+    rows = []
+    for number, line in enumerate(read_text(file, TABLE_BYTES).splitlines(), start=1):
+        words = re.split(r"[\s,;]+", line.split("%")[0].split("#")[0].strip())
+        if words == [""]:
+            continue
+        try:
+            rows.append([float(word) for word in words[:2]])
+        except ValueError:
+            raise _wrong(file, f"line {number}", f"'{shortened(line)}'", "y, z") from None
+        if len(rows[-1]) < 2 or not np.isfinite(rows[-1]).all():
+            raise _wrong(file, f"line {number}", f"'{shortened(line)}'", "two numbers y, z")
+    points = np.array(rows).T
+    if len(rows) < FEWEST_POINTS:
+        raise _wrong(file, "", f"{len(rows)} points", f"{FEWEST_POINTS} at least")
+    if np.abs(points).max() > 1.0:
+        points = 1e-3 * points
+    width = float(np.ptp(points[0]))
+    if not NARROWEST <= width <= WIDEST:
+        found = f"a section {1e3 * width:.3g} mm wide"
+        raise _wrong(file, "", found, f"{1e3 * NARROWEST:g} to {1e3 * WIDEST:g} mm; y, z in m or mm")
+    return points
+
+
+def embed_wheel_sections(data: dict[str, Any]) -> list[Fault]:
+    """Replace `file` by what it holds for every wheel with sections in the tables of a vehicle."""
+    faults: list[Fault] = []
+    _embed(data, "", faults)
+    return faults
+
+
+def _embed(group: Any, key: str, faults: list[Fault]) -> None:
+    for name, wheelset in _tables(group, "wheelsets"):
+        for part, table in _tables(wheelset, "out_of_round"):
+            where = f"{key}wheelsets.{name}.out_of_round.{part}.file"
+            if table.get("type") != "sections" or not isinstance(table.get("file"), str):
+                continue
+            if not is_file(table["file"]):
+                shown = shortened(table["file"], LONGEST_FILE)
+                faults.append(Fault("", where, f"no file '{shown}'", "a list of sections, .slcw"))
+                continue
+            try:
+                found = wheel_heights(read_sections(table["file"], "wheel"))
+            except InputError as error:
+                faults += error.faults
+                continue
+            del table["file"]
+            table |= dict(zip(("angles", "positions", "heights"), found, strict=True))
+    for name, assembly in _tables(group, "assemblies"):
+        _embed(assembly, f"{key}assemblies.{name}.", faults)
+
+
+def _tables(group: Any, key: str) -> list[tuple[str, dict[str, Any]]]:
+    inner = group.get(key) if isinstance(group, dict) else None
+    if not isinstance(inner, dict):
+        return []
+    return [(name, table) for name, table in inner.items() if isinstance(table, dict)]
+
+
+SMOOTHING_ACROSS = 5e-9  # m3
+SPACING = 1e-3  # m, of the positions that are kept
+OUTER, INNER = 0.045, -0.025  # m, tread and flange root
+
+
+def wheel_heights(sections: SectionList) -> tuple[list[float], list[float], list[list[float]]]:
+    """Radius over angle and lateral position from the sections of a wheel, smoothed across.
+
+    Smoothing splines (Reinsch 1967) minimise sum (z - f)^2 + lambda integral f''^2 dy, lambda 5 mm3.
+
+    Returns
+    -------
+    angles [rad], positions [m], heights [m] : lists
+    """
+    from scipy.interpolate import make_smoothing_spline
+
+    low = max(INNER, max(float(points[0].min()) for points in sections.points))
+    high = min(OUTER, min(float(points[0].max()) for points in sections.points))
+    places = SPACING * np.arange(np.ceil(low / SPACING), np.floor(high / SPACING) + 1)
+    rows = []
+    for points in sections.points:
+        y, z = points[:, np.argsort(points[0], kind="stable")]
+        keep = (y > low - 0.01) & np.append(True, np.diff(y) > 1e-5)
+        spline = make_smoothing_spline(1e3 * y[keep], 1e3 * z[keep], lam=1e9 * SMOOTHING_ACROSS)
+        rows.append([round(1e-3 * value, 8) for value in spline(1e3 * places).tolist()])
+    angles = [round(angle, 9) for angle in sections.positions.tolist()]
+    return angles, [round(place, 6) for place in places.tolist()], rows

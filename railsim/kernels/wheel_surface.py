@@ -1,0 +1,151 @@
+"""Wheels that are not round: height of the contact over the wheel's angle.
+
+The wheel's angle phi is what it has rolled since the beginning of the track, s/r0 less the
+wheelset's coordinate `pitch`; material at the angle phi is at the bottom then.  With e(phi, y) the
+radius at which the wheel stands on its rail, less that of the round wheel, its height is
+
+    p = z - g + e,   p' = z' - g' + e_phi (V/r0 - pitch') + e_y y',
+
+and the patch lies e_phi ahead of the axle: the path of the centre over the angle is the envelope
+of the wheel's surface, max over psi of r(psi) cos(psi - phi), whose slope is r sin(psi - phi).  The
+normal force has the moment N e_phi about the axle, so that it does no work over a turn.
+
+Tables hold e, e_phi, e_y and e_phi_y at the nodes of an even grid, periodic in phi; bicubic between
+them (Hermite), constant beyond the ends in y.
+"""
+
+from math import floor, pi
+
+from railsim.kernels import compiled
+from railsim.kernels.rails import ASIDE, ROLL
+from railsim.kernels.system import AHEAD, ARC_LENGTH, RADIUS, SPEED
+
+# columns of Contact.surface_row: first row of its values and of its angles to the next flat, number
+# of nodes over the angle and in y, first node and spacing in y [m]; length of its shortest flat and
+# of the shortest wave all around it, which steps resolve [m]
+FIRST, FIRST_AHEAD, N_PHI, N_Y, Y0, DY, FLAT, WAVE = range(8)
+SURFACE_ROW = 8
+# columns of Work.bump, of each patch of the wheel at hand: e [m], its rate [m/s], e_phi [m], e_y
+# [1], change of the rate over `AHEAD` [m/s]
+B_HEIGHT, B_RATE, B_LEAD, B_ACROSS, B_CHANGE = range(5)
+BUMP_SIZE = 8
+AT_ONCE = 1e12  # N/s, rate of a force that has its step divided
+
+
+@compiled(inline=True)
+def wheel_angle(system, state, w):
+    """Angle of wheelset `w`, rising while it rolls forward, and its rate V/r0 - pitch'.
+
+    The pitch's own rate is still to be taken from the rate.
+    """
+    b = system.contact.body[w]
+    radius = system.bodies.row[b, RADIUS]
+    s = state[ARC_LENGTH] + system.frame_offset[system.bodies.frame[b]]
+    return s / radius - state[6 * b + 4], state[SPEED] / radius
+
+
+@compiled(python=False)
+def surface_at(contact, table, phi, y):
+    """Height e of a wheel [m] at the angle `phi` and lateral position `y`, e_phi [m] and e_y [1]."""
+    row = contact.surface_row
+    values = contact.surface
+    n_phi, n_y = int(row[table, N_PHI]), int(row[table, N_Y])
+    step = 2.0 * pi / n_phi
+    x = phi / step
+    i = int(floor(x))
+    x -= i
+    i -= n_phi * int(floor(i / n_phi))
+    after = i + 1 if i + 1 < n_phi else 0
+    dy = row[table, DY]
+    u = min(max((y - row[table, Y0]) / dy, 0.0), n_y - 1.0)
+    j = min(int(u), n_y - 2)
+    u -= j
+    inside = 1.0 if y > row[table, Y0] and y < row[table, Y0] + dy * (n_y - 1.0) else 0.0
+    first = int(row[table, FIRST])
+    a0, a1 = (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u), u * u * (3.0 - 2.0 * u)
+    b0, b1 = dy * u * (1.0 - u) * (1.0 - u), dy * u * u * (u - 1.0)
+    da, db0, db1 = 6.0 * u * (1.0 - u) / dy, (1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
+    e, lead, across = 0.0, 0.0, 0.0
+    for end in range(2):
+        k = first + (after if end else i) * n_y + j
+        value = a0 * values[k, 0] + a1 * values[k + 1, 0] + b0 * values[k, 2] + b1 * values[k + 1, 2]
+        slope = a0 * values[k, 1] + a1 * values[k + 1, 1] + b0 * values[k, 3] + b1 * values[k + 1, 3]
+        value_y = (
+            da * (values[k + 1, 0] - values[k, 0]) + db0 * values[k, 2] + db1 * values[k + 1, 2]
+        )
+        slope_y = (
+            da * (values[k + 1, 1] - values[k, 1]) + db0 * values[k, 3] + db1 * values[k + 1, 3]
+        )
+        t = x if end else 1.0 - x
+        sign = 1.0 if end else -1.0
+        share, turn = t * t * (3.0 - 2.0 * t), sign * step * t * t * (t - 1.0)
+        e += share * value + turn * slope
+        across += share * value_y + turn * slope_y
+        lead += sign * 6.0 * t * (1.0 - t) / step * value + t * (3.0 * t - 2.0) * slope
+    return e, lead, inside * across
+
+
+@compiled(python=False)
+def angle_to_flat(contact, table, phi):
+    """Angle that the wheel has still to roll until it is at a flat, 0 on one [rad]."""
+    n_phi = int(contact.surface_row[table, N_PHI])
+    i = int(floor(phi * n_phi / (2.0 * pi)))
+    i -= n_phi * int(floor(i / n_phi))
+    return contact.flat_ahead[int(contact.surface_row[table, FIRST_AHEAD]) + i]
+
+
+@compiled(python=False)
+def note_surfaces(system, work, state, w, side, wheel):
+    """Heights of a wheel that is not round into `work.bump`, by patch.
+
+    Returns
+    -------
+    float
+        Largest e of the patches [m].
+    """
+    contact, bump, h = system.contact, work.bump, work.watch[AHEAD]
+    phi, rate = wheel_angle(system, state, w)
+    rate -= work.acceleration[contact.body[w], 4]
+    most = 0.0
+    for patch in range(bump.shape[0]):
+        table = contact.surface_of[w, side, patch]
+        if table < 0:
+            for k in range(BUMP_SIZE):
+                bump[patch, k] = 0.0
+            continue
+        shear = contact.shear[contact.table[w, side]]
+        y = wheel.y - shear * wheel.roll
+        e, lead, across = surface_at(contact, table, phi, y)
+        bump[patch, B_HEIGHT] = e
+        bump[patch, B_RATE] = lead * rate
+        bump[patch, B_LEAD] = lead
+        bump[patch, B_ACROSS] = across
+        bump[patch, B_CHANGE] = 0.0
+        most = max(most, e)
+        if h > 0.0:
+            _, later, _ = surface_at(contact, table, phi + rate * h, y)
+            bump[patch, B_CHANGE] = (later - lead) * rate
+            if angle_to_flat(contact, table, phi) < rate * h:
+                work.force_rate[w] = AT_ONCE
+    return most
+
+
+@compiled(python=False)
+def foreseen_heights(system, work, state, w, track, first):
+    """Heights e of both treads and their rates into ``track[first:first + 4]``."""
+    contact = system.contact
+    b = contact.body[w]
+    n = system.bodies.kind.shape[0]
+    phi, _ = wheel_angle(system, state, w)
+    rate = -state[6 * n + 6 * b + 4]  # the turn of the track's frame left out
+    for side in range(2):
+        table = contact.surface_of[w, side, 0]
+        if table < 0:
+            continue
+        sign = 2.0 * side - 1.0
+        shear = contact.shear[contact.table[w, side]]
+        roll = state[6 * b + 3] - work.plane[w, ROLL]
+        y = sign * (state[6 * b + 1] - work.rail[w, side, ASIDE] - shear * roll)
+        e, lead, _ = surface_at(contact, table, phi, y)
+        track[first + side] = e
+        track[first + 2 + side] = lead * rate

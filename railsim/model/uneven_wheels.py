@@ -1,0 +1,111 @@
+"""Wheels that are not round, in the arrays of a run.
+
+Equilibrium, linear analyses and the choice of the step see round wheels, as they see smooth rails;
+`rolling` gives the system that runs.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.contact.curves import rail_curve, tape_circle_position
+from railsim.contact.out_of_round import Surface, parts_by_wheel, surface_arrays, wheel_surface
+from railsim.definitions.flatten import FlatVehicle
+from railsim.definitions.out_of_round import Flat, Sections, Uneven
+from railsim.definitions.track import Track
+from railsim.kernels.contact_table import FLANGE, N_PATCH
+from railsim.kernels.system import System
+from railsim.kernels.wheel_surface import FLAT, SURFACE_ROW, WAVE
+from railsim.profiles.profile import Profile
+
+Floats = NDArray[np.float64]
+PER_LENGTH = 20.0  # steps over a flat or wave
+
+
+class UnevenWheels(NamedTuple):
+    """The fields of `kernels.system.Contact` that hold wheels that are not round."""
+
+    surface_of: NDArray[np.int64]
+    surface_row: Floats
+    surface: Floats
+    flat_ahead: Floats
+
+    def longest_step(self, speed: float) -> float:
+        """Longest step that resolves the waves around the wheels [s]."""
+        return float(min(self.surface_row[:, WAVE], default=np.inf)) / (PER_LENGTH * speed)
+
+
+ROUND = UnevenWheels(
+    np.zeros((0, 2, N_PATCH), dtype=np.int64),
+    np.zeros((0, SURFACE_ROW)),
+    np.zeros((0, 4)),
+    np.zeros(0),
+)
+
+
+def uneven_wheels(flat: FlatVehicle, track: Track, profiles: dict[str, Profile]) -> UnevenWheels:
+    """Return the wheels of a vehicle that are not round, on the rails of a track."""
+    wheelsets = [body.wheelset for body in flat.of_kind("wheelset")]
+    if not any(wheelset and wheelset.out_of_round for wheelset in wheelsets):
+        return ROUND
+    surface_of = np.full((len(wheelsets), 2, N_PATCH), -1)
+    surfaces: list[Surface] = []
+    known: dict[object, int] = {}
+
+    def number(parts: tuple[Uneven, ...], radius: float, rail: str, tape: float) -> int:
+        if not parts:
+            return -1
+        measured = any(isinstance(part, Sections) for part in parts)
+        key = (tuple(part.model_copy(update={"wheel": "both"}) for part in parts), radius) + (
+            (rail, tape) if measured else ()
+        )
+        if key not in known:
+            curve = rail_curve(profiles[rail], track.gauge, track.inclination)
+            known[key] = len(surfaces)
+            surfaces.append(wheel_surface(parts, radius, curve, tape))
+        return known[key]
+
+    for w, wheelset in enumerate(wheelsets):
+        assert wheelset is not None
+        tape = tape_circle_position(wheelset.back_to_back)
+        for side, parts in enumerate(parts_by_wheel(wheelset.out_of_round)):
+            radius, rail = wheelset.radius[side], track.rail[side]
+            surface_of[w, side] = number(parts, radius, rail, tape)
+            # flats are on the tread
+            whole = tuple(part for part in parts if not isinstance(part, Flat | Sections))
+            surface_of[w, side, FLANGE] = number(whole, radius, rail, tape)
+    return UnevenWheels(surface_of, *surface_arrays(surfaces))
+
+
+def rolling(system: System, wheels: UnevenWheels) -> System:
+    """Return the system with its wheels as they are."""
+    return system._replace(contact=system.contact._replace(**wheels._asdict()))
+
+
+def joined(wheels: list[UnevenWheels], counts: list[int]) -> UnevenWheels:
+    """Return those of several vehicles with some numbers of wheelsets as one."""
+    if not any(len(one.surface_of) for one in wheels):
+        return ROUND
+    surface_of, row = [], []
+    first = values = aheads = 0
+    for one, count in zip(wheels, counts, strict=True):
+        own = one.surface_of if len(one.surface_of) else np.full((count, 2, N_PATCH), -1)
+        surface_of.append(np.where(own >= 0, own + first, -1))
+        moved = one.surface_row.copy()
+        moved[:, :2] += (values, aheads)
+        row.append(moved)
+        first += len(moved)
+        values, aheads = values + len(one.surface), aheads + len(one.flat_ahead)
+    return UnevenWheels(
+        np.concatenate(surface_of),
+        np.concatenate(row),
+        np.concatenate([one.surface for one in wheels]),
+        np.concatenate([one.flat_ahead for one in wheels]),
+    )
+
+
+def longest_part(system: System, speed: float) -> float:
+    """Longest part of a step in which a wheel passes a flat [s]; infinite without flats."""
+    flat = min(system.contact.surface_row[:, FLAT], default=np.inf)
+    return float(flat) / (PER_LENGTH * speed)
