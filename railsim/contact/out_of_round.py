@@ -78,7 +78,7 @@ def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape:
     resolved = [_lengths(part, radius) for part in parts]
     shortest = min(min(lengths) for lengths in resolved)
     n = int(np.clip(np.ceil(NODES * TURN * radius / shortest), FEWEST, MOST))
-    phi = TURN / n * np.arange(n)
+    phi = np.linspace(0.0, TURN, n, endpoint=False)
     measured = any(isinstance(part, Sections) for part in parts)
     y = ACROSS if measured else np.array([-1.0, 1.0])
     values = np.zeros((n, y.size, 4))
@@ -98,7 +98,7 @@ def wheel_surface(parts: Iterable[Uneven], radius: float, rail: RailCurve, tape:
             end = begin + part.length / radius
         margin = 2.0 * TURN / n
         there = (phi - begin + margin) % TURN
-        np.minimum(ahead, np.where(there < end - begin + 2.0 * margin, 0.0, TURN - there), ahead)
+        ahead = np.minimum(ahead, np.where(there < end - begin + 2.0 * margin, 0.0, TURN - there))
     flats, waves = (min(lengths) for lengths in zip(*resolved, strict=True))
     return Surface(values, y, ahead, flats, waves)
 
@@ -118,7 +118,7 @@ def surface_arrays(surfaces: Iterable[Surface]) -> tuple[Array, Array, Array]:
 
 
 def _wrapped(angle: Array) -> Array:
-    return (angle + np.pi) % TURN - np.pi
+    return np.asarray((angle + np.pi) % TURN - np.pi)
 
 
 def _lengths(part: Uneven, radius: float) -> tuple[float, float]:
@@ -128,7 +128,7 @@ def _lengths(part: Uneven, radius: float) -> tuple[float, float]:
     if isinstance(part, Flat):
         return part.length, np.inf
     if isinstance(part, RadiusTable):
-        phi = TURN / 4096 * np.arange(4096)
+        phi = np.linspace(0.0, TURN, 4096, endpoint=False)
         waves = np.abs(np.fft.rfft(_height(part, radius, phi)[0]))[1:]
         order = 1 + np.flatnonzero(waves >= SMALL_WAVE * max(waves.max(), 1e-30))[-1]
         return np.inf, TURN * radius / float(order)
@@ -172,7 +172,8 @@ def _deviation(part: Sections) -> tuple[Array, float, float]:
     The round wheel is the median of all sections, or, of sections that do not go all around, the
     mean of the first and the last.
     """
-    assert part.angles is not None and part.heights is not None
+    assert part.angles is not None
+    assert part.heights is not None
     heights, angles = np.array(part.heights), np.array(part.angles)
     around = angles[-1] - angles[0] > AROUND
     round_wheel = np.median(heights, axis=0) if around else 0.5 * (heights[0] + heights[-1])
@@ -208,7 +209,9 @@ def rolled_out(
     """
     from scipy.interpolate import CubicSpline, make_smoothing_spline
 
-    assert part.angles is not None and part.positions is not None and part.heights is not None
+    assert part.angles is not None
+    assert part.positions is not None
+    assert part.heights is not None
     change, begin, end = _deviation(part)
     angles, places = np.array(part.angles), np.array(part.positions)
     round_wheel = CubicSpline(places, np.array(part.heights)[0] - change[0])

@@ -5,6 +5,7 @@ at the bottom then.  `body_position` counts the pitch the other way round (nose 
 file at the angle phi touches the rail at the pitch -phi.
 """
 
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -49,9 +50,7 @@ class RadiusTable(Uneven):
 
     type: Literal["table"]
     rows: Annotated[
-        tuple[tuple[Angle, Change], ...],
-        Field(min_length=3, max_length=MOST_ROWS),
-        rises("angle"),
+        tuple[tuple[Angle, Change], ...], Field(min_length=3, max_length=MOST_ROWS), rises("angle")
     ]
     """Rows [angle, change of the radius], over less than one turn [rad, m]"""
 
@@ -94,7 +93,7 @@ class Sections(Uneven):
             raise ValueError("either 'file', or 'angles', 'positions' and 'heights' are needed")
         if self.angles is not None and self.positions is not None and self.heights is not None:
             for name, values in (("angles", self.angles), ("positions", self.positions)):
-                if any(b <= a for a, b in zip(values, values[1:], strict=False)):
+                if any(b <= a for a, b in pairwise(values)):
                     raise ValueError(f"the {name} must increase")
             if self.angles[-1] - self.angles[0] >= 6.284:
                 raise ValueError("the angles span more than a turn")
@@ -105,6 +104,4 @@ class Sections(Uneven):
         return self
 
 
-OutOfRound = Annotated[
-    Harmonics | RadiusTable | Flat | Sections, Field(discriminator="type")
-]
+OutOfRound = Annotated[Harmonics | RadiusTable | Flat | Sections, Field(discriminator="type")]

@@ -4,7 +4,8 @@ The first two are those of the program CONTACT (user guide, "variable profiles")
 of the positions, number of sections, numbers of features, kinks and accelerations, kind of
 interpolation, then position and file of each section, and for each section where along its contour
 the features lie.  The project's own list is a CSV with the columns `s` (m) or `angle` (rad), and
-`file`.  A section's file has two columns y, z; values beyond 1 are taken for millimetres.
+`file`, or `y` and `z` (m) with a row for every point.  A section's file has two columns y, z;
+values beyond 1 are taken for millimetres.
 """
 
 import csv
@@ -70,19 +71,19 @@ def read_sections(path: str | Path, kind: str) -> SectionList:
     if suffix not in (own, ".csv"):
         raise _wrong(path, "", f"unknown kind of file '{path.suffix}'", f"{own} or .csv")
     text = read_text(path, TABLE_BYTES)
-    positions, names, features = _own_list(path, text, kind) if suffix == ".csv" else _slc(
-        path, text, 1.0 if kind == "wheel" else 1e-3
-    )
+    if suffix == ".csv":
+        positions, points = _own_list(path, text, kind)
+        features = np.full((len(positions), 0), np.nan)
+    else:
+        positions, names, features = _slc(path, text, 1.0 if kind == "wheel" else 1e-3)
+        read = {name: _section(path, name) for name in dict.fromkeys(names)}
+        points = [read[name] for name in names]
     if len(positions) < 2 or len(positions) > MOST_SECTIONS:
         raise _wrong(path, "", f"{len(positions)} sections", f"2 to {MOST_SECTIONS}")
     for before, after in pairwise(positions):
         if after <= before:
             raise _wrong(path, "", f"position {after:g} after {before:g}", "rising positions")
-    known: dict[str, Array] = {}
-    for name in names:
-        if name not in known:
-            known[name] = _section(path, name)
-    return SectionList(np.array(positions), tuple(known[name] for name in names), features)
+    return SectionList(np.array(positions), tuple(points), features)
 
 
 def _wrong(path: Path, key: str, found: str, allowed: str) -> InputError:
@@ -138,21 +139,31 @@ def _slc(path: Path, text: str, unit: float) -> tuple[list[float], list[str], Ar
     return positions, names, features
 
 
-def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[str], Array]:
-    """Positions and files of the project's own list."""
+def _own_list(path: Path, text: str, kind: str) -> tuple[list[float], list[Array]]:
+    """Positions and points of the project's own list."""
     key = "s" if kind == "rail" else "angle"
     rows = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     reader = csv.DictReader(rows, skipinitialspace=True)
-    if not {key, "file"} <= set(reader.fieldnames or ()):
-        raise _wrong(path, "line 1", f"columns {reader.fieldnames}", f"{key}, file")
-    positions, names = [], []
+    columns = set(reader.fieldnames or ())
+    listed = {key, "file"} <= columns
+    if not listed and not {key, "y", "z"} <= columns:
+        allowed = f"{key}, file, or {key}, y, z"
+        raise _wrong(path, "", f"columns {', '.join(reader.fieldnames or ())}", allowed)
+    found: dict[float, list[tuple[float, float]]] = {}
+    files: dict[float, str] = {}
     for row in reader:
         try:
-            positions.append(float(row[key]))
+            position = float(row[key])
+            if listed:
+                files[position] = (row["file"] or "").strip()
+            else:
+                found.setdefault(position, []).append((float(row["y"]), float(row["z"])))
         except (TypeError, ValueError):
-            raise _wrong(path, "", f"{key} '{row[key]}'", "a number") from None
-        names.append((row["file"] or "").strip())
-    return positions, names, np.full((len(names), 0), np.nan)
+            shown = ", ".join(str(value) for value in row.values())
+            raise _wrong(path, "", f"row '{shortened(shown)}'", f"numbers {key}, y, z") from None
+    if listed:
+        return list(files), [_section(path, name) for name in files.values()]
+    return list(found), [_checked(path, np.array(points).T) for points in found.values()]
 
 
 def _section(path: Path, name: str) -> Array:
@@ -173,14 +184,20 @@ def _section(path: Path, name: str) -> Array:
         if len(rows[-1]) < 2 or not np.isfinite(rows[-1]).all():
             raise _wrong(file, f"line {number}", f"'{shortened(line)}'", "two numbers y, z")
     points = np.array(rows).T
-    if len(rows) < FEWEST_POINTS:
-        raise _wrong(file, "", f"{len(rows)} points", f"{FEWEST_POINTS} at least")
-    if np.abs(points).max() > 1.0:
+    if points.size and np.abs(points).max() > 1.0:
         points = 1e-3 * points
+    return _checked(file, points)
+
+
+def _checked(file: Path, points: Array) -> Array:
+    """Points of a section that can be one [m]."""
+    if points.shape[-1] < FEWEST_POINTS:
+        raise _wrong(file, "", f"{points.shape[-1]} points", f"{FEWEST_POINTS} at least")
     width = float(np.ptp(points[0]))
-    if not NARROWEST <= width <= WIDEST:
+    if not NARROWEST <= width <= WIDEST or not np.isfinite(points).all():
         found = f"a section {1e3 * width:.3g} mm wide"
-        raise _wrong(file, "", found, f"{1e3 * NARROWEST:g} to {1e3 * WIDEST:g} mm; y, z in m or mm")
+        allowed = f"{1e3 * NARROWEST:g} to {1e3 * WIDEST:g} mm; y, z in m or mm"
+        raise _wrong(file, "", found, allowed)
     return points
 
 
@@ -227,7 +244,8 @@ OUTER, INNER = 0.045, -0.025  # m, tread and flange root
 def wheel_heights(sections: SectionList) -> tuple[list[float], list[float], list[list[float]]]:
     """Radius over angle and lateral position from the sections of a wheel, smoothed across.
 
-    Smoothing splines (Reinsch 1967) minimise sum (z - f)^2 + lambda integral f''^2 dy, lambda 5 mm3.
+    Smoothing splines (Reinsch 1967) minimise sum (z - f)^2 + lambda integral f''^2 dy with a
+    lambda of 5 mm3.
 
     Returns
     -------

@@ -46,15 +46,15 @@ def wheel_angle(system, state, w):
 
 @compiled(python=False)
 def surface_at(contact, table, phi, y):
-    """Height e of a wheel [m] at the angle `phi` and lateral position `y`, e_phi [m] and e_y [1]."""
+    """Height e [m] of a wheel at an angle and a lateral position, with e_phi [m] and e_y [1]."""
     row = contact.surface_row
     values = contact.surface
     n_phi, n_y = int(row[table, N_PHI]), int(row[table, N_Y])
     step = 2.0 * pi / n_phi
     x = phi / step
-    i = int(floor(x))
+    i = floor(x)
     x -= i
-    i -= n_phi * int(floor(i / n_phi))
+    i -= n_phi * floor(i / n_phi)
     after = i + 1 if i + 1 < n_phi else 0
     dy = row[table, DY]
     u = min(max((y - row[table, Y0]) / dy, 0.0), n_y - 1.0)
@@ -68,8 +68,12 @@ def surface_at(contact, table, phi, y):
     e, lead, across = 0.0, 0.0, 0.0
     for end in range(2):
         k = first + (after if end else i) * n_y + j
-        value = a0 * values[k, 0] + a1 * values[k + 1, 0] + b0 * values[k, 2] + b1 * values[k + 1, 2]
-        slope = a0 * values[k, 1] + a1 * values[k + 1, 1] + b0 * values[k, 3] + b1 * values[k + 1, 3]
+        value = (
+            a0 * values[k, 0] + a1 * values[k + 1, 0] + b0 * values[k, 2] + b1 * values[k + 1, 2]
+        )
+        slope = (
+            a0 * values[k, 1] + a1 * values[k + 1, 1] + b0 * values[k, 3] + b1 * values[k + 1, 3]
+        )
         value_y = (
             da * (values[k + 1, 0] - values[k, 0]) + db0 * values[k, 2] + db1 * values[k + 1, 2]
         )
@@ -89,8 +93,8 @@ def surface_at(contact, table, phi, y):
 def angle_to_flat(contact, table, phi):
     """Angle that the wheel has still to roll until it is at a flat, 0 on one [rad]."""
     n_phi = int(contact.surface_row[table, N_PHI])
-    i = int(floor(phi * n_phi / (2.0 * pi)))
-    i -= n_phi * int(floor(i / n_phi))
+    i = floor(phi * n_phi / (2.0 * pi))
+    i -= n_phi * floor(i / n_phi)
     return contact.flat_ahead[int(contact.surface_row[table, FIRST_AHEAD]) + i]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from railsim.contact.table import TableGrid
 from railsim.kernels.support import MOST_CORRECTIONS, SETTLED
-from railsim.kernels.system import TIME, UNSETTLED
+from railsim.kernels.system import TIME, UNSETTLED, Support
 from railsim.kernels.vibration import AMPLITUDE, CUT_OFF, FREQUENCY, POSITION
 from railsim.notation import SIDES
 from railsim.result.hunting import Hunting
@@ -38,23 +38,30 @@ def run_remarks(run: Run, swings: Hunting | None) -> tuple[str, ...]:
     wheelsets = model.index.wheelsets
     Q0 = run.prepared.balance.Q0
     extremes = run_extremes(run.extremes, Q0)
+    uneven = len(model.wheels.surface_row) > 0
     found = [
         *run.remarks,
         *run.prepared.remarks,
         *beyond_experience(extremes, Q0, wheelsets),
         *lifted_wheels(extremes, run.unloaded, wheelsets),
-        *stability(swings, extremes, float(run.state[TIME] - run.prepared.state[TIME])),
+        *(
+            ()
+            if uneven and swings is None
+            else stability(swings, extremes, float(run.state[TIME] - run.prepared.state[TIME]))
+        ),
         *vibration(
             run.vibration,
             Q0,
             wheelsets,
             irregular=bool(model.system.track.has_irregularity),
+            uneven=uneven,
             elastic=bool(model.system.support.elastic),
             hunts=swings is not None,
         ),
         *creep_range(int(run.events[1]), int(run.events[0])),
         *yaw_range(int(run.events[2])),
         *unsettled_rails(int(run.parts[UNSETTLED])),
+        *(uneven_wheels_on(model.system.support) if uneven else ()),
     ]
     return tuple(dict.fromkeys(found))
 
@@ -174,6 +181,18 @@ def _evaluations(number: int) -> str:
     return f"{number} evaluation{'s' * (number > 1)}"
 
 
+def uneven_wheels_on(support: Support) -> tuple[str, ...]:
+    """Remark on wheels that are not round on a track without masses."""
+    if support.elastic and not support.massless:
+        return ()
+    rails = "has no masses" if support.elastic else "is rigid"
+    return (
+        f"Wheels are not round, and the track {rails}: "
+        "what flats and short waves do to it above 50 Hz depends on the mass of the rails; "
+        'preset = "co-running" or "p2" of [support] has one.',
+    )
+
+
 def creep_range(outside: int, patches: int) -> tuple[str, ...]:
     """Remark on contact patches outside the creep law's range of a/b.
 
@@ -209,6 +228,7 @@ def vibration(
     *,
     irregular: bool,
     elastic: bool,
+    uneven: bool = False,
     hunts: bool = False,
 ) -> tuple[str, ...]:
     """Remark on wheel loads that vibrate, as a high pass at 40 Hz shows them.
@@ -221,8 +241,9 @@ def vibration(
         Static wheel loads [N].
     wheelsets : sequence of str
         Their names.
-    irregular, elastic, hunts : bool
-        Whether the rails are irregular, and elastic; whether the vehicle hunts.
+    irregular, elastic, uneven, hunts : bool
+        Whether the rails are irregular, and elastic; whether wheels are not round; whether the
+        vehicle hunts.
     """
     if not len(measured):
         return ()
@@ -233,6 +254,8 @@ def vibration(
     frequency, position = measured[w, side, FREQUENCY], measured[w, side, POSITION]
     if hunts:
         cause = "the vehicle hunts"
+    elif uneven:
+        cause = "excited by wheels that are not round"
     elif irregular:
         cause = "excited by the irregularities of the rails"
     else:

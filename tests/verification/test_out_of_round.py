@@ -1,0 +1,271 @@
+"""Wheels that are not round: paths against CONTACT and closed forms, runs against irregular rails.
+
+Sections and results of the program CONTACT (tests/data/sections, licence beside them).
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from railsim.contact.curves import RailCurve, rail_curve
+from railsim.contact.out_of_round import ACROSS, rolled_out, surface_arrays, wheel_surface
+from railsim.definitions.flatten import flatten
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_vehicle
+from railsim.definitions.out_of_round import Flat, Harmonics, Sections
+from railsim.errors import InputError
+from railsim.kernels.wheel_surface import angle_to_flat, surface_at
+from railsim.profiles import Profile
+from railsim.simulation import simulate
+
+FOLDER = Path(__file__).parents[1] / "data" / "sections"
+RADIUS = 0.46
+FURTHER = pytest.mark.further
+WHEELSET = "assemblies.bogie.assemblies.axle.wheelsets.wheelset"
+
+
+def written_list(folder, name):
+    """Write the kept sections of a wheel as a `.slcw` list with its files."""
+    kept = np.load(FOLDER / "wheel_sections.npz")
+    points = np.split(1e-4 * kept[f"{name}_points"], np.cumsum(kept[f"{name}_count"])[:-1], axis=1)
+    angles = kept[f"{name}_angle"]
+    lines = [" 0.0 1.0  TH_OFFSET, TH_SCALE", f" {angles.size}  NSLC", " 0 0 0 NFEAT", " 2 % kind"]
+    for k, (angle, part) in enumerate(zip(angles, points, strict=True)):
+        np.savetxt(folder / f"{k}.txt", part.T, fmt="%.4f")
+        lines.append(f" {angle:.9f}  '{k}.txt'")
+    path = folder / "wheel.slcw"
+    path.write_text("% a wheel\n" + "\n".join(lines) + "\n")
+    return path
+
+
+def sections_of(tmp_path, name):
+    """Sections of a wheel as a vehicle that is loaded holds them."""
+    loaded = with_file(tmp_path, written_list(tmp_path, name))
+    group = loaded.assemblies["bogie"].assemblies["axle"].wheelsets["wheelset"]
+    part = group.out_of_round["scan"]
+    assert isinstance(part, Sections)
+    assert part.file is None
+    return part
+
+
+def measured(name):
+    with (FOLDER / f"{name}_dev.csv").open() as lines:
+        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(lines)]
+
+
+class Tables:
+    """Arrays of one surface as the kernel takes them."""
+
+    def __init__(self, *args):
+        self.surface_row, self.surface, self.flat_ahead = surface_arrays([wheel_surface(*args)])
+
+    def at(self, phi, y=0.0):
+        return surface_at.py_func(self, 0, phi, y)
+
+
+def round_rail(radius):
+    Y = 0.75 + np.arange(-0.05, 0.05, 2e-5)
+    height = radius - np.sqrt(radius**2 - (Y - 0.75) ** 2)
+    return RailCurve(float(Y[0]), 2e-5, height, np.zeros_like(Y), np.zeros_like(Y))
+
+
+def test_rounded_flat_as_contact_finds_it(tmp_path):
+    """Height less approach within 0.01 mm, contact ahead within 0.3 mm; symmetric to 1e-6 mm."""
+    tables = Tables([sections_of(tmp_path, "rounded")], 0.45, round_rail(0.3), 0.75)
+    cases = measured("rounded_flat_d09")
+    assert len(cases) == 8
+    for case in cases:
+        e, lead, across = tables.at(-case["pitch_rad"])
+        assert -1e3 * e == pytest.approx(case["z_mm"] - case["approach_mm"], abs=0.01)
+        assert 1e3 * lead == pytest.approx(case["xcp_tr_mm"], abs=0.3)
+        assert abs(across) < 1e-6
+    for phi in np.radians(np.arange(0.5, 7.0, 0.5)):
+        assert tables.at(phi)[0] == pytest.approx(tables.at(-phi)[0], abs=1e-9)
+
+
+def test_measured_flat_as_contact_finds_it(tmp_path):
+    """Height less approach within 0.02 mm at every angle, sections smoothed both ways."""
+    with_points = np.loadtxt(FOLDER / "r300_wide.csv", delimiter=",", skiprows=1).T
+    rail = rail_curve(Profile("r300", "rail", *with_points), 1.435, 0.02)
+    part = sections_of(tmp_path, "chalmers")
+    tables = Tables([part], 0.49, rail, 0.75)
+    _, level, (begin, end) = rolled_out(part, 0.49, rail, 0.75, 1024, ACROSS)
+    assert begin < 0.55 < 0.75 < end
+    for case in measured("chalmers_flat_fz125"):
+        e, lead, _ = tables.at(-case["pitch_rad"])
+        height = 0.49 - level[20] - e
+        assert 1e3 * height == pytest.approx(case["z_mm"] - case["approach_mm"], abs=0.02)
+        assert 1e3 * lead == pytest.approx(case["xcp_tr_mm"], abs=1.5)
+
+
+def test_fresh_flat_is_a_chord():
+    """Depth l^2/(8 r) in the middle, contact half a length away, nothing beyond its ends."""
+    flat = Flat(type="flat", length=0.06, angle=1.0)
+    tables = Tables([flat], RADIUS, round_rail(0.3), 0.75)
+    half = 0.03 / RADIUS
+    e, _, _ = tables.at(1.0)
+    # the jump of the contact is rounded over a cell of the table
+    assert -e == pytest.approx(0.06**2 / 8.0 / RADIUS, rel=0.02)
+    fall = RADIUS * (1.0 - np.cos(0.9 * half))
+    assert -tables.at(1.0 + 0.1 * half)[0] == pytest.approx(fall, rel=1e-5)
+    assert tables.at(1.0 - 0.02 * half)[1] == pytest.approx(-0.98 * 0.03, rel=1e-2)
+    assert tables.at(1.0 + 0.02 * half)[1] == pytest.approx(0.98 * 0.03, rel=1e-2)
+    for phi in (1.0 - 1.01 * half, 1.0 + 1.01 * half, 1.0 + np.pi, 1.0 - np.pi):
+        assert tables.at(phi)[0] == pytest.approx(0.0, abs=1e-9)
+    # a turn later it is there again; before it, the way to it is known
+    assert tables.at(1.0 + 2.0 * np.pi)[0] == pytest.approx(e, rel=1e-9)
+    assert angle_to_flat.py_func(tables, 0, 1.0) == 0.0
+    assert angle_to_flat.py_func(tables, 0, 0.5) == pytest.approx(0.5 - half, abs=5e-3)
+    assert angle_to_flat.py_func(tables, 0, 1.0 + half + 0.1) == pytest.approx(2 * np.pi, abs=0.3)
+
+
+def test_path_and_lead_belong_together():
+    """The lead is the slope of the height, so that the normal force does no work over a turn."""
+    parts = [
+        Harmonics(type="harmonics", waves=((3, 1e-4, 0.2), (17, 2e-5, 1.0))),
+        Flat(type="flat", length=0.05, shape="worn", angle=-2.0),
+    ]
+    tables = Tables(parts, RADIUS, round_rail(0.3), 0.75)
+    for phi in np.linspace(-8.0, 8.0, 41):
+        h = 1e-6
+        slope = (tables.at(phi + h)[0] - tables.at(phi - h)[0]) / (2.0 * h)
+        assert tables.at(phi)[1] == pytest.approx(slope, abs=1e-8)
+    phi = 0.7
+    exact = 1e-4 * np.cos(3 * phi + 0.2) + 2e-5 * np.cos(17 * phi + 1.0)
+    assert tables.at(phi)[0] == pytest.approx(exact, abs=1e-10)
+
+
+def straight(preset, length=200.0, **more):
+    plan = [{"type": "STR", "length": length}]
+    cant = [{"type": "CST", "length": length, "cant": 0.0}]
+    values = {"plan": plan, "cant": cant, "support": {"preset": preset}, **more}
+    return load_track("straight").replace(**values)
+
+
+def with_wheels(**parts):
+    return load_vehicle("benchmark_vehicle1").with_values({f"{WHEELSET}.out_of_round": parts})
+
+
+def fitted(result, omega, begin):
+    """Amplitude of the leading right wheel's load at a frequency [N]."""
+    t = result["time"]
+    known = t > begin
+    t, Q = t[known], result["Q"][known, 0, 1]
+    basis = np.column_stack([np.cos(omega * t), np.sin(omega * t), np.ones_like(t), t])
+    found = np.linalg.lstsq(basis, Q, rcond=None)[0]
+    return float(np.hypot(found[0], found[1]))
+
+
+@pytest.mark.parametrize("preset", [pytest.param("rigid", marks=FURTHER), "co-running"])
+def test_wave_around_the_wheel_is_a_wave_of_the_rail(preset):
+    """Order n equals a sine of the wavelength 2 pi r/n as irregularity, within 0.1 %."""
+    order, amplitude, speed = 8, 2e-5, 14.0
+    wave = 2.0 * np.pi * RADIUS / order
+    waves = [[order, amplitude, 0.3]]
+    uneven = with_wheels(all={"type": "harmonics", "waves": waves})
+    sweep = {
+        "type": "sweep",
+        "amplitude": amplitude,
+        "wavelengths": [wave, wave],
+        "begin": -20.0,
+        "end": 180.0,
+        "fade": 0.0,
+    }
+    settings = load_settings().with_values({"output_rate": 2000.0})
+    how = {"speed": speed, "start": 20.0, "duration": 2.5, "settings": settings}
+    mine = simulate(uneven, straight(preset), **how)
+    other = simulate(
+        load_vehicle("benchmark_vehicle1"), straight(preset, irregularities=[sweep]), **how
+    )
+    omega = 2.0 * np.pi * speed / wave
+    a, b = (fitted(result, omega, 1.0) for result in (mine, other))
+    assert b > 200.0
+    assert a == pytest.approx(b, rel=1e-3)
+
+
+@pytest.mark.parametrize("length", [pytest.param(0.04, marks=FURTHER), 0.06])
+def test_worn_flat_is_a_dip_of_the_rail(length):
+    """A haversine flat gives the forces of a dip of its length and depth, within 1 %."""
+    at, speed = 30.0, 16.0
+    flat = {"type": "flat", "length": length, "shape": "worn"}
+    flat["angle"] = float((at / RADIUS + np.pi) % (2.0 * np.pi) - np.pi)
+    dip = {"type": "dip", "s": at, "length": length, "depth": length**2 / 16.0 / RADIUS}
+    dip["shape"] = "cosine"
+    settings = load_settings().with_values({"output_rate": 20000.0})
+    vehicle = load_vehicle("benchmark_vehicle1")
+    first = max(body.position[0] for body in flatten(vehicle).of_kind("wheelset"))
+    how = {"speed": speed, "start": at - first - 0.5, "duration": 0.6 / speed, "settings": settings}
+    mine = simulate(with_wheels(one=flat), straight("co-running"), **how)
+    other = simulate(vehicle, straight("co-running", irregularities=[dip]), **how)
+    Q, P = mine["Q"][:, 0, 1], other["Q"][:, 0, 1]
+    assert P.max() > 1.5 * P[0]
+    assert Q.max() == pytest.approx(P.max(), rel=0.01)
+
+
+def test_left_and_right_are_mirror_images():
+    """A flat on the left wheel of the mirrored vehicle gives the mirrored forces."""
+    flat = {"type": "flat", "length": 0.05, "wheel": "right", "angle": 0.6}
+    vehicle = with_wheels(one=flat)
+    settings = load_settings().with_values({"output_rate": 5000.0})
+    how = {"speed": 12.0, "start": 20.0, "duration": 0.1, "settings": settings}
+    mine = simulate(vehicle, straight("p2"), **how)
+    other = simulate(mirrored_vehicle(vehicle), straight("p2"), **how)
+    Q, P = mine["Q"], other["Q"][:, :, ::-1]
+    assert np.abs(Q - Q[0]).max() > 1e4
+    np.testing.assert_allclose(Q, P, atol=1e-6 * Q.max())
+
+
+def test_run_goes_on_at_the_wheels_angle():
+    """The angle is part of the state: a run in two parts is the run in one."""
+    vehicle = with_wheels(one={"type": "flat", "length": 0.05, "angle": 0.6})
+    track = straight("p2")
+    whole = simulate(vehicle, track, speed=12.0, start=20.0, duration=0.4)
+    first = simulate(vehicle, track, speed=12.0, start=20.0, duration=0.2)
+    second = simulate(vehicle, track, duration=0.2, resume=first)
+    np.testing.assert_allclose(second["Q"][-1], whole["Q"][-1], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ({"type": "flat", "length": 0.5}, "length"),
+        ({"type": "harmonics", "waves": [[2.5, 1e-4, 0.0]]}, "whole number"),
+        ({"type": "table", "rows": [[0.0, 0.0], [1.0, 1e-4], [7.0, 0.0]]}, "turn"),
+        ({"type": "table", "rows": [[0.0, 0.0], [1.0, 1e-4], [0.5, 0.0]]}, "increase"),
+        ({"type": "sections"}, "'file'"),
+        ({"type": "oval"}, "type"),
+    ],
+)
+def test_wrong_wheels_are_refused(part, said):
+    with pytest.raises(InputError, match=said):
+        with_wheels(one=part)
+
+
+def test_wrong_lists_are_refused(tmp_path):
+    path = written_list(tmp_path, "rounded")
+    text = path.read_text()
+    lines = text.splitlines()
+    wrong = {
+        "rising positions": "\n".join([*lines[:6], lines[5], *lines[7:]]),
+        "no file": text.replace("'3.txt'", "'none.txt'"),
+        "sections": text.replace(" 57  NSLC", " 1  NSLC"),
+        "times": text.replace(" 57  NSLC", " 99  NSLC"),
+    }
+    for said, changed in wrong.items():
+        path.write_text(changed)
+        with pytest.raises(InputError, match=said):
+            with_file(tmp_path, path)
+    path.write_text(text)
+    (tmp_path / "3.txt").write_text("-3e-4 0\n" * 20)
+    with pytest.raises(InputError, match="wide"):
+        with_file(tmp_path, path)
+
+
+def with_file(folder, path):
+    file = folder / "coach.toml"
+    head = 'format = "railsim-vehicle/1"\nname = "x"\nextends = "coach_manchester"\n'
+    table = f'[{WHEELSET}.out_of_round.scan]\ntype = "sections"\nfile = "{path.name}"\n'
+    file.write_text(head + table)
+    return load_vehicle(file)
