@@ -7,6 +7,7 @@ module         job
 `curves`       profiles placed on axle and track, with slopes and averaged curvatures
 `conicity`     equivalent conicity of EN 15302
 `geometry`     rigid contact functions of a wheelset
+`out_of_round` surfaces of wheels that are not round
 `table`        the contact table: generator, cache on disk
 `kalker`       creepage coefficients of linear theory
 `creep`        creep force by every law, for scripts and plots
