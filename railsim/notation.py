@@ -498,6 +498,25 @@ REQUESTED = {
             _row("patch_friction", "coefficient of friction of the patch", r"\mu", "1", _PATCH),
         ),
         *_requested(
+            "check_rail",
+            _row(
+                "check_rail_force",
+                "force of the check rail",
+                "F_c",
+                "kN",
+                _WHEEL,
+                "on the back of the flange, lateral; not part of Y",
+            ),
+            _row(
+                "check_rail_T_gamma",
+                "wear number of the check rail",
+                r"T\gamma_{cr}",
+                "N",
+                _WHEEL,
+                "friction work at the back of the flange per metre of the vehicle's way",
+            ),
+        ),
+        *_requested(
             "sensors",
             _row(
                 "sensor_acceleration",

@@ -24,6 +24,7 @@ from railsim.definitions.base import (
     pair,
     rises,
 )
+from railsim.definitions.check_rail import MOST_CHECK_RAILS, CheckRail
 from railsim.definitions.excitations import Irregularity
 from railsim.definitions.file_definition import FileDefinition
 from railsim.definitions.support import Support
@@ -238,6 +239,8 @@ class TrackTables(FileDefinition):
 
     irregularities: tuple[Irregularity, ...] = Field(default=(), max_length=MOST_IRREGULARITIES)
     """Displacements of the rails from their ideal positions; they add up"""
+    check_rail: tuple[CheckRail, ...] = Field(default=(), max_length=MOST_CHECK_RAILS)
+    """Check rails and guard rails"""
     support: Support = Support()
     """What carries the rails: rigid, or elastic as a moving track model"""
 

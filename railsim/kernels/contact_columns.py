@@ -41,11 +41,24 @@
 ) = range(34)
 PATCH_ROWS = 34
 
-# columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch
-(W_Q, W_Y, W_XI_X, W_XI_Y, W_PHI, W_T_GAMMA, W_LIFT, W_NORMAL, W_T_GAMMA_SPIN, W_C_Y, W_C_Z) = (
-    range(11)
-)
-WHEEL_COLUMNS = 11
+# columns of Work.wheel[w, side]; creepages, normal force and position of the most loaded patch;
+# force of check rails and its wear number
+(
+    W_Q,
+    W_Y,
+    W_XI_X,
+    W_XI_Y,
+    W_PHI,
+    W_T_GAMMA,
+    W_LIFT,
+    W_NORMAL,
+    W_T_GAMMA_SPIN,
+    W_C_Y,
+    W_C_Z,
+    W_CHECK,
+    W_CHECK_GAMMA,
+) = range(13)
+WHEEL_COLUMNS = 13
 
 # columns of Work.contact_jacobian[b], what the contact takes from the wheelset's speeds, for the
 # implicit part of the step: creep forces along the track [N s/m], the same times the lever c_z

@@ -23,6 +23,7 @@ the angle g > 0 where the normal leans to the right; on the wheel the opposite, 
 """
 
 from railsim.kernels import compiled
+from railsim.kernels.check_rails import add_check_rails
 from railsim.kernels.contact_columns import (
     ANGLE_COS,
     ANGLE_SIN,
@@ -156,6 +157,8 @@ def wheel_rail(system, work, speed, state):
         if system.support.elastic and work.support_step[k, SKIP] > 0.0:
             continue
         complete_normal_force(system, work, b, state)
+    if system.contact.check.shape[0] > 0:
+        add_check_rails(system, work, speed, state)
     patch = work.patch
     for k in range(n):  # here and not above, where each patch would wait for its root
         third = cube_root(patch[NORMAL, k])

@@ -44,6 +44,7 @@ from railsim.kernels.system import (
     System,
 )
 from railsim.kernels.track_frame import TrackTables
+from railsim.model.check_rails import NONE, CheckRails, check_rails
 from railsim.model.element_arrays import ElementArrays
 from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
 from railsim.model.work import CONSTANT_SPEED
@@ -102,6 +103,8 @@ class Model:
         The vehicle in its design load, whose preloads these are, where a load case is in force.
     wheels : UnevenWheels
         Wheels that are not round, which `system` leaves out: see `railsim.model.uneven_wheels`.
+    check : CheckRails
+        Check rails, likewise.
     """
 
     system: System
@@ -111,6 +114,7 @@ class Model:
     profiles: Mapping[str, Profile]
     design: "Model | None" = None
     wheels: UnevenWheels = ROUND
+    check: CheckRails = NONE
 
     @property
     def n_state(self) -> int:
@@ -172,7 +176,8 @@ def assemble(
         unloaded = vehicle.model_copy(update={"load": None})
         design = assemble(unloaded, track, settings, profiles, shared)
     wheels = uneven_wheels(flat, track, book.used)
-    return Model(system, index, flat, tables, book.used, design, wheels)
+    check = check_rails(flat, track, book.used)
+    return Model(system, index, flat, tables, book.used, design, wheels, check)
 
 
 def without_rails(vehicle: Vehicle) -> Model:
@@ -459,6 +464,7 @@ def _contact(
         friction_rest=falling.rest if falling else 1.0,
         friction_decay=falling.decay if falling else 0.0,
         **ROUND._asdict(),
+        **NONE._asdict(),
     )
     return contact, tuple(tables)
 

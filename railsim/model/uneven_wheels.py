@@ -1,7 +1,7 @@
 """Wheels that are not round, in the arrays of a run.
 
 Equilibrium, linear analyses and the choice of the step see round wheels, as they see smooth rails;
-`rolling` gives the system that runs.
+`rolling` gives the system that runs, with the check rails.
 """
 
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from railsim.definitions.track import Track
 from railsim.kernels.contact_table import FLANGE, N_PATCH
 from railsim.kernels.system import System
 from railsim.kernels.wheel_surface import FLAT, SURFACE_ROW, WAVE
+from railsim.model.check_rails import CheckRails
 from railsim.profiles.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -78,9 +79,10 @@ def uneven_wheels(flat: FlatVehicle, track: Track, profiles: dict[str, Profile])
     return UnevenWheels(surface_of, *surface_arrays(surfaces))
 
 
-def rolling(system: System, wheels: UnevenWheels) -> System:
-    """Return the system with its wheels as they are."""
-    return system._replace(contact=system.contact._replace(**wheels._asdict()))
+def rolling(system: System, wheels: UnevenWheels, check: CheckRails) -> System:
+    """Return the system with its wheels as they are, and check rails."""
+    contact = system.contact._replace(**wheels._asdict(), **check._asdict())
+    return system._replace(contact=contact)
 
 
 def joined(wheels: list[UnevenWheels], counts: list[int]) -> UnevenWheels:

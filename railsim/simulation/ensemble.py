@@ -113,7 +113,7 @@ class Ensemble:
             for own, inner, axles, chosen in zip(bodies, internal, wheelsets, elements, strict=True)
         )
         if len(models) == 1:
-            self.system = rolling(systems[0], models[0].wheels)
+            self.system = rolling(systems[0], models[0].wheels, models[0].check)
             self.recorder = recorders[0]
             return
         self.system = joined_system(models)
@@ -268,6 +268,9 @@ def _joined_contact(models: Sequence[Model], first: Ints) -> Contact:
         shear=np.array(shear),
         coupling=np.array(coupling),
         **joined([model.wheels for model in models], [len(c.body) for c in contacts])._asdict(),
+        check=models[0].check.check,
+        check_flangeway=models[0].check.check_flangeway,
+        check_wheel=np.concatenate([model.check.check_wheel for model in models]),
     )
 
 

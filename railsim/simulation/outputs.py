@@ -16,6 +16,8 @@ from railsim.kernels import extremes as seen
 from railsim.kernels.contact_columns import (
     W_C_Y,
     W_C_Z,
+    W_CHECK,
+    W_CHECK_GAMMA,
     W_NORMAL,
     W_PHI,
     W_Q,
@@ -89,6 +91,14 @@ def quantities(model: Model, recorder: Recorder, rows: int, Q0: Floats) -> Mappi
         "contact_z": there * wheel[..., W_C_Z],
         "T_gamma": wheel[..., W_T_GAMMA],
         "T_gamma_spin": wheel[..., W_T_GAMMA_SPIN],
+        **(
+            {
+                "check_rail_force": wheel[..., W_CHECK],
+                "check_rail_T_gamma": wheel[..., W_CHECK_GAMMA],
+            }
+            if len(model.check.check)
+            else {}
+        ),
         "body_position": position,
         "body_velocity": recorder.rates[:rows].reshape(rows, n, 6),
         "body_acceleration": recorder.acceleration[:rows],
@@ -295,7 +305,12 @@ class OutputPlan:
         )
 
     def _known(self) -> tuple[Quantity, ...]:
-        asked = {**dict(self._asked), "elements": self.elements, "sensors": self._sensors}
+        asked = {
+            **dict(self._asked),
+            "elements": self.elements,
+            "sensors": self._sensors,
+            "check_rail": self._track_file.check_rail,
+        }
         more = [q for q in REQUESTED.values() if asked[q.request]]
         if self._readings_only:
             more = [q for q in more if q.request != "sensors" or q.name in READINGS]

@@ -1,0 +1,49 @@
+"""Check rails: third rails beside running rails, which guide the backs of flanges."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BeforeValidator, Field
+
+from railsim.definitions.base import Definition, Finite, NonNegative, Positive, rises
+
+OTHER: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
+MOST_CHECK_RAILS = 100
+Width = Annotated[Finite, Field(ge=0.02, le=0.2)]
+FAR = 1e7  # m
+
+
+def _rows(value: object) -> object:
+    """One width for all of the track."""
+    return ((-FAR, value), (FAR, value)) if isinstance(value, int | float) else value
+
+
+class CheckRail(Definition):
+    """A check rail, or a guard rail of a sharp curve."""
+
+    rail: Literal["left", "right"]
+    """Running rail beside which it stands; it holds the wheelset by the wheel on that rail"""
+    flangeway: Annotated[
+        tuple[tuple[Finite, Width], ...],
+        Field(min_length=2, max_length=10_000),
+        rises("arc length"),
+        BeforeValidator(_rows),
+    ]
+    """Rows [s, width] from its begin to its end, linear in between, or one width all along: from
+    the gauge face of the running rail to its own face, both 14 mm below the rail tops [m]"""
+    height: Annotated[Finite, Field(ge=-0.02, le=0.08)] = 0.0
+    """Height of its top above the tops of the running rails [m]"""
+    profile: (
+        Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2, max_length=1000)] | None
+    ) = None
+    """Points [y, z] of its contour from the top down the face: y towards the running rail, z down
+    from its top [m]; by default a plane face"""
+    friction: NonNegative = 0.3
+    """Coefficient of friction [1]"""
+    stiffness: Annotated[Positive, Field(ge=1e5, le=5e8)] = 5e7
+    """Lateral stiffness with its fastening [N/m]"""
+    damping: NonNegative = 5e4
+    """Its damping [N s/m]"""
+
+    def mirrored(self) -> Self:
+        """Return the same beside the other rail."""
+        return self.model_copy(update={"rail": OTHER[self.rail]})

@@ -1,0 +1,124 @@
+"""Check rails: first contact with the sections of a real one, forces against equilibrium, mirror."""
+
+import numpy as np
+import pytest
+
+from railsim.definitions.check_rail import CheckRail
+from railsim.definitions.flatten import flatten
+from railsim.definitions.loading import load_settings, load_track, load_vehicle
+from railsim.definitions.mirror import mirrored_track, mirrored_vehicle
+from railsim.errors import InputError
+from railsim.model.check_rails import flange_back
+from railsim.profiles import Profile
+from railsim.simulation import simulate
+
+# contour of the check rail of crossing 56E1-R245-1:9.25 where it is narrowest, and flange of the
+# wheel used with it (program CONTACT, see tests/data/sections): y, z [mm]
+FACE = [(-19.136, 1.0), (-6.016, 5.0), (-2.016, 10.0), (-1.026, 13.49), (-0.976, 14.0)]
+FACE += [(-0.656, 20.0), (-0.256, 28.0), (0.0, 33.0)]
+BACK = [(-69.61263, 13.48559), (-69.0, 16.6), (-67.0, 21.0), (-63.0, 25.3), (-56.0, 28.0)]
+
+
+def clearance(back_to_back, gauge):
+    """Lateral displacement at which the back of the flange touches [mm]."""
+    wheelset = flatten(load_vehicle("coach_manchester")).of_kind("wheelset")[0].wheelset
+    wheelset = wheelset.model_copy(update={"back_to_back": back_to_back})
+    y, z = 1e-3 * np.array([*BACK, (-40.0, 9.0), (0.0, 0.0), (60.0, -2.6)]).T
+    profiles = {name: Profile(name, "wheel", y, z) for name in wheelset.profile}
+    profile = tuple((1e-3 * y, 1e-3 * z) for y, z in FACE)
+    # the face is 76.00 mm inside of y = 0 of the rail, its gauge face 35.00 mm
+    rail = CheckRail(rail="right", flangeway=0.041, profile=profile)
+    offset, below, reach, back = flange_back(wheelset, rail, gauge, profiles)
+    assert below == pytest.approx(0.46 + 0.0135, abs=1e-3)
+    assert reach == pytest.approx(np.sqrt(0.488**2 - below**2), rel=1e-6)
+    assert back == pytest.approx(0.5 * back_to_back + 0.07 - 0.06961, abs=5e-4)
+    return 1e3 * (offset + 0.041)
+
+
+@pytest.mark.parametrize(
+    ("back_to_back", "gauge", "expected"),
+    [(1.360, 1.430, 6.44), (1.357, 1.430, 4.94), (1.363, 1.430, 7.94), (1.360, 1.435, 3.94)],
+)
+def test_first_contact(back_to_back, gauge, expected):
+    assert clearance(back_to_back, gauge) == pytest.approx(expected, abs=0.08)
+
+
+def curve(rails=(), **more):
+    """Curve of 150 m radius with a check rail beside the inner (right) rail."""
+    plan = [
+        {"type": "STR", "length": 25.0},
+        {"type": "CLO", "length": 20.0},
+        {"type": "CIR", "length": 60.0, "radius": 150.0},
+    ]
+    values = {"plan": plan, "cant": [{"type": "CST", "length": 105.0, "cant": 0.0}]}
+    return load_track("straight").replace(**values, check_rail=list(rails), speed=None, **more)
+
+
+RAIL = {"rail": "right", "flangeway": [[5.0, 0.060], [8.0, 0.040], [120.0, 0.040]]}
+HOW = {"speed": 8.0, "start": 12.0, "until": 85.0}
+
+
+def test_check_rail_relieves_the_outer_rail_in_a_sharp_curve():
+    """Its force guides the leading wheelset; Newton's law holds for the sum of lateral forces."""
+    coach = load_vehicle("coach_manchester")
+    plain, guided = simulate(coach, curve(), **HOW), simulate(coach, curve([RAIL]), **HOW)
+    assert "check_rail_force" not in plain
+    force = guided["check_rail_force"]
+    at_end = slice(-20, None)
+    N = force[at_end, 0, 1].mean()
+    assert N > 5e3
+    assert np.all(force[:, :, 0] == 0.0)
+    assert np.all(force >= 0.0)
+    # the outer (left) flange of the leading wheelset carries nothing any more
+    assert plain["Y"][at_end, 0, 0].mean() < -0.5 * N
+    assert guided["Y"][at_end, 0, 0].mean() > 0.0
+    relief = (guided["sum_Y"] - plain["sum_Y"])[at_end, 0].mean()
+    assert relief == pytest.approx(N, rel=0.1)
+    shift = guided["wheelset_lateral"] - plain["wheelset_lateral"]
+    assert shift[at_end, 0].mean() > 2e-3  # to the inner side
+    # lateral forces of all rails balance the same inertia
+    total = [
+        (result["sum_Y"].sum(axis=1) - extra)[at_end].mean()
+        for result, extra in ((plain, 0.0), (guided, force[:, :, 1].sum(axis=1)))
+    ]
+    assert total[1] == pytest.approx(total[0], rel=0.02)
+    # the back slides down ahead of the axle, at V x_c/r, up to the edge of the disc
+    wear = guided["check_rail_T_gamma"][at_end, 0, 1].mean()
+    reach = np.sqrt((0.46 + 0.028) ** 2 - 0.46**2) / 0.46
+    assert 0.9 * 0.3 * N * reach < wear < 1.02 * 0.3 * N * reach
+
+
+def test_check_rail_in_the_mirror():
+    coach, track = load_vehicle("coach_manchester"), curve([RAIL])
+    settings = load_settings()
+    mine = simulate(coach, track, settings=settings, **{**HOW, "until": 50.0})
+    other = simulate(
+        mirrored_vehicle(coach), mirrored_track(track), settings=settings, **{**HOW, "until": 50.0}
+    )
+    assert mine["check_rail_force"].max() > 1e3
+    np.testing.assert_allclose(
+        mine["check_rail_force"], other["check_rail_force"][:, :, ::-1], atol=50.0
+    )
+
+
+def test_check_rail_that_is_out_of_reach_changes_nothing():
+    coach = load_vehicle("coach_manchester")
+    far = {"rail": "left", "flangeway": 0.15}
+    how = {"speed": 8.0, "start": 12.0, "until": 30.0}
+    mine, plain = simulate(coach, curve([far]), **how), simulate(coach, curve(), **how)
+    np.testing.assert_array_equal(mine["Q"], plain["Q"])
+    assert not mine["check_rail_force"].any()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"flangeway": 0.5}, "flangeway"),
+        ({"flangeway": [[3.0, 0.04], [1.0, 0.04]]}, "increase"),
+        ({"rail": "both"}, "rail"),
+        ({"stiffness": 1e12}, "stiffness"),
+    ],
+)
+def test_wrong_check_rails_are_refused(wrong, said):
+    with pytest.raises(InputError, match=said):
+        curve([{**RAIL, **wrong}])
