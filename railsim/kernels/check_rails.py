@@ -9,8 +9,8 @@ the flangeway (right side; the left one mirrored),
 
 y, roll and yaw psi against the rails.  The force acts at x_c, the slope of p over the yaw, which
 goes to +-c; along the track it has the part N df/ds, so that what an entry flare does to the side
-it takes from the run.  The friction mu N opposes the slip of the flange's back, which mostly slides down ahead of
-the axle, up behind it, and backwards below the rail's top.
+it takes from the run.  The friction mu N opposes the slip of the flange's back, which slides down
+ahead of the axle, up behind it, and backwards below the rail's top.
 """
 
 from math import sqrt

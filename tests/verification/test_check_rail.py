@@ -1,4 +1,4 @@
-"""Check rails: first contact with the sections of a real one, forces against equilibrium, mirror."""
+"""Check rails: first contact with sections of a real one, forces against equilibrium, mirror."""
 
 import numpy as np
 import pytest
