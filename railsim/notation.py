@@ -4,6 +4,7 @@ Everything that names a quantity to a user (HDF5 attributes, plot axes, printed 
 from here; docs/notation.md is made from this table.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi
@@ -152,6 +153,22 @@ def _row(
     known = [SHOWN_UNITS.get(unit, (unit, 1.0)) for unit in shown.split(", ")]
     unit = ", ".join(stored for stored, _ in known)
     return Quantity(name, words, symbol, unit, dims, shown, known[0][1], sign, "", formula)
+
+
+GREEK = {"Delta": "Δ", "Sigma": "Σ", "varphi": "φ", "phi": "φ", "psi": "ψ", "theta": "θ",
+         "gamma": "γ", "kappa": "κ", "mu": "μ", "xi": "ξ", "dot": "", "ddot": ""}  # fmt: skip
+
+
+def plain_symbol(symbol: str) -> str:
+    r"""A symbol in mathtext as plain characters, for pages.
+
+    Examples
+    --------
+    >>> plain_symbol(r"\Delta Q/Q_0"), plain_symbol(r"\Sigma Y"), plain_symbol(r"T\gamma")
+    ('ΔQ/Q₀', 'ΣY', 'Tγ')
+    """
+    text = re.sub(r"\\([a-z]+) ?", lambda m: GREEK.get(m[1], m[1]), symbol, flags=re.IGNORECASE)
+    return text.translate(str.maketrans("", "", "{}")).replace("_0", "₀").replace("_", "")
 
 
 def frictional_power(values: Mapping[str, Any]) -> Any:

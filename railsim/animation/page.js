@@ -88,6 +88,11 @@ function polygons() {
       return;
     }
     const corner = [];
+    if (!scene.forces) {
+      const still = [];
+      for (const x of [-a, a]) for (const y of [-b, b]) for (const z of [-c, c]) still.push(toSpace(trackAt(s0 + body.offset), [x + mx, body.y + y + my, body.z + z + mz]));
+      for (const face of FACES) { add(face.map(i => still[i]), null, ink.soft); found[found.length - 1].closed = true; }
+    }
     for (const x of [-a, a]) for (const y of [-b, b]) for (const z of [-c, c]) corner.push(place([x + mx, y + my, z + mz]));
     for (const face of FACES) add(face.map(i => corner[i]), ink[body.kind], body.kind === "car" ? ink.left : ink.right);
   });
@@ -100,7 +105,8 @@ function drawView() {
   for (const poly of list) {
     g.beginPath();
     poly.p.forEach((p, i) => i ? g.lineTo(X(p), Y(p)) : g.moveTo(X(p), Y(p)));
-    if (poly.fill) { g.closePath(); g.fillStyle = poly.fill; g.fill(); }
+    if (poly.fill || poly.closed) g.closePath();
+    if (poly.fill) { g.fillStyle = poly.fill; g.fill(); }
     g.strokeStyle = poly.stroke; g.stroke();
   }
   if (!scene.forces) return;
@@ -207,9 +213,9 @@ const SERIES = scene.forces ? [
   [scene.words.Q, i => scene.forces.Q[i][chosen]],
   [scene.words.Y, i => scene.forces.Y[i][chosen]],
   [scene.words.wheelset_lateral, i => [scene.pose[i][first + chosen][1] * 1e3]],
-] : [["lateral displacement of the first body (relative)", i => [scene.pose[i][0][1]]]];
+] : [];
 function drawPlots() {
-  const [g, w, h] = fit($("plots")), axis = scene.forces ? scene.distance : scene.time;
+  const [g, w, h] = fit($("plots")), axis = scene.distance;
   const low = axis[0], high = axis[n - 1], left = 44, each = (h - 18) / SERIES.length;
   const X = v => left + (w - left - 8) * (v - low) / (high - low);
   g.font = "11px system-ui, sans-serif"; g.lineWidth = 1.2;
@@ -231,7 +237,7 @@ function drawPlots() {
   g.strokeStyle = ink.now; g.beginPath(); g.moveTo(X(axis[frame]), 16); g.lineTo(X(axis[frame]), h - 16); g.stroke();
   g.fillStyle = ink.soft; g.textAlign = "left"; g.fillText(low.toFixed(0), left, h - 4);
   g.textAlign = "right"; g.fillText(high.toFixed(0), w - 8, h - 4);
-  g.textAlign = "center"; g.fillText(scene.forces ? "distance (m)" : "time (s)", (left + w) / 2, h - 4);
+  g.textAlign = "center"; g.fillText("distance (m)", (left + w) / 2, h - 4);
 }
 function speedAt(i) {
   const a = Math.max(0, i - 1), b = Math.min(n - 1, i + 1);
@@ -240,7 +246,7 @@ function speedAt(i) {
 function draw() {
   drawView();
   if (scene.sections.length) { drawSection(0); drawSection(1); drawBehind(); drawBeside(); }
-  drawPlots();
+  if (SERIES.length) drawPlots();
   $("scrub").value = frame;
   const s = scene.distance[frame], at = trackAt(s), ahead = trackAt(s + 1);
   const kappa = ahead.heading - at.heading;
@@ -276,7 +282,7 @@ for (const [share, words] of [[.05, "1/20"], [.1, "1/10"], [.25, "1/4"], [.5, "1
   const option = document.createElement("option"), kmh = 3.6 * speed * share;
   option.value = share;
   option.textContent = speed > .1 ? (kmh < 10 ? kmh.toFixed(1) : kmh.toFixed(0)) + " km/h" + (share === 1 ? " (as run)" : "") : words + " of real time";
-  option.selected = share === (scene.forces ? 1 : .1);
+  option.selected = share === 1;
   $("rate").append(option);
 }
 wheelsets.forEach((body, i) => { const option = document.createElement("option"); option.value = i; option.textContent = i + 1 + " " + body.name; $("wheelset").append(option); });
@@ -309,6 +315,18 @@ view.addEventListener("pointermove", e => {
 for (const name of ["pointerup", "pointercancel"]) view.addEventListener(name, e => { fingers.delete(e.pointerId); apart = 0; });
 view.addEventListener("wheel", e => { scale = Math.min(Math.max(scale * Math.exp(-e.deltaY * .001), .3), 30); draw(); e.preventDefault(); }, { passive: false });
 window.addEventListener("resize", draw);
+function show(mode) {
+  Object.assign(scene, mode);
+  $("title").textContent = document.title = mode.title;
+  // a cycle in about two seconds
+  const shares = Array.from($("rate").options, o => +o.value), period = scene.time[n - 1] - scene.time[0];
+  $("rate").value = shares.reduce((a, b) => Math.abs(Math.log(b * 2 / period)) < Math.abs(Math.log(a * 2 / period)) ? b : a);
+  go(0);
+}
+scene.modes.forEach((mode, i) => { const option = document.createElement("option"); option.value = i; option.textContent = mode.name; option.selected = mode.title === scene.title; $("mode").append(option); });
+$("mode").onchange = e => show(scene.modes[+e.target.value]);
+if (!scene.modes.length) $("mode").parentNode.hidden = true;
+if (!scene.sections.length) $("side").hidden = $("main").classList.add("alone") || true;
 if (!scene.sections.length) $("sections").hidden = $("wheelset").parentNode.hidden = $("key").hidden = true;
 inks();
-draw();
+if (scene.modes.length) { show(scene.modes[+$("mode").value]); play(true); } else draw();

@@ -1,5 +1,6 @@
 """A scene as one HTML page without anything from elsewhere: plays, scrubs, zooms, turns."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,19 @@ from railsim.notation import QUANTITIES
 from railsim.page import rendered
 
 
-def write_page(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Path:
+def write_page(
+    scene: Scene, path: str | Path, *, modes: Sequence[Scene] = (), overwrite: bool = False
+) -> Path:
     """Write a scene as an HTML page.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is shown at first.
+    path : str or Path
+    modes : sequence of Scene
+        Modes of the same vehicle to choose from, the scene among them.
+    overwrite : bool
 
     Raises
     ------
@@ -26,7 +38,7 @@ def write_page(scene: Scene, path: str | Path, *, overwrite: bool = False) -> Pa
         title=scene.title,
         styles=["page.css"],
         scripts=["page.js"],
-        data=scene_data(scene),
+        data=scene_data(scene) | {"modes": [_motion(mode) for mode in modes]},
         schemes="light dark",
     )
     with whole_file(path) as partial:
@@ -62,6 +74,16 @@ def scene_data(scene: Scene) -> dict[str, Any]:
         "seats": None if scene.seats is None else _list(scene.seats, 5),
         "patches": patches,
     }  # fmt: skip
+
+
+def _motion(scene: Scene) -> dict[str, Any]:
+    """What differs between the modes of a vehicle."""
+    return {
+        "title": scene.title,
+        "name": scene.title.partition(" · ")[2],
+        "time": _list(scene.time, 5),
+        "pose": _list(scene.pose, 4),
+    }
 
 
 def _words(name: str) -> str:

@@ -18,6 +18,7 @@ def run_campaign(
     overwrite: bool,
     as_json: bool,
     quiet: bool,
+    report: bool = False,
 ) -> int:
     """Run a scenario for vehicles, print and write its assessment; return the exit status."""
     from railsim.cli import DONE
@@ -37,6 +38,12 @@ def run_campaign(
             on_remark=lambda text: echo(f"remark: {text}", err=True),
         )  # fmt: skip
     written = write_assessments(Path(out), done.assessments)
+    if report:
+        from railsim.cli.report import write_report
+
+        page = Path(out) / "report.html"
+        write_report([out], page)
+        written.append(page)
     if as_json:
         print_json({
             "folder": str(done.folder),

@@ -1,6 +1,8 @@
 """``railsim modes``: eigenfrequencies, damping and mode shapes of a vehicle."""
 
 import math
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,10 +13,12 @@ from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from railsim.linear.modes import RootLocus
+    from railsim.definitions.vehicle import Vehicle
+    from railsim.linear.modes import Modes, RootLocus
 
 FILES = ("modes.json", "modes.png")
-ANIMATION = "mode.html"
+ANIMATION, ALL = "mode.html", "modes.html"
+CYCLE = {"frames": 40, "cycles": 1}
 
 
 @click.command()
@@ -47,9 +51,11 @@ ANIMATION = "mode.html"
 )
 @click.option("--cant", type=float, default=0.0, metavar="H", help="Cant of the track in m.")
 @click.option(
-    "--animate", metavar="NAME", help="Write this mode to --out as an animated page, mode.html."
+    "--animate",
+    metavar="NAME",
+    help="Begin the animated page of --out with this mode, and call it mode.html.",
 )
-@analysis_options("modes.json and modes.png")
+@analysis_options("modes.json, modes.png and, at one speed, modes.html with all modes animated")
 def command(
     files: InputFiles,
     output: Output,
@@ -81,6 +87,8 @@ def command(
         wrong = "given without --out" if output.out is None else "given with --speeds or --over"
         raise InputError([Fault("--animate", "", wrong, "one speed, and --out DIR")])
     names = FILES if animate is None else (*FILES, ANIMATION)
+    if speeds is None and over is None and animate is None:
+        names = (*FILES, ALL)
     folder = Folder(output.out, names, output.overwrite)
     with progress_bar("modes", quiet=output.quiet):
         found: Modes | RootLocus
@@ -92,21 +100,39 @@ def command(
         else:
             how.update(settings=inputs.settings, speed=speed)
             found = modes(inputs.vehicle, inputs.track, **how)
-    if animate is not None and folder.path is not None:
-        from railsim.animation import mode_scene, write_page
-        from railsim.animation.scene import chosen_mode
-        from railsim.files import make_folder
-
-        mode = chosen_mode(found.record()["modes"], animate, "--animate")  # type: ignore[call-overload]
-        make_folder(folder.path)
-        page = folder.path / ANIMATION
-        folder.written.append(write_page(mode_scene(inputs.vehicle, mode), page, overwrite=True))
+    if folder.path is not None and isinstance(found, Modes):
+        page = folder.path / (ALL if animate is None else ANIMATION)
+        folder.written += _animated(inputs.vehicle, found, animate, page)
 
     def parts() -> list[Any]:
         remarks = [f"remark: {remark}" for remark in found.remarks]
         return [found.table(), *found.notes, *remarks]
 
     folder.finish(found.record(), found.plot, parts, as_json=output.as_json)
+
+
+def _animated(vehicle: "Vehicle", found: "Modes", name: str | None, page: Path) -> list[Path]:
+    """Write the oscillations as a page that shows one of them; nothing where there is none."""
+    from railsim.animation import mode_scene, write_page
+    from railsim.animation.scene import chosen_mode
+    from railsim.files import make_folder
+    from railsim.linear.modes import SHOWN
+
+    records = [m.record() for m in found.oscillations if m.natural_frequency <= SHOWN]
+    first = found.least_damped.name if found.least_damped else ""
+    scenes = {}
+    if name is not None:
+        chosen = chosen_mode(found.record()["modes"], name, "--animate")
+        first = str(chosen["name"])
+        scenes[first] = mode_scene(vehicle, chosen, **CYCLE)
+    for record in records:
+        with suppress(InputError):  # where nothing moves that is drawn
+            scenes[record["name"]] = mode_scene(vehicle, record, **CYCLE)
+    if not scenes:
+        return []
+    make_folder(page.parent)
+    scene = scenes.get(first) or next(iter(scenes.values()))
+    return [write_page(scene, page, modes=list(scenes.values()), overwrite=True)]
 
 
 def _over(files: InputFiles, over: str, speed: float, how: dict[str, Any]) -> "RootLocus":

@@ -1,12 +1,17 @@
 """``railsim report``: one self-contained page about results or studies."""
 
 from collections.abc import Sequence
+from contextlib import chdir
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from railsim.cli.common import output_options, report_file
 from railsim.files import check_file, whole_file
+
+if TYPE_CHECKING:
+    from railsim.report.inputs import Used
 
 ENDINGS = (".html", ".htm")
 
@@ -54,7 +59,7 @@ def write_report(
     files: Sequence[str], path: Path, *, title: str | None = None, curves: int = 8
 ) -> None:
     """Write the page about result files and folders of studies."""
-    from railsim.cli.gathered import gather
+    from railsim.cli.gathered import folder_of, gather
     from railsim.report.runs import page
     from railsim.report.spread import worst_runs
 
@@ -65,10 +70,38 @@ def write_report(
     names = (
         str(study)
         if study
-        else ", ".join(dict.fromkeys(Path(file).resolve().stem for file in files[:4]))
+        else ", ".join(dict.fromkeys(folder_of(file).resolve().stem for file in files[:4]))
     )
     more = f" and {len(files) - 4} more" if len(files) > 4 else ""
     every = found.results([record["name"] for record in with_files])
-    text = page(title or names + more, found.records, results, found.remarks, every, found.inputs)
+    used = [] if results or not found.inputs else _used(folder_of(files[0]))
+    text = page(
+        title or names + more, found.records, results, found.remarks, every, found.inputs, used
+    )
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def _used(folder: Path) -> "list[Used]":
+    """Inputs of a study without results: the first run of each vehicle on each track.
+
+    From the files as they are now; nothing where they are gone or no longer what they were.
+    """
+    from railsim.errors import RailsimError
+    from railsim.report.inputs import Used
+    from railsim.studies.plan import Plan
+    from railsim.studies.study import stored_spec
+
+    try:
+        spec, base = stored_spec(folder)
+        with chdir(base):
+            plan = Plan(spec)
+            first = {(point.run.vehicle, point.run.track): point for point in reversed(plan.points)}
+            cases = plan.cases(list(first.values())[::-1])
+    except (RailsimError, OSError):
+        return []
+    return [
+        Used(str(case.labels["vehicle"]), str(case.labels["track"]), case.vehicle, case.track,
+             case.settings, case.speed)
+        for case in cases
+    ]  # fmt: skip

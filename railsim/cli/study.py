@@ -305,7 +305,7 @@ def _campaign(
     from railsim.errors import Fault, InputError
 
     taken = {"--tracks, --speeds, --grid": any(others)}
-    refused = ["start", "duration", "until", "settings", "plots", "report", "file", "quantities"]
+    refused = ["start", "duration", "until", "settings", "plots", "file", "quantities"]
     refused += ["compress", "single"]
     taken |= {f"--{n}": bool(how[n]) for n in refused}
     taken["--keep"] = how["keep"] != "all"
@@ -319,7 +319,7 @@ def _campaign(
     return run_campaign(
         scenario, vehicles, out, assignments=assignments, workers=how["workers"],
         scheduler=how["scheduler"], resume=resume, overwrite=how["overwrite"], as_json=as_json,
-        quiet=quiet,
+        quiet=quiet, report=how["report"],
     )  # fmt: skip
 
 

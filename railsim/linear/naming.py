@@ -15,7 +15,8 @@ bogie          the frames have 30 % of the energy and more: bounce, pitch, roll,
 rolling        the whole vehicle runs along the track: eigenvalue zero
 =============  ==================================================================================
 
-Any other mode is called after the body and component with most of its energy.
+Any other mode is called after what has most of its energy: car body, bogie, or wheelsets with the
+component, and which of them move.
 """
 
 from dataclasses import dataclass
@@ -36,6 +37,8 @@ NEAR_ZERO = 0.05  # 1/s, |lambda| of rolling
 HUNTING_RATIO = 0.3
 HUNTING_PHASE = np.radians(45.0)
 CAR_NAMES = {0: "longitudinal", 2: "bounce", 4: "pitch", 5: "yaw"}
+WHEELSET_NAMES = ("longitudinal", "lateral", "vertical", "roll", "rotation", "yaw")
+MOVES = 0.3  # share of the largest energy from which on a wheelset is named
 LEAST_OF_FRAMES = 0.3  # share of the frames in a mode of the bogies
 BOGIE_NAMES = ("longitudinal", "lateral", "bounce", "roll", "pitch", "yaw")
 
@@ -137,7 +140,25 @@ def mode_name(parts: Parts, shape: Complex, eigenvalue: complex, speed: float) -
         component = int(np.argmax(shares[frames].sum(axis=0)))
         return f"bogie {BOGIE_NAMES[component]}{_phase(parts, shape, component)}"
     body, component = divmod(int(np.argmax(shares)), shares.shape[1])
+    if body in parts.cars:
+        return _car_name(parts, shape, shares)
+    if body in parts.wheelsets:
+        return _wheelset_name(parts, shares, component)
     return f"{parts.model.index.bodies[body]}.{COMPONENTS[component]}"
+
+
+def _wheelset_name(parts: Parts, shares: Floats, component: int) -> str:
+    """Name of a mode of wheelsets: which move, where not all do."""
+    most = float(shares[list(parts.wheelsets), component].max())
+    moving = [b for b in parts.wheelsets if shares[b, component] > MOVES * most]
+    names = [parts.model.index.bodies[b].removesuffix(".wheelset") for b in moving]
+    bogies = {parts.bogie_of(b) for b in moving}
+    words = f"wheelset{'s' * (len(moving) > 1)} {WHEELSET_NAMES[component]}"
+    if len(moving) == len(parts.wheelsets):
+        return words
+    return (
+        f"{words}, {bogies.pop() if len(bogies) == 1 and len(names) > 1 else ' and '.join(names)}"
+    )
 
 
 def _car_name(parts: Parts, shape: Complex, shares: Floats) -> str:

@@ -53,7 +53,7 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
         for k in chosen:
             size = np.abs(eigenvalues[:, k])
             colour, width = colours[k]
-            dashes = (0, (4, 2)) if width < 1.0 or locus.names[k][-1].isdigit() else "-"
+            dashes = (0, (4, 2)) if width > 1.0 and locus.names[k][-1].isdigit() else "-"
             style: dict[str, Any] = {"color": colour, "lw": width, "ls": dashes}
             if len(values) == 1:
                 style["marker"] = "o"
@@ -77,18 +77,19 @@ def locus_figure(locus: RootLocus, title: str = "") -> Figure:
 def _frame(damping: Axes, frequency: Axes, plane: Axes, locus: RootLocus) -> None:
     words = "speed (m/s)" if locus.key == "speed" else locus.key
     damping.axhline(0.0, color=LIMIT, lw=0.8)
-    title = "Damping; below zero unstable (grey: bogies and wheelsets)"
+    title = "Damping; below zero unstable"
     damping.set(xlabel=words, ylabel="damping ratio (%)", title=title)
     damping.set_ylim(max(-30.0, damping.get_ylim()[0]), min(60.0, damping.get_ylim()[1]))
+    damping.plot([], [], color="0.65", lw=0.9, label="bogies, wheelsets")
     damping.legend(ncol=1, loc="upper left", bbox_to_anchor=(1.0, 1.02), fontsize=7.5)
     frequency.set(xlabel=words, ylabel="undamped frequency (Hz)", title="Frequency")
     frequency.set_ylim(0.0, None)
     plane.axvline(0.0, color=LIMIT, lw=0.8)
-    arrow = "speed" if locus.key == "speed" else "the parameter"
+    towards = "higher speed" if locus.key == "speed" else f"higher {locus.key}"
     plane.set(
         xlabel="growth Re λ (1/s)",
         ylabel="frequency Im λ/2π (Hz)",
-        title=f"Root locus; heads show where {arrow} goes",
+        title=f"Root locus; arrows point towards {towards}",
     )
     plane.set_xlim(max(-40.0, plane.get_xlim()[0]), plane.get_xlim()[1])
     plane.set_ylim(0.0, None)

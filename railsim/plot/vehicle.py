@@ -7,11 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 
 from railsim.definitions.base import Vector
 from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
+from railsim.definitions.outlines import Box, body_boxes
 from railsim.definitions.vehicle import Vehicle
 from railsim.plot.style import DISTINCT, Picture, styled
 from railsim.text import unformatted
@@ -20,15 +21,19 @@ SIDE, TOP, BEHIND = (0, 2), (0, 1), (1, 2)
 TITLES = {SIDE: "Side view from the right", TOP: "Top view", BEHIND: "View from behind"}
 LABELS = ("$x$ (m), forward", "$y$ (m), to the right", "$z$ (m), down")
 BODY, WHEEL, LEVER = "0.25", "0.55", "0.78"
+FILL, OUTLINE = (0.34, 0.66, 0.88, 0.10), "#8fb4cf"
 BOX: Any = {"ls": "", "marker": "s", "ms": 7, "mfc": "none", "mec": "0.35", "mew": 1.0}
 # The leading wheelset and those as near to it as this are shown once more in detail [m].
 BOGIE = 4.0
+# Names of bodies as near as this are written above each other [m].
+NEAR = (3.0, 0.4)
 
 
 def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
     """Draw a vehicle in three views with its elements.
 
-    Bodies are crosses at their centres of gravity, axleboxes squares, wheels circles or lines;
+    Bodies are crosses at their centres of gravity with the boxes of `railsim.definitions.outlines`,
+    axleboxes squares, wheels circles or lines;
     every element is drawn between its points, with a thin line from each point to the body that it
     is attached to.
 
@@ -52,7 +57,7 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
         figure = Picture(figsize=(11.0, 9.0), layout="constrained")
         figure.suptitle(unformatted(title or vehicle.name), x=0.012, ha="left")
         grid = figure.add_gridspec(3, 3, height_ratios=[1.0, 1.0, 1.7])
-        end = _leading_end(flat)
+        end, boxes = _leading_end(flat), body_boxes(flat)
         for cell, view, limits in (
             (grid[0, :], SIDE, None),
             (grid[1, :], TOP, None),
@@ -60,9 +65,17 @@ def vehicle_figure(vehicle: Vehicle, title: str = "") -> Figure:
             (grid[2, 1], TOP, end),
             (grid[2, 2], BEHIND, None),
         ):
-            _draw_view(figure.add_subplot(cell), view, flat, colours, limits)
+            axes = figure.add_subplot(cell)
+            for box in boxes.values():
+                axes.add_patch(_outline(box, view))
+            _draw_view(axes, view, flat, colours, limits)
         figure.legend(handles=list(_handles(flat, colours)), loc="outside lower left", ncols=6)
         return figure
+
+
+def _outline(box: Box, view: tuple[int, int]) -> Rectangle:
+    (x, y), (far_x, far_y) = ([corner[axis] for axis in view] for corner in box)
+    return Rectangle((x, y), far_x - x, far_y - y, fc=FILL, ec=OUTLINE, lw=0.7, zorder=0.5)
 
 
 def _leading_end(flat: FlatVehicle) -> tuple[float, float]:
@@ -93,22 +106,13 @@ def _draw_view(
         _draw_element(axes, element, flat, view, colours[_kind(element)])
     for body in flat.of_kind("axlebox"):
         axes.plot(body.position[across], body.position[upright], **BOX)
+    together: dict[tuple[float, float], list[str]] = {}
     for body in flat.of_kind("body"):
         x, y = body.position[across], body.position[upright]
         axes.plot(x, y, marker="+", ms=10, mew=1.8, color=BODY, zorder=4)
         if across == 0 and (limits is None or limits[0] < x < limits[1]):
-            above = 18 if upright == 2 else 10  # points; out of the way of springs
-            label = axes.annotate(
-                unformatted(body.name),
-                (x, y),
-                (0, above),
-                textcoords="offset points",
-                ha="center",
-                fontsize=7,
-                color=BODY,
-                zorder=6,
-            )
-            label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
+            together.setdefault((round(x, 2), round(y, 2)), []).append(body.name)
+    _name_bodies(axes, together, above=18 if upright == 2 else 10)
     axes.set_title(TITLES[view] + (", leading end" if limits else ""))
     axes.set_xlabel(LABELS[across])
     axes.set_ylabel(LABELS[upright])
@@ -118,6 +122,29 @@ def _draw_view(
         axes.set_ylim(*((-2.5, 0.5) if upright == 2 else (-1.7, 1.7)))
     axes.set_aspect("equal", adjustable="box" if limits else "datalim")
     axes.invert_yaxis()
+
+
+def _name_bodies(axes: Axes, together: dict[tuple[float, float], list[str]], above: float) -> None:
+    """Write names over centres of gravity, out of the way of springs and of each other."""
+    written: list[tuple[float, float]] = []  # where
+    for (x, y), names in sorted(together.items(), key=lambda item: -item[0][1]):
+        if len(names) > 1:  # one behind the other: left and right
+            names = [name.removesuffix("_left").removesuffix("_right") for name in names]
+        words = ", ".join(dict.fromkeys(names))
+        near = sum(abs(x - other_x) < NEAR[0] and abs(y - other_y) < NEAR[1]
+                   for other_x, other_y in written)  # fmt: skip
+        written.append((x, y))
+        label = axes.annotate(
+            unformatted(words),
+            (x, y),
+            (0, above + 9 * near),
+            textcoords="offset points",
+            ha="center",
+            fontsize=7,
+            color=BODY,
+            zorder=6,
+        )
+        label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
 def _draw_element(
@@ -159,10 +186,11 @@ def _line(axes: Axes, points: Sequence[Vector], across: int, upright: int, **sty
     axes.plot([p[across] for p in points], [p[upright] for p in points], **style)  # type: ignore[arg-type]
 
 
-def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D]:
+def _handles(flat: FlatVehicle, colours: dict[str, str]) -> Iterator[Line2D | Rectangle]:
     yield Line2D([], [], ls="", marker="+", ms=9, mew=1.8, color=BODY, label="centre of gravity")
     yield Line2D([], [], color=WHEEL, lw=2.0, label="wheelset")
     yield Line2D([], [], color=LEVER, lw=0.8, label="attached to")
+    yield Rectangle((0, 0), 1, 1, fc=FILL, ec=OUTLINE, label="body, as a box")
     if flat.of_kind("axlebox"):
         yield Line2D([], [], **BOX, label="axlebox")
     for kind, colour in colours.items():

@@ -1,6 +1,7 @@
 """Time histories of several runs, thinned for the plots of a page.
 
-Runs over the same alignment share their horizontal axis, the distance, divided into equal cells.
+Runs over the same alignment share their horizontal axis, the distance, divided into equal cells: as
+many as the outputs of a run fill, if the page stays small; the page draws what its width shows.
 The smallest and the largest value of each cell are kept, in the order in which they occur, so that
 no peak is lost.  Values are stored as 16-bit integers between the smallest and the largest value of
 a quantity.
@@ -16,14 +17,15 @@ from numpy.typing import NDArray
 
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.section import Section
+from railsim.notation import plain_symbol
 from railsim.plot.selection import STUDY, limit_of
 from railsim.result import Result
 from railsim.text import printable
 
 Floats = NDArray[np.float64]
 
-CELLS = 800  # of the horizontal axis
-MOST_VALUES = 4_000_000  # of all curves of a page, 2 bytes each
+CELLS = 6400  # of the horizontal axis; the page draws fewer, and more where it is zoomed
+MOST_VALUES = 1_600_000  # of all curves of a page, 2 bytes each
 MISSING = 65535  # code for no value
 STANDS_STILL = 1.0  # m; below it the time is the horizontal axis
 
@@ -132,6 +134,7 @@ def _quantity(
     return {
         "name": name,
         "words": quantity.long_name[:1].upper() + quantity.long_name[1:],
+        "symbol": plain_symbol(quantity.symbol),
         "unit": quantity.shown_unit.replace("-", ""),
         "sign": quantity.sign,
         "sides": sides,
@@ -164,21 +167,29 @@ def thinned(axis: Floats, values: Floats, edges: Floats) -> Floats:
     starts = np.searchsorted(axis, edges)
     starts[-1] = len(axis) if edges[-1] >= axis[-1] else starts[-1]
     found = np.full((2 * cells, values.shape[1]), np.nan)
-    columns = np.arange(values.shape[1])
-    missing = np.isnan(values)
-    lows, highs = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
-    for cell in range(cells):
-        begin, end = starts[cell], starts[cell + 1]
-        if begin < end:
-            low, high = lows[begin:end].argmin(axis=0), highs[begin:end].argmax(axis=0)
-            found[2 * cell] = values[begin + np.minimum(low, high), columns]
-            found[2 * cell + 1] = values[begin + np.maximum(low, high), columns]
-            continue
+    filled = np.flatnonzero(starts[1:] > starts[:-1])
+    if len(filled):
+        first, last = starts[filled[0]], starts[filled[-1] + 1]
+        own = values[first:last]
+        begins = starts[filled] - first
+        of = np.repeat(np.arange(len(filled)), np.diff(np.append(begins, len(own))))
+        place = np.arange(len(own))[:, None]
+        for extreme, missing in ((np.minimum, np.inf), (np.maximum, -np.inf)):
+            there = np.where(np.isnan(own), missing, own)
+            best = extreme.reduceat(there, begins, axis=0)
+            # where it occurs first
+            at = np.minimum.reduceat(np.where(there == best[of], place, len(own)), begins, axis=0)
+            if extreme is np.minimum:
+                low = at
+        columns = np.arange(values.shape[1])
+        found[2 * filled] = own[np.minimum(low, at), columns]
+        found[2 * filled + 1] = own[np.maximum(low, at), columns]
+    for cell in np.flatnonzero(starts[1:] == starts[:-1]):
         for row, share in ((2 * cell, 0.25), (2 * cell + 1, 0.75)):
-            at = edges[cell] + share * (edges[cell + 1] - edges[cell])
-            if axis[0] <= at <= axis[-1]:
-                after = max(1, int(np.searchsorted(axis, at)))
-                part = (at - axis[after - 1]) / (axis[after] - axis[after - 1])
+            at_x = edges[cell] + share * (edges[cell + 1] - edges[cell])
+            if axis[0] <= at_x <= axis[-1]:
+                after = max(1, int(np.searchsorted(axis, at_x)))
+                part = (at_x - axis[after - 1]) / (axis[after] - axis[after - 1])
                 found[row] = (1.0 - part) * values[after - 1] + part * values[after]
     return found
 

@@ -11,6 +11,7 @@ import numpy as np
 from railsim.definitions.base import Vector
 from railsim.definitions.flatten import FlatBody, FlatElement, FlatVehicle, flatten
 from railsim.definitions.layout import curvature_sections
+from railsim.definitions.outlines import body_boxes
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.track.alignment import Alignment
@@ -26,8 +27,9 @@ SIDE, TOP = (0, 2), (0, 1)
 def vehicle_svg(vehicle: Vehicle) -> str:
     """Draw a vehicle to scale from the right and from above, the leading end to the right.
 
-    Wheels are circles or lines, centres of gravity are crosses, elements are lines between their
-    points; `element_kinds` returns the kinds of elements in the order of their colours.
+    Bodies are boxes, wheels circles or lines, centres of gravity are crosses, elements are lines
+    between their points; `element_kinds` returns the kinds of elements in the order of their
+    colours.
     """
     flat = flatten(vehicle)
     kinds = element_kinds(vehicle)
@@ -47,6 +49,7 @@ def _view(flat: FlatVehicle, kinds: Sequence[str], view: View) -> str:
     shapes = list(_shapes(flat, kinds, view))
     points = [body.position for body in flat.bodies]
     points += [point for e in flat.elements for point in (e.point1, e.point2)]
+    points += [corner for box in body_boxes(flat).values() for corner in box]
     across, upright = (np.array([p[axis] for p in points]) for axis in view)
     x, y = across.min() - MARGIN, min(upright.min() - 0.4, -MARGIN)
     width, height = across.max() + MARGIN - x, max(upright.max(), 0.0) + 0.4 - y
@@ -63,6 +66,12 @@ def _shapes(flat: FlatVehicle, kinds: Sequence[str], view: View) -> Iterator[str
     if view == SIDE:
         ends = [body.position[0] for body in flat.bodies]
         yield _line([(min(ends) - 9.0, 0.0, 0.0), (max(ends) + 9.0, 0.0, 0.0)], view, "rail")
+    for name, box in body_boxes(flat).items():
+        (x, y), (far_x, far_y) = (_projected(corner, view) for corner in box)
+        yield (
+            f'<rect class="box" x="{x:.3f}" y="{y:.3f}" width="{far_x - x:.3f}" '
+            f'height="{far_y - y:.3f}"><title>{escape(name)}</title></rect>'
+        )
     for element in flat.elements:
         for name, point in ((element.body1, element.point1), (element.body2, element.point2)):
             if name:

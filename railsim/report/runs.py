@@ -4,73 +4,36 @@
 The page loads no other files; its plots are drawn by uPlot (`vendor/`).
 """
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 from markupsafe import Markup
 
-from railsim.definitions.settings import Settings
-from railsim.definitions.track import Track
-from railsim.definitions.vehicle import Vehicle
-from railsim.description.rest import rest_frequencies
-from railsim.errors import InputError, ModelError
-from railsim.model.statics import static_loads
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
-from railsim.profiles import Profile
 from railsim.report.curves import cells_of, curve_data, groups
-from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
+from railsim.report.inputs import Used, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published
-from railsim.report.spread import LEAST, WORDS, columns, command, parameters, spread_rows
-from railsim.report.tables import Cell, Table, of_values
+from railsim.report.spread import (
+    LEAST,
+    WORDS,
+    WORST,
+    columns,
+    command,
+    parameters,
+    spread_rows,
+    worst_rows,
+)
+from railsim.report.tables import Cell, Section, Table, day, listed
 from railsim.result import Result
 from railsim.text import printable
 from railsim.version import __version__
 
 Record = Mapping[str, Any]
 MOST_ROWS = 300  # of a table on the page
-MOST_SHOWN = 12  # values of an input of a study
-MOST_AT_REST = 3  # vehicles
-MOST_DIFFERENCES = 40  # keys in which the vehicles differ
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A drawing of the page; `kinds` are the labels of its colours."""
-
-    title: str
-    words: str
-    svg: str
-    kinds: Sequence[str] = ()
-
-
-@dataclass
-class Section:
-    """A section of the page.
-
-    Attributes
-    ----------
-    id, title : str
-    texts : list of str
-    drawings : list of Drawing
-    tables : list of Table
-    plots : list of str
-        Plots that the script of the page draws: the number of a group of curves, or ``spread``.
-    details : list of Table
-        Tables that are folded at first.
-    """
-
-    id: str
-    title: str
-    texts: list[str] = field(default_factory=list)
-    drawings: list[Drawing] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
-    plots: list[str] = field(default_factory=list)
-    details: list[Table] = field(default_factory=list)
 
 
 def page(
@@ -80,6 +43,7 @@ def page(
     remarks: Sequence[str] = (),
     assessable: Mapping[str, Result] | None = None,
     inputs: Mapping[str, Any] | None = None,
+    used: Sequence[Used] = (),
 ) -> str:
     """Return the page as HTML.
 
@@ -98,13 +62,17 @@ def page(
         All results, which are assessed together; by default `results`.
     inputs : mapping, optional
         Inputs of the study whose runs these are, as in its ``study.json``.
+    used : sequence of Used
+        What runs without results used, as the files are now.
     """
     found = groups(results)
     cells = cells_of(found)
     curves = [curve_data(group, cells) for group in found]
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
     limits = assessed(results if assessable is None else assessable)
-    sections = [_peaks(records, results)]
+    sections = [_peaks(records, results)] if results or len(records) < LEAST else []
+    if len(_done(records)) > max(LEAST, len(results)):
+        sections.append(_worst(records))
     if found:
         sections.append(_curves(len(data["curves"]), records, results))
     if limits.tables or limits.details:
@@ -115,7 +83,7 @@ def page(
         sections.append(spread)
     if published := _published(results):
         sections.append(published)
-    sections.append(_what_was_run(records, results, inputs or {}))
+    sections.append(what_was_run(inputs_of(records, results) or list(used), results, inputs or {}))
     sections.append(_remarks(records, remarks))
     return rendered(
         "railsim.report",
@@ -153,7 +121,7 @@ def _lead(records: Sequence[Record], results: Mapping[str, Result]) -> str:
     if versions and any(versions):
         parts.append(f"computed by railsim {', '.join(filter(None, versions))}")
     if created and created[-1]:
-        parts.append(f"last run {created[-1]}")
+        parts.append(f"last run on {day(created[-1])}")
     return "; ".join(parts) + "."
 
 
@@ -196,6 +164,18 @@ def _peaks(records: Sequence[Record], results: Mapping[str, Result]) -> Section:
         texts.append(f"{len(shown)} of {len(_done(records))} runs, those with the largest values; "
                      "all others follow in the table of runs.")  # fmt: skip
     return Section("peaks", "Peaks", texts, tables=[table] if shown else [])
+
+
+def _worst(records: Sequence[Record]) -> Section:
+    """The runs with the largest values, and where the study has them."""
+    done = _done(records)
+    ranks = [f"{k}." for k in range(1, WORST + 1)]
+    table = Table(["", *ranks], worst_rows(done))
+    text = (
+        f"The largest of {len(done)} runs by magnitude, over all wheels; the table of runs below "
+        "has the rest, and the command of each."
+    )
+    return Section("worst", "Worst runs", [text], tables=[table])
 
 
 def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> Section:
@@ -274,156 +254,32 @@ def _published(results: Mapping[str, Result]) -> Section | None:
     return Section("published", "Comparison with published values", tables=tables)
 
 
-def _what_was_run(
-    records: Sequence[Record], results: Mapping[str, Result], inputs: Mapping[str, Any]
-) -> Section:
-    section = Section("inputs", "Inputs")
-    labels = {record["name"]: record["labels"] for record in records}
-    vehicles: dict[str, Any] = {}
-    tracks: dict[str, list[Track]] = {}
-    for name, result in results.items():
-        own = labels.get(name, {})  # two files may hold vehicles of one name
-        vehicle, track = result.vehicle(), result.track()
-        vehicles.setdefault(str(own.get("vehicle", vehicle.name)), vehicle)
-        tracks.setdefault(str(own.get("track", track.name)), []).append(track)
-    for name, vehicle in vehicles.items():
-        words = f"{vehicle.name}. {vehicle.source or ''}"
-        section.drawings.append(
-            Drawing(
-                printable(name),
-                printable(words),
-                _svg(vehicle_svg(vehicle)),
-                [kind.replace("_", " ") for kind in element_kinds(vehicle)],
-            )
-        )
-    for name, variants in tracks.items():
-        rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
-        values = sorted({mu for track in variants for mu in track.friction})
-        friction = ", ".join(f"{mu:g}" for mu in values)
-        words = f"{variants[0].name}. Friction {friction}; rails {rails}."
-        drawing = _svg(track_svg(variants[0]))
-        section.drawings.append(Drawing(printable(name), printable(words), drawing))
-    section.details += _at_rest(results)
-    if len(vehicles) > 1:
-        section.tables.append(_differences(vehicles))
-    if results:
-        section.tables.append(_settings(results))
-    if inputs:
-        section.tables.append(_inputs(inputs))
-    return section
-
-
-def _at_rest(results: Mapping[str, Result]) -> list[Table]:
-    """Return how the vehicles of the results stand at rest, each in its load case."""
-    vehicles: list[tuple[Vehicle, Mapping[str, Profile]]] = []
-    for result in results.values():
-        vehicle = result.vehicle()
-        if all(vehicle != known for known, _ in vehicles) and len(vehicles) < MOST_AT_REST:
-            vehicles.append((vehicle, result.profiles))
-    found = []
-    for vehicle, profiles in vehicles:
-        with suppress(InputError, ModelError):
-            loads = static_loads(vehicle, profiles=profiles)
-            subject = f"{vehicle.name}, load '{loads.load}' at rest"
-            found += [of_values(table, subject) for table in loads.tables]
-            found.append(of_values(rest_frequencies(vehicle, profiles), subject))
-    return found
-
-
-def _inputs(inputs: Mapping[str, Any]) -> Table:
-    """Inputs of a study, without those that are not given."""
-    rows = []
-    for key, value in inputs.items():
-        if value in (None, [], {}, False, "", ()) or key == "folder":
-            continue
-        parts = value.items() if isinstance(value, dict) else [("", value)]
-        for name, part in parts:
-            values = part if isinstance(part, list) else [part]
-            words = ", ".join(_number(v) for v in values[:MOST_SHOWN])
-            more = len(values) - MOST_SHOWN
-            words += f" and {more} more" if more > 0 else ""
-            rows.append([printable(f"{key} {name}".strip()), printable(words)])
-    return Table(["input", "value"], rows, "Inputs of the study", words=frozenset({0, 1}))
-
-
-def _rails(track: Track) -> str:
-    preset = track.support.preset
-    return "rigid" if preset == "rigid" else f"elastic ({preset})"
-
-
-def _svg(text: str) -> Any:
-    return Markup(text)
-
-
-def _differences(vehicles: Mapping[str, Any]) -> Table:
-    """Return the keys in which vehicles differ."""
-    flat = {name: dict(_flat(vehicle.model_dump())) for name, vehicle in vehicles.items()}
-    keys = dict.fromkeys(key for values in flat.values() for key in values)
-    told = ("name", "source")
-    rows = [
-        [key, *(str(values.get(key, "—")) for values in flat.values())]
-        for key in keys
-        if key not in told and len({str(values.get(key)) for values in flat.values()}) > 1
-    ]
-    more = len(rows) - MOST_DIFFERENCES
-    return Table(
-        ["key", *map(printable, vehicles)],
-        [[printable(cell) for cell in row] for row in rows[:MOST_DIFFERENCES]],
-        "Differences between the vehicles (SI)",
-        words=frozenset(range(len(vehicles) + 1)),
-        note=f"{more} more keys differ." if more > 0 else "",
-    )
-
-
-def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
-    if isinstance(node, dict):
-        return [row for name, value in node.items()
-                for row in _flat(value, f"{key}.{name}" if key else str(name))]  # fmt: skip
-    if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
-        return [(key, f"{len(node)} rows: {node}"[:60])]
-    return [(key, node)]
-
-
-def _settings(results: Mapping[str, Result]) -> Table:
-    """Return a table of the settings of the runs, with differences from the default."""
-    usual = dict(_flat(Settings().model_dump()))
-    found: dict[str, dict[str, None]] = {}
-    for result in results.values():
-        own = dict(_flat(result.settings().model_dump()))
-        own["step"] = f"{1e3 * float(result.attributes.get('step', 0.0)):.4g} ms"
-        for key, value in own.items():
-            found.setdefault(key, {})[str(value)] = None
-    always = ("scheme", "step", "output_rate", "creep_law", "fastsim_grid", "normal_contact")
-    rows = []
-    for key, values in found.items():
-        changed = key != "step" and set(values) != {str(usual.get(key))}
-        if key in always or changed:
-            rows.append([key, ", ".join(values), "changed" if changed else ""])
-    words = frozenset({0, 1, 2})
-    return Table(["setting", "value", ""], rows, "Method of computation", words=words)
-
-
-def _number(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
     """Runs that failed or ended early, and remarks, equal ones once."""
     section = Section("remarks", "Failures and remarks", list(map(printable, more)))
+    ended: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        if record["status"] != "complete":  # one reason for whatever numbers it tells
+            kind = re.sub(r"\d+(\.\d+)?", "#", str(record.get("status_reason", "")))
+            ended.setdefault((str(record["status"]), kind), []).append(record)
     rows = [
-        [printable(str(record["name"])), str(record["status"]),
-         printable(str(record.get("status_reason", "")))]
-        for record in records
-        if record["status"] != "complete"
-    ]  # fmt: skip
+        [
+            f"{len(group)}",
+            status,
+            printable(str(group[0].get("status_reason", ""))),
+            listed([str(record["name"]) for record in group]),
+        ]
+        for (status, _), group in sorted(ended.items(), key=lambda item: -len(item[1]))
+    ]
     if rows:
+        short = sum(map(len, ended.values()))
         left = len(rows) - MOST_ROWS
         section.tables.append(
             Table(
-                ["run", "status", "reason"],
+                ["runs", "status", "reason, of the first", "which"],
                 rows[:MOST_ROWS],
-                f"{len(rows)} of {len(records)} runs did not reach the requested end",
-                words=frozenset({0, 1, 2}),
+                f"{short} of {len(records)} runs did not reach the requested end",
+                words=frozenset({1, 2, 3}),
                 note=f"{left} more are in summary.csv." if left > 0 else "",
             )
         )
@@ -435,8 +291,7 @@ def _remarks(records: Sequence[Record], more: Sequence[str]) -> Section:
             said.setdefault(str(remark), []).append(str(record["name"]))
     cells = []
     for remark, names in list(said.items())[:MOST_ROWS]:
-        more_names = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        cells.append([printable(remark), printable(", ".join(names[:3]) + more_names)])
+        cells.append([printable(remark), listed(names)])
     if cells:
         section.tables.append(
             Table(

@@ -13,6 +13,9 @@ from railsim.text import printable
 Record = Mapping[str, Any]
 WORDS = {"abs": "peak", "max": "largest", "min": "smallest"}
 LEAST = 3  # runs, for a spread
+SHORTEST = 4  # letters of a parameter's short name: `stiffness.x` and not `x`
+WORST = 5  # runs of each quantity
+RANKED = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")  # for the worst runs
 
 
 def parameters(records: Sequence[Record]) -> dict[str, dict[str, Any]]:
@@ -50,7 +53,8 @@ def _short(name: str, names: Sequence[str]) -> str:
     parts = name.split(".")
     for number in range(1, len(parts)):
         end = ".".join(parts[-number:])
-        if sum(f".{other}".endswith(f".{end}") for other in names) == 1:
+        alone = sum(f".{other}".endswith(f".{end}") for other in names) == 1
+        if alone and len(end) >= SHORTEST:
             return end
     return name
 
@@ -156,6 +160,32 @@ def spread_rows(records: Sequence[Record]) -> list[list[str]]:
     return rows
 
 
+def worst_rows(records: Sequence[Record]) -> list[list[tuple[str, str] | str]]:
+    """Return the runs with the largest values of each quantity, with what tells them apart.
+
+    The quantities are those by which the runs with curves are chosen; where no run has any of
+    them, those of analyses and functions of the user.
+    """
+    there, varied = columns(records), parameters(records)
+    rows: list[list[tuple[str, str] | str]] = []
+    own = [key for key in there if "_mid" not in key and not key.endswith(tuple(WORDS))]
+    for key in [name for name in RANKED if name in there] or own:
+        column = there[key]
+        pairs = [(-v, i) for i, v in enumerate(column["values"]) if v is not None]
+        unit = f" ({column['unit']})" if column["unit"] else ""
+        row: list[tuple[str, str] | str] = [column["words"] + unit]
+        for value, number in sorted(pairs)[:WORST]:
+            told = (f"{own['words']} {_text(own['values'][number])}" for own in varied.values())
+            where = ", ".join(told) or str(records[number]["name"])
+            row.append((f"{-value:.4g}", printable(where)))
+        rows.append(row + [""] * (1 + WORST - len(row)))
+    return rows
+
+
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
 def worst_runs(records: Sequence[Record], most: int) -> list[str]:
     """Return the names of at most `most` runs, those with the largest values.
 
@@ -166,7 +196,7 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
     if len(names) <= most:
         return names
     ranked = []
-    for name in ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs"):
+    for name in RANKED:
         values = columns(records).get(name, {"values": []})["values"]
         pairs = [(-value, number) for number, value in enumerate(values) if value is not None]
         ranked.append([number for _, number in sorted(pairs)])

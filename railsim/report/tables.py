@@ -1,7 +1,10 @@
-"""Tables of a page."""
+"""Sections and tables of a page, and values in words."""
 
+from calendar import month_name
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
 
 from railsim import table as values
 from railsim.text import printable
@@ -34,6 +37,41 @@ class Table:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing of the page; `kinds` are the labels of its colours."""
+
+    title: str
+    words: str
+    svg: str
+    kinds: Sequence[str] = ()
+
+
+@dataclass
+class Section:
+    """A section of the page.
+
+    Attributes
+    ----------
+    id, title : str
+    texts : list of str
+    drawings : list of Drawing
+    tables : list of Table
+    plots : list of str
+        Plots that the script of the page draws: the number of a group of curves, or ``spread``.
+    details : list of Table
+        Tables that are folded at first.
+    """
+
+    id: str
+    title: str
+    texts: list[str] = field(default_factory=list)
+    drawings: list[Drawing] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    plots: list[str] = field(default_factory=list)
+    details: list[Table] = field(default_factory=list)
+
+
 def of_values(table: values.Table, subject: str) -> Table:
     """Return a table of values for the page; its caption begins with its subject."""
     return Table(
@@ -42,3 +80,39 @@ def of_values(table: values.Table, subject: str) -> Table:
         printable(f"{subject}: {table.caption}"),
         words=frozenset(k for k, column in enumerate(table.columns) if not column.format),
     )
+
+
+def day(created: str) -> str:
+    """A time of ISO 8601 in words.
+
+    Examples
+    --------
+    >>> day("2026-11-03T15:04:20+00:00"), day("earlier")
+    ('3 November 2026, 15:04', 'earlier')
+    """
+    try:
+        when = datetime.fromisoformat(created)
+    except ValueError:
+        return created
+    return f"{when.day} {month_name[when.month]} {when.year}, {when:%H:%M}"
+
+
+def in_words(value: Any) -> str:
+    """A value of a file in words: no brackets of Python.
+
+    Examples
+    --------
+    >>> in_words((10, 10)), in_words(True), in_words(None), in_words(0.1 + 0.2)
+    ('10, 10', 'yes', 'none', '0.3')
+    """
+    if isinstance(value, tuple | list):
+        return ", ".join(map(in_words, value)) or "none"
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first names of a list, and how many more there are."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return printable(", ".join(names[:3]) + more)

@@ -102,6 +102,8 @@ def campaign(
     cases = scenario_cases(plan, names, assignments)
     spec = StudySpec(
         folder=os.path.relpath(Path.cwd(), folder),
+        name=plan.name,
+        purpose=plan.purpose,
         scenario=str(scenario),
         vehicles=[str(name) for name in names],
         tracks=[],

@@ -124,7 +124,8 @@ def _refuse_another_study(
             there = read_index(folder / "study.json").inputs.stored()
         except InputError:
             return
-    asked = {name: value for name, value in inputs.items() if name != "folder"}
+    unread = ("folder", "name", "purpose")  # no number depends on them
+    asked = {name: value for name, value in inputs.items() if name not in unread}
     differing = [name for name, value in asked.items() if there.get(name, value) != value]
     if differing:
         found = f"{folder} holds a study with other " + ", ".join(differing)

@@ -116,6 +116,8 @@ class StudySpec(BaseModel):
     Attributes
     ----------
     railsim_version : str
+    name, purpose : str or None
+        What a study file or a scenario calls it, and what it is for; no number depends on them.
     folder : str
         Folder that relative file names refer to, from the folder of the study.
     scenario : str or None
@@ -131,6 +133,8 @@ class StudySpec(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
     railsim_version: str = __version__
+    name: str | None = None
+    purpose: str | None = None
     folder: str = "."
     scenario: str | None = None
     vehicles: Annotated[list[str], BeforeValidator(_file_names)]

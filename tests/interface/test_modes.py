@@ -1,6 +1,7 @@
 """``railsim modes``: table, root locus, JSON, pictures, and what is refused."""
 
 import json
+import re
 
 import pytest
 from selection import points
@@ -107,6 +108,23 @@ def test_a_mode_is_animated(capsys, tmp_path):
     assert "front hunting" in (folder / "mode.html").read_text()
     assert main([*arguments, "--animate", "front huntin"]) == 2
     assert "front hunting" in capsys.readouterr().err
+
+
+def test_all_modes_of_one_speed_are_animated_and_named_after_what_moves(capsys, tmp_path):
+    out = ["--speed", "30", "--quiet", "--out", str(tmp_path)]
+    assert main(["modes", "wagon_y25", *out, "--overwrite"]) == 0
+    assert str(tmp_path / "modes.html") in capsys.readouterr().out
+    data = json.loads(
+        re.search(r'id="data">(.*?)</script>', (tmp_path / "modes.html").read_text())[1]
+    )
+    names = [mode["name"].split(" · ")[0] for mode in data["modes"]]
+    told = [mode["name"] for mode in json.loads((tmp_path / "modes.json").read_text())["modes"]]
+    assert set(names) <= set(told)
+    assert len(names) == len(set(names)) > 20
+    assert {"lower sway", "car body bounce", "bogie pitch, in phase"} < set(names)
+    assert {"wheelsets longitudinal, front", "wheelsets longitudinal, rear"} < set(names)
+    assert not [name for name in names if "." in name or "_" in name]
+    assert {len(mode["pose"]) for mode in data["modes"]} == {40}
 
 
 @pytest.mark.parametrize(

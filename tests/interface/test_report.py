@@ -23,7 +23,8 @@ from railsim.cli import main
 from railsim.report.curves import MISSING, coded, curve_data, groups, thinned
 from railsim.report.published import beside_published, reading
 from railsim.report.runs import page
-from railsim.report.spread import columns, command, parameters, worst_runs
+from railsim.report.spread import columns, command, parameters, worst_rows, worst_runs
+from railsim.report.tables import day, in_words
 from railsim.result import Hdf5Sink, peaks
 from railsim.result.facts import run_facts
 
@@ -54,12 +55,15 @@ function probe(frame) {
   over.dispatchEvent(new w.MouseEvent("mousemove", at(0.35)));
   found.readings = Array.from(d.querySelectorAll(".readings tbody td")).map(c => c.textContent);
   found.position = d.querySelector(".readings th").textContent;
+  found.step = plots[0].data[0][2] - plots[0].data[0][0];
+  found.axes = plots.map(u => u.axes.map(a => a.label));
   found.linked = plots.map(u => u.cursor.idx);
   over.dispatchEvent(new w.MouseEvent("mousedown", at(0.3)));
   d.dispatchEvent(new w.MouseEvent("mousemove", at(0.5)));
   over.dispatchEvent(new w.MouseEvent("mousemove", at(0.5)));
   d.dispatchEvent(new w.MouseEvent("mouseup", at(0.5)));
   return new Promise(done => w.setTimeout(() => {
+    found.steps = [found.step, plots[0].data[0][2] - plots[0].data[0][0]];
     found.zoomed = plots.map(u => [u.scales.x.min, u.scales.x.max]);
     const side = d.querySelectorAll(".controls select")[1], first = plots[0].data[1].slice();
     side.value = 1 - side.value;
@@ -171,7 +175,7 @@ def test_page_holds_everything_and_fetches_nothing(html):
     assert outside.found == []
     assert "@import" not in html
     assert not re.search(r"url\((?!#)", html)
-    assert len(html) < 1_000_000
+    assert len(html) < 2_000_000
     for words in ("All 3 runs are complete", "Nadal", "Prud", "Manchester primary suspension"):
         assert words in html
 
@@ -195,6 +199,9 @@ def test_page_works_in_a_browser_at_desktop_and_phone_width(html, tmp_path):
         low, high = found["zoomed"][0]
         assert found["zoomed"] == [[low, high]] * 6
         assert 0.0 < high - low < 0.3 * 980.0  # a fifth of the length was drawn over
+        assert found["steps"][1] < 0.7 * found["steps"][0]  # finer where it is zoomed
+        assert found["axes"][0] == ["s (m)", "ΔQ/Q₀ (%)"]
+        assert all(all(labels) for labels in found["axes"])
         assert found["changed"]
         assert 0.01 < found["ink"] < 0.9
 
@@ -219,6 +226,40 @@ def test_study_without_results_has_table_curves_map_and_parallel_coordinates(tmp
         assert values == sorted(values, reverse=True)
         assert [row[0] for row in found["failed"]] == ["run5"]
         assert found["told"].startswith("no equilibrium — railsim run coach1 curve --speed 15")
+
+
+def test_study_without_results_tells_its_inputs_once_and_its_worst_runs(tmp_path, simulated):
+    """And is the same study under another name."""
+    study = tmp_path / "study.toml"
+    study.write_text(
+        'format = "railsim-study/1"\nname = "Friction of the curve"\nvehicles = '
+        '["coach_manchester"]\ntracks = ["curve_r250"]\nspeeds = [20.0]\nuntil = 40.0\n'
+        '[grid]\n"track.friction" = [0.2, 0.3, 0.4, 0.5]\n'
+    )
+    out = tmp_path / "out"
+    given = ["study", str(study), "--out", str(out), "--keep", "summary", "--workers", "1"]
+    assert main([*given, "--report"]) == 0
+    page_text = (out / "report.html").read_text(encoding="utf-8")
+    assert "<h1>Friction of the curve</h1>" in page_text
+    assert "None" not in re.sub(r"<script.*?</script>", "", page_text, flags=re.DOTALL)
+    for words in (
+        "Worst runs",
+        "FASTSIM 10 x 10",
+        "Passenger coach, Manchester",
+        'svg class="drawing"',
+    ):
+        assert page_text.count(words) >= 1, words
+    assert page_text.count("contact damping") == 1
+    study.write_text(study.read_text().replace("Friction of the curve", "Friction"))
+    assert main(given) == 0
+
+
+def test_values_are_told_in_words():
+    assert day("2026-11-03T15:04:20+00:00") == "3 November 2026, 15:04"
+    assert in_words(((10, 10), None, True)) == "10, 10, none, yes"
+    rows = worst_rows([{**r, "labels": {"speed": 20.0 + i}} for i, r in enumerate(records(7))])
+    values = [[float(value) for value, _ in row[1:]] for row in rows]
+    assert all(row == sorted(row, reverse=True) and len(row) == 5 for row in values)
 
 
 def test_thinned_curves_keep_every_peak_and_their_order():

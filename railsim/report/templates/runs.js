@@ -91,19 +91,52 @@
       return [low < 0 ? low - more : low, high > 0 ? high + more : high];
     };
   }
+  /* What a plot shows of fine values between two positions: of groups of cells the smallest and the
+     largest value in their order, or the values themselves where the screen has room. */
+  var ROOM = 1600;
+  function seen(x, low, high) {
+    var from = 0, to = x.length, group, picks = [];
+    while (from < x.length - 2 && x[from + 2] <= low) { from += 2; }
+    while (to > from + 2 && x[to - 3] >= high) { to -= 2; }
+    group = Math.max(1, Math.ceil((to - from) / ROOM)) * 2;
+    for (var k = from; k < to; k += group) { picks.push([k, Math.min(k + group, to)]); }
+    return picks;
+  }
+  function thinnedTo(values, picks) {
+    var found = [];
+    picks.forEach(function (p) {
+      if (p[1] - p[0] <= 2) { for (var i = p[0]; i < p[1]; i++) { found.push(values[i]); } return; }
+      var low = -1, high = -1;
+      for (var k = p[0]; k < p[1]; k++) {
+        if (values[k] === null) { continue; }
+        if (low < 0 || values[k] < values[low]) { low = k; }
+        if (high < 0 || values[k] > values[high]) { high = k; }
+      }
+      found.push(low < 0 ? null : values[Math.min(low, high)], low < 0 ? null : values[Math.max(low, high)]);
+    });
+    return found;
+  }
+  function positions(x, picks) {
+    var found = [];
+    picks.forEach(function (p) {
+      if (p[1] - p[0] <= 2) { for (var i = p[0]; i < p[1]; i++) { found.push(x[i]); } return; }
+      var width = x[p[1] - 1] - x[p[0]];
+      found.push(x[p[0]] + 0.25 * width, x[p[0]] + 0.75 * width);
+    });
+    return found;
+  }
   function curves(box, data, key) {
-    var points = 2 * data.cells, width = (data.high - data.low) / data.cells, x = [], k;
-    for (k = 0; k < data.cells; k++) { x.push(data.low + (k + 0.25) * width, data.low + (k + 0.75) * width); }
-    var lines = data.quantities.map(function (q) { return decoded(q, points); }), plots = [];
+    var points = 2 * data.cells, width = (data.high - data.low) / data.cells, fine = [], k;
+    for (k = 0; k < data.cells; k++) { fine.push(data.low + (k + 0.25) * width, data.low + (k + 0.75) * width); }
+    var lines = data.quantities.map(function (q) { return decoded(q, points); }), plots = [], kept = {}, grid;
+    var picks = seen(fine, data.low, data.high), x = positions(fine, picks), unit = data.axis.charAt(0) === "D" ? "m" : "s", over = unit === "m" ? "s (m)" : "t (s)";
     made("h3", box, data.track);
     var controls = made("div", box, undefined, "controls");
     var wheelset = choose(controls, "Wheelset", data.wheelsets.map(function (n, i) { return i + 1 + ": " + n; }), fill);
     var side = choose(controls, "Wheel", ["left", "right"], fill);
     var reset = made("button", controls, "Whole length");
     reset.type = "button";
-    var keep = made("button", controls, "Save picture");
-    keep.type = "button";
-    keep.addEventListener("click", function () { save(grid, data.track); });
+    exports(controls, function () { return grid; }, function () { return data.track; });
     made("span", controls, "Drag over a plot to zoom all of them, double-click for the whole length.", "notes");
     var readings = made("div", box, undefined, "readings scroll"), table = made("table", readings);
     var head = made("tr", made("thead", table)), body = made("tbody", table), at = made("th", head), cells = [];
@@ -124,7 +157,26 @@
     }
     function values(i) {
       var q = data.quantities[i];
-      return [x].concat(data.runs.map(function (_, r) { return lines[i](line(q, r)); }));
+      return [x].concat(data.runs.map(function (_, r) {
+        var n = line(q, r), name = i + " " + n;
+        if (!kept[name]) { kept[name] = lines[i](n); }
+        return thinnedTo(kept[name], picks);
+      }));
+    }
+    /* all plots together: what lies between the ends of the zoomed one, in the detail of the screen */
+    var zooming = false;
+    function zoom(low, high) {
+      if (zooming) { return; }
+      zooming = true;
+      picks = seen(fine, low, high);
+      x = positions(fine, picks);
+      plots.forEach(function (u, i) { u.batch(function () { u.setData(values(i), false); u.setScale("x", { min: low, max: high }); }); });
+      zooming = false;
+      detail();
+    }
+    function detail() {
+      var step = x.length > 2 ? x[2] - x[0] : width;
+      note.textContent = data.axis + ". Each pair of points is the smallest and the largest value of " + shown(step) + " " + unit + "; zoomed, down to " + shown(width) + " " + unit + ".";
     }
     function told(u) {
       var idx = u.cursor.idx;
@@ -135,8 +187,8 @@
         });
       });
     }
-    function fill() { plots.forEach(function (u, i) { u.setData(values(i), false); u.redraw(true, true); u.setScale("x", { min: u.scales.x.min, max: u.scales.x.max }); }); }
-    var grid = made("div", box, undefined, "grid");
+    function fill() { kept = {}; zoom(plots[0].scales.x.min, plots[0].scales.x.max); plots.forEach(function (u) { u.redraw(true, true); }); }
+    grid = made("div", box, undefined, "grid");
     /* the wheel that is loaded most in the first run */
     data.quantities.forEach(function (q, i) {
       if (q.name !== "dQ_over_Q0") { return; }
@@ -149,24 +201,27 @@
     });
     data.quantities.forEach(function (q, i) {
       var panel = made("div", grid, undefined, "panel");
-      var title = made("h4", panel, q.words + (q.unit ? " (" + q.unit + ")" : "") + " ");
+      var title = made("h4", panel, q.words + " ");
       if (q.sign) { made("small", title, q.sign); }
       var target = made("div", panel);
       var u = new uPlot({
-        width: Math.max(200, target.clientWidth), height: 190, legend: { show: false },
-        cursor: { sync: { key: key }, drag: { x: true, y: false } },
+        width: Math.max(200, target.clientWidth), height: 210, legend: { show: false },
+        cursor: { sync: { key: key }, drag: { x: true, y: false }, bind: { dblclick: function () { return function () { zoom(data.low, data.high); return null; }; } } },
         scales: { x: { time: false }, y: { range: range(q) } },
-        axes: [axis("", 22), axis("", 46)],
+        axes: [axis(over, 22), axis(q.symbol + (q.unit ? " (" + q.unit + ")" : ""), 46)],
         series: [{}].concat(data.runs.map(function (name, r) {
           return { label: name, stroke: function () { return runColour(r); }, width: 1.4, points: { show: false } };
         })),
-        hooks: { drawClear: [shade(data)], draw: [limitLine(q)], setCursor: [told] }
+        hooks: { drawClear: [shade(data)], draw: [limitLine(q)], setCursor: [told], setScale: [function (u, name) {
+          if (name === "x" && plots.length === data.quantities.length && !zooming) { zoom(u.scales.x.min, u.scales.x.max); }
+        }] }
       }, values(i), target);
       plots.push(u);
-      place(u, target, 190);
+      place(u, target, 210);
     });
-    made("p", box, data.axis + ". Each pair of points is the smallest and the largest value of " + shown(width) + (data.axis.charAt(0) === "D" ? " m." : " s."), "notes");
-    reset.addEventListener("click", function () { plots.forEach(function (u) { u.setScale("x", { min: data.low, max: data.high }); }); });
+    var note = made("p", box, "", "notes");
+    detail();
+    reset.addEventListener("click", function () { zoom(data.low, data.high); });
     told({ cursor: {} });
     box.railsimPlots = plots;
   }
@@ -178,35 +233,104 @@
     link.download = name;
     link.click();
   }
-  function save(box, name) {
-    var file = name.replace(/[^A-Za-z0-9]+/g, "_"), picture = box.querySelector("svg");
-    if (picture) {
-      var copy = picture.cloneNode(true), style = getComputedStyle(root), marks = ["--ink", "--soft", "--rule", "--bad", "--k4"];
-      copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
-      marks.forEach(function (n) { copy.style.setProperty(n, style.getPropertyValue(n)); });
-      copy.insertBefore(made("style", null, "text{font:12px sans-serif;fill:var(--soft)}polyline{fill:none;stroke-width:1.2px}.axis{stroke:var(--soft)}"), copy.firstChild);
-      kept("data:image/svg+xml," + encodeURIComponent(new XMLSerializer().serializeToString(copy)), file + ".svg");
-    } else {
-      var canvases = Array.from(box.querySelectorAll("canvas")), sheet = made("canvas"), y = 0;
-      sheet.width = Math.max.apply(null, canvases.map(function (c) { return c.width; }));
-      sheet.height = canvases.reduce(function (h, c) { return h + c.height + 24; }, 0);
-      var g = sheet.getContext("2d");
-      g.fillStyle = colour("--paper"); g.fillRect(0, 0, sheet.width, sheet.height);
-      canvases.forEach(function (c) {
-        var panel = c.closest(".panel"), title = panel ? panel.querySelector("h4").textContent : name;
-        g.fillStyle = colour("--ink"); g.font = "14px system-ui, sans-serif"; g.fillText(title, 8, y + 17);
-        g.drawImage(c, 0, y + 24);
-        y += c.height + 24;
+  function exports(parent, box, name) {
+    ["PNG", "SVG"].forEach(function (kind) {
+      var button = made("button", parent, "Save " + kind);
+      button.type = "button";
+      button.addEventListener("click", function () { (kind === "PNG" ? savePng : saveSvg)(box(), name().replace(/[^A-Za-z0-9]+/g, "_")); });
+    });
+  }
+  var NS = "http://www.w3.org/2000/svg";
+  function drawnAs(name, parent, attributes, text) {
+    var node = document.createElementNS(NS, name);
+    Object.keys(attributes).forEach(function (a) { node.setAttribute(a, attributes[a]); });
+    if (text !== undefined) { node.textContent = text; }
+    parent.appendChild(node);
+    return node;
+  }
+  /* a picture of the page with its own colours */
+  function standalone(picture) {
+    var copy = picture.cloneNode(true), copies = copy.querySelectorAll("*");
+    picture.querySelectorAll("*").forEach(function (node, i) {
+      var style = getComputedStyle(node);
+      ["fill", "stroke", "stroke-width", "opacity", "font-size", "paint-order"].forEach(function (n) { copies[i].setAttribute(n, style.getPropertyValue(n)); });
+    });
+    return framed(copy);
+  }
+  function framed(picture) {
+    var box = picture.viewBox.baseVal;
+    picture.setAttribute("xmlns", NS);
+    picture.setAttribute("width", box.width);
+    picture.setAttribute("height", box.height);
+    picture.setAttribute("font-family", "sans-serif");
+    picture.insertBefore(drawnAs("rect", picture, { width: box.width, height: box.height, fill: colour("--paper") }), picture.firstChild);
+    return picture;
+  }
+  /* plots of a canvas as lines */
+  function asSvg(box) {
+    var found = plotsIn(box), W = 760, H = 250, left = 64, right = 12, top = 26, bottom = 44;
+    var picture = document.createElementNS(NS, "svg");
+    var named = found[0].series.slice(1).filter(function (s) { return s.show && s.class !== "quiet"; });
+    picture.setAttribute("viewBox", "0 0 " + W + " " + (H * found.length + 18 * named.length + 8));
+    named.forEach(function (s, i) {
+      var y = H * found.length + 18 * i + 8, stroke = typeof s.stroke === "function" ? s.stroke(found[0], i + 1) : s.stroke;
+      drawnAs("line", picture, { x1: left, x2: left + 24, y1: y, y2: y, stroke: stroke, "stroke-width": 3 });
+      drawnAs("text", picture, { x: left + 32, y: y + 4 }, s.label);
+    });
+    picture.setAttribute("font-size", 12);
+    picture.setAttribute("fill", colour("--soft"));
+    found.forEach(function (u, row) {
+      var y0 = row * H, sx = u.scales.x, sy = u.scales.y;
+      function X(v) { return left + (v - sx.min) / (sx.max - sx.min) * (W - left - right); }
+      function Y(v) { return y0 + H - bottom - (v - sy.min) / (sy.max - sy.min) * (H - top - bottom); }
+      var panel = u.root.closest(".panel");
+      if (panel) { drawnAs("text", picture, { x: left, y: y0 + 16 }, panel.querySelector("h4").textContent); }
+      drawnAs("rect", picture, { x: left, y: y0 + top, width: W - left - right, height: H - top - bottom, fill: "none", stroke: colour("--strong") });
+      function ticks(axis, place) { (axis._splits || []).forEach(function (v, i) { var text = axis._values[i]; if (text !== null && text !== undefined && text !== "") { place(v, text); } }); }
+      ticks(u.axes[0], function (v, text) { if (v >= sx.min && v <= sx.max) { drawnAs("text", picture, { x: X(v), y: y0 + H - bottom + 15, "text-anchor": "middle" }, text); } });
+      ticks(u.axes[1], function (v, text) { if (v >= sy.min && v <= sy.max) { drawnAs("text", picture, { x: left - 6, y: Y(v) + 4, "text-anchor": "end" }, text); } });
+      drawnAs("text", picture, { x: 0.5 * (left + W - right), y: y0 + H - 10, "text-anchor": "middle" }, u.axes[0].label || "");
+      drawnAs("text", picture, { x: 14, y: y0 + 0.5 * (top + H - bottom), transform: "rotate(-90 14 " + (y0 + 0.5 * (top + H - bottom)) + ")", "text-anchor": "middle" }, u.axes[1].label || "");
+      u.series.forEach(function (s, i) {
+        if (!i || !s.show || s.class === "quiet") { return; }
+        var part = [], stroke = typeof s.stroke === "function" ? s.stroke(u, i) : s.stroke;
+        function end() {
+          if (part.length > 1 && s.width) { drawnAs("polyline", picture, { points: part.join(" "), fill: "none", stroke: stroke, "stroke-width": 1.3 }); }
+          if (!s.width || (typeof s.points.show === "function" ? s.points.show(u, i) : s.points.show)) { part.forEach(function (p) { drawnAs("circle", picture, { cx: p[0], cy: p[1], r: 3, fill: stroke }); }); }
+          part = [];
+        }
+        u.data[i].forEach(function (v, k) {
+          var at = u.data[0][k];
+          if (v === null || v === undefined) { if (!s.spanGaps) { end(); } } else if (at >= sx.min && at <= sx.max) { part.push([X(at).toFixed(1), Y(v).toFixed(1)]); }
+        });
+        end();
       });
-      kept(sheet.toDataURL("image/png"), file + ".png");
-    }
+    });
+    return framed(picture);
+  }
+  function plotsIn(box) { return drawn.filter(function (d) { return box.contains(d.plot.root); }).map(function (d) { return d.plot; }); }
+  function svgOf(box) {
+    var picture = box.querySelector("svg");
+    return "data:image/svg+xml," + encodeURIComponent(new XMLSerializer().serializeToString(picture ? standalone(picture) : asSvg(box)));
+  }
+  function saveSvg(box, name) { kept(svgOf(box), name + ".svg"); }
+  function savePng(box, name) {
+    var image = new Image();
+    image.onload = function () {
+      var sheet = made("canvas"), g = sheet.getContext("2d");
+      sheet.width = 2 * image.width; sheet.height = 2 * image.height;
+      g.fillStyle = colour("--paper"); g.fillRect(0, 0, sheet.width, sheet.height);
+      g.drawImage(image, 0, 0, sheet.width, sheet.height);
+      kept(sheet.toDataURL("image/png"), name + ".png");
+    };
+    image.src = svgOf(box);
   }
   function plot(options, values, target) {
     options.width = Math.max(200, target.clientWidth);
     place(new uPlot(options, values, target), target, options.height);
   }
   var study = all.spread && railsimStudy(all.spread, {
-    made: made, shown: shown, choose: choose, colour: colour, runColour: runColour, faint: faint, axis: axis, plot: plot, save: save
+    made: made, shown: shown, choose: choose, colour: colour, runColour: runColour, faint: faint, axis: axis, plot: plot, exports: exports
   });
 
   document.querySelectorAll("[data-plots]").forEach(function (box) {

@@ -105,10 +105,10 @@ window.railsimStudy = function (data, tools) {
     value.values.forEach(function (v, r) { if (v !== null) { cells[up.of(y.values[r])][across.of(x.values[r])].push(v); } });
     var worst = cells.map(function (row) { return row.map(function (g) { return g.length ? Math.max.apply(null, g) : null; }); });
     var ends = extent([].concat.apply([], worst)), n = across.labels.length, m = up.labels.length;
-    var W = 900, left = 150, wide = (W - left) / n, high = Math.min(44, Math.max(18, 360 / m)), H = m * high + 54;
+    var W = 900, left = 150, wide = (W - left) / n, high = Math.min(44, Math.max(18, 360 / m)), H = m * high + 74, above = 20;
     var picture = svg("svg", made("div", box, undefined, "scroll"), { viewBox: "0 0 " + W + " " + H, class: "study" });
     worst.forEach(function (row, j) {
-      var top = (m - 1 - j) * high;
+      var top = above + (m - 1 - j) * high;
       svg("text", picture, { x: left - 8, y: top + 0.5 * high + 4, "text-anchor": "end" }, up.labels[j]);
       row.forEach(function (v, i) {
         if (v === null) { return; }
@@ -119,9 +119,9 @@ window.railsimStudy = function (data, tools) {
       });
     });
     across.labels.forEach(function (label, i) {
-      if (n <= 14 || i % Math.ceil(n / 12) === 0) { svg("text", picture, { x: left + (i + 0.5) * wide, y: m * high + 18, "text-anchor": "middle" }, label); }
+      if (n <= 14 || i % Math.ceil(n / 12) === 0) { svg("text", picture, { x: left + (i + 0.5) * wide, y: above + m * high + 18, "text-anchor": "middle" }, label); }
     });
-    svg("text", picture, { x: left + 0.5 * (W - left), y: m * high + 42, "text-anchor": "middle" }, words(x));
+    svg("text", picture, { x: left + 0.5 * (W - left), y: above + m * high + 42, "text-anchor": "middle" }, words(x));
     svg("text", picture, { x: 4, y: 12 }, words(y));
     scale(box, ends[0], ends[1]);
     return "Colour: largest " + words(value) + " of all runs of a cell; empty cells have no run.";
@@ -162,9 +162,8 @@ window.railsimStudy = function (data, tools) {
     var labels = names.map(function (_, k) { return words(parameter(k)); });
     var over = choose(controls, "over", labels, draw);
     var family = choose(controls, "and", ["(all together)"].concat(labels), draw);
-    var save = made("button", controls, "Save picture"), note, body;
-    save.type = "button";
-    save.addEventListener("click", function () { tools.save(body, data.columns[keys[quantity.value]].words); });
+    var note, body;
+    tools.exports(controls, function () { return body; }, function () { return data.columns[keys[quantity.value]].words; });
     quantity.value = Math.max(0, keys.indexOf(PRINCIPAL[0]));
     var first = names.findIndex(function (_, k) { return isNumber(parameter(k)); });
     over.value = Math.max(0, first);

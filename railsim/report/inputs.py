@@ -1,0 +1,203 @@
+"""What was run: vehicles, tracks, inputs of the study, assumptions, settings."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from markupsafe import Markup
+
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.description.rest import rest_frequencies
+from railsim.errors import InputError, ModelError
+from railsim.model.statics import static_loads
+from railsim.profiles import Profile
+from railsim.report.drawings import element_kinds, track_svg, vehicle_svg
+from railsim.report.tables import Drawing, Section, Table, in_words, of_values
+from railsim.result import Result
+from railsim.simulation.assumptions import assumptions
+from railsim.text import printable
+
+Record = Mapping[str, Any]
+MOST_SHOWN = 12  # values of an input of a study
+MOST_AT_REST = 3  # vehicles
+MOST_ASSUMED = 4  # pairs of a vehicle and a track
+MOST_DIFFERENCES = 40  # keys in which the vehicles differ
+
+
+class Used(NamedTuple):
+    """Inputs of a run, with the labels of the study: two files may hold vehicles of one name."""
+
+    vehicle_label: str
+    track_label: str
+    vehicle: Vehicle
+    track: Track
+    settings: Settings
+    speed: float
+
+
+def inputs_of(records: Sequence[Record], results: Mapping[str, Result]) -> list[Used]:
+    """Return the inputs of results."""
+    labels = {record["name"]: record["labels"] for record in records}
+    found = []
+    for name, result in results.items():
+        own, vehicle, track = labels.get(name, {}), result.vehicle(), result.track()
+        names = str(own.get("vehicle", vehicle.name)), str(own.get("track", track.name))
+        found.append(Used(*names, vehicle, track, result.settings(), result.speed))
+    return found
+
+
+def _assumed(used: Sequence[Used]) -> Table:
+    """Return the assumptions of the runs, those of all once."""
+    columns: dict[str, dict[str, str]] = {}
+    for one in used:
+        name = f"{one.vehicle_label} on {one.track_label}"
+        if name not in columns and len(columns) < MOST_ASSUMED:
+            lines = assumptions(one.vehicle, one.track, one.settings, one.speed)[1:]
+            columns[name] = dict(line.split(None, 1) for line in lines)
+    if all(own == next(iter(columns.values())) for own in columns.values()):
+        columns = {"all runs": next(iter(columns.values()))}
+    keys = dict.fromkeys(key for own in columns.values() for key in own)
+    rows = [[key, *(printable(own.get(key, "")) for own in columns.values())] for key in keys]
+    words = frozenset(range(len(columns) + 1))
+    return Table(
+        ["", *map(printable, columns)],
+        rows,
+        "Assumptions",
+        words=words,
+        note="Of the first run of each vehicle on each track, without what was varied.",
+    )
+
+
+def what_was_run(
+    used: Sequence[Used], results: Mapping[str, Result], inputs: Mapping[str, Any]
+) -> Section:
+    """Return the section of the page about vehicles, tracks, inputs and settings."""
+    section = Section("inputs", "Inputs")
+    vehicles: dict[str, Any] = {}
+    tracks: dict[str, list[Track]] = {}
+    for one in used:
+        vehicles.setdefault(one.vehicle_label, one.vehicle)
+        tracks.setdefault(one.track_label, []).append(one.track)
+    if used and not results:
+        section.texts.append("Vehicles and tracks as their files are now; results were not kept.")
+    for name, vehicle in vehicles.items():
+        words = f"{vehicle.name}. {vehicle.source or ''}"
+        section.drawings.append(
+            Drawing(
+                printable(name),
+                printable(words),
+                _svg(vehicle_svg(vehicle)),
+                [kind.replace("_", " ") for kind in element_kinds(vehicle)],
+            )
+        )
+    for name, variants in tracks.items():
+        rails = ", ".join(dict.fromkeys(_rails(track) for track in variants))
+        values = sorted({mu for track in variants for mu in track.friction})
+        friction = ", ".join(f"{mu:g}" for mu in values)
+        words = f"{variants[0].name}. Friction {friction}; rails {rails}."
+        drawing = _svg(track_svg(variants[0]))
+        section.drawings.append(Drawing(printable(name), printable(words), drawing))
+    section.details += _at_rest(results)
+    if len(vehicles) > 1:
+        section.tables.append(_differences(vehicles))
+    if inputs:
+        section.tables.append(_inputs(inputs))
+    if used:
+        section.tables.append(_assumed(used))
+    if results:
+        section.tables.append(_settings(results))
+    return section
+
+
+def _at_rest(results: Mapping[str, Result]) -> list[Table]:
+    """Return how the vehicles of the results stand at rest, each in its load case."""
+    vehicles: list[tuple[Vehicle, Mapping[str, Profile]]] = []
+    for result in results.values():
+        vehicle = result.vehicle()
+        if all(vehicle != known for known, _ in vehicles) and len(vehicles) < MOST_AT_REST:
+            vehicles.append((vehicle, result.profiles))
+    found = []
+    for vehicle, profiles in vehicles:
+        with suppress(InputError, ModelError):
+            loads = static_loads(vehicle, profiles=profiles)
+            subject = f"{vehicle.name}, load '{loads.load}' at rest"
+            found += [of_values(table, subject) for table in loads.tables]
+            found.append(of_values(rest_frequencies(vehicle, profiles), subject))
+    return found
+
+
+def _inputs(inputs: Mapping[str, Any]) -> Table:
+    """Inputs of a study, without those that are not given."""
+    rows = []
+    for key, value in inputs.items():
+        if value in (None, [], {}, False, "", ()) or key in ("folder", "name"):
+            continue
+        parts = value.items() if isinstance(value, dict) else [("", value)]
+        for name, part in parts:
+            values = [v for v in (part if isinstance(part, list) else [part]) if v is not None]
+            if not values:
+                continue
+            words = ", ".join(in_words(v) for v in values[:MOST_SHOWN])
+            more = len(values) - MOST_SHOWN
+            words += f" and {more} more" if more > 0 else ""
+            rows.append([printable(f"{key} {name}".strip()), printable(words)])
+    return Table(["input", "value"], rows, "Inputs of the study", words=frozenset({0, 1}))
+
+
+def _rails(track: Track) -> str:
+    preset = track.support.preset
+    return "rigid" if preset == "rigid" else f"elastic ({preset})"
+
+
+def _svg(text: str) -> Any:
+    return Markup(text)
+
+
+def _differences(vehicles: Mapping[str, Any]) -> Table:
+    """Return the keys in which vehicles differ."""
+    flat = {name: dict(_flat(vehicle.model_dump())) for name, vehicle in vehicles.items()}
+    keys = dict.fromkeys(key for values in flat.values() for key in values)
+    told = ("name", "source")
+    rows = [
+        [key, *(in_words(values.get(key, "—")) for values in flat.values())]
+        for key in keys
+        if key not in told and len({str(values.get(key)) for values in flat.values()}) > 1
+    ]
+    more = len(rows) - MOST_DIFFERENCES
+    return Table(
+        ["key", *map(printable, vehicles)],
+        [[printable(cell) for cell in row] for row in rows[:MOST_DIFFERENCES]],
+        "Differences between the vehicles (SI)",
+        words=frozenset(range(len(vehicles) + 1)),
+        note=f"{more} more keys differ." if more > 0 else "",
+    )
+
+
+def _flat(node: Any, key: str = "") -> list[tuple[str, Any]]:
+    if isinstance(node, dict):
+        return [row for name, value in node.items()
+                for row in _flat(value, f"{key}.{name}" if key else str(name))]  # fmt: skip
+    if isinstance(node, tuple | list) and node and isinstance(node[0], tuple | list | dict):
+        return [(key, f"{len(node)} rows: {'; '.join(map(in_words, node))}"[:60])]
+    return [(key, node)]
+
+
+def _settings(results: Mapping[str, Result]) -> Table:
+    """Return a table of the settings of the runs, with differences from the default."""
+    usual = dict(_flat(Settings().model_dump()))
+    found: dict[str, dict[str, None]] = {}
+    for result in results.values():
+        own = dict(_flat(result.settings().model_dump()))
+        own["step"] = f"{1e3 * float(result.attributes.get('step', 0.0)):.4g} ms"
+        for key, value in own.items():
+            found.setdefault(key, {})[in_words(value)] = None
+    always = ("scheme", "step", "output_rate", "creep_law", "fastsim_grid", "normal_contact")
+    rows = []
+    for key, values in found.items():
+        changed = key != "step" and set(values) != {in_words(usual.get(key))}
+        if key in always or changed:
+            rows.append([key, ", ".join(values), "changed" if changed else ""])
+    words = frozenset({0, 1, 2})
+    return Table(["setting", "value", ""], rows, "Method of computation", words=words)
