@@ -1,8 +1,11 @@
 """Remarks on a run that ended, from what it counted."""
 
+import logging
+
 import numpy as np
 import pytest
 
+import railsim
 from railsim.kernels.support import MOST_CORRECTIONS
 from railsim.kernels.vibration import AMPLITUDE, FREQUENCY, VIBRATION
 from railsim.simulation.remarks import creep_range, unsettled_rails, vibration
@@ -15,7 +18,7 @@ def test_nothing_counted_is_nothing_said():
 def test_all_corrections_used_are_told_with_their_number_and_a_way_to_check():
     (remark,) = unsettled_rails(17)
     assert "17 evaluations" in remark
-    assert f"all {MOST_CORRECTIONS} corrections" in remark
+    assert f"all {MOST_CORRECTIONS} iterations" in remark
     assert "0.02%" in remark
     assert "--check-step" in remark
 
@@ -36,3 +39,15 @@ def test_the_remark_on_vibrations_contradicts_neither_itself_nor_another(hunts, 
     assert remark.startswith("The wheel loads vibrate at 35 Hz: 10 % of Q0")
     assert "above" not in remark
     assert cause in remark
+
+
+def test_each_remark_is_logged_once_and_what_was_asked_for_is_not(caplog):
+    vehicle, track = railsim.load_vehicle("coach_manchester"), railsim.load_track("straight")
+    settings = railsim.Settings(outputs={"low_pass": {"frequency": 20.0}})
+    with caplog.at_level(logging.WARNING):
+        result = railsim.simulate(vehicle, track, speed=20.0, duration=5.0, settings=settings)
+    logged = [record.message for record in caplog.records]
+    low_passed = [remark for remark in result.remarks if "low-pass" in remark]
+    assert len(low_passed) == 1
+    assert sorted(logged) == sorted(set(result.remarks) - set(low_passed))
+    assert any("Nothing disturbs the vehicle" in remark for remark in logged)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import railsim
-from railsim.assessment.record import Record
+from railsim.assessment.record import Record, _Readings
 
 ROWS = slice(0, 500), slice(300, 800), slice(310, 700), slice(0, 400), slice(900, 950)
 
@@ -21,6 +21,14 @@ def test_parts_are_the_same_to_the_last_bit(run: railsim.Result) -> None:
         alone = Record(run, "run", coarse=True).readings(rows)
         for one, other in zip(shared.readings(rows), alone, strict=True):
             assert one.tobytes() == other.tobytes(), rows
+
+
+def test_readings_of_another_speed_are_read_again() -> None:
+    rows = slice(0, 400)
+    known = _Readings(0, np.full(400, 20.0), *(np.zeros((400, 2)) for _ in range(2)))
+    assert known.part_of(rows, np.full(400, 20.0)) is not None
+    assert known.part_of(rows, np.full(400, 21.0)) is None
+    assert known.part_of(slice(900, 950), np.full(50, 20.0)) is None
 
 
 def test_what_overlaps_is_not_read_again(

@@ -1,0 +1,162 @@
+"""Plant errors in the sources, one at a time, and count those that the tests catch.
+
+    python tests/plant_errors.py --seed 1 --count 40 --list build/planted.csv
+
+Each error is one token: an operator, a comparison, a sign, a number, a condition.  It is planted
+in the working copy, the module's own examples and the test files that name what it defines are run
+until one fails, then the file is put back.  The list holds place, change, and the first test that
+failed, or `survived`; what stands in a list is not tried again.  Run it in a clone of its own: it
+changes sources.
+
+Mutation operators after DeMillo, Lipton and Sayward (1978), "Hints on test data selection".
+"""
+
+import argparse
+import ast
+import csv
+import random
+import re
+import subprocess
+import sys
+import tokenize
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SWAPPED = {
+    "+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", ">": "<=", "<=": ">", ">=": "<",
+    "==": "!=", "!=": "==", "+=": "-=", "-=": "+=", "*=": "/=", "and": "or", "or": "and",
+    "True": "False", "False": "True", "min": "max", "max": "min", "sin": "cos", "cos": "sin",
+}  # fmt: skip
+FILES_PER_ERROR = 10
+SECONDS_PER_ERROR = 1200
+
+
+@dataclass(frozen=True)
+class Planted:
+    """One changed token: its place (line from 1, column from 0), what it was, what it is."""
+
+    path: str
+    line: int
+    column: int
+    was: str
+    now: str
+
+
+def changes(path: Path) -> Iterator[Planted]:
+    """All errors that can be planted in one file: tokens of statements, not of texts or types."""
+    source = path.read_text()
+    idle = _idle_lines(ast.parse(source))
+    with path.open("rb") as file:
+        tokens = list(tokenize.tokenize(file.readline))
+    for before, token in pairwise(tokens):
+        line, column = token.start
+        if line in idle:
+            continue
+        now = SWAPPED.get(token.string)
+        if token.string in "+-" and before.string in ("(", "[", ",", "=", "return", ":"):
+            now = "" if token.string == "-" else None
+        if token.type == tokenize.NUMBER and re.fullmatch(r"\d+\.\d*(e[-+]?\d+)?", token.string):
+            now = repr(float(token.string) * 1.2 if float(token.string) else 1.0)
+        elif token.type == tokenize.NUMBER and token.string.isdigit():
+            now = str(int(token.string) + 1)
+        if token.string in ("*", "**") and before.string in ("(", ","):
+            now = None
+        if now is not None:
+            yield Planted(str(path.relative_to(ROOT)), line, column, token.string, now)
+
+
+def _idle_lines(tree: ast.Module) -> set[int]:
+    """Lines of texts, imports, decorators, type annotations and messages of errors."""
+    idle: set[int] = set()
+    for node in ast.walk(tree):
+        parts: list[ast.AST] = []
+        if isinstance(node, ast.Import | ast.ImportFrom | ast.Raise | ast.JoinedStr):
+            parts = [node]
+        elif isinstance(node, ast.FunctionDef):
+            returns = [node.returns] if node.returns else []
+            annotations = [a.annotation for a in node.args.args if a.annotation]
+            parts = [*node.decorator_list, *returns, *annotations]
+        elif isinstance(node, ast.AnnAssign):
+            parts = [node.annotation]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            parts = [node] if node.end_lineno != node.lineno else []
+        for part in parts:
+            idle.update(range(part.lineno, part.end_lineno + 1))
+    return idle
+
+
+def tests_of(path: str) -> list[str]:
+    """Test files, those first that name most of what the module and its package define."""
+    module = ROOT / path
+    room = module.parent.name
+    names = {
+        node.name
+        for node in ast.parse(module.read_text()).body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+    }
+    dotted = path.removesuffix(".py").replace("/", ".")
+    scores: dict[str, float] = {}
+    for file in sorted((ROOT / "tests").rglob("test_*.py")):
+        text = file.read_text()
+        words = set(re.findall(r"\w+", text))
+        score = 5.0 * (dotted in text) + 3.0 * len(names & words) + 2.0 * (module.stem in words)
+        score += 1.5 * (module.stem.split("_")[0] in file.stem) + 1.0 * (room in file.stem)
+        score += 0.5 * (f"railsim.{room}" in text)
+        scores[str(file.relative_to(ROOT))] = score - 0.00001 * len(text)
+    best = sorted(scores, key=lambda name: -scores[name])
+    return best[:FILES_PER_ERROR]
+
+
+def first_failure(planted: Planted) -> str:
+    """The first test that fails with the error in place, or `survived`."""
+    path = ROOT / planted.path
+    source = path.read_text()
+    lines = source.splitlines(keepends=True)
+    line = lines[planted.line - 1]
+    end = planted.column + len(planted.was)
+    lines[planted.line - 1] = line[: planted.column] + planted.now + line[end:]
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
+    try:
+        path.write_text("".join(lines))
+        run = subprocess.run(
+            [*command, planted.path, *tests_of(planted.path)],
+            cwd=ROOT, capture_output=True, text=True, timeout=SECONDS_PER_ERROR,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return "out of time"
+    finally:
+        path.write_text(source)
+    if run.returncode == 0:
+        return "survived"
+    failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", run.stdout, re.MULTILINE)
+    return failed[0] if failed else "no test could start"
+
+
+def main() -> None:
+    """Choose the errors by the seed, plant one after the other, write the list as it grows."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--list", type=Path, default=ROOT / "build" / "planted.csv")
+    options = parser.parse_args()
+    possible = [c for path in sorted((ROOT / "railsim").rglob("*.py")) for c in changes(path)]
+    chosen = random.Random(options.seed).sample(possible, options.count)
+    options.list.parent.mkdir(parents=True, exist_ok=True)
+    done = options.list.read_text() if options.list.exists() else ""
+    with options.list.open("a", newline="") as file:
+        writer = csv.writer(file)
+        for planted in chosen:
+            place = [planted.path, str(planted.line), planted.was, planted.now]
+            if ",".join(place) in done:
+                continue
+            result = first_failure(planted)
+            writer.writerow([*place, result])
+            file.flush()
+            print(*place, result, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Bifurcation diagrams of an amplitude equation whose branches are known in closed form.
+
+a' = r a (l + x - x^2), x = (a/a0)^2, l = (v - 50)/20: rest loses its stability at 50 m/s, an
+unstable motion goes back to the fold at l = -1/4, 45 m/s, where x = 1/2, and stable hunting from
+there on has x = (1 + sqrt(1 + 4 l))/2 (Guckenheimer and Holmes 1983, Nonlinear oscillations,
+dynamical systems, and bifurcations of vector fields, section 3.4).
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from railsim.stability.branches import Branch, Point, jumps, lowest_of
+from railsim.stability.diagram import diagram, settled
+from railsim.stability.motion import Stretch
+
+A0, RATE, OMEGA, STEP = 4e-3, 4.0, 12.0, 0.01
+FOLD, LOST = 45.0, 50.0
+
+
+class NormalForm:
+    """The amplitude equation as a motion: amplitude and phase."""
+
+    def rest(self, speed, amplitude):
+        return np.array([amplitude, 0.0])
+
+    def stretch(self, state, begin, end, duration):
+        n = round(duration / STEP)
+        a, phase = state
+        time, lateral = STEP * np.arange(1, n + 1), np.empty((n, 1))
+        for k in range(n):
+            excess = (begin + (end - begin) * (k + 0.5) / n - LOST) / 20.0
+            x = (a / A0) ** 2
+            a *= math.exp(RATE * STEP * (excess + x - x * x))
+            phase += OMEGA * STEP
+            lateral[k, 0] = a * math.cos(phase)
+        return Stretch(np.array([a, phase]), time, lateral, 1e6 * lateral)
+
+
+def hunting(speed):
+    """Amplitudes of the stable and of the unstable motion."""
+    root = math.sqrt(1.0 + 4.0 * (speed - LOST) / 20.0)
+    return A0 * math.sqrt(0.5 * (1.0 + root)), A0 * math.sqrt(max(0.0, 0.5 * (1.0 - root)))
+
+
+@pytest.fixture(scope="module")
+def branches():
+    return diagram(NormalForm(), [43.0, 44.0, 46.0, 48.0, 49.0, 51.0, 53.0])
+
+
+def test_branches_are_those_of_the_closed_form(branches):
+    up, down = branches[:2]
+    for point in down.points:
+        if point.speed > FOLD + 0.5:
+            assert point.amplitude == pytest.approx(hunting(point.speed)[0], rel=0.01)
+        if point.speed < FOLD - 0.5:
+            assert point.amplitude < 1e-4
+    for point in up.points:
+        expected = 0.0 if point.speed < LOST else hunting(point.speed)[0]
+        assert point.amplitude == pytest.approx(expected, rel=0.01, abs=5e-5)
+    assert lowest_of(branches).speed == pytest.approx(FOLD, abs=0.15)
+
+
+def test_unstable_motions_lie_on_the_branch_between(branches):
+    (between,) = [branch for branch in branches if branch.direction == "threshold"]
+    assert between.points
+    for point in between.points:
+        assert point.amplitude == pytest.approx(hunting(point.speed)[1], rel=0.15)
+        assert not point.stable
+
+
+def test_the_jump_down_is_at_the_fold(branches):
+    (down,) = [jump for jump in jumps(branches) if jump.direction == "down"]
+    assert down.speed == pytest.approx(FOLD, abs=0.15)
+    assert down.amplitude == pytest.approx(hunting(FOLD)[0], rel=0.15)
+    assert down.to < 1e-4
+
+
+def test_only_changes_within_the_resolution_are_jumps():
+    """Two motions of one branch that lie far apart in speed need not be a jump."""
+
+    def branch(gap):
+        return Branch("up", [Point(50.0, 1e-3, 2.0), Point(50.0 + gap, 5e-3, 2.0)])
+
+    assert [jump.speed for jump in jumps([branch(0.0625)])] == [50.0]
+    assert jumps([branch(1.0)]) == []
+
+
+def test_a_motion_that_grows_is_followed_to_its_end():
+    """Decaying below the threshold it counts as dead, growing from below it does not."""
+    start = NormalForm().rest(51.0, 2e-6)
+    assert settled(NormalForm(), start, 51.0, 51.0).amplitude == pytest.approx(
+        hunting(51.0)[0], rel=0.01
+    )
+    start = NormalForm().rest(45.5, 4e-3)
+    assert settled(NormalForm(), start, 45.5, 45.5).amplitude == pytest.approx(
+        hunting(45.5)[0], rel=0.01
+    )
