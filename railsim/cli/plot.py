@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from railsim.plot.study import Column
 
 # default quantities of the picture of a study
+RECORDING = "recording"  # instead of a quantity, of a track
 DEFAULT = ("dQ_over_Q0_max", "Y_over_Q_abs", "sum_Y_abs", "T_gamma_abs")
 
 
@@ -69,6 +70,9 @@ def command(
     wheel of the leading wheelset, body_acceleration:carbody:y the lateral acceleration of the
     carbody.
 
+    Of a track with a measured irregularity, `recording` draws it as read and as it acts, with its
+    spectra beside those of ERRI B176.
+
     Of a STUDY, its folder or summary.csv: values of its summary such as Y_over_Q_abs or
     sum_abs_Y_mid1 over the parameter of most values, a curve for each value of the next, or as
     --against, --family and --kind say.
@@ -80,6 +84,7 @@ def command(
       railsim plot friction dQ_over_Q0_max --kind map
       railsim plot run.h5 Y Q:1 --over time --by wheelset --out forces.pdf
       railsim plot curve_r250 --out curve.png
+      railsim plot my_track.toml recording --out recording.png
     """  # noqa: D301 - click reads the escape
     from railsim.cli.gathered import folder_of
 
@@ -173,7 +178,28 @@ def _track_figure(file: str, selections: tuple[str, ...]) -> "Figure":
     from railsim.definitions.loading import load_track
     from railsim.plot.track import track_figure
 
+    if selections == (RECORDING,):
+        return _recording_figure(file)
     if selections:
         found = f"'{selections[0]}' asked of a track"
-        raise InputError([Fault("QUANTITY", "", found, "quantities belong to results (.h5)")])
+        allowed = f"{RECORDING}; quantities belong to results (.h5)"
+        raise InputError([Fault("QUANTITY", "", found, allowed)])
     return track_figure(load_track(file))
+
+
+def _recording_figure(file: str) -> "Figure":
+    """The recording of a track as its file holds it, and as it acts."""
+    from railsim.definitions.excitations.measured_file import recordings
+    from railsim.definitions.loading import load_track
+    from railsim.definitions.sources import find_file, read_source
+    from railsim.plot.recording import recording_figure
+
+    track = load_track(file)  # says what is wrong
+    data = read_source(find_file(file, "track"), "track").data
+    found = recordings(data.get("irregularities", ()))
+    if not found:
+        allowed = 'an irregularity of type = "measured" with a file'
+        raise InputError([Fault(file, "irregularities", "no recording", allowed)])
+    name, before, after = found[0]
+    more = f", the first of {len(found)}" if len(found) > 1 else ""
+    return recording_figure(before, after, f"{track.name}: {name}{more}")

@@ -1,21 +1,26 @@
 """Assessments as pictures: estimates in per cent of their limits, comfort along the car, wear."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from railsim.assessment import Assessment
+from railsim.assessment.comfort_report import PointComfort
 from railsim.assessment.criteria import WORDS
 from railsim.assessment.wear import WholeLifeRailModel, shakedown_limit
 from railsim.assessment.wear_report import WheelWear
 from railsim.assessment.zones import Assessed, ZoneReport
+from railsim.definitions.limits import ComfortLimits
 from railsim.plot.style import DISTINCT, LIMIT, Picture, styled
+from railsim.text import unformatted
 
+LEAST_SPEEDS = 3  # for curves over the speed
 LONGEST_BAR = 250.0  # per cent; longer ones are cut and say how long they are
 
 
@@ -25,7 +30,9 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
         if any(a.zones for a in assessments):
             return _limits_figure(assessments)
         if any(a.comfort for a in assessments):
-            return _comfort_figure(assessments)
+            speeds = {speed for a in assessments for speed, _ in a.driven.values()}
+            over = _comfort_over_speed if len(speeds) >= LEAST_SPEEDS else _comfort_figure
+            return over(assessments)
         if any(a.wear for a in assessments):
             return _wear_figure(assessments)
     return None
@@ -202,9 +209,77 @@ def _regression(ax: Axes, report: ZoneReport, like: Assessed, colour: str) -> No
     ax.plot(1e3 * line.target, scale * row.estimate.value, "D", color=colour, ms=5)
 
 
+def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
+    """Mean comfort and Sperling's index over the speed, a curve for each vehicle and rails.
+
+    The line is the middle of the car, the band all its measuring points; behind the mean comfort
+    the classes of the standard.
+    """
+    figure = Picture(figsize=(10.2, 4.4), layout="constrained")
+    mean, index = figure.subplots(1, 2)
+    kinds: dict[tuple[str, str], list[tuple[float, Sequence[PointComfort]]]] = {}
+    for a in assessments:
+        for run, points in a.comfort.items():
+            speed, rails = a.driven[run]
+            kinds.setdefault((a.vehicle, rails), []).append((3.6 * speed, points))
+    vehicles, tracks = ({key[k]: None for key in kinds} for k in (0, 1))
+    for number, ((vehicle, rails), runs) in enumerate(kinds.items()):
+        words = [vehicle] * (len(vehicles) > 1) + [rails] * (len(tracks) > 1)
+        colour = DISTINCT[number % len(DISTINCT)]
+        runs.sort(key=lambda run: run[0])
+        label = ", ".join(words) or "middle of the car"
+        _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
+        for way, line in (("lateral", "-"), ("vertical", "--")):
+            _over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)
+    mean.set(xlabel="speed (km/h)", ylabel="$N_{MV}$", title="Mean comfort, EN 12299")
+    index.set(xlabel="speed (km/h)", ylabel="$W_z$", title="Sperling")
+    for ax in (mean, index):
+        ax.set_ylim(bottom=0.0)
+    _classes(mean, assessments)
+    look = {"color": "0.3", "ls": "-"}
+    handles = [*mean.get_legend_handles_labels()[0],
+               Patch(color="0.3", alpha=0.2, label="all measuring points"),
+               Line2D([], [], label="$W_z$ lateral", **look),
+               Line2D([], [], label="$W_z$ vertical", **look | {"ls": "--"})]  # fmt: skip
+    figure.legend(handles=handles, loc="outside right upper")
+    title = [*vehicles, *tracks] if len(vehicles) == len(tracks) == 1 else list(vehicles)
+    figure.suptitle("\n".join(map(unformatted, title[:4])), x=0.012, ha="left")
+    return figure
+
+
+def _over_speed(
+    axes: Axes,
+    runs: Sequence[tuple[float, Sequence[PointComfort]]],
+    value: Callable[[PointComfort], float],
+    line: str,
+    **look: Any,
+) -> None:
+    speeds = [speed for speed, _ in runs]
+    middle = [value(min(points, key=lambda p: abs(p.place))) for _, points in runs]
+    axes.plot(speeds, middle, "o", ls=line, ms=4, **look)
+    low, high = ([end(map(value, points)) for _, points in runs] for end in (min, max))
+    axes.fill_between(speeds, low, high, color=look["color"], alpha=0.15, lw=0)
+
+
+def _classes(axes: Axes, assessments: Sequence[Assessment]) -> None:
+    """Bands of the classes of mean comfort, named at the right edge."""
+    limits = assessments[0].limits
+    if not isinstance(limits, ComfortLimits):
+        return
+    bottom, top = 0.0, axes.get_ylim()[1]
+    ends = [*limits.mean_comfort.values, (np.inf, limits.mean_comfort.above)]
+    for number, (end, name) in enumerate(ends):
+        if bottom < top:
+            axes.axhspan(bottom, min(end, top), color="0.5", alpha=0.05 + 0.06 * number, lw=0)
+            axes.text(0.99, bottom + 0.02 * top, name, transform=axes.get_yaxis_transform(),
+                      ha="right", fontsize=7.5, color="0.35")  # fmt: skip
+        bottom = end
+    axes.set_ylim(0.0, top)
+
+
 def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     """Mean comfort and Sperling's index along the car, a line for each run."""
-    figure = Picture(figsize=(7.6, 3.4), layout="constrained")
+    figure = Picture(figsize=(9.6, 3.8), layout="constrained")
     mean, index = figure.subplots(1, 2)
     number = 0
     for assessment in assessments:
@@ -217,14 +292,20 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
                 values = [p.sperling[way] for p in ordered]
                 index.plot(x, values, "o", ls=line, color=colour)
             number += 1
-    mean.set(xlabel="along the car, forwards (m)", ylabel="mean comfort $N_{MV}$")
-    index.set(xlabel="along the car, forwards (m)", ylabel="Sperling $W_z$")
+    mean.set(
+        xlabel="along the car, forwards (m)", ylabel="$N_{MV}$", title="Mean comfort, EN 12299"
+    )
+    index.set(xlabel="along the car, forwards (m)", ylabel="$W_z$", title="Sperling")
     index.plot([], [], "-", color="0.3", label="lateral")
     index.plot([], [], "--", color="0.3", label="vertical")
     for ax in (mean, index):
         ax.set_ylim(bottom=0.0)
         ax.margins(y=0.15)
-        _legend(ax)
+    handles = [handle for ax in (mean, index) for handle in ax.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="outside right upper")
+    names = [a.vehicle for a in assessments]
+    names += [rails for a in assessments for _, rails in a.driven.values()]
+    figure.suptitle("\n".join(map(unformatted, list(dict.fromkeys(names))[:4])), x=0.012, ha="left")
     return figure
 
 

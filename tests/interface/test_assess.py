@@ -9,12 +9,16 @@ from example_result import example_result
 from made_record import Q0, curve, made, track
 
 import railsim
-from railsim.assessment import assess
+from railsim.assessment import Assessment, assess
+from railsim.assessment.comfort import MeanComfort
+from railsim.assessment.comfort_report import PointComfort
 from railsim.cli import main
 from railsim.cli.assess import FILES
+from railsim.definitions.loading import load_comfort_limits
 from railsim.definitions.vehicle_tables import Service
 from railsim.errors import InputError
 from railsim.notation import PATCHES, REQUESTED
+from railsim.plot.assessment import assessment_figure
 from railsim.result import Result
 
 STRAIGHT = {"type": "STR", "length": 1700.0}
@@ -401,3 +405,30 @@ def test_law_of_a_file_in_the_assessment(tmp_path, capsys):
     assert main(["assess", path, "--standard", "wear", "--law", "nothing"]) == 2
     with pytest.raises(InputError, match="contact_patches"):
         assess(made(track(STRAIGHT), FAST), "wear", law=str(law))
+
+
+def test_comfort_is_drawn_over_the_speed_with_classes_and_a_legend_beside():
+    """Points made up to rise with the speed: curves hold them in the order of the speed."""
+    comfort, driven = {}, {}
+    for rails, factor in (("low", 1.0), ("high", 2.0)):
+        for speed in (40.0, 20.0, 30.0):
+            name = f"{rails} {speed}"
+            comfort[name] = [
+                PointComfort(place, x, MeanComfort(n, n, n, np.zeros((60, 3)), 60), np.zeros(3),
+                             {"lateral": n, "vertical": n}, (), {})
+                for place, x, n in (("middle", 0.0, factor * speed / 20), ("end", 9.0, speed / 5))
+            ]  # fmt: skip
+            driven[name] = (speed, rails)
+    made = Assessment("A coach", "comfort", tuple(comfort), comfort=comfort, driven=driven,
+                      limits=load_comfort_limits("comfort"))  # fmt: skip
+    figure = assessment_figure([made])
+    mean = figure.axes[0]
+    low, high = mean.lines[:2]
+    np.testing.assert_allclose(low.get_xdata(), [72.0, 108.0, 144.0])
+    np.testing.assert_allclose(high.get_ydata(), [2.0, 3.0, 4.0])
+    classes = [text.get_text() for text in mean.texts]
+    assert classes[:2] == ["very comfortable", "comfortable"]
+    assert figure.get_suptitle() == "A coach"
+    figure.draw_without_rendering()
+    legend = figure.legends[0].get_window_extent()
+    assert all(legend.x0 >= axes.get_window_extent().x1 for axes in figure.axes)  # hides nothing

@@ -9,12 +9,16 @@ from example_result import WHEELSETS, example_result
 from matplotlib.colors import to_hex
 
 from railsim.cli import main
+from railsim.definitions.excitations.measured_file import recordings
 from railsim.definitions.loading import load_track
+from railsim.definitions.sources import read_source
 from railsim.errors import InputError
 from railsim.plot.histories import STUDY, histories
 from railsim.plot.overlay import overlay
+from railsim.plot.recording import recording_figure
 from railsim.plot.style import HUES, SHADES, wheelset_colours
 from railsim.plot.track import track_figure
+from railsim.track.irregularity import displacement
 
 
 @pytest.fixture(scope="module")
@@ -239,3 +243,48 @@ def test_overlay_has_a_colour_for_every_result(result):
     first, second = drawn(axes)
     assert first.get_color() != second.get_color()
     np.testing.assert_allclose(second.get_ydata(), 0.5 * first.get_ydata())
+
+
+def test_a_recording_is_drawn_as_read_and_as_it_acts_with_its_spectrum(tmp_path, capsys):
+    """Offsets at a chord, of rails of ERRI B176: what acts has that spectrum again.
+
+    Means over a third of a decade of 32 averaged spectra: 15 %.
+    """
+    line = load_track(
+        "straight",
+        [
+            "plan=[{type='STR', length=3000.0}]",
+            "irregularities=[{type='random', spectrum='erri_b176_low', wavelengths=[3.0, 120.0]}]",
+        ],
+    )
+    s = np.arange(10.0, 2900.0, 0.25)
+    rails = displacement(line)
+    offsets = rails(s)[0] - 0.6 * rails(s - 4.0)[0] - 0.4 * rails(s + 6.0)[0]
+    head = "s,y_left,z_left,y_right,z_right"
+    np.savetxt(tmp_path / "record.csv", np.vstack([s, offsets]).T, delimiter=",", header=head,
+               comments="")  # fmt: skip
+    (tmp_path / "line.toml").write_text(
+        'format = "railsim-track/1"\nextends = "straight"\nname = "Line"\n'
+        "plan = [{ type = 'STR', length = 3000.0 }]\n[[irregularities]]\ntype = 'measured'\n"
+        "file = 'record.csv'\nchord = [4.0, 6.0]\nscale = 1.0\n"
+    )
+    out = tmp_path / "record.png"
+    assert main(["plot", str(tmp_path / "line.toml"), "recording", "--out", str(out)]) == 0
+    assert out.stat().st_size > 50_000
+    data = read_source(tmp_path / "line.toml", "track").data
+    ((name, before, after),) = recordings(data["irregularities"])
+    assert name == "record.csv"
+    assert np.allclose(before[:, 1:], offsets.T, atol=1e-12)
+    figure = recording_figure(before, after, "Line")
+    for axes in figure.axes[1::2]:  # read, acts, low, high
+        read, acts, low, _ = (line.get_xydata()[::-1] for line in axes.lines)
+        low = low[np.argsort(low[:, 0])]
+
+        def over_low(curve, low=low):
+            curve = curve[(curve[:, 0] > 6.0) & (curve[:, 0] < 15.0)]
+            return np.mean(curve[:, 1] / np.interp(curve[:, 0], *low.T))
+
+        assert over_low(acts) == pytest.approx(1.0, abs=0.15)
+        assert over_low(read) > 1.4  # the chord doubles waves of twice its length over odd numbers
+    assert main(["plot", "curve_r250", "recording", "--out", str(tmp_path / "no.png")]) == 2
+    assert "no recording" in capsys.readouterr().err

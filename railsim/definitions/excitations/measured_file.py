@@ -5,14 +5,14 @@ The rows become part of the track, so that a result carries its irregularities w
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from railsim.definitions.excitations.base import COLUMNS
+from railsim.definitions.excitations.base import COLUMNS, Array
 from railsim.definitions.excitations.measured import READING, Measured
 from railsim.definitions.excitations.recording import BANDS, band_passed, equal_step, from_chord
 from railsim.errors import Fault, InputError, counted, nearest
@@ -86,6 +86,34 @@ def _definition(table: dict[str, Any]) -> Measured | None:
         return Measured.model_validate({**table, "file": "-"})
     except ValidationError:
         return None
+
+
+def recordings(tables: Iterable[Any]) -> list[tuple[str, Array, Array]]:
+    """Recordings of valid irregularities: name of the file, rows as read, and rows as they act.
+
+    Parameters
+    ----------
+    tables : iterable of dict
+        Irregularities of a track as plain tables, with files.
+
+    Returns
+    -------
+    list of (str, float64[n, 5], float64[n, 5])
+        s, y_left, z_left, y_right, z_right [m]; `chord`, `band` and `scale` are in the second only.
+    """
+    found = []
+    for table in tables:
+        how = _definition(table) if "file" in table else None
+        if how is None:
+            continue
+        plain = how.model_copy(update={"chord": None, "band": None})
+        path = Path(table["file"])
+        before, after = (np.array(read_measured(path, one)[0]) for one in (plain, how))
+        before[:, 0] += how.shift
+        after[:, 0] += how.shift
+        after[:, 1:] *= how.scale
+        found.append((path.name, before, after))
+    return found
 
 
 def read_measured(path: Path, how: Measured) -> tuple[Rows, list[Fault]]:
