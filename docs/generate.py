@@ -1,139 +1,30 @@
-"""Fill those tables of the manual that railsim itself knows.
+"""Make what the manual holds of tables, pages and pictures.
 
-``python docs/generate.py`` writes them between ``<!-- generated: NAME -->`` and ``<!-- end -->``:
-the quantities of a result, and the published curving study against railsim; and the first picture
-of README and manual.  The tests check that they are up to date, of the picture what it shows, which
-is in its file as a text.
+``python docs/generate.py [NAME[:PART] ...]``, for instance ``creep:fastsim`` or ``examples:pages``;
+``--help`` lists the names.  Without a name those that a change of railsim's quantities needs.
 """
 
-import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
+from importlib import import_module
 
-import numpy as np
-
-from railsim import Result, Settings, load_track, load_vehicle, simulate
-from railsim.definitions.schema import check_markers
-from railsim.notation import QUANTITIES, REQUESTED, Quantity
-from railsim.plot.histories import histories
-
-DOCS = Path(__file__).parent
-PAGES = (DOCS.parent / "README.md", DOCS / "notation.md", DOCS / "validation" / "curving.md")
-PICTURE = DOCS / "img" / "curve_r250.png"
-PICTURED, SHOWN = ("dQ_over_Q0", "Y_over_Q"), (250.0, 550.0)  # quantities; m
-TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
-
-sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
-from curving_study import COACHES, MID_CURVE, RIGID, measured, published  # noqa: E402
+from generators import GENERATORS
 
 
-def tables() -> dict[str, str]:
-    """All tables by name."""
-    return {"quantities": quantity_table(), **{coach: curving_table(coach) for coach in COACHES}}
-
-
-def quantity_table() -> str:
-    """Table of the quantities of a result."""
-    head = ("name", "symbol", "meaning", "sign", "unit", "shown", "dimensions")
-    return table(head, map(_quantity_row, QUANTITIES.values()), "---")
-
-
-def _quantity_row(quantity: Quantity) -> tuple[str, ...]:
-    return (
-        f"`{quantity.name}`",
-        f"${quantity.symbol}$".replace("|", r"{\vert}"),
-        quantity.long_name,
-        quantity.sign,
-        quantity.unit,
-        quantity.shown_unit,
-        ", ".join(quantity.dims),
-    )
-
-
-def curving_table(coach: str) -> str:
-    """Comparison of one coach with the published curving study, on rigid and on elastic rails."""
-    track, vehicle = load_track("curve_r250"), load_vehicle(f"coach_{coach}")
-    rigid = simulate(vehicle, track.replace(support=RIGID), speed=20.0)
-    deflected = Settings.model_validate({"outputs": {"track": True}})
-    elastic = simulate(vehicle, track, speed=20.0, settings=deflected)
-    rows = []
-    for name, expected in published(coach).items():
-        quantity, found = QUANTITIES[name], measured(rigid, name)
-        where = "largest" if name == "dQ_over_Q0" else "mid-curve"
-        difference = f"{100.0 * (found / expected - 1.0):+.1f} %"
-        values = (expected, found, measured(elastic, name))
-        numbers = [_digits(quantity.scale * value) for value in values]
-        rows.append((f"{quantity.words}, {where}", *numbers[:2], difference, numbers[2]))
-    rows += _beside(elastic)
-    head = ("leading wheelset", "published", "rigid rails", "difference", "elastic rails")
-    return table(head, rows)
-
-
-def _beside(elastic: Result) -> list[tuple[str, ...]]:
-    """What elastic rails add to the wheelset's lateral displacement: without a published value."""
-    middle = int(np.argmin(np.abs(elastic["time"] - MID_CURVE)))
-    left, right = elastic["rail_deflection_lateral"][middle, 0]
-    aside = REQUESTED["wheelset_lateral_on_track"]
-    values = (
-        ("of this, half the widening of the gauge under load (mm)", 0.5 * (left - right)),
-        (f"{aside.words}", measured(elastic, aside.name)),
-    )
-    return [(words, "", "", "", _digits(aside.scale * value)) for words, value in values]
-
-
-def first_run() -> Result:
-    """The run of README's first picture, as its example of one run."""
-    return simulate(load_vehicle("coach_manchester"), load_track("curve_r250"), speed=20.0)
-
-
-def shown(result: Result) -> str:
-    """What the picture shows, in numbers: they tell whether it is up to date."""
-    change, quotient = (result[name][result["distance"] > SHOWN[0]] for name in PICTURED)
-    return (
-        f"dQ/Q0 {100.0 * change.min():.1f} to {100.0 * change.max():.1f} %, "
-        f"Y/Q {quotient.min():.2f} to {quotient.max():.2f}"
-    )
-
-
-def draw_first_picture() -> None:
-    """Wheel load change and derailment quotient in the curve."""
-    result = first_run()
-    figure = histories(result, PICTURED, between=SHOWN)
-    figure.savefig(PICTURE, metadata={"Description": shown(result)})
-
-
-def _digits(value: float) -> str:
-    return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.3f}"
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---:") -> str:
-    """Return a table of the manual; `rule` aligns all columns but the first."""
-    rules = ("---", *[rule] * (len(head) - 1))
-    return "".join(f"| {' | '.join(row)} |\n" for row in (head, rules, *rows))
-
-
-def filled(text: str, known: dict[str, str]) -> str:
-    """Return a page with its tables filled."""
-    check_markers(text)
-    return TABLE.sub(lambda match: f"{match[1]}\n{known[match[2]]}\n{match[3]}", text)
-
-
-def fill_page(
-    page: Path, makers: Mapping[str, Callable[[], str]], wanted: Sequence[str] = ()
-) -> None:
-    """Make the wanted tables of a page: by default those of the command line, else all."""
-    wanted = wanted or sys.argv[1:] or list(makers)
-    text = page.read_text("utf-8")
-    known = {name: make() for name, make in makers.items() if name in wanted}
-    for match in TABLE.finditer(text):  # tables that were not asked for stay
-        present = match[0].split("-->\n", 1)[1].rsplit("<!-- end", 1)[0]
-        known.setdefault(match[2], present.strip() + "\n")
-    page.write_text(filled(text, known), encoding="utf-8")
+def main(words: Sequence[str]) -> int:
+    """Run the generators that are named."""
+    wanted: dict[str, list[str]] = {}
+    for word in words or ["tables"]:
+        name, _, part = word.partition(":")
+        wanted.setdefault(name, []).extend([part] if part else [])
+    if unknown := wanted.keys() - GENERATORS.keys():
+        lines = [f"  {name:11} {what}" for name, what in GENERATORS.items()]
+        print("python docs/generate.py [NAME[:PART] ...]", *lines, sep="\n")
+        return 0 if unknown <= {"-h", "--help"} else 2
+    for name, parts in wanted.items():
+        import_module(f"generators.{name}").make(parts)
+    return 0
 
 
 if __name__ == "__main__":
-    draw_first_picture()
-    known = tables()
-    for page in PAGES:
-        page.write_text(filled(page.read_text("utf-8"), known), encoding="utf-8")
+    sys.exit(main(sys.argv[1:]))

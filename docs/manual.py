@@ -7,7 +7,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parent))
-from generate_examples import SCRIPTS, notebook
+from generators.examples import SCRIPTS, notebook
 
 
 def on_files(files: Files, *, config: Any) -> Files:

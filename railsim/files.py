@@ -72,7 +72,7 @@ def check_file(
     elif not os.access(path.parent, os.W_OK):
         found, allowed = f"the folder {path.parent} cannot be written to", "choose another"
     elif path.exists() and not overwrite:
-        found, allowed = f"{path} exists", "give --overwrite or another name"
+        found, allowed = f"{path} exists", "give `overwrite` or another name"
     _refuse(found, allowed, option)
 
 
@@ -94,8 +94,8 @@ def check_folder(folder: Path, names: Iterable[str] = (), *, overwrite: bool = F
     elif found := _unwritable(folder):
         allowed = "choose another folder"
     elif not overwrite and (there := [name for name in names if (folder / name).exists()]):
-        found, allowed = f"{folder} holds {', '.join(there)}", "give --overwrite or another folder"
-    _refuse(found, allowed)
+        found, allowed = f"{folder} holds {', '.join(there)}", "give `overwrite` or another folder"
+    _refuse(found, allowed, parameter="out")
 
 
 def write_folder(
@@ -128,9 +128,9 @@ def make_folder(folder: Path) -> None:
         _refuse(f"cannot make {folder} ({error.strerror})", "choose another folder")
 
 
-def _refuse(found: str, allowed: str, option: str = "--out") -> None:
+def _refuse(found: str, allowed: str, option: str = "--out", *, parameter: str = "path") -> None:
     if found:
-        raise InputError([argument_fault("path", "", found, allowed, option)]) from None
+        raise InputError([argument_fault(parameter, "", found, allowed, option)]) from None
 
 
 def _unwritable(folder: Path) -> str:

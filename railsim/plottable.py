@@ -4,7 +4,9 @@ Analyses lie below pictures and know none of them.  The package's top hands over
 draws any of them (`railsim.plot.plot`), which looks at the type of what it is given.
 """
 
+from base64 import b64encode
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +27,32 @@ def picture_of(thing: object, path: str | Path | None, overwrite: bool, **how: A
     return _plotters[0](thing, path=path, overwrite=overwrite, **how)
 
 
+def image_tag(figure: "Figure") -> str:
+    """Return a figure as a picture within a page."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=80)
+    return f'<img src="data:image/png;base64,{b64encode(stream.getvalue()).decode()}">'
+
+
 class Plottable:
-    """An object that can be plotted."""
+    """An object with a `title` and a `table` that can be plotted; a notebook shows all three."""
+
+    @property
+    def title(self) -> str:
+        """What was analysed, in words."""
+        return ""
+
+    def table(self) -> Any:
+        """Return the values as a `railsim.table.Table`."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.title}>"
+
+    def _repr_html_(self) -> str:
+        table = self.table()
+        table.caption = repr(self)[1:-1]
+        return f"{table.html()}{image_tag(self.plot())}"
 
     def plot(
         self, path: str | Path | None = None, *, title: str = "", overwrite: bool = False

@@ -2,6 +2,7 @@
 
 import math
 import re
+from typing import Any
 
 UNITS = {
     "km/h": 1.0 / 3.6, "m/s": 1.0, "mm": 1e-3, "m": 1.0, "kN": 1e3, "N": 1.0,
@@ -9,6 +10,7 @@ UNITS = {
 }  # fmt: skip
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*({'|'.join(map(re.escape, UNITS))})")
+_SPEED = re.compile(rf"({NUMBER})\s*(km/h|m/s)?")
 _RANGE = re.compile(
     rf"(log:)?({NUMBER}):({NUMBER}):(\d+)(?:\s*({'|'.join(map(re.escape, UNITS))}))?"
 )
@@ -26,6 +28,18 @@ def number_with_unit(text: str) -> float | None:
     """
     found = _WITH_UNIT.fullmatch(text.strip())
     return rounded(float(found[1]) * UNITS[found[2]]) if found else None
+
+
+def speed_in_si(value: Any) -> Any:
+    """Return the speed of a text such as ``72 km/h`` or ``20`` [m/s]; anything else as it is.
+
+    Examples
+    --------
+    >>> speed_in_si("72 km/h"), speed_in_si("20"), speed_in_si(20.0), speed_in_si("20 kN")
+    (20.0, 20.0, 20.0, '20 kN')
+    """
+    found = _SPEED.fullmatch(value.strip()) if isinstance(value, str) else None
+    return rounded(float(found[1]) * UNITS[found[2] or "m/s"]) if found else value
 
 
 def range_values(text: str) -> list[float] | None:

@@ -93,14 +93,14 @@ class Record:
         if self.coarse and not coarse:
             allowed = (
                 f"at least {FINE_ENOUGH:g} (settings.output_rate=1000), or values low-pass "
-                "filtered by the run (settings.outputs.low_pass); --coarse assesses it nevertheless"
+                "filtered by the run (settings.outputs.low_pass); `coarse` assesses it nevertheless"
             )
             raise self.fault("time", f"{self.rate:.4g} samples per second", allowed)
         self._last: _Readings | None = None
 
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """Return the error for a property of the result that is not admissible."""
-        return InputError([Fault(self.name, key, found, allowed)])
+        return InputError([Fault(self.name, key, found, allowed, option=self.name)])
 
     def need(self, names: Sequence[str], output: str) -> None:
         """Refuse a result that lacks quantities.

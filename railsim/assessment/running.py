@@ -175,7 +175,7 @@ def _service(runs: Mapping[str, Result]) -> Service:
         raise InputError([Fault(
             name, "vehicle.service", "the vehicle has no service table",
             "add [service] with admissible_speed and cant_deficiency to its file, or give "
-            "--admissible-speed and --cant-deficiency",
+            "`admissible_speed` and `cant_deficiency`", name,
         )])  # fmt: skip
     return service
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from railsim.cli.common import echo, output_options, print_json, show
+from railsim.cli.common import Speed, echo, output_options, print_json, show
 from railsim.files import check_folder, make_folder, whole_file
 from railsim.text import counted_remarks, spreadsheet_cell
 
@@ -37,7 +37,7 @@ FILES = ("assessment.json", "assessment.csv", "assessment.png", "assessment_sect
     help="With wheel forces, or with accelerations only.",
 )  # fmt: skip
 @click.option(
-    "--admissible-speed", type=float, metavar="V", help="Instead of the vehicle's, in m/s."
+    "--admissible-speed", type=Speed(), metavar="V", help="Instead of the vehicle's, in m/s."
 )
 @click.option("--cant-deficiency", type=float, metavar="I", help="Admissible cant deficiency in m.")
 @click.option(

@@ -31,12 +31,12 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
         """Return the speed in m/s."""
-        from railsim.units import number_with_unit
+        from railsim.units import speed_in_si
 
-        found = number_with_unit(str(value))
-        if found is not None:
-            return found
-        return float(click.FLOAT.convert(value, param, ctx))
+        found = speed_in_si(str(value))
+        if isinstance(found, str):
+            self.fail(f"'{value}' is not a speed, such as 20 or 72km/h", param, ctx)
+        return float(found)
 
 
 def echo(text: object = "", *, err: bool = False) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.analysis import Folder, InputFiles, Inputs, Output, analysis_options, values_of
-from railsim.cli.common import echo, linearisation_options, names_of
+from railsim.cli.common import Speed, echo, linearisation_options, names_of
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -31,20 +31,20 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @click.option(
     "--from",
     "low",
-    type=float,
+    type=Speed(),
     default=5.0,
     show_default=True,
     metavar="V",
-    help="Lowest speed in m/s.",
+    help="Lowest speed in m/s, or with a unit.",
 )
 @click.option(
     "--to",
     "high",
-    type=float,
+    type=Speed(),
     default=120.0,
     show_default=True,
     metavar="V",
-    help="Highest speed in m/s.",
+    help="Highest speed in m/s, or with a unit.",
 )
 @click.option(
     "--points",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from railsim.cli.common import (
+    Speed,
     json_option,
     load_option,
     overwrite_option,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 @click.option(
     "--speed",
     "speeds",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Speed(),
     multiple=True,
     metavar="V",
     help="Speed for the cant deficiency in the curves of a track, m/s; may be given several times.",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.analysis import Folder, InputFiles, Output, analysis_options, values_of
-from railsim.cli.common import linearisation_options, names_of
+from railsim.cli.common import Speed, linearisation_options, names_of
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -25,7 +25,12 @@ CYCLE = {"frames": 40, "cycles": 1}
 @click.argument("vehicle", metavar="VEHICLE", shell_complete=names_of("vehicle"))
 @click.argument("track", metavar="[TRACK]", required=False, shell_complete=names_of("track"))
 @click.option(
-    "--speed", type=float, default=20.0, show_default=True, metavar="V", help="Speed in m/s."
+    "--speed",
+    type=Speed(),
+    default=20.0,
+    show_default=True,
+    metavar="V",
+    help="Speed in m/s, or with a unit: 72km/h.",
 )
 @click.option("--speeds", metavar="A:B:N", help="N speeds from A to B: a root locus.")
 @click.option(

@@ -24,6 +24,8 @@ from pydantic import (
     WithJsonSchema,
 )
 
+from railsim.units import speed_in_si
+
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
@@ -31,6 +33,11 @@ Count = Annotated[int, Field(strict=True, gt=0)]
 Flag = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Name = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+
+Speed = Annotated[
+    float, BeforeValidator(speed_in_si), Field(strict=True, allow_inf_nan=False, gt=0)
+]
+"""Speed [m/s]; texts with units are taken too"""
 
 Vector = tuple[Finite, Finite, Finite]
 PositiveVector = tuple[Positive, Positive, Positive]

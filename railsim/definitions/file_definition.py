@@ -128,7 +128,19 @@ class FileDefinition(Definition):
 
     def __repr__(self) -> str:
         kind, name = type(self).__name__, getattr(self, "name", None)
-        return f"<{kind} {printable(name)!r}>" if name else f"<{kind}>"
+        if name:
+            return f"<{kind} {printable(name)!r}>"
+        own = self.model_dump(exclude_defaults=True, exclude={"format"})
+        values = shortened(", ".join(f"{key}={value!r}" for key, value in own.items()))
+        return f"<{kind}: {printable(values) or 'defaults'}>"
+
+    __str__ = __repr__
+
+    def __dir__(self) -> list[str]:
+        """Return names to complete: keys and what users call."""
+        inside = {"KIND", "OPEN_TABLES", "complete", "contradictions", "format_name",
+                  "note_assigned", "table_faults"}  # fmt: skip
+        return sorted(set(super().__dir__()) - inside)
 
     def _table(self) -> Table:
         """Return the table that a notebook shows: keys and their values."""

@@ -168,12 +168,24 @@ def _holds(keys: Sequence[str], path: Sequence[str]) -> bool:
     return all(part in rest for part in path)
 
 
+def _kinds(table: Sequence[str]) -> str:
+    """Beginning of a new force element, of which the kind has to be given."""
+    if not table or table[-1] != "elements":
+        return ""
+    from railsim.definitions.elements import KINDS
+
+    return f'kind="{"|".join(KINDS)}", '
+
+
 def _no_member(node: Any, part: str, before: Sequence[str], others: Iterable[str]) -> str:
     table = ".".join(before) or "the file"
     if isinstance(node, dict):
         known = {*node, *others}
-        allowed = nearest(part, known) if known else f"it is empty; {table}.{part}={{...}} adds it"
-        return f"no '{part}' in {table}; {allowed}"
+        allowed = nearest(part, known) if known else "it is empty"
+        named = all(isinstance(member, dict) for member in node.values())
+        new = named and not allowed.startswith("did you mean")
+        adds = f"{table}.{part}={{{_kinds(before)}...}} adds it" if new else ""
+        return "; ".join(filter(None, [f"no '{part}' in {table}", allowed, adds]))
     if isinstance(node, list):
         names = [m["name"] for m in node if isinstance(m, dict) and "name" in m]
         if names:

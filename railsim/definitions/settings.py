@@ -4,13 +4,20 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from railsim.definitions.base import Definition, Finite, Flag, NonNegative, Positive, Text, rises
+from railsim.definitions.base import (
+    Definition,
+    Finite,
+    Flag,
+    NonNegative,
+    Positive,
+    Speed,
+    Text,
+    rises,
+)
 from railsim.definitions.creep_law import CreepLawName
 from railsim.definitions.file_definition import FileDefinition
 
-SpeedRows = Annotated[
-    tuple[tuple[Finite, Positive], ...], Field(min_length=1), rises("first column")
-]
+SpeedRows = Annotated[tuple[tuple[Finite, Speed], ...], Field(min_length=1), rises("first column")]
 Step = Annotated[Finite, Field(ge=1e-6, le=0.1)]
 Rate = Annotated[Finite, Field(ge=1e-3, le=1e5)]
 Spacing = Annotated[Finite, Field(ge=1e-3, le=1e5)]

@@ -16,7 +16,7 @@ from railsim.definitions.base import (
     Flag,
     NonNegative,
     NonNegativePair,
-    Positive,
+    Speed,
     Text,
     TextPair,
     both_sides,
@@ -201,7 +201,7 @@ class TrackTables(FileDefinition):
     """What the track is called in tables and plots"""
     source: Text | None = None
     """Where the numbers come from"""
-    speed: Positive | None = None
+    speed: Speed | None = None
     """Highest speed permitted on the track [m/s]: remarks on the alignment refer to it, and the
     speed `permitted` of a study"""
     mileage: Finite = 0.0

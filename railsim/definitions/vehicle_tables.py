@@ -17,6 +17,7 @@ from railsim.definitions.base import (
     Positive,
     PositivePair,
     PositiveVector,
+    Speed,
     Text,
     TextPair,
     Vector,
@@ -115,7 +116,7 @@ class Point(Definition):
 class Service(Definition):
     """Approved operating conditions of the vehicle: the base of its assessment."""
 
-    admissible_speed: Positive
+    admissible_speed: Speed
     """Highest speed in service [m/s]"""
     cant_deficiency: Positive
     """Admissible cant deficiency [m]"""

@@ -27,15 +27,16 @@ if TYPE_CHECKING:
 __all__ = ["Description", "describe"]
 
 
-def describe(item: "FileDefinition | Result", speeds: Sequence[float] = ()) -> Description:
+def describe(item: "FileDefinition | Result", speeds: Sequence[float | str] = ()) -> Description:
     """Return what a vehicle, track, spring, mechanism, study, settings or result holds.
 
     Parameters
     ----------
     item
         Definition or result.
-    speeds : sequence of float
-        Of a track: speeds for which the cant deficiency in its curves is given [m/s].
+    speeds : sequence of float or str
+        Of a track: speeds for which the cant deficiency in its curves is given [m/s], or texts with
+        units.
     """
     if not isinstance(item, FileDefinition):
         return _result(item)

@@ -11,8 +11,10 @@ from railsim.definitions.layout import cant_sections, curvature_sections, gradie
 from railsim.definitions.section import Section
 from railsim.definitions.track import Track
 from railsim.description.values import Description, Parts, either, short
+from railsim.errors import InputError, argument_fault
 from railsim.table import Column, Table
 from railsim.track.curves import Curve, curves
+from railsim.units import speed_in_si
 
 _COPIED = (
     "name", "source", "length", "gauge", "rail", "inclination", "friction", "friction_table",
@@ -20,22 +22,33 @@ _COPIED = (
 )  # fmt: skip
 
 
-def describe_track(track: Track, speeds: Sequence[float]) -> Description:
+def _checked(speed: float | str) -> float:
+    value = speed_in_si(speed)
+    if isinstance(value, str) or not value > 0.0:
+        fault = argument_fault(
+            "speeds", "", f"found {speed!r}", "above 0, such as 20 or '72 km/h'", "--speed"
+        )
+        raise InputError([fault])
+    return float(value)
+
+
+def describe_track(track: Track, speeds: Sequence[float | str]) -> Description:
     """Return plan with cant, speeds of the curves, vertical profile, irregularities."""
+    speeds_si = [_checked(speed) for speed in speeds]
     plan, cant = curvature_sections(track), cant_sections(track)
     bends = {curve.section: curve for curve in curves(track)}
     data = {
         "kind": "track",
         **{name: getattr(track, name) for name in _COPIED},
         "friction_falling": track.friction_falling and track.friction_falling.model_dump(),
-        "plan": [_plan_row(section, cant, bends.get(section), speeds) for section in plan],
+        "plan": [_plan_row(section, cant, bends.get(section), speeds_si) for section in plan],
         "cant": [_row(section) for section in cant],
         "vertical": [_row(section) for section in gradient_sections(track)],
         "mileage": (track.mileage_at(0.0), track.mileage_at(track.length)),
         "irregularities": [_irregularity(part) for part in track.irregularities],
     }
-    parts: Parts = [*_track_lines(track, data["mileage"]), "", _plan_table(data["plan"], speeds)]
-    if speeds and any("cant_deficiency" in row for row in data["plan"]):
+    parts: Parts = [*_track_lines(track, data["mileage"]), "", _plan_table(data["plan"], speeds_si)]
+    if speeds_si and any("cant_deficiency" in row for row in data["plan"]):
         parts.append("columns of speeds: cant deficiency in mm")
     ends = [Column("begin", "from", "m", "g"), Column("end", "to", "m", "g")]
     vertical = [

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,6 +21,7 @@ from railsim.linear.vehicle import AMPLITUDE, Contact, LinearVehicle, smooth_law
 from railsim.plottable import Plottable
 from railsim.profiles import Profile
 from railsim.table import Column, Table
+from railsim.units import speed_in_si
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -93,7 +95,7 @@ class Mode:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Modes(Plottable):
     """Modes of a vehicle at one speed.
 
@@ -193,7 +195,7 @@ class Modes(Plottable):
         return f"{self.vehicle}: {self.speed:g} m/s, {self.place}, contact {self.contact.words()}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RootLocus(Plottable):
     """Oscillations of a vehicle over speed or another parameter, each at the same index throughout.
 
@@ -297,7 +299,7 @@ def modes(
     vehicle: Vehicle,
     track: Track | None = None,
     *,
-    speed: float = 20.0,
+    speed: float | str = 20.0,
     linearisation: str = "tangent",
     amplitude: float = AMPLITUDE,
     conicity: float | None = None,
@@ -316,8 +318,8 @@ def modes(
         See `load_vehicle`.
     track : Track, optional
         Whose rails, gauge and friction count; by default ``straight``.
-    speed : float
-        [m/s].
+    speed : float or str
+        [m/s], or with a unit: ``"72 km/h"``.
     linearisation : "tangent" or "harmonic"
         Of the contact: its derivative, or its first harmonic for `amplitude`.
     amplitude : float
@@ -362,12 +364,12 @@ def modes(
         settings=smooth_law(settings),
         profiles=profiles,
     )
-    check_speeds([speed])
+    (speed,) = checked_speeds([speed])
     return _named(prepared, eigenmodes(prepared.linearised(speed)), speed)
 
 
 def root_locus(
-    vehicle: Vehicle, track: Track | None = None, *, speeds: Sequence[float], **how: Any
+    vehicle: Vehicle, track: Track | None = None, *, speeds: Sequence[float | str], **how: Any
 ) -> RootLocus:
     """Return the modes of a vehicle over speed, each followed.
 
@@ -375,18 +377,18 @@ def root_locus(
     ----------
     vehicle, track : Vehicle, Track
         As in `modes`.
-    speeds : sequence of float
-        [m/s].
+    speeds : sequence of float or str
+        [m/s], or with a unit: ``"72 km/h"``.
     **how
         The other arguments of `modes`: linearisation, amplitude, conicity, radius, cant, held,
         hold, settings, profiles.
     """
-    check_speeds(speeds)
+    speeds = checked_speeds(speeds, "speeds")
     how = {**how, "settings": smooth_law(how.get("settings"))}
     names = ("linearisation", "amplitude", "conicity")
     contact = Contact(**{name: how.pop(name) for name in names if name in how})
     prepared = LinearVehicle(vehicle, track or load_track("straight"), contact=contact, **how)
-    sets = followed(prepared.linearised, list(speeds), FOLLOWED)
+    sets = followed(prepared.linearised, speeds, FOLLOWED)
     named = [_named(prepared, found, speed) for found, speed in zip(sets, speeds, strict=True)]
     return RootLocus("speed", tuple(speeds), tuple(named))
 
@@ -406,7 +408,7 @@ def parameter_locus(
     speed : float
         [m/s].
     """
-    check_speeds([speed])
+    (speed,) = checked_speeds([speed])
     of = cache(prepared)
     sets = followed(lambda value: of(value).linearised(speed), list(values), FOLLOWED)
     named = [
@@ -416,13 +418,21 @@ def parameter_locus(
     return RootLocus(key, tuple(values), tuple(named))
 
 
-def check_speeds(speeds: Sequence[float]) -> None:
-    """Raise InputError where speeds are out of range."""
+def checked_speeds(speeds: Sequence[float | str], name: str = "speed") -> list[float]:
+    """Return speeds, which may be texts with units [m/s].
+
+    Raises
+    ------
+    InputError : one of them is no speed or out of range, or there is none.
+    """
     low, high = SPEED_RANGE
-    bad = [v for v in speeds if not (math.isfinite(v) and low <= v <= high)]
-    if bad or not len(speeds):
-        found = f"found {bad[0]:g} m/s" if bad else "no speed"
-        raise InputError([argument_fault("speed", "", found, f"{low:g} to {high:g} m/s")])
+    values = [speed_in_si(speed) for speed in speeds]
+    bad = [v for v in values if not (isinstance(v, Real) and low <= float(v) <= high)]
+    if bad or not values:
+        found = f"found {bad[0]!r}" if bad else "no speed"
+        allowed = f"{low:g} to {high:g} m/s, or a text such as '72 km/h'"
+        raise InputError([argument_fault(name, "", found, allowed)])
+    return [float(value) for value in values]
 
 
 def _named(

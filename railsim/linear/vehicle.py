@@ -292,13 +292,7 @@ def _check_hold(model: Model, hold: Sequence[str]) -> None:
     ]
     wrong = [name for name in hold if name not in rigid]
     if wrong:
-        raise InputError(
-            [
-                argument_fault(
-                    "hold", wrong[0], "no such body; --held holds the wheelsets", ", ".join(rigid)
-                )
-            ]
-        )
+        raise InputError([argument_fault("hold", wrong[0], "no such body", ", ".join(rigid))])
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

@@ -4,9 +4,7 @@ A `Result` never changes: its arrays are read-only, and what is derived from the
 functions beside it.  Arrays that come from a file are read when they are first asked for.
 """
 
-import io
 import re
-from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
@@ -19,7 +17,7 @@ from numpy.typing import NDArray
 
 from railsim.errors import InputError, nearest, optional_package
 from railsim.notation import Quantity
-from railsim.plottable import picture_of
+from railsim.plottable import image_tag, picture_of
 from railsim.profiles.profile import Profile
 from railsim.table import Table
 from railsim.text import printable
@@ -180,9 +178,7 @@ class Result:
         """Return the forces of the wheels as a picture in a page, where there are any."""
         if not {"Q", "Y", "distance"} <= set(self) or len(self["time"]) < 2:
             return ""
-        stream = io.BytesIO()
-        self.plot("Q", "Y").savefig(stream, format="png", dpi=80)
-        return f'<img src="data:image/png;base64,{b64encode(stream.getvalue()).decode()}">'
+        return image_tag(self.plot("Q", "Y"))
 
     def _names(self) -> tuple[str, ...]:
         return (*self._arrays, "attributes", "coordinates", "quantities", "profiles", "groups")
@@ -209,13 +205,18 @@ class Result:
         name : str
             Quantity.
         **labels : str or int
-            Dimension = name along it, or its index from 0; texts as ``Q:1:left`` and tables
-            number wheelsets from 1.
+            Dimension = name along it, or its index from 0.  As everywhere, texts (``"1"``,
+            ``Q:1:left``) and tables number wheelsets from 1, integers and arrays from 0.
 
         Returns
         -------
         ndarray
             The array without the dimensions that were given [SI].
+
+        Raises
+        ------
+        KeyError
+            There is no such quantity, dimension or label.
         """
         dims = self._quantities[name].dims if name in self._quantities else ()
         array = self[name]
@@ -224,15 +225,36 @@ class Result:
                 raise KeyError(f"{name} has no dimension '{dim}'; {nearest(dim, dims)}")
         return array[tuple(self._index(dim, labels.get(dim)) for dim in dims)]
 
+    def _places(self, dims: tuple[str, ...], labels: list[str]) -> dict[int, list[str]]:
+        """Labels that are wanted by the number of their dimension; wheelsets also from 1."""
+        known = {label: (k, label) for k, dim in enumerate(dims) for label in self.coordinates[dim]}
+        if "wheelset" in dims:
+            names = enumerate(self.coordinates["wheelset"], start=1)
+            known |= {str(number): (dims.index("wheelset"), name) for number, name in names}
+        found: dict[int, list[str]] = {}
+        for label in labels:
+            if label not in known:
+                raise KeyError(f"no label '{label}'; {nearest(label, known)}")
+            k, name = known[label]
+            found.setdefault(k, []).append(name)
+        return found
+
     def _index(self, dim: str, label: str | int | None) -> int | slice:
         if label is None:
             return slice(None)
-        if isinstance(label, int):
+        if dim == "time" and not isinstance(label, str):
             return label
         names = self._coordinates[dim]
-        if label not in names:
-            raise KeyError(f"no {dim} '{label}'; {nearest(label, names)}")
-        return names.index(label)
+        if isinstance(label, str):
+            numbers = map(str, range(1, len(names) + 1)) if dim == "wheelset" else ()
+            known = {number: k for k, number in enumerate(numbers)}
+            known |= {name: k for k, name in enumerate(names)}
+            if label not in known:
+                raise KeyError(f"no {dim} '{label}'; {nearest(label, known)}")
+            return known[label]
+        if not -len(names) <= label < len(names):
+            raise KeyError(f"no {dim} {label}; 0 to {len(names) - 1}, or a name")
+        return int(label)
 
     # -- what describes them ------------------------------------------------------------------
 
@@ -349,7 +371,8 @@ class Result:
         ----------
         *quantities : str
             Quantities, with labels where not all are wanted: ``"Q"``, ``"Y:1:left"``,
-            ``"body_acceleration:carbody:y"``; by default those of the curving study.
+            ``"body_acceleration:carbody:y"``; wheelsets by name, or by number from 1; by default
+            wheel load change, guiding forces, derailment quotient and the motion of the wheelsets.
         over : {"distance", "time"}
             Horizontal axis.
         by : {"wheel", "wheelset"}
@@ -385,6 +408,16 @@ class Result:
         """
         return _WRITERS["hdf5"](self, path, overwrite)
 
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the result file, as `to_hdf5`: definitions and results alike are saved by `save`.
+
+        Raises
+        ------
+        InputError
+            The file exists and may not be overwritten, or cannot be written.
+        """
+        return self.to_hdf5(path, overwrite=overwrite)
+
     def to_xarray(self) -> "xarray.Dataset":
         """Return the arrays as an `xarray.Dataset` with named coordinates and units.
 
@@ -415,7 +448,8 @@ class Result:
         Parameters
         ----------
         *names : str
-            Quantities with time as their first dimension; by default all of them.
+            Quantities with time as their first dimension, with labels where not all are wanted
+            (``"Q:1:left"``: names, and wheelsets also by numbers from 1); by default all of them.
 
         Returns
         -------
@@ -428,6 +462,8 @@ class Result:
         ------
         ImportError
             Pandas is not installed.
+        KeyError
+            There is no such quantity or label.
         """
         pandas = optional_package("pandas", "to_pandas", "'railsim[pandas]'")
         found = list(self.columns(*names))
@@ -439,13 +475,17 @@ class Result:
     def columns(self, *names: str) -> Iterator[tuple[str, str, Array]]:
         """Yield name, unit and values of every column of quantities over time, see `to_pandas`."""
         over_time = [n for n, q in self._quantities.items() if q.dims[0] == "time" != n]
-        for name in names or over_time:
+        for text in names or over_time:
+            name, *wanted = text.split(":")
             array = self[name]
             if name not in over_time:
                 raise KeyError(f"{name} is not over time; {nearest(name, over_time)}")
             quantity = self._quantities[name]
+            places = self._places(quantity.dims[1:], wanted)
             combinations = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
             for labels, values in zip(combinations, array.reshape(len(array), -1).T, strict=True):
+                if any(labels[k] not in chosen for k, chosen in places.items()):
+                    continue
                 along = "component" in quantity.dims
                 unit = quantity.component(labels[-1]).unit if along else quantity.unit
                 yield ":".join((name, *labels)), unit, values

@@ -13,6 +13,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.result import Result
 from railsim.text import shortened
+from railsim.units import speed_in_si
 
 Floats = NDArray[np.float64]
 SPEED_RANGE = (0.5, 150.0)  # m/s
@@ -36,23 +37,29 @@ class Inputs:
         cls,
         track: Track,
         settings: Settings,
-        speed: float | None,
+        speed: float | str | None,
         start: float,
         duration: float | None,
         until: float | None,
     ) -> "Inputs":
         """Return the inputs; raise InputError with all faults of speed, start and end."""
-        check_numbers(speed=speed, start=start, duration=duration, until=until)
-        speed = initial_speed(settings, speed, start)
-        check_range(track, speed, start, duration, until)
+        given = speed_in_si(speed)
+        check_numbers(speed=given, start=start, duration=duration, until=until)
+        first = initial_speed(settings, given, start)
+        check_range(track, first, start, duration, until)
         # of another type of number the time loop would be compiled again
-        return cls(track, settings, float(speed), float(start), duration, until)
+        return cls(track, settings, float(first), float(start), duration, until)
 
 
 def check_numbers(**given: object) -> None:
     """Raise InputError with everything among the arguments that is neither None nor a number."""
     faults = [
-        argument_fault(name, "", f"found {shortened(repr(value))}", "a number")
+        argument_fault(
+            name,
+            "",
+            f"found {shortened(repr(value))}",
+            "a number" + " of m/s, or a text such as '72 km/h'" * (name == "speed"),
+        )
         for name, value in given.items()
         if value is not None and (not isinstance(value, Real) or isinstance(value, bool))
     ]
@@ -140,7 +147,7 @@ def state_before(
                     "resume",
                     "",
                     f"the result is of another {kind}",
-                    f"the {kind} and the --set {kind}... of the result",
+                    f"the {kind} with the assignments of the result",
                     "--continue",
                 )
             )
@@ -150,7 +157,7 @@ def state_before(
             "resume",
             f"settings.{key}",
             f"found {here[key]}",
-            f"{there[key]}, as in the result (--settings, --set)",
+            f"{there[key]}, as in the result",
             "--continue",
         )
         for key in here

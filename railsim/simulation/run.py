@@ -25,6 +25,7 @@ from railsim.simulation.conditions import Inputs, state_before
 from railsim.simulation.ending import end
 from railsim.simulation.preparation import begin
 from railsim.simulation.run_progress import Progress, RunProgress
+from railsim.units import speed_in_si
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def simulate(
     vehicle: Vehicle,
     track: Track,
     *,
-    speed: float | None = None,
+    speed: float | str | None = None,
     start: float = 0.0,
     duration: float | None = None,
     until: float | None = None,
@@ -49,9 +50,9 @@ def simulate(
     ----------
     vehicle, track : Vehicle, Track
         Definitions, see `load_vehicle`, `load_track`.
-    speed : float
-        Speed of the reference body [m/s]: constant, or at the start of a free run; not needed
-        where the settings have a speed table or with `resume`.
+    speed : float or str
+        Speed of the reference body [m/s], or a text such as ``"72 km/h"``: constant, or at the
+        start of a free run; not needed where the settings have a speed table or with `resume`.
     start : float
         Arc length at which the reference body starts [m].
     duration, until : float, optional
@@ -96,7 +97,7 @@ def simulate(
     before = None if resume is None else state_before(vehicle, track, settings, resume)
     if before is not None:
         own = {"speed": float(before[-1]), "start": float(before[-2])}
-        for name, given in (("speed", speed), ("start", start or None)):
+        for name, given in (("speed", speed_in_si(speed)), ("start", start or None)):
             if given is not None and given != own[name]:
                 found, allowed = "given together with `resume`", "the state's own is used"
                 raise InputError([argument_fault(name, "", found, allowed)])

@@ -1,9 +1,9 @@
 """`critical_speed`: from which speed a vehicle hunts, linear and non-linear, and how it begins."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from railsim.stability.diagram import diagram
 from railsim.stability.motion import LeftRange, VehicleMotion
 from railsim.stability.ramp import EXCITATIONS, SMALL, ramp
 from railsim.stability.result import Conicity, CriticalSpeed, LinearLoss, OverAmplitude
+from railsim.units import speed_in_si
 
 Progress = Callable[[float], None]
 
@@ -51,8 +52,8 @@ def critical_speed(
     track: Track | None = None,
     *,
     methods: Sequence[str] = ("linear", "ramp"),
-    low: float = 5.0,
-    high: float = 120.0,
+    low: float | str = 5.0,
+    high: float | str = 120.0,
     points: int = 16,
     linearisation: str = "tangent",
     amplitude: float = AMPLITUDE,
@@ -73,8 +74,8 @@ def critical_speed(
         Whose rails, gauge, friction and support count; by default ``straight``.
     methods : sequence of str
         Of `METHODS`; the linear one is always used.
-    low, high : float
-        Range of the search [m/s].
+    low, high : float or str
+        Range of the search [m/s], or with units: ``"400 km/h"``.
     points : int
         Speeds of a bifurcation diagram.
     linearisation, amplitude, conicity
@@ -98,7 +99,7 @@ def critical_speed(
     ModelError
         There is no equilibrium, or no stable step.
     """
-    _check(methods, low, high, points, excitations)
+    low, high = _checked(methods, (low, high), points, excitations)
     settings, track = settings or Settings(), track or load_track("straight")
     contact, law = Contact(linearisation, amplitude, conicity), smooth_law(settings)
 
@@ -142,9 +143,14 @@ def critical_speed(
     return found
 
 
-def _check(
-    methods: Sequence[str], low: float, high: float, points: int, excitations: Sequence[float]
-) -> None:
+def _checked(
+    methods: Sequence[str],
+    speeds: tuple[float | str, float | str],
+    points: int,
+    excitations: Sequence[float],
+) -> tuple[float, float]:
+    """Return lowest and highest speed [m/s]; raise InputError with all faults of the arguments."""
+    low, high = map(speed_in_si, speeds)
     faults = []
 
     def check(right: bool, name: str, found: str, allowed: str, option: str | None = None) -> None:
@@ -155,8 +161,8 @@ def _check(
     check(unknown is None, "methods", f"found '{unknown}'", " or ".join(METHODS), "--method")
     least, most = SPEED_RANGE
     for name, option, value in (("low", "--from", low), ("high", "--to", high)):
-        inside = math.isfinite(value) and least <= value <= most
-        check(inside, name, f"found {value:g} m/s", f"{least:g} to {most:g} m/s", option)
+        inside = isinstance(value, Real) and least <= float(value) <= most
+        check(inside, name, f"found {value!r}", f"{least:g} to {most:g} m/s", option)
     if not faults:
         words = f"less than the highest, {high:g} m/s"
         check(low < high, "low", f"found {low:g} m/s", words, "--from")
@@ -171,6 +177,7 @@ def _check(
     )
     if faults:
         raise InputError(faults)
+    return float(low), float(high)
 
 
 # linear -------------------------------------------------------------------------------------------

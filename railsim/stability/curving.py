@@ -65,7 +65,7 @@ METHODS = ("no steady state", "", "by time integration")
 STILL = 1e-4  # share of the wheel loads by which forces still change after a second
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Curving(Plottable):
     """Steady curving on a grid.
 

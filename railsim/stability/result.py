@@ -88,7 +88,7 @@ class Conicity:
     conicity: list[float]
 
 
-@dataclass
+@dataclass(repr=False)
 class CriticalSpeed(Plottable):
     """Critical speeds of a vehicle.
 
@@ -138,6 +138,14 @@ class CriticalSpeed(Plottable):
     instability_limit: Limit | None = None
     conicity_over_amplitude: Conicity | None = None
     remarks: list[str] = field(default_factory=list)
+
+    @property
+    def title(self) -> str:
+        """Vehicle and critical speeds in words."""
+        linear = f"linear {self.linear.speed:.4g} m/s" if self.linear else "no linear one"
+        lowest = self.lowest
+        found = f"slowest sustained hunting {lowest.speed:.4g} m/s" if lowest else "none that lasts"
+        return ", ".join([self.vehicle, linear, *([found] if self.nonlinear else [])])
 
     @property
     def lowest(self) -> Point | None:

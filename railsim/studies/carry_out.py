@@ -8,7 +8,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, argument_fault
 from railsim.files import is_file, make_folder, sweep
 from railsim.studies.execute import (
     Batch,
@@ -52,7 +52,8 @@ def carry_out(plan: Runs, spec: StudySpec, folder: Path, execution: Execution) -
         if execution.overwrite:
             journal.clear()
         elif known is None and journal.entries:
-            raise InputError([Fault("--out", "", f"another study has begun in {folder}", "")])
+            found = f"another study has begun in {folder}"
+            raise InputError([argument_fault("out", "", found, "")])
         journal.begin(inputs)
         for text in state.settle(journal):
             (execution.on_remark or _LOG.warning)(text)
@@ -129,8 +130,8 @@ def _refuse_another_study(
     differing = [name for name, value in asked.items() if there.get(name, value) != value]
     if differing:
         found = f"{folder} holds a study with other " + ", ".join(differing)
-        allowed = "--resume continues with these inputs, --overwrite computes everything; "
-        raise InputError([Fault("--out", "", found, f"{allowed}or another --out")])
+        allowed = "`resume` continues with these inputs, `overwrite` computes everything; "
+        raise InputError([argument_fault("out", "", found, f"{allowed}or another `out`")])
 
 
 def _refuse_files_of_others(folder: Path) -> None:
@@ -146,8 +147,8 @@ def _refuse_files_of_others(folder: Path) -> None:
         name, found = table.name, "is not of a study"
     else:
         return
-    allowed = "choose another --out, or give --overwrite"
-    raise InputError([Fault("--out", str(folder / name), found, allowed)])
+    allowed = "choose another `out`, or give `overwrite`"
+    raise InputError([argument_fault("out", str(folder / name), found, allowed)])
 
 
 def _is_newer(one: Path, other: Path) -> bool:

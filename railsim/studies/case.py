@@ -137,11 +137,11 @@ class Loader:
             self.report(self._as_written(fault, kind) for fault in error.faults)
             return None
 
-    def _as_written(self, fault: Fault, kind: str) -> Fault:
+    def _as_written(self, fault: Fault, kind: str = "") -> Fault:
         """Return the fault of an assignment with its key and option as given."""
         if fault.file != OVERRIDE:
             return fault
-        key = f"{kind}.{fault.key}"
+        key = f"{kind}.{fault.key}" if kind else fault.key
         of_grid = any(key == name or key.startswith(f"{name}.") for name in self._grid)
         parameter, option = ("grid", "--grid") if of_grid else ("assignments", "--set")
         return replace(fault, file=parameter, option=option, key=key)
@@ -154,7 +154,7 @@ class Loader:
                 for kind, some in split_overrides([text]).items():
                     found[kind] += tuple(some)
             except InputError as error:
-                self.report(error.faults)
+                self.report(self._as_written(fault) for fault in error.faults)
         return found
 
     def first_speed(self, run: RunSpec) -> float | None:

@@ -25,7 +25,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, ModelError, RailsimError
+from railsim.errors import InputError, ModelError, RailsimError, argument_fault
 from railsim.files import remove_partial_files, sweep, whole_file
 from railsim.kernels.time_loop import time_loop
 from railsim.processes import hear_requests, signals_later, worker_context, workers_begin
@@ -314,12 +314,13 @@ def cluster(address: str) -> Any:
     except ImportError:
         found = "the package 'distributed' is not installed"
         allowed = "install it with: pip install 'railsim[distributed]'"
-        raise InputError([Fault("--scheduler", "", found, allowed)]) from None
+        raise InputError([argument_fault("scheduler", "", found, allowed)]) from None
     try:
         return Client(address)
     except (OSError, ValueError) as error:
         found = f"no scheduler answers at {address} ({error})"
-        raise InputError([Fault("--scheduler", "", found, "such as tcp://host:8786")]) from None
+        fault = argument_fault("scheduler", "", found, "such as tcp://host:8786")
+        raise InputError([fault]) from None
 
 
 def on_cluster(batches: Sequence[Batch], client: Any, progress: Progress) -> Iterator[Record]:

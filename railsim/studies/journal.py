@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self, overload
 
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.files import locked
 from railsim.studies.records import Record, json_bytes
 
@@ -95,7 +95,7 @@ class Journal:
             if not locked(self._handle):
                 self.close()
                 found = f"another study is writing into {folder}"
-                fault = Fault("--out", "", found, "wait for it, or choose another folder")
+                fault = argument_fault("out", "", found, "wait for it, or choose another folder")
                 raise InputError([fault])
         self.entries: dict[str, Entry] = {}
         self.inputs: Mapping[str, Any] | None = None

@@ -17,7 +17,7 @@ import tomli_w
 from railsim.definitions.design import Optimise
 from railsim.definitions.loading import load_study
 from railsim.definitions.study import Study
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.files import check_folder, is_file, make_folder, read_text, whole_file
 from railsim.studies.carry_out import cores
 from railsim.studies.designs import (
@@ -236,9 +236,10 @@ def _check_folder(folder: Path, definition: Study, *, resume: bool, overwrite: b
     path = folder / INPUTS
     if is_file(path) and read_text(path, INPUT_BYTES) != text and not (resume or overwrite):
         allowed = (
-            "--resume uses what is still valid, --overwrite computes everything; or another --out"
+            "`resume` uses what is still valid, `overwrite` computes everything; or another `out`"
         )
-        raise InputError([Fault("--out", str(folder), "holds another optimisation", allowed)])
+        found = "holds another optimisation"
+        raise InputError([argument_fault("out", str(folder), found, allowed)])
     make_folder(folder)
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -259,7 +260,7 @@ def _concluded(evaluation: Evaluation, choose: int | None) -> Optimisation:
         chosen = front[knee(values[order])]
     if choose is not None:
         if not 1 <= choose <= len(designs):
-            fault = Fault("--choose", "", f"design {choose}", f"1 to {len(designs)}")
+            fault = argument_fault("choose", "", f"design {choose}", f"1 to {len(designs)}")
             raise InputError([fault])
         chosen = designs[choose - 1]
     names = [name_of(one) for one in (*wanted.objectives, *wanted.constraints)]

@@ -11,7 +11,7 @@ from itertools import product
 from railsim.definitions.analyses import needs_run
 from railsim.definitions.loading import load_track
 from railsim.definitions.study import value_texts
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.studies.case import Case, Loader, run_labels, run_name
 from railsim.studies.points import Fingerprints, Point, check_number, point_key
 from railsim.studies.rows import PERMITTED, Row, made_rows
@@ -182,10 +182,12 @@ def parse_grid(text: str) -> tuple[str, tuple[str, ...]]:
     key, equals, written = text.partition("=")
     values = [value.strip() for value in re.split(r",(?![^\[{]*[\]}])", written)]
     if not (equals and key.strip() and all(values)):
-        fault = Fault("--grid", text, "not understood", "allowed: key.path=a,b,c")
+        fault = argument_fault("grid", text, "not understood", "allowed: key.path=a,b,c")
         raise InputError([fault])
     try:
         found = tuple(one for value in values for one in value_texts(value))
     except ValueError as error:
-        raise InputError([Fault("--grid", text, str(error), f"allowed: {ALLOWED}")]) from None
+        raise InputError(
+            [argument_fault("grid", text, str(error), f"allowed: {ALLOWED}")]
+        ) from None
     return key.strip(), found

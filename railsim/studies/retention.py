@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from railsim.errors import Fault, InputError, nearest
+from railsim.errors import InputError, argument_fault, nearest
 from railsim.notation import QUANTITIES, REQUESTED
 from railsim.result import Result
 from railsim.result.hdf5 import PLAIN, Storage, write
@@ -68,7 +68,7 @@ def retention(spec: StudySpec) -> Retention:
     wrong = [name for name in names if not any(fnmatchcase(one, name) for one in known)]
     if wrong or not names:
         raise InputError(
-            Fault("--keep", name, "no such quantity", nearest(name, [ALL, SUMMARY, *known]))
+            argument_fault("keep", name, "no such quantity", nearest(name, [ALL, SUMMARY, *known]))
             for name in wrong or [spec.keep]
         )
     return Retention(names, False, storage)

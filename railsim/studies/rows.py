@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import product
 
 from railsim.definitions.study import Sample, Spread
-from railsim.errors import Fault, InputError
-from railsim.units import number_with_unit
+from railsim.errors import InputError, argument_fault
+from railsim.units import speed_in_si
 
 Grid = Mapping[str, Sequence[str]]
 SPEED = "speed"  # not a key of a file: the speed of the run
@@ -62,6 +62,9 @@ def _row(values: Mapping[str, str], name: str) -> Row:
     return Row(_without_speed(values), name, speed)
 
 
+SPEEDS = "such as 20 or 72km/h"
+
+
 def speed_of(text: str, option: str = "speeds") -> float:
     """Return the speed of a text, which may have a unit [m/s].
 
@@ -69,14 +72,10 @@ def speed_of(text: str, option: str = "speeds") -> float:
     ------
     InputError : the text is not a number.
     """
-    found = number_with_unit(text)
-    if found is not None:
-        return found
-    try:
-        return float(text)
-    except ValueError:
-        fault = Fault(option, "", f"'{text}' is not a speed", "such as 20 or 72km/h")
-        raise InputError([fault]) from None
+    found = speed_in_si(text)
+    if isinstance(found, str):
+        raise InputError([argument_fault(option, "", f"'{text}' is not a speed", SPEEDS)])
+    return float(found)
 
 
 def sampled(sample: Sample) -> list[dict[str, str]]:

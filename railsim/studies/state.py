@@ -7,7 +7,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Protocol
 
-from railsim.errors import Fault, InputError
+from railsim.errors import Fault, InputError, argument_fault
 from railsim.result import open_result
 from railsim.studies.case import Case
 from railsim.studies.journal import JOURNAL, Journal, Records
@@ -17,8 +17,8 @@ from railsim.studies.retention import SUMMARY
 from railsim.studies.spec import Execution, StudySpec
 from railsim.studies.summary import finished_record, waiting_record
 
-DAMAGED = "--resume computes it again and keeps this file beside it; or another --out"
-CHANGED = "--resume computes what has changed, --overwrite everything; or another --out"
+DAMAGED = "`resume` computes it again and keeps this file beside it; or another `out`"
+CHANGED = "`resume` computes what has changed, `overwrite` everything; or another `out`"
 
 
 class Runs(Protocol):
@@ -98,7 +98,7 @@ class State:
         if entry is None or not entry.is_done or entry.size or entry.key == point.key:
             return []
         self._changed.append(case.name)
-        return [Fault("--out", case.name, "a summary of other inputs", CHANGED)]
+        return [argument_fault("out", case.name, "a summary of other inputs", CHANGED)]
 
     def _look_at(self, point: Point, case: Case) -> list[Fault]:
         """Accept an existing result, or record why it cannot be used."""
@@ -113,9 +113,9 @@ class State:
                 return []
         except InputError as error:
             self._damaged[path] = str(error.faults[0])
-            return [replace(fault, allowed=DAMAGED) for fault in error.faults]
+            return [replace(f, allowed=DAMAGED, option=f.file) for f in error.faults]
         self._changed.append(case.name)
-        return [Fault("--out", str(path), "a result of other inputs", CHANGED)]
+        return [argument_fault("out", str(path), "a result of other inputs", CHANGED)]
 
     def settle(self, journal: Journal) -> list[str]:
         """Record existing results, rename damaged files; return remarks for the user."""

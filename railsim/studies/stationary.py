@@ -273,8 +273,8 @@ def twist_heights(flat: FlatVehicle, limits: StationaryLimits) -> dict[str, Floa
 
 def _admissible_cant(vehicle: Vehicle) -> float:
     if vehicle.service is None:
-        allowed = "give --cant, or add [service] with cant_deficiency"
-        raise InputError([Fault(vehicle.name, "service", "missing", allowed)])
+        allowed = "give `cant`, or add [service] with cant_deficiency"
+        raise InputError([Fault(vehicle.name, "service", "missing", allowed, vehicle.name)])
     return vehicle.service.cant_deficiency
 
 

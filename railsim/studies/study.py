@@ -10,7 +10,7 @@ from railsim.definitions.settings import Settings
 from railsim.definitions.study import Sample
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import Fault, InputError
+from railsim.errors import InputError, argument_fault
 from railsim.files import check_folder, is_file
 from railsim.studies.carry_out import carry_out, cores
 from railsim.studies.journal import JOURNAL, Journal
@@ -169,7 +169,9 @@ def run_study(spec: StudySpec, folder: Path, execution: Execution) -> Outcome:
     check_folder(folder)
     retention(spec)  # refuses unknown quantities
     if spec.quantities and not needs_run(spec.analyses):
-        fault = Fault("--quantities", "", "no analysis computes a run", 'add one of kind = "run"')
+        fault = argument_fault(
+            "quantities", "", "no analysis computes a run", 'add one of kind = "run"'
+        )
         raise InputError([fault])
     plan = Plan(spec, execution.workers or cores())
     base = os.path.relpath(Path.cwd(), folder)
@@ -199,7 +201,7 @@ def stored_spec(folder: Path) -> tuple[StudySpec, Path]:
         index = folder / "study.json"
         if not is_file(index):
             found = f"no study in {folder} to resume"
-            fault = Fault("--resume", "", found, "give --vehicles, --tracks and --speeds")
+            fault = argument_fault("resume", "", found, "give `vehicles`, `tracks` and `speeds`")
             raise InputError([fault])
         inputs = read_index(index).inputs
     else:

@@ -167,7 +167,7 @@ def check_index(path: Path) -> Index:
     InputError : as `read_index`, or results are missing.
     """
     index = read_index(path)
-    allowed = "the same study with --resume computes it again"
+    allowed = "the same study with `resume` computes it again"
     faults = []
     for run in index.runs:
         if run.status in NOT_DONE or not run.file:
@@ -175,7 +175,9 @@ def check_index(path: Path) -> Index:
         if Path(run.file).name != run.file:
             faults.append(Fault(str(path), run.file[:60], "is not in the folder of the study", ""))
         elif not is_file(path.parent / run.file):
-            faults.append(Fault(str(path), run.file, "the result is missing", allowed))
+            faults.append(
+                Fault(str(path), run.file, "the result is missing", allowed, option=str(path))
+            )
     if faults:
         raise InputError(faults)
     return index

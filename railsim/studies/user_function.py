@@ -13,11 +13,11 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
-from railsim.errors import Fault, InputError, RailsimError
+from railsim.errors import InputError, RailsimError, argument_fault
 from railsim.files import TABLE_BYTES, read_bytes
 from railsim.result import Result
 
-OPTION = "--quantities"
+PARAMETER = "quantities"
 ALLOWED = "FILE.py:FUNCTION, such as quantities.py:summary"
 
 Function = Callable[[Result], Mapping[str, float]]
@@ -40,11 +40,13 @@ def full_name(function: "str | Function | None") -> str | None:
             file = ""
         if not name.isidentifier() or not Path(file).is_file():
             found = f"{function!r} is not a function of a module"
-            raise InputError([Fault(OPTION, "", found, "a function defined in a file")])
+            raise InputError([argument_fault(PARAMETER, "", found, "a function defined in a file")])
         return f"{Path(file).resolve()}:{name}"
     file, _, name = function.rpartition(":")
     if not (file.endswith(".py") and name.isidentifier()):
-        raise InputError([Fault(OPTION, function, "not understood", f"allowed: {ALLOWED}")])
+        raise InputError(
+            [argument_fault(PARAMETER, function, "not understood", f"allowed: {ALLOWED}")]
+        )
     whole = f"{Path(file).resolve()}:{name}"
     _loaded(whole)
     return whole
@@ -62,8 +64,10 @@ def given_again(stored: str | None, option: str | None) -> str | None:
     """
     if stored and not option:
         found = f"the study in this folder calls the function {stored}"
-        allowed = f"read it, then give {OPTION} FILE.py:FUNCTION too: it runs with your rights"
-        raise InputError([Fault("--resume", "", found, allowed)])
+        allowed = (
+            f"read it, then give `{PARAMETER}`, FILE.py:FUNCTION, too: it runs with your rights"
+        )
+        raise InputError([argument_fault("resume", "", found, allowed)])
     return full_name(option)
 
 
@@ -87,7 +91,7 @@ def user_quantities(name: str | None, result: Result) -> dict[str, float]:
         found: Any = _loaded(name)(result)
         return {_checked_name(key): _number(key, value) for key, value in dict(found).items()}
     except Exception as error:
-        raise RailsimError(f"{OPTION} {name}: {type(error).__name__}: {error}") from error
+        raise RailsimError(f"{PARAMETER} {name}: {type(error).__name__}: {error}") from error
 
 
 def _checked_name(key: object) -> str:
@@ -114,8 +118,8 @@ def _loaded(name: str) -> Function:
         spec.loader.exec_module(module)
     except Exception as error:
         found = f"cannot be loaded ({type(error).__name__}: {error})"
-        raise InputError([Fault(OPTION, file, found, ALLOWED)]) from None
+        raise InputError([argument_fault(PARAMETER, file, found, ALLOWED)]) from None
     loaded: Function | None = getattr(module, function, None)
     if not callable(loaded):
-        raise InputError([Fault(OPTION, file, f"no function '{function}'", ALLOWED)])
+        raise InputError([argument_fault(PARAMETER, file, f"no function '{function}'", ALLOWED)])
     return loaded

@@ -1,25 +1,13 @@
 """Every example runs, as the notebook that the manual offers; its page shows what it prints."""
 
-import importlib.util
 import json
 import re
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
+from generators import examples as GALLERY
 
-ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("gallery", ROOT / "docs" / "generate_examples.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-GALLERY = loaded()
 
 
 @pytest.mark.slow
@@ -40,7 +28,9 @@ def test_example_runs_and_draws_its_picture(script, tmp_path, monkeypatch, capsy
 
 def test_gallery_is_up_to_date():
     written = {path: path.read_text("utf-8") for path in GALLERY.PAGES.glob("*.md")}
-    assert written == GALLERY.pages(), "python docs/generate_examples.py"
+    assert written == GALLERY.pages(), (
+        "python docs/generate.py examples, or examples:pages where texts changed"
+    )
     assert len(GALLERY.SCRIPTS) == 10
     pictures = sorted(GALLERY.IMAGES.glob("*.png"))
     assert [p.stem for p in GALLERY.SCRIPTS] == [p.stem for p in pictures]

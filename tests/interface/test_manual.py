@@ -1,10 +1,10 @@
 """The manual and the README are up to date: generated tables, command lines, the main job."""
 
-import importlib.util
 import re
 import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import click
@@ -22,10 +22,7 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
 @pytest.fixture(scope="module")
 def generate():
-    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return import_module("generators.tables")
 
 
 def generated(name):

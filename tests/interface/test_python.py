@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import railsim
+from railsim.cli import main
 from railsim.errors import InputError
 
 COACH = "coach_manchester"
@@ -116,6 +117,80 @@ def test_static_loads_carry_the_weight(coach):
     assert loads.Q0.sum() == pytest.approx(coach.mass * 9.81, rel=1e-6)
     assert loads.axle_load.shape == (4,)
     assert "axle load (kN)" in loads._repr_html_()
+
+
+def test_wheelsets_have_names_numbers_from_1_in_texts_and_from_0_as_integers(result):
+    second = result.Q[:, 1, 0]
+    for label in ("2", "front.inner.wheelset", 1, -3):
+        assert (result.series("Q", wheelset=label, side="left") == second).all()
+    for text in ("Q:2:left", "Q:front.inner.wheelset:left"):
+        (column,) = result.columns(text)
+        assert column[0] == "Q:front.inner.wheelset:left"
+        assert (column[2] == second).all()
+    assert len(list(result.columns("Q:2"))) == 2
+    for wrong in ("0", "5", "inner", 4, -5):
+        with pytest.raises(KeyError, match=f"no wheelset '?{wrong}'?; "):
+            result.series("Q", wheelset=wrong)
+    with pytest.raises(KeyError, match="no label '5'"):
+        list(result.columns("Q:5"))
+
+
+def test_speeds_are_taken_with_their_unit(coach):
+    track = railsim.load_track("curve_r250", ["speed=72 km/h"])
+    assert track.speed == coach.with_values({"service.admissible_speed": "72 km/h"}
+                                            ).service.admissible_speed == 20.0  # fmt: skip
+    table = {"mode": "table", "speed_table": [[0.0, "72 km/h"], [50.0, 10.0]]}
+    assert railsim.Settings(drive=table).drive.speed_table[0][1] == 20.0
+    assert railsim.simulate(coach, track, speed="72 km/h", until=0.5).speed == 20.0
+    assert railsim.modes(coach, speed="72 km/h").speed == 20.0
+    found = railsim.critical_speed(
+        coach, methods=["linear"], low="36 km/h", high="360km/h", over_amplitude=False
+    )
+    assert (found.low, found.high) == (10.0, 100.0)
+    assert railsim.describe(track, ["72 km/h"]).data == railsim.describe(track, [20.0]).data
+    for wrong in ("fast", "20 kN"):
+        for call in (railsim.modes, railsim.simulate):
+            with pytest.raises(InputError, match=f"^speed: found '{wrong}'; "):
+                call(coach, track, speed=wrong)
+
+
+def test_analyses_say_what_they_are_of_and_draw_themselves(coach):
+    found = railsim.modes(coach)
+    assert repr(found).startswith(f"<Modes: {coach.name}: 20 m/s")
+    assert "<img src=" in found._repr_html_()
+    assert repr(railsim.Settings()) == "<Settings: defaults>"
+    assert str(railsim.Settings(output_rate=500.0)) == "<Settings: output_rate=500.0>"
+
+
+def test_completion_shows_keys_and_methods_for_users(coach):
+    names = {name for name in dir(coach) if not name.startswith("_")}
+    assert {"bodies", "with_values", "save", "plot"} <= names
+    assert not {"model_dump", "copy", "json", "note_assigned", "KIND"} & names
+    assert len(names) < 25
+
+
+def test_faults_name_parameters_in_python_and_options_on_the_command_line(tmp_path, capsys):
+    def study(**changes):
+        given = {"vehicles": "coach_manchester", "tracks": "curve_r250", "speeds": [20]}
+        with pytest.raises(InputError) as caught:
+            railsim.study(**{**given, "out": tmp_path / "study", **changes})
+        return str(caught.value)
+
+    assert study(grid={"track.frictio": [1]}).startswith("grid: track.frictio: ")
+    assert study(grid={"frictio": [1]}).startswith("grid: frictio: ")
+    assert study(keep="nothing").startswith("keep: nothing: ")
+    assert study(quantities="nothing").startswith("quantities: ")
+    (tmp_path / "out.txt").write_text("")
+    assert study(out=tmp_path / "out.txt").startswith("out: ")
+    assert main(["study", "--vehicles", "coach_manchester", "--tracks", "curve_r250", "--speeds",
+                 "20", "--keep", "nothing", "--out", str(tmp_path / "study")]) == 2  # fmt: skip
+    assert capsys.readouterr().err.startswith("--keep: nothing: ")
+
+
+def test_results_are_saved_like_definitions(result, tmp_path):
+    assert railsim.open_result(result.save(tmp_path / "run.h5")).status == result.status
+    with pytest.raises(InputError, match="give `overwrite`"):
+        result.save(tmp_path / "run.h5")
 
 
 @pytest.mark.parametrize(

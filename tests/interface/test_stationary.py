@@ -106,5 +106,5 @@ def test_bad_input_is_told_in_a_line(capsys, arguments, words):
 
 def test_without_service_table_a_cant_is_asked_for():
     coach = railsim.load_vehicle("coach_manchester").replace(service=None)
-    with pytest.raises(railsim.InputError, match="give --cant"):
+    with pytest.raises(railsim.InputError, match="give `cant`"):
         stationary(coach, railsim.load_track("straight"), load_stationary_limits("stationary"))

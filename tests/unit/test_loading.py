@@ -406,3 +406,11 @@ def test_any_file_is_recognised_by_its_format():
     definition = load_any(Path(sources.shipped_folder("track")) / "straight.toml")
     assert definition.KIND == "track"
     assert definition.name.startswith("Straight")
+
+
+def test_a_missing_element_is_told_with_the_way_to_add_it():
+    with pytest.raises(InputError, match=r"no 'mine' in elements; it is empty; ") as caught:
+        load_vehicle("coach_manchester", ["elements.mine.kind=bushing"])
+    assert 'elements.mine={kind="airspring|' in str(caught.value)
+    with pytest.raises(InputError, match=r"did you mean 'carbody'[?]$"):
+        load_vehicle("coach_manchester", ["bodies.carbdy.mass=3"])

@@ -4,7 +4,7 @@ Masses, wheel loads and undamped vertical modes (vertical springs alone, wheels 
 vehicles were computed outside railsim from the sources' numbers; a mistyped number shows.
 """
 
-import importlib.util
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -245,16 +245,11 @@ def test_twisted_track_has_the_twists_of_the_standard():
 
 @pytest.fixture(scope="module")
 def pages():
-    spec = importlib.util.spec_from_file_location("vehicles", DOCS / "generate_vehicles.py")
-    module = importlib.util.module_from_spec(spec)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(DOCS))
-        spec.loader.exec_module(module)
-    return module
+    return import_module("generators.vehicles")
 
 
 def test_pages_of_the_library_are_up_to_date(pages):
-    mended_by = "python docs/generate_vehicles.py --data, or without --data where vehicles changed"
+    mended_by = "python docs/generate.py vehicles:data, or without :data where vehicles changed"
     for name in pages.VEHICLES:
         written = (pages.PAGES / f"{name}.md").read_text("utf-8")
         assert written.startswith(pages.data(name)), mended_by

@@ -1,6 +1,6 @@
 """Curves on elastic rails do not depend on how they are computed: twenty cases out of the grid.
 
-All 280 are run by ``python docs/generate_robustness.py grid``.
+All 280 are run by ``python docs/generate.py robustness:grid``.
 """
 
 import re
@@ -67,4 +67,4 @@ def test_the_table_of_rigid_rails_is_up_to_date(case):
     made = rigid_row(case)
     (written,) = (row for row in rows if row[0] == made[0])
     for old, new in zip(written[1:4], made[1:4], strict=True):
-        assert float(old) == pytest.approx(float(new), abs=0.0101), "generate_robustness.py rigid"
+        assert float(old) == pytest.approx(float(new), abs=0.0101), "generate.py robustness:rigid"

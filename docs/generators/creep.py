@@ -1,6 +1,6 @@
 """Fill the tables of `docs/validation/creep.md` and draw its pictures.
 
-``python docs/generate_creep.py [NAME ...]`` takes some minutes: it solves all reference points with
+It takes some minutes: it solves all reference points with
 the half-space solver on several grids, and runs the curving study with every creep law.
 """
 
@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from generate import fill_page, table
 
+from generators.filling import fill_page, table
 from railsim import load_settings, load_track, load_vehicle, simulate
 from railsim.contact.creep import LAWS, CreepForce, creep_force
 from railsim.contact.creep_curves import CASES, Patch, exact_force
@@ -21,7 +21,7 @@ from railsim.notation import QUANTITIES
 from railsim.plot.creep import creep_curves_figure, traction_figure
 from railsim.plot.style import save
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 PAGE = DOCS / "validation" / "creep.md"
 sys.path.insert(0, str(DOCS.parent / "tests" / "reference"))
 from creep_curves import DATA, creep_curves  # noqa: E402
@@ -193,7 +193,8 @@ def pictures():
     save(figure, DOCS / "img" / "creep_traction.png", overwrite=True)
 
 
-if __name__ == "__main__":
+def make(parts):
+    """Fill the tables of these names, draw the `pictures`."""
     makers = {
         "fastsim": fastsim_table,
         "creep_laws": laws_table,
@@ -202,6 +203,6 @@ if __name__ == "__main__":
         "coefficients": coefficients_table,
         "law_curving": curving_table,
     }
-    if "pictures" in sys.argv or not sys.argv[1:]:
+    if "pictures" in parts or not parts:
         pictures()
-    fill_page(PAGE, makers)
+    fill_page(PAGE, makers, parts)

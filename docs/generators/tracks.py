@@ -1,23 +1,20 @@
-"""Fill the tables of `docs/validation/vehicles_and_tracks.md` and draw its picture.
-
-``python docs/generate_tracks.py``; it takes a minute.
-"""
+"""Fill the tables of `docs/validation/vehicles_and_tracks.md` and draw its picture."""
 
 import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from generate import fill_page, table
 from scipy.signal import welch
 
+from generators.filling import fill_page, table
 from railsim.definitions.excitations.spectra import SPECTRA
 from railsim.definitions.track import Track
 from railsim.notation import QUANTITIES
 from railsim.plot.style import DISTINCT, save, styled
 from railsim.track.irregularity import displacement
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 PAGE = DOCS / "validation" / "vehicles_and_tracks.md"
 sys.path.insert(0, str(DOCS.parent / "tests" / "verification"))
 from step_halving import changes, half_as_long, irregular_run  # noqa: E402
@@ -143,7 +140,10 @@ def picture(omega, density):
         save(figure, DOCS / "img" / "irregularity_spectra.png", overwrite=True)
 
 
-if __name__ == "__main__":
+def make(parts):
+    """Fill the tables of these names, and draw the picture."""
     omega, density, variance = spectra()
     picture(omega, density)
-    fill_page(PAGE, {"convergence": convergence, "variance": lambda: variance_table(variance)})
+    fill_page(
+        PAGE, {"convergence": convergence, "variance": lambda: variance_table(variance)}, parts
+    )

@@ -1,12 +1,10 @@
 """Make the pictures of ``docs/user/stability.md``.
 
-``python docs/generate_stability.py`` makes all of them, or those that are named: ``modes``,
-``critical_speed``, ``hunting_flexicoil``, ``hunting_benchmark``, ``curving``.  Together they take
-some ten minutes on one core.
+Parts: ``modes``, ``critical_speed``, ``hunting_flexicoil``, ``hunting_benchmark``, ``curving``.
+Together they take some ten minutes on one core.
 """
 
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from railsim.plot.modes import locus_figure
 from railsim.plot.stability import bifurcation_figure
 from railsim.plot.style import save
 
-IMAGES = Path(__file__).parent / "img"
+IMAGES = Path(__file__).parents[1] / "img"
 COACH = "coach_manchester"
 RADII = (250.0, 300.0, 400.0, 500.0, 700.0, 1000.0, 2000.0, 5000.0)
 DEFICIENCIES = (0.0, 0.05, 0.1, 0.15)
@@ -55,6 +53,8 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "curving": curving_picture,
 }
 
-if __name__ == "__main__":
-    for name in sys.argv[1:] or PICTURES:
+
+def make(parts: Sequence[str]) -> None:
+    """Draw these pictures, by default all."""
+    for name in parts or PICTURES:
         save(PICTURES[name](), IMAGES / f"{name}.png", overwrite=True)

@@ -1,7 +1,7 @@
-"""Make the gallery of examples: ``python docs/generate_examples.py``.
+"""The gallery of examples.
 
 Each script of ``examples/`` gets a page with its question, text, picture, code and output.
-Question, text and code are the script's (``--pages`` makes nothing else), picture and output come
+Question, text and code are the script's (part `pages`), picture and output come
 from a run of it.  The manual offers each as a notebook, too (``docs/manual.py``).
 """
 
@@ -12,11 +12,10 @@ import json
 import re
 import runpy
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SCRIPTS = tuple(sorted((ROOT / "examples").glob("[0-9]*.py")))
 PAGES, IMAGES = ROOT / "docs" / "examples", ROOT / "docs" / "img" / "examples"
 
@@ -104,8 +103,9 @@ def run() -> None:
             (PAGES / f"{script.stem}.md").write_text(page(script, printed.getvalue()), "utf-8")
 
 
-if __name__ == "__main__":
-    if "--pages" not in sys.argv:
+def make(words):
+    """Run the examples and write their pages, or only the texts of these."""
+    if "pages" not in words:
         run()
     for path, text in pages().items():
         path.write_text(text, "utf-8")

@@ -1,21 +1,20 @@
-"""Make the pages of the library: ``python docs/generate_vehicles.py [NAME ...]``.
+"""The pages of the library.
 
 One page for every shipped vehicle: drawing, data, gaps, modes, a run through a curve; and the
 tables of vehicles and tracks in `docs/user/library.md`.  The numbers are those of the TOML files,
-read line by line with the letters beside them.  ``--data`` computes nothing: it rewrites the parts
+read line by line with the letters beside them.  Part `data` computes nothing: it rewrites the parts
 that come from the files alone.  All vehicles take about two minutes.
 """
 
 import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from generate import filled, table
 from PIL import Image
 
 import railsim
+from generators.filling import filled, table
 from railsim.cli.library import MEANING, text_with_bases, trust
 from railsim.definitions.layout import curvature_sections
 from railsim.definitions.settings import Settings
@@ -28,7 +27,7 @@ from railsim.model.statics import SLOW
 from railsim.plot.style import DISTINCT, SIDE_LINES, Picture, save, shade, spans, styled
 from railsim.plot.vehicle import vehicle_figure
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 PAGES, IMAGES, OVERVIEW = DOCS / "library", DOCS / "img" / "library", DOCS / "user" / "library.md"
 VEHICLES = tuple(sorted(path.stem for path in shipped_folder("vehicle").glob("*.toml")))
 TRACKS = tuple(sorted(path.stem for path in shipped_folder("track").glob("*.toml")))
@@ -418,9 +417,10 @@ def overview(text: str) -> str:
     return filled(text, {"vehicles": vehicles_table(), "tracks": tracks_table()})
 
 
-if __name__ == "__main__":
-    compute = "--data" not in sys.argv
-    for name in [name for name in sys.argv[1:] if name in VEHICLES] or VEHICLES:
+def make(parts):
+    """Write the pages of these vehicles, by default of all."""
+    compute = "data" not in parts
+    for name in [name for name in parts if name in VEHICLES] or VEHICLES:
         (PAGES / f"{name}.md").write_text(page(name, compute), encoding="utf-8")
         print(name, flush=True)
     OVERVIEW.write_text(overview(OVERVIEW.read_text("utf-8")), encoding="utf-8")

@@ -4,7 +4,7 @@ And that of the test campaign in `docs/validation/assessment.md`, from the folde
 
     railsim study --scenario en14363 --vehicles ... --out DIR
 
-``python docs/generate_campaign.py DIR`` reads the folder of
+``python docs/generate.py campaign:DIR`` reads the folder of
 
     railsim study --vehicles ... --tracks ... --speeds permitted --keep summary --out DIR
 
@@ -13,16 +13,14 @@ with all vehicles and tracks of `railsim list`; it takes a quarter of an hour of
 
 import json
 import shutil
-import sys
 from collections import defaultdict
 from pathlib import Path
 
-from generate import fill_page, table
-
+from generators.filling import fill_page, table
 from railsim.definitions.sources import library_files
 from railsim.studies.summary import read_index
 
-PAGE = Path(__file__).parent / "validation" / "vehicles_and_tracks.md"
+PAGE = Path(__file__).parents[1] / "validation" / "vehicles_and_tracks.md"
 ASSESSMENT = PAGE.with_name("assessment.md")
 IMAGES = PAGE.parents[1] / "img" / "assessment"
 COMPLETE = "complete"
@@ -115,8 +113,9 @@ def coaches(folder: Path, found: list[dict]) -> str:
     return table(head, rows, "---")
 
 
-if __name__ == "__main__":
-    folder = Path(sys.argv[1])
+def make(parts):
+    """Fill the tables from a folder."""
+    (folder,) = map(Path, parts)
     runs = [run.model_dump() for run in read_index(folder / "study.json").runs]
     if (folder / "assessment.json").is_file():
         fill_page(ASSESSMENT, {"coaches": lambda: coaches(folder, runs)}, ["coaches"])

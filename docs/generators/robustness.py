@@ -1,17 +1,18 @@
 """Tables of `docs/validation/robustness.md`.
 
-``python docs/generate_robustness.py rigid`` writes that of rigid rails into the page, in a minute.
-Without a word the differences of twenty curves on elastic rails are printed, in five minutes, with
-``grid`` those of all 280, in half an hour.
+Part `rigid` writes that of rigid rails into the page, in a minute.  Without a part the differences
+of twenty curves on elastic rails are printed, in five minutes, with `grid` those of all 280, in
+half an hour.
 """
 
 import sys
 from pathlib import Path
 
 import numpy as np
-from generate import fill_page, table
 
-DOCS = Path(__file__).parent
+from generators.filling import fill_page, table
+
+DOCS = Path(__file__).parents[1]
 sys.path[:0] = [str(DOCS.parent / "tests" / folder) for folder in ("", "verification")]
 from robustness import CASES, FRICTIONS, RADII, RIGID_CASES, peaks, rigid_row, ways  # noqa: E402
 from test_robustness import CHOSEN, REFERRED  # noqa: E402
@@ -99,10 +100,11 @@ def rigid():
     return table(head, map(rigid_row, RIGID_CASES))
 
 
-if __name__ == "__main__":
-    if "rigid" in sys.argv[1:]:
+def make(parts):
+    """Fill the table, or print the differences."""
+    if "rigid" in parts:
         fill_page(DOCS / "validation" / "robustness.md", {"rigid": rigid})
-    elif "grid" in sys.argv[1:]:
+    elif "grid" in parts:
         print(grid())
     else:
         print(chosen())

@@ -1,6 +1,6 @@
 """Fill the tables of `docs/validation/contact_geometry.md`.
 
-``python docs/generate_contact.py`` takes some minutes: it runs the curving study with six
+It takes some minutes: it runs the curving study with six
 contact tables, boundary elements at a dozen points, and an independent rigid search.
 """
 
@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from generate import fill_page, table
 from scipy.optimize import brentq
 
+from generators.filling import fill_page, table
 from railsim import load_track, load_vehicle, simulate
 from railsim.contact import build_contact_table, contact_geometry
 from railsim.contact.elastic import loaded_contact
@@ -23,7 +23,7 @@ from railsim.model import assembly
 from railsim.profiles import load_profile
 from railsim.profiles.builtin import s1002_height
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 PAGE = DOCS / "validation" / "contact_geometry.md"
 for folder in ("reference", "verification"):
     sys.path.insert(0, str(DOCS.parent / "tests" / folder))
@@ -229,11 +229,12 @@ def time_table() -> str:
     return table(("normal contact", "processor time of both cores, s"), body)
 
 
-if __name__ == "__main__":
+def make(parts):
+    """Fill the tables of these names."""
     makers = {
         "rigid": rigid_table,
         "exact": exact_table,
         "tables": curving_table,
         "building": time_table,
     }
-    fill_page(PAGE, makers)
+    fill_page(PAGE, makers, parts)

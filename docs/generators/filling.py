@@ -1,0 +1,34 @@
+"""Tables between ``<!-- generated: NAME -->`` and ``<!-- end -->`` of a page of the manual."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from railsim.definitions.schema import check_markers
+
+TABLE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---:") -> str:
+    """Return a table of the manual; `rule` aligns all columns but the first."""
+    rules = ("---", *[rule] * (len(head) - 1))
+    return "".join(f"| {' | '.join(row)} |\n" for row in (head, rules, *rows))
+
+
+def filled(text: str, known: dict[str, str]) -> str:
+    """Return a page with its tables filled."""
+    check_markers(text)
+    return TABLE.sub(lambda match: f"{match[1]}\n{known[match[2]]}\n{match[3]}", text)
+
+
+def fill_page(
+    page: Path, makers: Mapping[str, Callable[[], str]], wanted: Sequence[str] = ()
+) -> None:
+    """Make the wanted tables of a page, by default all of them."""
+    wanted = wanted or list(makers)
+    text = page.read_text("utf-8")
+    known = {name: make() for name, make in makers.items() if name in wanted}
+    for match in TABLE.finditer(text):  # tables that were not asked for stay
+        present = match[0].split("-->\n", 1)[1].rsplit("<!-- end", 1)[0]
+        known.setdefault(match[2], present.strip() + "\n")
+    page.write_text(filled(text, known), encoding="utf-8")
