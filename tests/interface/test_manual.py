@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 import pytest
+from generators import GENERATORS
 from PIL import Image
 
 from railsim.cli import railsim as command_line
@@ -39,6 +40,13 @@ def test_markers_of_filled_tables_alternate():
     for wrong in ("<!-- end -->", "<!-- generated: b -->", "<!-- keys: f N --><!-- end -->"):
         with pytest.raises(ValueError, match=r"partner|no end"):
             check_markers(table + wrong)
+
+
+def test_every_generator_of_the_manual_is_registered():
+    folder = ROOT / "docs" / "generators"
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__", "filling"}
+    assert modules == set(GENERATORS)
+    assert all("\ndef make(" in (folder / f"{name}.py").read_text("utf-8") for name in modules)
 
 
 def test_table_of_quantities_is_up_to_date(generate):
