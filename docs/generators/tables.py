@@ -26,7 +26,14 @@ from curving_study import COACHES, MID_CURVE, RIGID, measured, published  # noqa
 
 def tables() -> dict[str, str]:
     """All tables by name."""
-    return {"quantities": quantity_table(), **{coach: curving_table(coach) for coach in COACHES}}
+    studies = {coach: curving_table(coach) for coach in COACHES}
+    return {"quantities": quantity_table(), "validation": short(studies["manchester"]), **studies}
+
+
+def short(study: str) -> str:
+    """Return the rows of the curving study that have a published value, for README."""
+    rows = [line for line in study.splitlines() if "|  |  |" not in line]
+    return "".join(f"{line}\n" for line in rows)
 
 
 def quantity_table() -> str:

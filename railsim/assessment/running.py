@@ -106,7 +106,7 @@ def _populations(runs: Mapping[str, Result]) -> dict[str, str]:
 
 
 def assessed_runs(
-    runs: Mapping[str, Result], limits: RunningLimits, given: Service | None, options: Options
+    runs: Mapping[str, Result], limits: RunningLimits, replacement: Service | None, options: Options
 ) -> Running:
     """Assess all runs of a vehicle.
 
@@ -114,7 +114,7 @@ def assessed_runs(
     ------
     InputError : no service table; a run lacks a quantity, is sampled too coarsely or too short.
     """
-    service = given or _service(runs)
+    service = replacement or _service(runs)
     done = _read(runs, limits, service, options)
     if done and not any(run.sections for run in done):
         raise InputError([Fault(
@@ -129,12 +129,12 @@ def assessed_runs(
     zones: list[ZoneReport] = []
     conditions: list[Condition] = []
     for name in dict.fromkeys(run.population for run in done):
-        own = [run for run in done if run.population == name]
-        result = own[0].record.result
+        members = [run for run in done if run.population == name]
+        result = members[0].record.result
         population = Population(name, result.vehicle(), result["Q0"])
         reports = zone_reports(
-            population, [v for run in own for v in run.values],
-            [s for run in own for s in run.sections], service, limits, options.method,
+            population, [v for run in members for v in run.values],
+            [s for run in members for s in run.sections], service, limits, options.method,
         )  # fmt: skip
         zones += reports
         conditions += missing_zones(population, reports, limits)
@@ -193,9 +193,11 @@ def _read(
         record.need(NEEDED, f"settings.outputs.quantities with {', '.join(NEEDED)}")
         if "Q0" not in result:
             raise record.fault("Q0", "is not in the result", "static wheel loads, as every run has")
-        own = track_sections(result.track(), limits, service, record.covered(), record.speed_at)
-        counting = [s for s in own if s.zone and (options.all_sections or not s.reason)]
-        found.append(_Run(name, record, populations[name], own, counting))
+        sections = track_sections(
+            result.track(), limits, service, record.covered(), record.speed_at
+        )
+        counting = [s for s in sections if s.zone and (options.all_sections or not s.reason)]
+        found.append(_Run(name, record, populations[name], sections, counting))
     return found
 
 

@@ -189,21 +189,21 @@ def load_transfer(signals: Signals, band: Band | None) -> Signal:
     for w, name in enumerate(signals.record.result.wheelsets):
         bogies.setdefault(name.split(".")[0], []).append(w)
     Q, s = signals.filtered("Q", band), signals.s_wheelset(band)
-    values = np.stack([overturning(Q[:, own]) for own in bogies.values()], axis=-1)
-    middles = np.stack([s[:, own].mean(axis=1) for own in bogies.values()], axis=-1)
+    values = np.stack([overturning(Q[:, columns]) for columns in bogies.values()], axis=-1)
+    middles = np.stack([s[:, columns].mean(axis=1) for columns in bogies.values()], axis=-1)
     return Signal(values, middles, [(name, None) for name in bogies])
 
 
 def _acceleration(signals: Signals, band: Band | None, axis: int, *, frames: bool) -> Signal | None:
     names = list(signals.record.sensors)
-    own = [k for k, name in enumerate(names) if name.startswith("frame_") == frames]
-    if not own:
+    columns = [k for k, name in enumerate(names) if name.startswith("frame_") == frames]
+    if not columns:
         return None
     near = signals._near(band)
-    raw = signals.raw("acceleration")[near][:, own, axis]
-    s = np.stack([signals.s_sensor(names[k], band) for k in own], axis=-1)
+    raw = signals.raw("acceleration")[near][:, columns, axis]
+    s = np.stack([signals.s_sensor(names[k], band) for k in columns], axis=-1)
     values = raw if band is None else signals.passed(raw, band)
-    return Signal(values, s, [(names[k], None) for k in own])
+    return Signal(values, s, [(names[k], None) for k in columns])
 
 
 def body_lateral(signals: Signals, band: Band | None) -> Signal | None:

@@ -131,23 +131,23 @@ def _service(
     category: str | None,
 ) -> "Service | None":
     """Service table with options instead of the vehicles' values; None where there are none."""
-    given = {
+    changes = {
         name: value
         for name, value in (
             ("admissible_speed", speed), ("cant_deficiency", deficiency), ("category", category),
         )
         if value is not None
     }  # fmt: skip
-    if not given:
+    if not changes:
         return None
     from pydantic import ValidationError
 
     from railsim.definitions.vehicle_tables import Service
     from railsim.errors import Fault, InputError
 
-    own = next(iter(results.values())).vehicle().service
+    service = next(iter(results.values())).vehicle().service
     try:
-        return Service.model_validate({**(own.model_dump() if own else {}), **given})
+        return Service.model_validate({**(service.model_dump() if service else {}), **changes})
     except ValidationError as error:
         raise InputError([
             Fault(f"--{str(e['loc'][0]).replace('_', '-')}", "", e["msg"].lower(), "in SI units")
@@ -171,8 +171,8 @@ def write_assessments(folder: Path, assessments: "Sequence[Assessment]") -> list
     with whole_file(rows) as partial:
         partial.write_text(assessment_csv(assessments), encoding="utf-8")
     written = [record, rows]
-    drawn = (assessment_figure, sections_figure, regression_figure)
-    for path, draw in zip(pictures, drawn, strict=True):
+    figures = (assessment_figure, sections_figure, regression_figure)
+    for path, draw in zip(pictures, figures, strict=True):
         figure = draw(assessments)
         if figure is not None:
             save(figure, path, overwrite=True)
@@ -242,7 +242,7 @@ def _verdict_lines(assessment: "Assessment") -> list[str]:
     deciding = getattr(assessment.limits, "deciding", ())
     lines = [f"verdict: {assessment.verdict}"]
     for name, verdict in assessment.verdicts.items():
-        told = "" if name in deciding else " (for information)"
-        lines.append(f"  {WORDS[name]}{told}: {verdict.value}")
+        note = "" if name in deciding else " (for information)"
+        lines.append(f"  {WORDS[name]}{note}: {verdict.value}")
     lines += [f"    {reason}" for reason in assessment.reasons]
     return lines

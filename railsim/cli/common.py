@@ -5,7 +5,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -33,10 +33,10 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
         """Return the speed in m/s."""
         from railsim.units import speed_in_si
 
-        found = speed_in_si(str(value))
-        if isinstance(found, str):
+        try:
+            return float(speed_in_si(str(value)))
+        except ValueError:
             self.fail(f"'{value}' is not a speed, such as 20 or 72km/h", param, ctx)
-        return float(found)
 
 
 def echo(text: object = "", *, err: bool = False) -> None:
@@ -189,14 +189,6 @@ def plain(data: Any) -> Any:
     if isinstance(data, float):
         return data if abs(data) < float("inf") else None
     return data
-
-
-def text_table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: int = 1) -> "Table":
-    """Return a table of texts, from the column `numbers` on aligned to the right."""
-    from railsim.table import Column, Table
-
-    columns = [Column(name or " ", format=">" * (k >= numbers)) for k, name in enumerate(header)]
-    return Table(columns, rows)
 
 
 def report_file(path: Path, *, as_json: bool, quiet: bool, **facts: Any) -> None:

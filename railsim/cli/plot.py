@@ -94,10 +94,10 @@ def command(
     if not out and path.name:
         path = path / "study.png" if of_study else path.with_suffix(".png")
     check_file(path, overwrite=overwrite, endings=PICTURES)
-    chosen = {"--against": against, "--family": family, "--kind": kind}
+    options = {"--against": against, "--family": family, "--kind": kind}
     if of_study:
-        figure = _study_figure(str(folder), selections, chosen)
-    elif wrong := [option for option, value in chosen.items() if value]:
+        figure = _study_figure(str(folder), selections, options)
+    elif wrong := [option for option, value in options.items() if value]:
         fault = Fault(wrong[0], "", f"'{file}' is no study's folder", "a folder of results")
         raise InputError([fault])
     elif Path(file).suffix.lower() in RESULTS:
@@ -121,7 +121,7 @@ def _result_figure(
 
 
 def _study_figure(
-    file: str, selections: tuple[str, ...], chosen: "dict[str, str | None]"
+    file: str, selections: tuple[str, ...], options: "dict[str, str | None]"
 ) -> "Figure":
     from railsim.cli.gathered import gather
     from railsim.plot.study import curves_figure, map_figure, ranking_figure
@@ -141,20 +141,20 @@ def _study_figure(
     varied = {name: _quantity(column) for name, column in parameters(records).items()}
     faults += [
         Fault(
-            option, "", f"'{chosen[option]}' was not varied", nearest(str(chosen[option]), varied)
+            option, "", f"'{options[option]}' was not varied", nearest(str(options[option]), varied)
         )
         for option in ("--against", "--family")
-        if chosen[option] and chosen[option] not in varied
+        if options[option] and options[option] not in varied
     ]
     if faults:
         raise InputError(faults)
     quantities = [_quantity(known[name]) for name in names]
     # most values first, numbers before words
     order = sorted(varied, key=lambda n: (not varied[n].numeric, -len(varied[n].different)))
-    x = chosen["--against"] or next((n for n in order if n != chosen["--family"]), None)
+    x = options["--against"] or next((n for n in order if n != options["--family"]), None)
     rest = [name for name in order if name != x]
-    family = chosen["--family"] or next(iter(rest), None)
-    kind = chosen["--kind"] or ("curves" if x and varied[x].numeric else "ranking")
+    family = options["--family"] or next(iter(rest), None)
+    kind = options["--kind"] or ("curves" if x and varied[x].numeric else "ranking")
     if kind == "ranking" or x is None:
         return ranking_figure(quantities, [str(record["name"]) for record in records])
     if kind == "map":

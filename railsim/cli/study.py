@@ -198,7 +198,7 @@ def command(
     from railsim.studies.study import run_study
 
     of_study = {name: how.pop(name) for name in OF_STUDY}
-    given: dict[str, Any] = {
+    inputs: dict[str, Any] = {
         "vehicles": list(vehicles),
         "tracks": list(tracks),
         "speeds": list(speeds),
@@ -207,7 +207,7 @@ def command(
         **{name: of_study[name] for name in ("settings", "start", "duration", "until")},
     }
     folder, base = Path(out), Path.cwd()
-    if resume and file is None and not any(given.values()):
+    if resume and file is None and not any(inputs.values()):
         spec, base = _stored(folder, of_study["quantities"])
         folder = folder if base == Path.cwd() else folder.absolute()
         if spec.scenario is not None:
@@ -218,13 +218,13 @@ def command(
                     ((),),
                     str(folder),
                     tuple(spec.assignments),
-                    {**given, **of_study, **how, "report": report, "file": None},
+                    {**inputs, **of_study, **how, "report": report, "file": None},
                     resume=True,
                     as_json=as_json,
                     quiet=quiet,
                 )
     else:
-        spec = _asked(file, {**of_study, **given})
+        spec = _asked(file, {**of_study, **inputs})
     lines = RunLines()
     execution = Execution(
         **how, resume=resume, on_record=None if quiet or as_json else lines, on_remark=_print_remark
@@ -252,7 +252,7 @@ def _stored(folder: Path, quantities: str | None) -> "tuple[StudySpec, Path]":
     return spec.changed(quantities=given_again(spec.quantities, quantities)), base
 
 
-def _asked(file: str | None, given: dict[str, Any]) -> "StudySpec":
+def _asked(file: str | None, inputs: dict[str, Any]) -> "StudySpec":
     """Return the study of the options, or of a file with the assignments of the options."""
     from railsim.definitions.loading import load_study
     from railsim.errors import Fault, InputError
@@ -260,23 +260,23 @@ def _asked(file: str | None, given: dict[str, Any]) -> "StudySpec":
     from railsim.studies.user_function import full_name
 
     if file is None:
-        _require(*(given[name] for name in ("vehicles", "tracks", "speeds")))
-        given["quantities"] = full_name(given["quantities"])
-        return checked(StudySpec, given, "study")
+        _require(*(inputs[name] for name in ("vehicles", "tracks", "speeds")))
+        inputs["quantities"] = full_name(inputs["quantities"])
+        return checked(StudySpec, inputs, "study")
     both = ("vehicles", "tracks", "speeds", "grid", "settings", "start", "duration", "until")
     faults = [
         Fault(f"--{name}", "", "given together with a study file", "the file holds it")
         for name in both
-        if given[name]
+        if inputs[name]
     ]
     if faults:
         raise InputError(faults)
     study = load_study(file)
     return StudySpec.of_file(
         study,
-        assignments=[*study.assignments, *given["assignments"]],
-        quantities=full_name(given["quantities"]),
-        **{name: given[name] for name in ("keep", "compress", "single")},
+        assignments=[*study.assignments, *inputs["assignments"]],
+        quantities=full_name(inputs["quantities"]),
+        **{name: inputs[name] for name in ("keep", "compress", "single")},
     )
 
 
@@ -311,8 +311,8 @@ def _campaign(
     taken["--keep"] = how["keep"] != "all"
     faults = [
         Fault(option, "", "given together with --scenario", "the scenario's file holds it")
-        for option, given in taken.items()
-        if given
+        for option, is_given in taken.items()
+        if is_given
     ]
     if faults:
         raise InputError(faults)
@@ -344,10 +344,10 @@ def _grid(texts: tuple[str, ...]) -> dict[str, list[str]]:
 def _require(vehicles: tuple[str, ...], tracks: tuple[str, ...], speeds: tuple[str, ...]) -> None:
     from railsim.errors import Fault, InputError
 
-    given = {"--vehicles": vehicles, "--tracks": tracks, "--speeds": speeds}
+    inputs = {"--vehicles": vehicles, "--tracks": tracks, "--speeds": speeds}
     faults = [
         Fault(option, "", "not given", "give one value at least")
-        for option, values in given.items()
+        for option, values in inputs.items()
         if not values
     ]
     if faults:
@@ -360,9 +360,9 @@ def _print_remark(text: str) -> None:
 
 def _print_end(outcome: "Outcome") -> None:
     there = len(outcome.records) - outcome.computed
-    kept = f", {there} were there" if there else ""
+    present = f", {there} were there" if there else ""
     done = outcome.computed - len(outcome.failed)
-    echo(f"{done} of {len(outcome.records)} runs computed{kept}")
+    echo(f"{done} of {len(outcome.records)} runs computed{present}")
     if outcome.failed:
         echo(f"{len(outcome.failed)} failed; study.json holds the reasons", err=True)
     echo(str(outcome.folder / "summary.csv"))

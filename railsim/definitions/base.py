@@ -35,7 +35,7 @@ Text = Annotated[str, Field(strict=True, min_length=1)]
 Name = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
 
 Speed = Annotated[
-    float, BeforeValidator(speed_in_si), Field(strict=True, allow_inf_nan=False, gt=0)
+    float, Field(strict=True, allow_inf_nan=False, gt=0), BeforeValidator(speed_in_si)
 ]
 """Speed [m/s]; texts with units are taken too"""
 

@@ -169,9 +169,9 @@ def _frames(group: Group, frame: _Frame) -> Iterator[tuple[Group, _Frame]]:
             yield from _frames(assembly, frame.inner(name, placement))
 
 
-def wrong_type(kind: str, given: object) -> str:
+def wrong_type(kind: str, value: object) -> str:
     """Return what is wrong where a name or a file is given instead of what it stands for."""
-    found = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
+    found = repr(value) if isinstance(value, str) else f"a {type(value).__name__}"
     return f"the {kind} is {found}; give what railsim.load_{kind} returns"
 
 
@@ -185,15 +185,15 @@ def flatten(vehicle: VehicleTables) -> FlatVehicle:
     """
     if not isinstance(vehicle, VehicleTables):
         raise TypeError(wrong_type("vehicle", vehicle))
-    kept: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
-    if KEPT not in kept:
+    stored: dict[str, FlatVehicle] = vehicle.__dict__  # a copy of the vehicle has it no more
+    if KEPT not in stored:
         faults = vehicle_faults(vehicle)
         if faults:
             raise InputError(
                 Fault(f"vehicle '{vehicle.name}'", f.key, f.found, f.allowed) for f in faults
             )
-        kept[KEPT] = _flat(vehicle)
-    return kept[KEPT]
+        stored[KEPT] = _flat(vehicle)
+    return stored[KEPT]
 
 
 def vehicle_faults(vehicle: VehicleTables) -> list[Fault]:

@@ -292,7 +292,13 @@ def _check_hold(model: Model, hold: Sequence[str]) -> None:
     ]
     wrong = [name for name in hold if name not in rigid]
     if wrong:
-        raise InputError([argument_fault("hold", wrong[0], "no such body", ", ".join(rigid))])
+        raise InputError(
+            [
+                argument_fault(
+                    "hold", wrong[0], "no such body; `held` holds the wheelsets", ", ".join(rigid)
+                )
+            ]
+        )
 
 
 def on_cones(vehicle: Vehicle, conicity: float) -> tuple[Vehicle, Profile]:

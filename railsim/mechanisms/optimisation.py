@@ -106,8 +106,8 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
     """
     generator = np.random.default_rng(seed)
     choices = _choices(judge)
-    own, choice = judge.point_of(judge.values)
-    found = [(np.clip(own, judge.lower, judge.upper), choice)]
+    written, choice = judge.point_of(judge.values)
+    found = [(np.clip(written, judge.lower, judge.upper), choice)]
     for i in range(1, count):
         choice = choices[i % len(choices)]
         for _ in range(DRAWS):
@@ -121,7 +121,7 @@ def first_points(judge: Judge, count: int, seed: int) -> list[tuple[Floats, dict
 def _choices(judge: Judge) -> list[dict[str, float]]:
     assemblies = judge.wanted.assemblies
     values = ([float(number(v, judge.values)) for v in each] for each in assemblies.values())
-    return [dict(zip(assemblies, chosen, strict=True)) for chosen in product(*values)]
+    return [dict(zip(assemblies, members, strict=True)) for members in product(*values)]
 
 
 def _assembles(judge: Judge, x: Floats, choice: dict[str, float]) -> bool:
@@ -162,9 +162,9 @@ def _finals(judge: Judge, starts: Sequence[Start]) -> list[Any]:
     """The most promising starts, and the file's own, from where they have come to."""
     usable = [start for start in starts if np.isfinite(start.objective)]
     ranked = sorted(usable, key=lambda start: (max(start.violation, FEASIBLE), start.objective))
-    own = [start for start in ranked[FINALISTS:] if start.number == 0]
-    chosen = [*ranked[:FINALISTS], *own]
-    return [(start.number, *judge.point_of(start.end), FINISH) for start in chosen]
+    written = [start for start in ranked[FINALISTS:] if start.number == 0]
+    finalists = [*ranked[:FINALISTS], *written]
+    return [(start.number, *judge.point_of(start.end), FINISH) for start in finalists]
 
 
 def _finished(judge: Judge, starts: Sequence[Start], finals: Sequence[Start]) -> list[Start]:
@@ -313,13 +313,13 @@ def _round(problem: _Problem, u0: Floats, here: Judgement, steps: int) -> Floats
         known = at(z) or here
         return np.vstack((known.slopes @ S, S, -S))
 
-    kept: Any = {"type": "ineq", "fun": margins, "jac": slopes}
+    inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}
     found: Any = minimize(
         objective,
         np.zeros(m),
         jac=gradient,
         method="SLSQP",
-        constraints=kept,
+        constraints=inequality,
         options={"maxiter": steps, "ftol": 1e-10},
     )
     end: Floats = np.clip(u0 + S @ found.x, 0.0, 1.0)
@@ -340,7 +340,7 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
         found = problem(y[:m]) or here
         return np.hstack((found.slopes, np.ones((len(found.margins), 1))))
 
-    kept: Any = {"type": "ineq", "fun": margins, "jac": slopes}
+    inequality: Any = {"type": "ineq", "fun": margins, "jac": slopes}
 
     def breach(y: Floats) -> tuple[float, Floats]:
         return float(y[m]), np.eye(m + 1)[m]
@@ -351,7 +351,7 @@ def _least_breach(problem: _Problem, u0: Floats, here: Judgement) -> tuple[Float
         jac=True,
         method="SLSQP",
         bounds=Bounds(np.zeros(m + 1), np.append(np.ones(m), np.inf)),
-        constraints=kept,
+        constraints=inequality,
         options={"maxiter": 100, "ftol": 1e-9},
     )
     u: Floats = np.clip(found.x[:m], 0.0, 1.0)

@@ -82,9 +82,9 @@ def _cylinders(result: Analysis, cylinder: Cylinder) -> list[Choice]:
                     f"{shortest * 1e3:.1f} mm at the shortest, {shortest_made * 1e3:g} mm from "
                     "pin to pin"
                 )
-        chosen = (f"stroke {made * 1e3:g} mm",) if made is not None else ()
+        words = (f"stroke {made * 1e3:g} mm",) if made is not None else ()
         name = f"bore {size * 1e3:g} mm"
-        found.append(Choice("cylinder", name, not why, tuple(why) or chosen, {}))
+        found.append(Choice("cylinder", name, not why, tuple(why) or words, {}))
     return found
 
 
@@ -104,9 +104,9 @@ def _gas_spring(
     if not strokes:
         largest = n(row.stroke[1]) if row.stroke is not None else n((row.strokes or (0.0,))[-1])
         why.append(f"stroke {needed * 1e3:.1f} mm is needed, {largest * 1e3:g} mm the largest")
-    chosen = strokes[0] if strokes else None
+    stroke = strokes[0] if strokes else None
     extended = n(spring.extended)
-    if chosen is not None and row.extended is not None:
+    if stroke is not None and row.extended is not None:
         factor, constant = (n(x) for x in row.extended)
         fitting = [
             c
@@ -114,22 +114,22 @@ def _gas_spring(
             if factor * c + constant >= lengths.most + unlock
             and (factor - 1.0) * c + constant <= lengths.least
         ]
-        chosen = fitting[0] if fitting else None
-        if chosen is None:
+        stroke = fitting[0] if fitting else None
+        if stroke is None:
             least, most = lengths.least * 1e3, lengths.most * 1e3
             why.append(f"{least:.1f} to {most:.1f} mm is no range of its lengths")
         else:
-            extended = factor * chosen + constant
-    elif chosen is not None:
+            extended = factor * stroke + constant
+    elif stroke is not None:
         # made to the length that the file asks for: what it is compressed by must be in the stroke
         compressed = extended - lengths.least
-        chosen = next((c for c in strokes if c >= compressed * (1.0 - ROUNDING)), None)
-        if chosen is None:
+        stroke = next((c for c in strokes if c >= compressed * (1.0 - ROUNDING)), None)
+        if stroke is None:
             why.append(f"compressed by {compressed * 1e3:.1f} mm, {strokes[-1] * 1e3:g} mm at most")
-    said = () if chosen is None else (f"stroke {chosen * 1e3:g} mm",)
+    said = () if stroke is None else (f"stroke {stroke * 1e3:g} mm",)
     values: dict[str, float] = {}
-    if not why and chosen is not None:
-        values = _with_row(result, name, spring, row, chosen, extended)
+    if not why and stroke is not None:
+        values = _with_row(result, name, spring, row, stroke, extended)
     return Choice(catalogue, f"{name}: {row.name}", not why, tuple(why) or said, values)
 
 

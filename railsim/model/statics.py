@@ -214,11 +214,11 @@ def _masses(model: Model) -> Table:
 def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
     index = model.index
     elements = {element.name: element for element in model.flat.elements}
-    chosen = [(LINK, k, name) for k, name in enumerate(index.links)]
-    chosen += [(MOUNT, k, name) for k, name in enumerate(index.mounts)]
-    found = _outputs(model, state, [pair[:2] for pair in chosen])
+    members = [(LINK, k, name) for k, name in enumerate(index.links)]
+    members += [(MOUNT, k, name) for k, name in enumerate(index.mounts)]
+    found = _outputs(model, state, [pair[:2] for pair in members])
     springs, stops = [], []
-    for (group, _, name), row in zip(chosen, found, strict=True):
+    for (group, _, name), row in zip(members, found, strict=True):
         element = elements.get(name) or elements[name.rpartition(".")[0]]
         travel, force = row[DEFLECTION : DEFLECTION + 3], row[FORCE : FORCE + 3]
         gaps = _gaps(element, travel)
@@ -235,9 +235,9 @@ def _springs_and_stops(model: Model, state: Floats) -> tuple[Table, Table]:
     )
 
 
-def _outputs(model: Model, state: Floats, chosen: list[tuple[int, int]]) -> Floats:
+def _outputs(model: Model, state: Floats, members: list[tuple[int, int]]) -> Floats:
     """Return deflections and forces of elements, float64[element, column of their outputs]."""
-    recorder = empty_recorder(model, 1, np.array(chosen, dtype=np.int64).reshape(-1, 2))
+    recorder = empty_recorder(model, 1, np.array(members, dtype=np.int64).reshape(-1, 2))
     trial, derivative = state.copy(), np.zeros_like(state)
     time_loop(
         model.system,

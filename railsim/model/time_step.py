@@ -171,8 +171,8 @@ class Stability:
         more = GROWTH_IN_FLANGE if flange else GROWTH
         growth = _step_growth(self._model, system, state, self._scheme, h)
         if growth > more and flange not in self._allowed:  # for most the question does not arise
-            own = _vehicle_growth(self._model, system, state)
-            self._allowed[flange] = max(0.0, own) + more
+            vehicle_growth = _vehicle_growth(self._model, system, state)
+            self._allowed[flange] = max(0.0, vehicle_growth) + more
         if growth <= self._allowed.get(flange, more):
             return True
         return growth * h < SLIGHT and not self._helped_by_halving(system, state, h, growth)

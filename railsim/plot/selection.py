@@ -13,6 +13,7 @@ from railsim.errors import Fault, InputError, nearest
 from railsim.notation import Quantity
 from railsim.result import Result
 from railsim.result.data import Array
+from railsim.result.labels import known_labels
 
 MOST_LINES = 24
 
@@ -106,9 +107,11 @@ def _wanted(
     result: Result, quantity: Quantity, selection: str, given: list[str]
 ) -> dict[str, list[str]]:
     wanted = {dim: list(result.coordinates[dim]) for dim in quantity.dims[1:]}
-    known = {label: (dim, label) for dim, labels in wanted.items() for label in labels}
-    numbered = enumerate(wanted.get("wheelset", []), start=1)
-    known |= {str(number): ("wheelset", label) for number, label in numbered}
+    known = {
+        label: (dim, names[index])
+        for dim, names in wanted.items()
+        for label, index in known_labels(dim, names).items()
+    }
     chosen: dict[str, list[str]] = {}
     for name in filter(None, given):
         if name not in known:

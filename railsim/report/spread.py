@@ -200,11 +200,11 @@ def worst_runs(records: Sequence[Record], most: int) -> list[str]:
         values = columns(records).get(name, {"values": []})["values"]
         pairs = [(-value, number) for number, value in enumerate(values) if value is not None]
         ranked.append([number for _, number in sorted(pairs)])
-    chosen: dict[int, None] = {}
+    selected: dict[int, None] = {}
     for rank in range(len(names)):
         for ranks in ranked:
-            if rank < len(ranks) and len(chosen) < most:
-                chosen[ranks[rank]] = None
-    if not chosen:
-        chosen = dict.fromkeys(range(most))
-    return [names[number] for number in sorted(chosen)]
+            if rank < len(ranks) and len(selected) < most:
+                selected[ranks[rank]] = None
+    if not selected:
+        selected = dict.fromkeys(range(most))
+    return [names[number] for number in sorted(selected)]

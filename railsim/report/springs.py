@@ -109,30 +109,30 @@ def figures(results: Collected) -> dict[str, Figure]:
     """Draw all pictures; returned by the names of their files."""
     suspension = results.suspension
     with styled():
-        drawn = {
+        made = {
             "stiffness": plots.stiffness_figure(results.verification),
             "deflection": plots.deflection_figure(suspension, results.verification),
             "arm": plots.arm_figure(suspension, results.verification),
         }
         if results.design is not None:
-            drawn["coils"] = plots.coils_figure(suspension, results.design)
+            made["coils"] = plots.coils_figure(suspension, results.design)
         if results.fatigue is not None:
-            drawn["goodman_smith"] = plots.goodman_figure(suspension, results.fatigue)
+            made["goodman_smith"] = plots.goodman_figure(suspension, results.fatigue)
         if results.ride_heights is not None:
             tare = suspension.fatigue.tare if suspension.fatigue is not None else None
-            drawn["ride_height"] = plots.ride_height_figure(results.ride_heights, tare)
+            made["ride_height"] = plots.ride_height_figure(results.ride_heights, tare)
         if results.search is not None:
-            drawn["search"] = plots.search_figure(results.search)
-    return drawn
+            made["search"] = plots.search_figure(results.search)
+    return made
 
 
-def page(results: Collected, drawn: Mapping[str, bytes]) -> str:
+def page(results: Collected, figures: Mapping[str, bytes]) -> str:
     """Return the page as HTML, with PNG pictures by the names of `figures`."""
     suspension, verification = results.suspension, results.verification
     sheets = data_sheets(suspension, verification)
 
     def shown(*names: str) -> list[Drawn]:
-        return pictures(drawn, CAPTIONS, names)
+        return pictures(figures, CAPTIONS, names)
 
     sections = [Section("Inputs", [], tables.input_tables(suspension))]
     if results.design is not None:

@@ -2,6 +2,7 @@
 
 ==============  ===========================================================================
 `data.py`       `Result`: arrays by name, coordinates, attributes, the embedded inputs
+`labels.py`     names and numbers of wheelsets along the dimensions of a result
 `extremes.py`   largest values with wheelset, side, time and distance; values at mid-curve
 `facts.py`      what summaries and reports say of a result
 `sinks.py`      `Sink`, what a simulation writes to; `MemorySink`

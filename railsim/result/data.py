@@ -19,6 +19,7 @@ from railsim.errors import InputError, nearest, optional_package
 from railsim.notation import Quantity
 from railsim.plottable import image_tag, picture_of
 from railsim.profiles.profile import Profile
+from railsim.result.labels import chosen_names, index_of
 from railsim.table import Table
 from railsim.text import printable
 
@@ -225,36 +226,12 @@ class Result:
                 raise KeyError(f"{name} has no dimension '{dim}'; {nearest(dim, dims)}")
         return array[tuple(self._index(dim, labels.get(dim)) for dim in dims)]
 
-    def _places(self, dims: tuple[str, ...], labels: list[str]) -> dict[int, list[str]]:
-        """Labels that are wanted by the number of their dimension; wheelsets also from 1."""
-        known = {label: (k, label) for k, dim in enumerate(dims) for label in self.coordinates[dim]}
-        if "wheelset" in dims:
-            names = enumerate(self.coordinates["wheelset"], start=1)
-            known |= {str(number): (dims.index("wheelset"), name) for number, name in names}
-        found: dict[int, list[str]] = {}
-        for label in labels:
-            if label not in known:
-                raise KeyError(f"no label '{label}'; {nearest(label, known)}")
-            k, name = known[label]
-            found.setdefault(k, []).append(name)
-        return found
-
     def _index(self, dim: str, label: str | int | None) -> int | slice:
         if label is None:
             return slice(None)
         if dim == "time" and not isinstance(label, str):
             return label
-        names = self._coordinates[dim]
-        if isinstance(label, str):
-            numbers = map(str, range(1, len(names) + 1)) if dim == "wheelset" else ()
-            known = {number: k for k, number in enumerate(numbers)}
-            known |= {name: k for k, name in enumerate(names)}
-            if label not in known:
-                raise KeyError(f"no {dim} '{label}'; {nearest(label, known)}")
-            return known[label]
-        if not -len(names) <= label < len(names):
-            raise KeyError(f"no {dim} {label}; 0 to {len(names) - 1}, or a name")
-        return int(label)
+        return index_of(dim, self._coordinates[dim], label)
 
     # -- what describes them ------------------------------------------------------------------
 
@@ -481,7 +458,7 @@ class Result:
             if name not in over_time:
                 raise KeyError(f"{name} is not over time; {nearest(name, over_time)}")
             quantity = self._quantities[name]
-            places = self._places(quantity.dims[1:], wanted)
+            places = chosen_names(quantity.dims[1:], self._coordinates, wanted)
             combinations = product(*(self._coordinates[dim] for dim in quantity.dims[1:]))
             for labels, values in zip(combinations, array.reshape(len(array), -1).T, strict=True):
                 if any(labels[k] not in chosen for k, chosen in places.items()):

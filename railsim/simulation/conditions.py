@@ -43,15 +43,15 @@ class Inputs:
         until: float | None,
     ) -> "Inputs":
         """Return the inputs; raise InputError with all faults of speed, start and end."""
-        given = speed_in_si(speed)
-        check_numbers(speed=given, start=start, duration=duration, until=until)
-        first = initial_speed(settings, given, start)
+        number = speed_in_si(speed)
+        check_numbers(speed=number, start=start, duration=duration, until=until)
+        first = initial_speed(settings, number, start)
         check_range(track, first, start, duration, until)
         # of another type of number the time loop would be compiled again
         return cls(track, settings, float(first), float(start), duration, until)
 
 
-def check_numbers(**given: object) -> None:
+def check_numbers(**values: object) -> None:
     """Raise InputError with everything among the arguments that is neither None nor a number."""
     faults = [
         argument_fault(
@@ -60,7 +60,7 @@ def check_numbers(**given: object) -> None:
             f"found {shortened(repr(value))}",
             "a number" + " of m/s, or a text such as '72 km/h'" * (name == "speed"),
         )
-        for name, value in given.items()
+        for name, value in values.items()
         if value is not None and (not isinstance(value, Real) or isinstance(value, bool))
     ]
     if faults:
@@ -123,12 +123,12 @@ def state_before(
         not give what an undisturbed run gives.
     """
     if not isinstance(resume, Result):
-        given = np.asarray(resume)
-        if given.dtype.kind != "f" or given.ndim != 1 or not np.isfinite(given).all():
+        values = np.asarray(resume)
+        if values.dtype.kind != "f" or values.ndim != 1 or not np.isfinite(values).all():
             found = "not finite numbers in a row"
             allowed = 'a result, or its state: result.groups["state"]["end"]'
             raise InputError([argument_fault("resume", "", found, allowed, "--continue")])
-        return given.astype(float)
+        return values.astype(float)
     faults = []
     if "end" not in resume.groups.get("state", {}):
         faults.append(

@@ -97,8 +97,8 @@ def simulate(
     before = None if resume is None else state_before(vehicle, track, settings, resume)
     if before is not None:
         own = {"speed": float(before[-1]), "start": float(before[-2])}
-        for name, given in (("speed", speed_in_si(speed)), ("start", start or None)):
-            if given is not None and given != own[name]:
+        for name, value in (("speed", speed_in_si(speed)), ("start", start or None)):
+            if value is not None and value != own[name]:
                 found, allowed = "given together with `resume`", "the state's own is used"
                 raise InputError([argument_fault(name, "", found, allowed)])
         speed, start = own["speed"], own["start"]

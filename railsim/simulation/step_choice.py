@@ -88,38 +88,38 @@ class StepChoice:
         return interval / every, every
 
     def _choose(self, speed: float, interval: float) -> float:
-        given = self._settings.step
-        if given is None:
+        requested = self._settings.step
+        if requested is None:
             inputs = f"{self._digest()} {speed!r} {interval!r}"
             step = solution("step", inputs, lambda: {"step": self._stable(speed, interval)})
             return float(step["step"])
         if not self.varies:
-            count = max(1, round(interval / given))
-            if abs(count * given - interval) > WRITTEN * interval:
+            count = max(1, round(interval / requested))
+            if abs(count * requested - interval) > WRITTEN * interval:
                 raise InputError(
                     [
                         Fault(
                             "settings",
                             "step",
-                            f"found {given:g} s",
+                            f"found {requested:g} s",
                             f"an integer fraction of the output interval {interval:g} s",
                         )
                     ]
                 )
-            given = interval / count
+            requested = interval / count
         stability = self._stability(self._model, speed, self._states.get(speed))
-        if stability.holds(given):
-            return given
+        if stability.holds(requested):
+            return requested
         stable = stability.choose(interval)
         # a step is too long or not: growth at a shorter one comes from differences across a kink
-        if given < stable:
-            return given
+        if requested < stable:
+            return requested
         raise InputError(
             [
                 Fault(
                     "settings",
                     "step",
-                    f"found {given:g} s, unstable at {speed:g} m/s",
+                    f"found {requested:g} s, unstable at {speed:g} m/s",
                     f"at most {stable:g} s",
                 )
             ]

@@ -167,9 +167,11 @@ def scenario_cases(
     limits = load_running_limits(scenario.standard) if scenario.to_standard else None
     points = [dict(zip(scenario.grid, v, strict=True)) for v in product(*scenario.grid.values())]
     for vehicle in vehicles:
-        own = [a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")]
+        vehicle_assignments = [
+            a.removeprefix("vehicle.") for a in assignments if a.startswith("vehicle.")
+        ]
         try:
-            service = load_vehicle(vehicle, own).service
+            service = load_vehicle(vehicle, vehicle_assignments).service
         except InputError as error:
             faults += error.faults
             continue
@@ -183,7 +185,7 @@ def scenario_cases(
             speed = part_speed(part.speed, service)
             label = [short_name(vehicle), state, name, *map(in_a_name, point.values())]
             try:
-                if condition and not _has(vehicle, own, condition):
+                if condition and not _has(vehicle, vehicle_assignments, condition):
                     continue
                 if condition:
                     texts += condition.assignments

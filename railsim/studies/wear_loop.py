@@ -398,13 +398,15 @@ def _wear(
     """Mean of the runs weighted by their shares."""
     total = sum(run.share for run in wearing.runs)
     depths, hunts = [], dict[str, str]()
-    given = {wearing.names[name]: profile for name, profile in worn.items()}
+    worn_profiles = {wearing.names[name]: profile for name, profile in worn.items()}
     for number, run in enumerate(wearing.runs):
 
         def part(done: float, before: int = number) -> None:
             progress((before + done) / len(wearing.runs))
 
-        known = given | {rail: load_profile(rail) for rail in run.track.rail if rail not in given}
+        known = worn_profiles | {
+            rail: load_profile(rail) for rail in run.track.rail if rail not in worn_profiles
+        }
         try:
             result = simulate(
                 run.vehicle, run.track, speed=run.speed, settings=settings, profiles=known,

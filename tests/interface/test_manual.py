@@ -58,7 +58,10 @@ def test_table_of_quantities_is_up_to_date(generate):
 def test_tables_of_the_curving_study_are_up_to_date(generate, coach):
     made = generate.curving_table(coach)
     tables = generated(coach)
-    assert tables  # on the page on validation, of one coach in README as well
+    assert len(tables) == 1
+    if coach == "manchester":  # README has the published rows
+        (table,) = generated("validation")
+        assert table == generate.short(tables[0])
     for table in tables:
         assert NUMBER.sub("", table) == NUMBER.sub("", made), MENDED_BY
         # one unit of the last digit: another processor may round the other way

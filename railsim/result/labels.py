@@ -1,0 +1,60 @@
+"""Labels along the dimensions of a result: names, and for wheelsets numbers.
+
+Texts and tables number wheelsets from 1, from the leading end; integers and arrays count from 0.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from railsim.errors import nearest
+
+
+def known_labels(dim: str, names: Sequence[str]) -> dict[str, int]:
+    """Return the indices of all texts that name a place along a dimension.
+
+    Examples
+    --------
+    >>> known_labels("wheelset", ["front", "rear"])
+    {'1': 0, '2': 1, 'front': 0, 'rear': 1}
+    """
+    numbers = range(1, len(names) + 1) if dim == "wheelset" else ()
+    return {str(number): number - 1 for number in numbers} | {n: k for k, n in enumerate(names)}
+
+
+def index_of(dim: str, names: Sequence[str], label: str | int) -> int:
+    """Return the index of a label: a text, or an integer from 0.
+
+    Raises
+    ------
+    KeyError : there is no such label.
+    """
+    if isinstance(label, str):
+        known = known_labels(dim, names)
+        if label not in known:
+            raise KeyError(f"no {dim} '{label}'; {nearest(label, known)}")
+        return known[label]
+    if not -len(names) <= label < len(names):
+        raise KeyError(f"no {dim} {label}; 0 to {len(names) - 1}, or a name")
+    return int(label)
+
+
+def chosen_names(
+    dims: Sequence[str], coordinates: Mapping[str, Sequence[str]], labels: Sequence[str]
+) -> dict[int, list[str]]:
+    """Return the names that labels choose, by the number of their dimension.
+
+    Raises
+    ------
+    KeyError : a label that no dimension has.
+    """
+    known = {
+        label: (k, coordinates[dim][index])
+        for k, dim in enumerate(dims)
+        for label, index in known_labels(dim, coordinates[dim]).items()
+    }
+    found: dict[int, list[str]] = {}
+    for label in labels:
+        if label not in known:
+            raise KeyError(f"no label '{label}'; {nearest(label, known)}")
+        k, name = known[label]
+        found.setdefault(k, []).append(name)
+    return found
