@@ -144,7 +144,7 @@ def facts(name: str, vehicle: Vehicle) -> str:
             f"`{name}`" + (f"; load cases {', '.join(vehicle.loads)}" if vehicle.loads else ""),
         ),
         ("source", vehicle.source or ""),
-        ("reliability", letters_of("vehicle", name)),
+        ("source quality", letters_of("vehicle", name)),
         (
             "mass, mean wheel load",
             f"{mass / 1e3:.2f} t, {mass * GRAVITY / 2e3 / len(wheelsets):.2f} kN",
@@ -160,7 +160,7 @@ def facts(name: str, vehicle: Vehicle) -> str:
 
 
 def gaps(text: str) -> str:
-    """The numbers that are assumed or recalled."""
+    """The numbers that are assumed or from memory."""
     found = [
         (line, letter)
         for line in lines_of(text)
@@ -168,7 +168,7 @@ def gaps(text: str) -> str:
         if f"[{letter}]" in line.comment
     ]
     if not found:
-        return "No number of the file is assumed or recalled.\n"
+        return "No number of the file is assumed or from memory.\n"
     items = []
     for letter, words in (("A", "Assumed"), ("M", "Recalled, not read")):
         tables: dict[str, list[str]] = {}
@@ -199,7 +199,7 @@ def vehicles_table() -> str:
                 f"{3.6 * vehicle.service.admissible_speed:.0f}",
             )
         )
-    head = ("file", "what it is", "reliability", "mass (t)", "Q0 (kN)", "V (km/h)")
+    head = ("file", "what it is", "source quality", "mass (t)", "Q0 (kN)", "V (km/h)")
     return table(head, rows, "---")
 
 
@@ -225,7 +225,7 @@ def tracks_table() -> str:
                 f"{track.speed:g} ({3.6 * track.speed:.0f})",
             )
         )
-    head = ("file", "what it is", "reliability", "length (m)", "radius (m)",
+    head = ("file", "what it is", "source quality", "length (m)", "radius (m)",
             "cant (mm)", "speed, m/s (km/h)")  # fmt: skip
     return table(head, rows)
 

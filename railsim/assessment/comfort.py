@@ -8,7 +8,7 @@ filter of 2 Hz.
 Lateral accelerations are accelerometer readings: they include the component of gravity.
 
 Sources: EN 12299:2009 (replaced by EN 12299:2024) and ISO 2631-1:1997; formulas and constants of
-P_CT and P_DE recalled (equal to the older form in per cent of g), the others from secondary
+P_CT and P_DE from memory (equal to the older form in per cent of g), the others from secondary
 sources.  None has been compared with the printed standards.
 """
 

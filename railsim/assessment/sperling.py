@@ -8,7 +8,7 @@ k = 0.588 vertical, 0.735 lateral.  The index is defined with the amplitude of a
 in cm/s2, which is 100 sqrt(2) a_w.  For several frequencies the powers 20/3 of the indices are
 added, which is equivalent to adding the squares of a_w.
 
-Classes, such as 2 for good, are recalled and not used for a verdict; see the handbook.
+Classes, such as 2 for good, are from memory and not used for a verdict; see the handbook.
 """
 
 from typing import Literal

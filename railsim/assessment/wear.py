@@ -157,7 +157,7 @@ def wear_law(name: str) -> WearLaw:
 
 
 def pearce_sherratt_1991(T_gamma: Floats, diameter: float | Floats) -> Floats:
-    """Worn area of a wheel profile per distance (Pearce and Sherratt 1991, Wear 144; recalled).
+    """Worn area of a wheel profile per distance (Pearce and Sherratt 1991, Wear 144; from memory).
 
     In mm2/km, D in mm: 0.25 T/D below 100 N, 25/D to 200 N, (1.19 T - 154)/D above.  The last
     branch begins at 84/D: the law is discontinuous at 200 N.  It holds for one contact: the worn
@@ -225,7 +225,7 @@ class WholeLifeRailModel:
     Attributes
     ----------
     threshold : float
-        Wear number below which there is no damage [N]: 15 (recalled), 20 in later use.
+        Wear number below which there is no damage [N]: 15 (from memory), 20 in later use.
     """
 
     threshold: float = 15.0

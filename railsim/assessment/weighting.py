@@ -9,7 +9,7 @@ Each is a product of (w = 2 pi f, s = i w):
 Records are weighted in the frequency domain: a bilinear filter at 200 samples per second would be
 15 % in error at 40 Hz.
 
-Sources: form ISO 2631-1:1997 annex A; parameters of Wb, Wc, Wd EN 12299, those of Wk recalled and
+Sources: form ISO 2631-1:1997 annex A; parameters of Wb, Wc, Wd EN 12299, those of Wk from memory,
 equal to ISO 2631-1:1997 table 3 within 0.15 % from 0.1 to 400 Hz.  None has been compared with the
 printed standards.
 """

@@ -12,7 +12,7 @@ from railsim.cli.common import json_option, overwrite_option, print_json, show
 
 PROFILES = "profiles"
 # Letters of source quality beside a number, as the shipped files explain them: read, re-entered,
-# computed, recalled, assumed; a short name of the source may follow, [D G].
+# computed, from memory, assumed; a short name of the source may follow, [D G].
 MARK = re.compile(r"\[(D|R|C|M|A|assumed)(?: \w+)?\]")
 MEANING = {
     "D": "data sheet or printed table",

@@ -136,13 +136,19 @@ def _default(schema: dict[str, Any]) -> str:
     return f"`{json.dumps(value)}`"
 
 
+_ANY_VALUE = {"true or false", "whole number", "number", "text"}
+
+
 def _words(schema: dict[str, Any]) -> str:
     """Return the type of a value in words."""
     if "$ref" in schema:
         return str(schema["$ref"]).rsplit("/", 1)[-1]
     for union in ("anyOf", "oneOf"):
         if union in schema:
-            return " or ".join(dict.fromkeys(_words(option) for option in schema[union]))
+            parts = list(dict.fromkeys(_words(option) for option in schema[union]))
+            if len(parts) > len(_ANY_VALUE) and set(parts[: len(_ANY_VALUE)]) == _ANY_VALUE:
+                return "value"  # of whatever type, or a list
+            return " or ".join(parts)
     if "const" in schema:
         return f"`{json.dumps(schema['const'])}`"
     if "enum" in schema:

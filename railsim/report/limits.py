@@ -29,7 +29,7 @@ NOTE = (
     "Estimate from the sections within the standard's conditions, below it the share of the limit, "
     "the wheelset, wheel or sensor nearest to it and the method: 1-dim. mean + k s, 2-dim. upper "
     "bound of the regression over the cant deficiency at the admissible one. [P] printed in a "
-    "source that was read, [R] recalled, [A] assumed; unchecked: not compared with the printed "
+    "source that was read, [R] from memory, [A] assumed; unchecked: not compared with the printed "
     "standard."
 )
 METHOD = {"one": "1-dim.", "two": "2-dim.", "largest": "largest value", "smallest": "smallest"}

@@ -49,6 +49,14 @@ def test_every_generator_of_the_manual_is_registered():
     assert all("\ndef make(" in (folder / f"{name}.py").read_text("utf-8") for name in modules)
 
 
+def test_every_public_name_is_in_the_reference():
+    pages = [ROOT / "docs" / "reference.md", *(ROOT / "docs" / "reference").glob("*.md")]
+    text = "\n".join(page.read_text("utf-8") for page in pages)
+    for package in ("railsim", "railsim.contact", "railsim.assessment"):
+        names = set(import_module(package).__all__) - {"__version__"}
+        assert not [name for name in names if f"::: {package}.{name}\n" not in text]
+
+
 def test_table_of_quantities_is_up_to_date(generate):
     assert generated("quantities") == [generate.quantity_table()], MENDED_BY
 

@@ -7,7 +7,7 @@ S(omega) in m2/(rad/m); the cross level, whatever the form in the source, to tha
 (height difference over the rails' distance) in rad2/(rad/m).
 
 Source quality of the coefficients: [R] table re-entered in public code that names its source, [M]
-recalled and confirmed in one value only.
+from memory and confirmed in one value only.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -168,7 +168,7 @@ def fra(A_v: float, A_a: float, omega_s: float, label: str) -> Spectrum:
 
     return Spectrum(
         label,
-        "Federal Railroad Administration, recalled, one value confirmed [M]",
+        "Federal Railroad Administration, from memory, one value confirmed [M]",
         {"lateral": level(A_a), "vertical": level(A_v), "cross_level": cross, "gauge": cross},
     )
 
