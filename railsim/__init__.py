@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from railsim.model.statics import StaticLoads, static_loads
     from railsim.profiles import Profile, load_profile
     from railsim.result import Result, mid_curves, open_result, peaks
-    from railsim.simulation import simulate, simulate_together
+    from railsim.simulation import Simulation, simulate, simulate_together
     from railsim.stability.critical_speed import critical_speed
     from railsim.stability.curving import curving
     from railsim.studies.optimise import optimise
@@ -58,6 +58,7 @@ _HOMES = {
     "Profile": "railsim.profiles",
     "Result": "railsim.result",
     "Settings": "railsim.definitions.settings",
+    "Simulation": "railsim.simulation",
     "StaticLoads": "railsim.model.statics",
     "Track": "railsim.definitions.track",
     "TrailingArmSuspension": "railsim.definitions.spring",
@@ -98,6 +99,7 @@ __all__ = [
     "Profile",
     "Result",
     "Settings",
+    "Simulation",
     "StaticLoads",
     "Track",
     "TrailingArmSuspension",

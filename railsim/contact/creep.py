@@ -212,9 +212,8 @@ def creep_law(
     """
     table = creep_table(nu) if name == "table" else NO_TABLE
     curve = np.zeros((0, 2)) if adhesion_curve is None else np.array(adhesion_curve, dtype=float)
-    return CreepLaw(
-        CREEP_LAWS[name].number, *grid, G, *third_body, table.coefficients, table.scale, curve
-    )
+    number, data = CREEP_LAWS[name].number, (table.coefficients, table.scale, curve)
+    return CreepLaw(number, *grid, G, *third_body, *data, own=0, block=np.zeros(0))
 
 
 def creep_scratch(n: int, law: CreepLaw) -> CreepScratch:

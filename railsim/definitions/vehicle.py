@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from railsim.definitions.flatten import flatten, position_faults
+from railsim.definitions.laws import with_sources
 from railsim.definitions.names import name_faults
 from railsim.definitions.section_files import embed_wheel_sections
 from railsim.definitions.vehicle_tables import VehicleTables
@@ -24,8 +25,8 @@ class Vehicle(VehicleTables, Plottable):
 
     @classmethod
     def complete(cls, tables: dict[str, Any]) -> list[Fault]:
-        """Put the sections of wheels that are not round into the tables."""
-        return embed_wheel_sections(tables)
+        """Put the sections of wheels that are not round and the sources of laws into the tables."""
+        return [*embed_wheel_sections(tables), *with_sources(tables)]
 
     @classmethod
     def table_faults(cls, tables: Mapping[str, Any]) -> list[Fault]:

@@ -24,6 +24,7 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.elements import AnyElement
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.laws import Controller, Law, Signal
 from railsim.definitions.loads import LoadCase, LoadName
 from railsim.definitions.out_of_round import OutOfRound
 
@@ -154,6 +155,12 @@ class VehicleTables(FileDefinition):
     sensors: dict[Name, Point] = Field(default_factory=dict)
     """Points whose motion is recorded with `settings.outputs.sensors`, by name, beside the
     standard ones"""
+    laws: dict[Name, Law] | None = None
+    """Laws of one's own by name: Python functions, executed by permission alone"""
+    signals: dict[Name, Signal] | None = None
+    """What is measured during a run, by name"""
+    controllers: dict[Name, Controller] | None = None
+    """What reads signals and commands actuators, by name"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
     """Bodies by name"""
     wheelsets: dict[Name, Wheelset] = Field(default_factory=dict)

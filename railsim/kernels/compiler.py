@@ -214,6 +214,18 @@ class KernelCache:
             path.unlink(missing_ok=True)
 
 
+def entry(function, *args):
+    """Return a compiled function without what finds its types, for arguments of these types.
+
+    It has been called with such arguments before.  Numba looks through a `System` for its type,
+    20 us a call; the function itself takes a few microseconds.
+    """
+    if not PRIVATE or _config.DISABLE_JIT:
+        return function
+    kinds = tuple(function.typeof_pyval(value) for value in args)
+    return function.overloads[kinds].entry_point
+
+
 def compiled_by(function, folder, fastmath, *, python=True, allocates=False, **options):
     """Compile a function, keeping the code in `folder`.
 

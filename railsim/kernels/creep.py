@@ -10,9 +10,11 @@ from . import compiled
 from .creep_laws import adhesion_curve, fastrip, linear_saturated, polach
 from .creep_table import table_forces
 from .fastsim import fastsim
+from .own_laws import own_creep_law
 
 # numbers of the laws, as in `railsim.definitions.creep_law.CREEP_LAWS`
 FASTSIM, TABLE, FASTRIP, POLACH, LINEAR, ADHESION_CURVE = range(6)
+OWN = -1
 
 
 @compiled
@@ -70,5 +72,7 @@ def creep_forces(n, law, patches, scratch):
         polach(n, patches, law.G, law.k_adhesion, law.k_slip)
     elif law.number == LINEAR:
         linear_saturated(n, patches, G)
-    else:
+    elif law.number == ADHESION_CURVE:
         adhesion_curve(n, patches, law.curve)
+    else:
+        own_creep_law(n, patches, law, G)

@@ -22,9 +22,9 @@ from railsim.kernels.vectors import dot, plus
 LINK, MOUNT = range(2)
 
 # columns: deflection x y z (a link's along its line in x), angles about x y z, forces, moments,
-# power taken from the bodies
-DEFLECTION, ANGLE, FORCE, MOMENT, POWER = 0, 3, 6, 9, 12
-ELEMENT_COLUMNS = 13
+# power taken from the bodies, rates of deflections and angles
+DEFLECTION, ANGLE, FORCE, MOMENT, POWER, RATE = 0, 3, 6, 9, 12, 13
+ELEMENT_COLUMNS = 19
 
 
 @compiled(python=False)
@@ -35,7 +35,7 @@ def element_outputs(system, work, inner, chosen, out):
             out[e, k] = 0.0
         if chosen[e, 0] == LINK:
             link_output(system, work, inner, chosen[e, 1], e, out)
-        else:
+        elif chosen[e, 0] == MOUNT:
             mount_output(system, work, inner, chosen[e, 1], e, out)
 
 
@@ -67,6 +67,7 @@ def link_output(system, work, inner, index, e, out):
     out[e, DEFLECTION] = elongation
     out[e, FORCE] = force
     out[e, POWER] = force * rate
+    out[e, RATE] = rate
 
 
 @compiled(python=False)
@@ -85,8 +86,10 @@ def mount_output(system, work, inner, index, e, out):
         force = plus(spring_damper(spring, d, rate), more)
         put(out, e, DEFLECTION, laws, d)
         put(out, e, FORCE, laws, force)
+        put(out, e, RATE, laws, rate)
         out[e, POWER] += first_lane(laws, dot(force, rate))
     angle, rate, moment = rotation_law(R1, R2, omega_1, omega_2, rotation)
     put(out, e, ANGLE, laws, angle)
     put(out, e, MOMENT, laws, moment)
+    put(out, e, RATE + 3, laws, rate)
     out[e, POWER] += first_lane(laws, dot(moment, rate))

@@ -14,6 +14,9 @@ PAD            force of a friction pad that sticks elastically and slides at a l
                with its focus at no force, see `elements`.  What slides, slides along the gradient
                of |q| over the forces: with equal limits along the force, else by the principle of
                greatest dissipation (Michalowski, Mroz 1978, Archives of Mechanics 30)
+LAG            command u behind a first-order lag, x' = (u - x)/tau within +-r; exact over a step at
+               constant u
+OWN            state of a law of one's own, whose rate is its drive; the trapezoidal rule
 AIR            deflection w of the reservoir, c w' = k_1 (z - w) - k_2 w (Nishimura 1984); exact
                over a step at constant z
 """
@@ -26,7 +29,7 @@ import numpy as np
 from railsim.kernels import compiled
 from railsim.kernels.record import record
 
-MAXWELL, MAXWELL_CURVE, PAD, AIR = range(4)
+MAXWELL, MAXWELL_CURVE, PAD, AIR, LAG, OWN = range(6)
 MOST_RETURNS = 8  # iterations of `hold_within`
 RETURNED = 1e-12  # what is left beyond the limit, over it
 LEAST_LIMIT = 1e-6  # N; below it there is no friction
@@ -41,7 +44,8 @@ class Internal(NamedTuple):
     kind : int64[m]
     parameter : float64[m, 3]  MAXWELL: c, k_s; MAXWELL_CURVE: -, k_s; AIR: k_1, k_2, c;
                                PAD: k_t, 0 for a state alone, of several that slide together their
-                               number in the last and 1 in the others, e in the last
+                               number in the last and 1 in the others, e in the last; LAG: tau
+                               [s], r [1/s]
     curve : int64[m]           force-velocity table of MAXWELL_CURVE, else -1
     """
 
@@ -171,6 +175,10 @@ def internal_rate(internal, curves, i, x, drive, limit):
     p = internal.parameter
     if internal.kind[i] == MAXWELL:
         return p[i, 1] * (drive - x / p[i, 0])
+    if internal.kind[i] == LAG:
+        return min(p[i, 1], max(-p[i, 1], (limit - x) / p[i, 0]))
+    if internal.kind[i] == OWN:
+        return drive
     return (p[i, 0] * (drive - x) - p[i, 1] * x) / p[i, 2]
 
 
@@ -227,6 +235,18 @@ def hold_within(internal, last, first, drive, state):
                 state[first + i] /= (1.0 + slip * yielding(internal, i, drive)) * size
 
 
+@compiled(python=False)
+def lag_advanced(tau, rate, x, command, h):
+    """Command behind a first-order lag with a limited rate, after a step `h`."""
+    left = abs(command - x) - rate * tau
+    way = 1.0 if command > x else -1.0
+    if left > 0.0:
+        at_the_limit = min(h, left / rate)
+        x += way * rate * at_the_limit
+        h -= at_the_limit
+    return command + (x - command) * exp(-h / tau)
+
+
 @compiled
 def constant_decays(internal, h, decay):
     """e^(-h/tau) of the linear states, 0 for the others."""
@@ -245,5 +265,9 @@ def advanced(internal, curves, i, x, drive, limit, h, decay):
         return x if internal.parameter[i, 1] > 0.0 else min(limit, max(-limit, x))
     if internal.kind[i] == MAXWELL_CURVE:
         return curve_advanced(curves, internal.curve[i], internal.parameter[i, 1], x, drive, h)
+    if internal.kind[i] == LAG:
+        return lag_advanced(internal.parameter[i, 0], internal.parameter[i, 1], x, limit, h)
+    if internal.kind[i] == OWN:
+        return x + h * drive
     end = steady_value(internal, i, drive)
     return end + (x - end) * decay

@@ -76,6 +76,8 @@ class CreepLaw(NamedTuple):
     table : float32[], scale : float64[k, 4]   table of the full theory
                          (`railsim.contact.creep_table`); else empty
     curve : float64[k, 2]   measured adhesion curve: creepage, T/(mu N) [1]; else empty
+    own : int            address of a law of one's own, else 0
+    block : float64[...]    its block, see `own_laws`
     """
 
     number: int
@@ -87,6 +89,8 @@ class CreepLaw(NamedTuple):
     table: np.ndarray
     scale: np.ndarray
     curve: np.ndarray
+    own: int
+    block: np.ndarray
 
 
 @record

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.controllers import ACTUATOR, actuator_output
 from railsim.kernels.element_outputs import element_outputs
 from railsim.kernels.record import record
 
@@ -58,6 +59,11 @@ def record_row(recorder, row, system, state, derivative, work, n_patches):
             recorder.chosen,
             recorder.element[row],
         )
+        for e in range(recorder.chosen.shape[0]):
+            if recorder.chosen[e, 0] == ACTUATOR:
+                actuator_output(
+                    system, work, state, recorder.chosen[e, 1], e, recorder.element[row]
+                )
 
 
 @compiled(python=False)

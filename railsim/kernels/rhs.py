@@ -18,6 +18,7 @@ Dynamics, chapters 2 and 3; the choice of frames as in docs/theory.
 """
 
 from railsim.kernels import compiled
+from railsim.kernels.actuators import actuator_forces
 from railsim.kernels.driving import (
     add_axle_torques,
     add_traction,
@@ -48,7 +49,7 @@ from railsim.kernels.lanes import (
     store_rows,
 )
 from railsim.kernels.rotation import sine_cosine_lanes
-from railsim.kernels.status import END_OF_TRACK, RUNNING, STANDSTILL
+from railsim.kernels.status import END_OF_TRACK, LAW_NOT_FINITE, RUNNING, STANDSTILL
 from railsim.kernels.support import (
     AFTER_STEP,
     AS_GIVEN,
@@ -426,6 +427,10 @@ def mechanics(system, work, state, derivative, rails):
     if system.mounts.falling.shape[0] > 0:
         friction_at_speed(system, work)
     mount_forces(system, work, inner)
+    if system.actuators.body.shape[0] > 0:
+        where = actuator_forces(system, work, state)
+        if where >= 0:
+            return LAW_NOT_FINITE, where, 0
     hold_axleboxes(system, work, state)
     if system.loads.body.shape[0] > 0:
         load_forces(system, work, time, s)

@@ -11,6 +11,7 @@ END_OF_TRACK = 7
 STANDSTILL = 8
 STRIKES = 9  # no end: a wheel of one of several vehicles lifts or strikes; it goes on alone
 BESIDE_RAIL = 10
+LAW_NOT_FINITE = 11
 
 # code -> (root attribute `status`, sentence); {where} is the wheelset or body concerned
 STATUS = {
@@ -30,5 +31,6 @@ STATUS = {
         "the state of {where} is not finite: the step is too long or the model is unstable",
     ),
     END_OF_TRACK: ("stopped", "the vehicle reached the end of the track's table"),
+    LAW_NOT_FINITE: ("stopped", "{where} gave a value that is not finite"),
     STANDSTILL: ("stopped", "the vehicle came to a standstill: creepage is not defined there"),
 }

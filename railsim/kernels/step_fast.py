@@ -40,6 +40,7 @@ SMOOTHING = 0.3
 # the former: 98 Hz of the flexicoil coach's arms would be unstable at 1.67 ms without.  So does the
 # spin of a driven or braked wheelset: a brake that holds it would chatter.
 SMOOTHING_ELASTIC = 1.0
+LONGER = 100.0
 SPIN = 4  # component of a body about its y axis
 
 
@@ -213,7 +214,8 @@ def step_fast(system, work, state, derivative, decay, h):
             state[v + k] += h * rate[q + k] + (0.5 * weight * h + shift) * change
             before[q + k] += weight * change
     drives = first + 6 * n
-    ratio = h / last
+    # after a step that is shorter by far there is nothing to extrapolate from
+    ratio = h / last if h < LONGER * last else 0.0
     for i in range(m):
         k = 12 * n + i
         drive = work.drive[i, 0] + 0.5 * ratio * (work.drive[i, 0] - state[drives + i])

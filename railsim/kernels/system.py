@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from railsim.kernels.commands import Actuators, Controllers, Own, Signals
 from railsim.kernels.element_columns import FRICTION, LINK_COLUMNS, MOUNT_COLUMNS, ONE_SIDED
 from railsim.kernels.internal import Internal
 from railsim.kernels.patches import CreepLaw, CreepScratch
@@ -141,6 +142,8 @@ class Contact(NamedTuple):
     surface_row : float64[k, SURFACE_ROW];  surface : float64[..., 4];  flat_ahead : float64[...]
     check : float64[c, CHECK_ROW];  check_flangeway : float64[..., 2];
     check_wheel : float64[w, c, CHECK_WHEEL]   check rails, see `check_rails`
+    friction_law : int           address of a law of one's own for it, else 0
+    friction_block : float64[...]   its block, see `own_laws`
     """
 
     body: np.ndarray
@@ -166,6 +169,8 @@ class Contact(NamedTuple):
     check: np.ndarray
     check_flangeway: np.ndarray
     check_wheel: np.ndarray
+    friction_law: int
+    friction_block: np.ndarray
 
 
 @record
@@ -385,6 +390,10 @@ class System(NamedTuple):
     drives: Drives
     drive: Drive
     gravity: float
+    actuators: Actuators
+    signals: Signals
+    controllers: Controllers
+    own: Own
 
 
 @record
@@ -430,6 +439,8 @@ class Work(NamedTuple):
     unloaded : float64[w, 2]    time during which each wheel has carried nothing [s]
     bump : float64[p, BUMP_SIZE]  heights of the wheel at hand by patch, see `wheel_surface`
     decay_part : float64[m]     as `decay` for a part of a step
+    memory : float64[...]       of commands, signals and laws of one's own, see `Own`
+    element : float64[1, ELEMENT_COLUMNS]   of the element that a signal measures
     """
 
     frames: np.ndarray
@@ -470,3 +481,5 @@ class Work(NamedTuple):
     unloaded: np.ndarray
     bump: np.ndarray
     decay_part: np.ndarray
+    memory: np.ndarray
+    element: np.ndarray

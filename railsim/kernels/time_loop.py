@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from railsim.kernels import compiled
+from railsim.kernels.controllers import control
 from railsim.kernels.division import begin_division, end_division, prepare_steps, striking
 from railsim.kernels.extremes import note_extremes, note_unloaded
 from railsim.kernels.recording import record_row
@@ -33,6 +34,7 @@ class Chunk(NamedTuple):
     every : int     states are recorded where the count is a multiple of it, before the step
     fresh : int     1 where nothing was before the state: the scheme's memory begins here
     closing : int   1 to evaluate and record the state after the last step as well
+    rows : int      rows of the recorder that are taken already
     """
 
     first: int
@@ -40,6 +42,7 @@ class Chunk(NamedTuple):
     every: int
     fresh: int = 0
     closing: int = 0
+    rows: int = 0
 
 
 @compiled(python=False)
@@ -69,12 +72,13 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
     Returns
     -------
     status, where, steps, rows : int
-        Status code, the wheelset or state entry it concerns, steps taken, rows recorded.
+        Status code, the wheelset, state entry or law it concerns, steps taken, rows recorded now
+        and before.
     """
     work.parts[WHOLE] = np.int64(recorder.patch.shape[0] > 0)
     prepare_steps(system, work, h)
     filter_40_hz = high_pass(h)
-    rows = np.int64(0)
+    rows = np.int64(chunk.rows)
     step, end = chunk.first, chunk.first + chunk.steps
     left = np.int64(0)  # parts of the step that are still to be taken
     decay, length = work.decay, h
@@ -89,6 +93,10 @@ def time_loop(system, work, state, derivative, stages, recorder, scheme, h, chun
                 if step % chunk.every == 0:
                     record_row(recorder, rows, system, state, derivative, work, patches)
                     rows += 1
+                if system.signals.which.shape[0] + system.controllers.which.shape[0] > 0:
+                    status, where = control(system, work, state, derivative)
+                    if status != RUNNING:
+                        return status, where, step - chunk.first, rows
                 if step == end:
                     return RUNNING, 0, chunk.steps, rows
                 watch(work, filter_40_hz, h, state[ARC_LENGTH])

@@ -66,6 +66,7 @@ from railsim.kernels.creep import creep_forces, falling_friction
 from railsim.kernels.creepages import creepages
 from railsim.kernels.cube_root import cube_root
 from railsim.kernels.fastsim import kalker_lookup
+from railsim.kernels.own_laws import own_friction
 from railsim.kernels.patches import side_by_side
 from railsim.kernels.rails import locate_rails
 from railsim.kernels.status import RUNNING
@@ -168,7 +169,9 @@ def wheel_rail(system, work, speed, state):
     contact = system.contact
     patches = side_by_side(patch)
     kalker_lookup(n, patches, contact.kalker)
-    if contact.friction_rest < 1.0:
+    if contact.friction_law != 0:
+        own_friction(n, patches, patch[PATCH_SPEED], contact.friction_law, contact.friction_block)
+    elif contact.friction_rest < 1.0:
         falling_friction(
             n, patches, patch[PATCH_SPEED], contact.friction_rest, contact.friction_decay
         )

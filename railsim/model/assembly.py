@@ -18,6 +18,7 @@ from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
 from railsim.definitions.flatten import FlatBody, FlatVehicle, flatten
+from railsim.definitions.laws import Law
 from railsim.definitions.layout import is_straight_and_level
 from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Drive as DriveDefinition
@@ -45,9 +46,9 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails
-from railsim.model.element_arrays import ElementArrays
+from railsim.model.element_arrays import ElementArrays, LawBlocks
 from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
-from railsim.model.work import CONSTANT_SPEED
+from railsim.model.work import CONSTANT_SPEED, NO_CONTROLLERS, NO_SIGNALS
 from railsim.profiles import Profile, load_profile
 from railsim.profiles.profile import Kind
 from railsim.track.tables import track_tables
@@ -66,14 +67,19 @@ class Index:
         All bodies: rigid ones, wheelsets from the leading end, axleboxes.
     wheelsets : tuple of str
         Names of the wheelsets.
-    links, mounts : tuple of str
-        Names of the elements in `System.links` and `System.mounts`.
+    links, mounts, actuators : tuple of str
+        Names of the elements in `System.links`, `System.mounts` and `System.actuators`.
+    signals, controllers : tuple of str
+        Names of what is measured in a run, and of what follows from it.
     """
 
     bodies: tuple[str, ...]
     wheelsets: tuple[str, ...]
     links: tuple[str, ...]
     mounts: tuple[str, ...]
+    actuators: tuple[str, ...] = ()
+    signals: tuple[str, ...] = ()
+    controllers: tuple[str, ...] = ()
 
     @property
     def n_bodies(self) -> int:
@@ -130,6 +136,8 @@ def assemble(
     settings: Settings,
     profiles: Mapping[str, Profile] | None = None,
     shared: "SharedTables | None" = None,
+    *,
+    execute: bool = True,
 ) -> Model:
     """Build the arrays of one vehicle on one track.
 
@@ -142,6 +150,8 @@ def assemble(
         that it used).
     shared : SharedTables, optional
         Tables of other models with the same track, settings and profiles; takes those made now.
+    execute : bool
+        Compile laws of one's own, which needs permission; without, their elements are left out.
 
     Returns
     -------
@@ -164,7 +174,7 @@ def assemble(
     if shared.track is None:
         shared.track = track_tables(track)
     contact, tables = _contact(flat, track, settings, book, shared.contact)
-    system, index = _suspension(flat)
+    system, index = _suspension(flat, (vehicle.laws or {}) if execute else None)
     system = system._replace(
         track=shared.track,
         support=support_arrays(track.support),
@@ -174,7 +184,7 @@ def assemble(
     design = None
     if vehicle.load is not None:
         unloaded = vehicle.model_copy(update={"load": None})
-        design = assemble(unloaded, track, settings, profiles, shared)
+        design = assemble(unloaded, track, settings, profiles, shared, execute=execute)
     wheels = uneven_wheels(flat, track, book.used)
     check = check_rails(flat, track, book.used)
     return Model(system, index, flat, tables, book.used, design, wheels, check)
@@ -187,9 +197,9 @@ def without_rails(vehicle: Vehicle) -> Model:
     return Model(system, index, flat, (), {})
 
 
-def _suspension(flat: FlatVehicle) -> tuple[System, Index]:
+def _suspension(flat: FlatVehicle, laws: Mapping[str, Law] | None = None) -> tuple[System, Index]:
     """Bodies and elements as arrays, and their names; no track and no contacts."""
-    elements = ElementArrays({body.name: body for body in flat.bodies})
+    elements = ElementArrays({body.name: body for body in flat.bodies}, own=LawBlocks(laws))
     for element in flat.elements:
         elements.add(element)
     elements.sort()
@@ -209,12 +219,17 @@ def _suspension(flat: FlatVehicle) -> tuple[System, Index]:
         drives=elements.drives(),
         drive=CONSTANT_SPEED,
         gravity=GRAVITY,
+        actuators=elements.actuators(),
+        signals=NO_SIGNALS,
+        controllers=NO_CONTROLLERS,
+        own=elements.own.own(),
     )
     index = Index(
         bodies=tuple(_names(flat.bodies)),
         wheelsets=tuple(body.name for body in flat.of_kind("wheelset")),
         links=tuple(row["name"] for row in elements.link_rows),
         mounts=tuple(row["name"] for row in elements.mount_rows),
+        actuators=tuple(row["name"] for row in elements.act_rows),
     )
     return system, index
 
@@ -465,6 +480,8 @@ def _contact(
         friction_decay=falling.decay if falling else 0.0,
         **ROUND._asdict(),
         **NONE._asdict(),
+        friction_law=0,
+        friction_block=np.zeros(0),
     )
     return contact, tuple(tables)
 

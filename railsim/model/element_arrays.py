@@ -6,6 +6,7 @@ location of its point on body 2 in the nominal position, reached rigidly: the de
 there.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,6 +16,9 @@ from numpy.typing import NDArray
 
 from railsim.definitions.elements.base import two_sided
 from railsim.definitions.elements.rows import (
+    AXES,
+    NOTHING,
+    Act,
     Drive,
     FrictionLimit,
     Link,
@@ -25,7 +29,21 @@ from railsim.definitions.elements.rows import (
     Triple,
 )
 from railsim.definitions.flatten import FlatBody, FlatElement
+from railsim.definitions.laws import Law
+from railsim.errors import Fault, InputError, nearest
+from railsim.kernels.actuators import (
+    ALONG,
+    BY_DAMPER,
+    BY_FORCE,
+    BY_LAW,
+    BY_POSITION,
+    LAW_TAKES,
+    LINE,
+    ROW_SIZE,
+    WHICH_SIZE,
+)
 from railsim.kernels.aligned import aligned_zeros
+from railsim.kernels.commands import Actuators, Own
 from railsim.kernels.element_columns import (
     LINK_COLUMNS,
     LINK_SIZE,
@@ -33,7 +51,7 @@ from railsim.kernels.element_columns import (
     MOUNT_SIZE,
     ONE_SIDED,
 )
-from railsim.kernels.internal import AIR, MAXWELL, MAXWELL_CURVE, PAD, Internal
+from railsim.kernels.internal import AIR, LAG, MAXWELL, MAXWELL_CURVE, OWN, PAD, Internal
 from railsim.kernels.system import (
     Curves,
     Drives,
@@ -43,9 +61,14 @@ from railsim.kernels.system import (
     falling_friction,
     mount_laws,
 )
+from railsim.laws import FORCE_ELEMENT, Bound, bind
 
 Floats = NDArray[np.float64]
 LAWS = {"maxwell": MAXWELL, "maxwell_curve": MAXWELL_CURVE, "pad": PAD, "air": AIR}
+LAWS |= {"lag": LAG, "own": OWN}
+MODES = {"force": BY_FORCE, "damper": BY_DAMPER, "position": BY_POSITION, "law": BY_LAW}
+SLOT = 2.5e-4
+"""Commands on their way to an actuator may follow each other by so much [s]."""
 
 
 def rotation_potential(stiffness: Sequence[float]) -> Triple:
@@ -72,6 +95,56 @@ def rotation_potential(stiffness: Sequence[float]) -> Triple:
     return half - stiffness[0], half - stiffness[1], half - stiffness[2]
 
 
+class LawBlocks:
+    """Numbers of commands, signals and laws of one's own, as `Work.memory` begins with them.
+
+    Parameters
+    ----------
+    laws : mapping of str to Law, optional
+        Laws by name, compiled where an element has one; None leaves these elements out.
+    """
+
+    def __init__(self, laws: Mapping[str, Law] | None = None) -> None:
+        self.laws = laws
+        self.memory: list[float] = [0.0]  # the time of the begin
+        self.address: list[int] = []
+
+    def room(self, values: Sequence[float]) -> int:
+        """Where these numbers stand."""
+        self.memory.extend(values)
+        return len(self.memory) - len(values)
+
+    def command(self, delay: float) -> tuple[int, int, int]:
+        """Place of a command, of those on their way and how many of them there may be."""
+        place, slots = self.room([0.0]), 0
+        if delay > 0.0:
+            slots = math.ceil(delay / SLOT) + 4
+        return place, self.room([0.0] * (1 + 2 * slots)) if slots else -1, slots
+
+    def element_law(self, name: str, act: Act) -> tuple[int, int, int]:
+        """Number of a law, place of its block and number of its states."""
+        laws = self.laws or {}
+        if act.law not in laws:
+            found, allowed = f"no law '{act.law}'", nearest(act.law, laws) if laws else "none"
+            raise InputError([Fault("vehicle", f"elements.{name}.law", found, allowed)])
+        bound = bind(act.law, laws[act.law], FORCE_ELEMENT)
+        values = bound.parameters(f"elements.{name}.parameters", act.parameters)
+        block = [0.0] * (1 + bound.states + LAW_TAKES + bound.states)
+        return self.law(bound), self.room([*block, *values]), bound.states
+
+    def law(self, bound: Bound) -> int:
+        """Return the number of a law."""
+        if bound.address not in self.address:
+            self.address.append(bound.address)
+        return self.address.index(bound.address)
+
+    def own(self) -> Own:
+        """As arrays."""
+        return Own(
+            places=np.array(self.address, dtype=np.int64), memory=np.array(self.memory, dtype=float)
+        )
+
+
 @dataclass
 class ElementArrays:
     """Collects elements row by row until the arrays are made.
@@ -87,6 +160,8 @@ class ElementArrays:
     mount_rows: list[dict[str, Any]] = field(default_factory=list)
     load_rows: list[dict[str, Any]] = field(default_factory=list)
     drive_rows: list[dict[str, Any]] = field(default_factory=list)
+    act_rows: list[dict[str, Any]] = field(default_factory=list)
+    own: LawBlocks = field(default_factory=LawBlocks)
     internal_rows: list[tuple[int, Triple, int]] = field(default_factory=list)
     curve_rows: list[Floats] = field(default_factory=list)
 
@@ -102,6 +177,8 @@ class ElementArrays:
                     self._add_load(element, row)
                 case Drive():
                     self._add_drive(element, row)
+                case Act() if row.mode != "law" or self.own.laws is not None:
+                    self._add_act(element, row)
 
     def _add_link(self, element: FlatElement, link: Link) -> None:
         point1, point2 = np.array(element.point1), np.array(element.point2)
@@ -153,6 +230,42 @@ class ElementArrays:
                 "tables": (
                     np.array(drive.torque_table, dtype=float),
                     np.array(drive.demand_table or (), dtype=float).reshape(-1, 2),
+                ),
+            }
+        )
+
+    def _add_act(self, element: FlatElement, act: Act) -> None:
+        point1, point2 = np.array(element.point1), np.array(element.point2)
+        line = act.action == "line"
+        levers = self._levers(element, point1 if line else point2, point2)
+        command, queue, slots = self.own.command(act.delay)
+        lag = State("lag", (act.lag, act.rate_limit or np.inf, 0.0)) if act.lag > 0.0 else None
+        lagging = self._state(lag)
+        law, block, states = -1, -1, 0
+        if act.mode == "law":
+            law, block, states = self.own.element_law(element.name, act)
+        first = len(self.internal_rows)
+        for _ in range(states):
+            self._state(State("own", NOTHING))
+        action = LINE if line else ALONG + AXES.index(act.action)
+        limits = (act.force_limit, act.power_limit, act.stroke)
+        self.act_rows.append(
+            {
+                "name": element.name,
+                "body": self._pair(element),
+                "which": (
+                    *(action, MODES[act.mode], lagging, command, queue, slots),
+                    *(law, block, first, states),
+                ),
+                "row": (
+                    *levers["point_1"],
+                    *levers["point_2"],
+                    float(np.linalg.norm(point2 - point1)),
+                    act.sense,
+                    *(np.inf if limit is None else limit for limit in limits),
+                    act.stiffness,
+                    act.damping,
+                    act.delay,
                 ),
             }
         )
@@ -249,6 +362,14 @@ class ElementArrays:
             row=_column(rows, "row", (4,)),
             start=_starts(tables),
             table=np.concatenate(tables) if tables else np.zeros((0, 2)),
+        )
+
+    def actuators(self) -> Actuators:
+        """Arrays of all forces that follow commands or laws of one's own."""
+        return Actuators(
+            body=_column(self.act_rows, "body", (2,), np.int64),
+            which=_column(self.act_rows, "which", (WHICH_SIZE,), np.int64),
+            row=_column(self.act_rows, "row", (ROW_SIZE,)),
         )
 
     def curves(self) -> Curves:

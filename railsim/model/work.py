@@ -5,8 +5,11 @@ from numpy.typing import NDArray
 
 from railsim.contact.creep import creep_scratch
 from railsim.kernels.aligned import aligned_zeros
+from railsim.kernels.commands import Controllers, Signals
 from railsim.kernels.contact_columns import CONTACT_JACOBIAN, PATCH_ROWS, WHEEL_COLUMNS
 from railsim.kernels.contact_table import LOOK_UP_SIZE, N_PATCH, N_WEIGHT
+from railsim.kernels.controllers import CONTROLLER_WHICH, SIGNAL_ROW, SIGNAL_WHICH
+from railsim.kernels.element_outputs import ELEMENT_COLUMNS
 from railsim.kernels.elements import LAWS_SIZE
 from railsim.kernels.extremes import EXTREMES, MAX, MIN
 from railsim.kernels.rails import CHANGES, COSINE, MOTION_SIZE, PLANE_SIZE, RAIL_SIZE
@@ -34,6 +37,10 @@ Floats = NDArray[np.float64]
 # shortest step that has the full tolerance of forces on elastic rails (s), see `Work.watch`
 FULL_TOLERANCE = 1.25e-3
 
+NO_SIGNALS = Signals(np.zeros((0, SIGNAL_WHICH), dtype=np.int64), np.zeros((0, SIGNAL_ROW)))
+NO_CONTROLLERS = Controllers(
+    np.zeros((0, CONTROLLER_WHICH), dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64)
+)
 CONSTANT_SPEED = Drive(CONSTANT, np.zeros((1, 2)), np.zeros(3))
 
 
@@ -88,6 +95,8 @@ def work_arrays(system: System) -> Work:
         unloaded=aligned_zeros((n_wheelsets, 2)),
         bump=aligned_zeros((N_PATCH, BUMP_SIZE)),
         decay_part=aligned_zeros(len(system.internal.kind)),
+        memory=system.own.memory.copy(),
+        element=np.zeros((1, ELEMENT_COLUMNS)),
     )
 
 

@@ -1,6 +1,7 @@
 """Runs in the time domain; begin reading in `run`.
 
 - `run`: `simulate`, the course of a run on one page
+- `stepping`: `Simulation`, a run that is taken step by step
 - `conditions`, `preparation`, `ending`: its inputs checked, its model and state, its result
 - `together`: `simulate_together`, several runs in one call of the time loop
 - `run_progress`: the finished fraction, as it is reported during the run
@@ -18,6 +19,7 @@
 
 from railsim.simulation.preparation import prepare
 from railsim.simulation.run import simulate
+from railsim.simulation.stepping import Simulation
 from railsim.simulation.together import outcomes, simulate_together
 
-__all__ = ["outcomes", "prepare", "simulate", "simulate_together"]
+__all__ = ["Simulation", "outcomes", "prepare", "simulate", "simulate_together"]

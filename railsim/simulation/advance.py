@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from railsim.definitions.settings import Settings
 from railsim.errors import RailsimError
+from railsim.kernels.controllers import START
 from railsim.kernels.extremes import MAX, MIN
 from railsim.kernels.rhs import right_hand_sides
 from railsim.kernels.status import RUNNING
@@ -46,8 +47,27 @@ ROWS, STEPS = 1000, 64_000
 ROUND_OFF = 1e-9  # s
 
 # what a chunk changes in the work arrays: counts of patches and of steps, extremes, times without
-# load, vibrations
-COUNTED = ("events", "extremes", "unloaded", "vibration", "parts")
+# load, vibrations, commands and samples
+COUNTED = ("events", "extremes", "unloaded", "vibration", "parts", "memory")
+
+
+@dataclass(frozen=True, eq=False)
+class SavedState:
+    """All that a run goes on from, as `Simulation.state` gives it; it can be pickled.
+
+    Attributes
+    ----------
+    motion : float64[n_state]
+        See `railsim.kernels.system`.
+    counted : tuple of ndarray
+        What steps count and remember beside it: commands, samples, memory of laws, extremes.
+    grid : tuple
+        Where it is on the grid of steps.
+    """
+
+    motion: Floats
+    counted: tuple[NDArray[Any], ...]
+    grid: tuple[Any, ...]
 
 
 class _Before(NamedTuple):
@@ -127,6 +147,8 @@ class Run:
         How often the contact of one wheelset alone was evaluated again.
     vibration : float64[w, 2, VIBRATION]
         Vibrations of the wheel loads, see `railsim.kernels.vibration`; empty at its begin.
+    memory : float64[...]
+        Commands, samples and memory of laws, see `railsim.kernels.system.Own`.
     cpu_time, wall_time : float
         Its share of what the time loop, and all of the run, took [s].
     together : int
@@ -171,6 +193,8 @@ class Run:
         self.extremes: Floats = no_extremes(wheelsets)
         self.evaluated: Floats = no_extremes(wheelsets)
         self.unloaded: Floats = np.zeros((wheelsets, 2))
+        self.memory: Floats = self.prepared.model.system.own.memory.copy()
+        self.memory[START] = self.state[TIME]
         self.swings.begin(self.plan.coordinates)
 
 
@@ -201,7 +225,7 @@ def advance(
     waiting = _matching(runs, settings)
     while waiting:
         together = waiting.pop(0)
-        apart = _Convoy(together, settings).to_the_end(moved)
+        apart = Convoy(together, settings).to_the_end(moved)
         on_their_way = [run for group in apart for run in group]
         ended = [run for run in together if run not in on_their_way]
         done |= dict.fromkeys(ended, 1.0)
@@ -215,84 +239,95 @@ def _matching(runs: Sequence[Run], settings: Settings) -> list[list[Run]]:
     if settings.drive.mode == "free":
         return [[run] for run in runs]
     groups: dict[tuple[float | int, ...], list[Run]] = {}
-    for run in runs:
-        groups.setdefault(contact_grid(run.prepared.model), []).append(run)
+    for number, run in enumerate(runs):
+        model = run.prepared.model
+        # what follows commands or laws of one's own runs alone
+        alone = number if len(model.system.own.memory) > 1 else -1
+        groups.setdefault((alone, *contact_grid(model)), []).append(run)
     return list(groups.values())
 
 
-class _Convoy:
+class Convoy:
     """Runs that advance together, one or several."""
 
     def __init__(self, runs: Sequence[Run], settings: Settings) -> None:
         self._runs = runs
-        self._scheme = SCHEMES[settings.scheme]
+        self.scheme = SCHEMES[settings.scheme]
         models = [run.prepared.model for run in runs]
-        self._ensemble = Ensemble(models, [run.plan.recorder(ROWS) for run in runs])
-        self._system = self._ensemble.system
-        self._work = work_arrays(self._system)
-        self._state = self._ensemble.state([run.state for run in runs])
-        for run, part in zip(runs, self._ensemble.parts, strict=True):
+        self.ensemble = Ensemble(models, [run.plan.recorder(ROWS) for run in runs])
+        self.system = self.ensemble.system
+        self.work = work_arrays(self.system)
+        self.state = self.ensemble.state([run.state for run in runs])
+        for run, part in zip(runs, self.ensemble.parts, strict=True):
             if len(run.vibration):
-                self._work.vibration[part.wheelsets] = run.vibration
-        self._derivative = np.zeros_like(self._state)
-        self._stages = np.zeros((3, len(self._state)))
-        self._fresh, self._due = runs[0].fresh, runs[0].due
-        self._evaluates = self._state[TIME] >= runs[0].prepared.evaluation - ROUND_OFF
-        self._varies = runs[0].prepared.steps.varies
+                self.work.vibration[part.wheelsets] = run.vibration
+        self.work.memory[:] = runs[0].memory
+        self.derivative = np.zeros_like(self.state)
+        self.stages = np.zeros((3, len(self.state)))
+        self.fresh, self.due = runs[0].fresh, runs[0].due
+        self.evaluates = self.state[TIME] >= runs[0].prepared.evaluation - ROUND_OFF
+        self.varies = runs[0].prepared.steps.varies
         # equal steps of distance while the speed changes: every interval is a chunk of its own
-        self._spacing = settings.output_spacing if self._varies else None
+        self.spacing = settings.output_spacing if self.varies else None
         wheelsets = [len(model.system.contact.body) for model in models]
         self._shares = [number / sum(wheelsets) for number in wheelsets]
 
     def to_the_end(self, moved: Callable[[Sequence[Run], Floats], None]) -> list[list[Run]]:
         """Advance to the end, or to where runs part; return in which groups they go on."""
-        while self._left() > 1e-9 or self._due:
+        apart = self.chunks(moved)
+        if apart is None:
+            self.give_back()
+        return apart or []
+
+    def chunks(self, moved: Callable[[Sequence[Run], Floats], None]) -> list[list[Run]] | None:
+        """As `to_the_end`; None at the end, where the runs have neither states nor counts yet."""
+        while self.left() > 1e-9 or self.due:
             begin = time.perf_counter()
             before = _Before(
-                self._state.copy(),
-                self._fresh,
-                self._due,
-                [getattr(self._work, name).copy() for name in COUNTED],
+                self.state.copy(),
+                self.fresh,
+                self.due,
+                [getattr(self.work, name).copy() for name in COUNTED],
             )
-            choices = self._choices()
+            choices = self.choices()
             if len(set(choices)) > 1 or self._errors():
                 return self._parted(choices, before)
-            status, where, rows = self._chunk(*choices[0]) if choices else self._last_record()
+            status, where, rows = self._chunk(*choices[0]) if choices else self.last_record()
             if status != RUNNING and len(self._runs) > 1:
-                return self._parted(self._ensemble.concerned(status, where), before)
-            self._write(rows)
+                return self._parted(self.ensemble.concerned(status, where), before)
+            self.write(rows)
             spent = time.perf_counter() - begin
             for run, share in zip(self._runs, self._shares, strict=True):
                 run.status, run.where = status, where
                 run.wall_time += share * spent
-            moved(self._runs, self._state)
-            self._begin_evaluation()
+            moved(self._runs, self.state)
+            self.begin_evaluation()
             if status != RUNNING:
                 break
             if self._errors():
                 return self._parted([0] * len(self._runs))
-        self._give_back()
-        return []
+        return None
 
-    def _left(self) -> float:
-        return self._runs[0].prepared.left(self._state)
+    def left(self) -> float:
+        """Time to the end at the present speed [s]."""
+        return self._runs[0].prepared.left(self.state)
 
     def _errors(self) -> bool:
         return any(run.ended for run in self._runs)
 
-    def _choices(self) -> list[tuple[float, int]]:
+    def choices(self) -> list[tuple[float, int]]:
         """Step and number of steps to the next output of every run; none at the end."""
-        if self._left() <= 1e-9:
+        if self.left() <= 1e-9:
             return []
-        if self._spacing is not None:
-            right_hand_sides(self._system, self._work, self._state[None], self._derivative[None])
-        speed, rate = self._state[SPEED], self._derivative[SPEED]
+        if self.spacing is not None:
+            right_hand_sides(self.system, self.work, self.state[None], self.derivative[None])
+        speed, rate = self.state[SPEED], self.derivative[SPEED]
         choices = []
         for run in self._runs:
             try:
                 choices.append(run.prepared.steps.at(speed, rate))
             except RailsimError as error:  # no equilibrium at this speed, or no stable step
-                if self._state[TIME] > run.prepared.state[TIME]:
+                if self.state[TIME] > run.prepared.state[TIME]:
                     run.stopped = f"the run cannot go on at {speed:.3g} m/s: {error}"
                 else:
                     run.error = error
@@ -305,63 +340,64 @@ class _Convoy:
     def _chunk(self, step: float, every: int) -> tuple[int, int, int]:
         """Advance by one chunk: status, where, number of records."""
         at_most = max(1, STEPS // (every * len(self._runs)))
-        intervals = 1 if self._varies else min(ROWS, at_most)
-        if not self._evaluates:  # whose begin is the end of a chunk
-            before = self._runs[0].prepared.evaluation - self._state[TIME]
+        intervals = 1 if self.varies else min(ROWS, at_most)
+        if not self.evaluates:  # whose begin is the end of a chunk
+            before = self._runs[0].prepared.evaluation - self.state[TIME]
             intervals = min(intervals, max(1, math.ceil(before / (step * every) - ROUND_OFF)))
-        n_steps = min(intervals * every, math.ceil(self._left() / step * (1.0 - 1e-9)))
-        last = int(self._spacing is not None and n_steps == every)
-        goal = self._state[ARC_LENGTH] + (self._spacing or 0.0)
-        status, where, steps, rows = self._call(step, 0, n_steps - last, every)
+        n_steps = min(intervals * every, math.ceil(self.left() / step * (1.0 - 1e-9)))
+        last = int(self.spacing is not None and n_steps == every)
+        goal = self.state[ARC_LENGTH] + (self.spacing or 0.0)
+        status, where, steps, rows = self.call(step, 0, n_steps - last, every)
         if last and status == RUNNING:
             # the last step of an interval of distance ends where the interval ends
             rest = duration(
-                goal - self._state[ARC_LENGTH], self._state[SPEED], self._derivative[SPEED]
+                goal - self.state[ARC_LENGTH], self.state[SPEED], self.derivative[SPEED]
             )
-            status, where, more, first = self._call(rest, steps, 1, every)
+            status, where, more, first = self.call(rest, steps, 1, every)
             steps, rows = steps + more, rows + first
-        self._due = status == RUNNING and steps % every == 0
+        self.due = status == RUNNING and steps % every == 0
         return status, where, rows
 
-    def _begin_evaluation(self) -> None:
+    def begin_evaluation(self) -> None:
         """Begin with new extremes where the part of the run begins that is evaluated."""
-        if self._evaluates or self._state[TIME] < self._runs[0].prepared.evaluation - ROUND_OFF:
+        if self.evaluates or self.state[TIME] < self._runs[0].prepared.evaluation - ROUND_OFF:
             return
-        for run, part in zip(self._runs, self._ensemble.parts, strict=True):
-            _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
-        self._work.extremes[:] = no_extremes(self._work.extremes.shape[1])
-        self._evaluates = True
+        for run, part in zip(self._runs, self.ensemble.parts, strict=True):
+            _take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
+        self.work.extremes[:] = no_extremes(self.work.extremes.shape[1])
+        self.evaluates = True
 
-    def _last_record(self) -> tuple[int, int, int]:
+    def last_record(self) -> tuple[int, int, int]:
         """Record the state at the end: status, where, number of records."""
-        self._due = False
-        status, where, _, rows = self._call(1.0, 0, 0, 1, closing=1)
+        self.due = False
+        status, where, _, rows = self.call(1.0, 0, 0, 1, closing=1)
         return status, where, rows
 
-    def _call(
+    def call(
         self, step: float, first: int, n_steps: int, every: int, closing: int = 0
     ) -> tuple[int, int, int, int]:
+        """Call the time loop; its status, where, number of steps and of records."""
         begin = time.thread_time()  # a library's idle threads may still be spinning
         most = max(1, STEPS // len(self._runs))
-        longest = longest_part(self._system, self._state[SPEED])
-        divide_strikes(self._work, self._scheme, step, longest)
+        longest = longest_part(self.system, self.state[SPEED])
+        divide_strikes(self.work, self.scheme, step, longest)
         at, end, rows = first, first + n_steps, 0
         while True:
             # more than one call only within one output interval, which records at its begin:
             # Ctrl-C is heard between calls
             status, where, steps, new = time_loop(
-                self._system,
-                self._work,
-                self._state,
-                self._derivative,
-                self._stages,
-                self._ensemble.recorder,
-                self._scheme,
+                self.system,
+                self.work,
+                self.state,
+                self.derivative,
+                self.stages,
+                self.ensemble.recorder,
+                self.scheme,
                 step,
-                Chunk(at, min(most, end - at), every, fresh=int(self._fresh), closing=closing),
+                Chunk(at, min(most, end - at), every, fresh=int(self.fresh), closing=closing),
             )
             at, rows = at + steps, rows + new
-            self._fresh = self._fresh and steps == 0
+            self.fresh = self.fresh and steps == 0
             if status != RUNNING or at >= end:
                 break
         spent = time.thread_time() - begin
@@ -370,12 +406,12 @@ class _Convoy:
             run.together = max(run.together, len(self._runs))
         return status, where, at - first, rows
 
-    def _write(self, rows: int) -> None:
+    def write(self, rows: int) -> None:
         """Hand the records of a chunk to the runs' sinks."""
         if rows == 0:
             return
         for number, run in enumerate(self._runs):
-            records = self._ensemble.records(number, rows)
+            records = self.ensemble.records(number, rows)
             try:
                 chunk = run.plan.chunk(records, rows, run.prepared.balance.Q0)
                 run.swings.append(thinned(chunk))
@@ -386,10 +422,10 @@ class _Convoy:
     def _parted(self, keys: Sequence[object], before: _Before | None = None) -> list[list[Run]]:
         """Runs grouped by equal keys, as they were before; those with an error are at their end."""
         if before is not None:
-            self._state, self._fresh, self._due, counted = before
+            self.state, self.fresh, self.due, counted = before
             for name, values in zip(COUNTED, counted, strict=True):
-                getattr(self._work, name)[:] = values
-        self._give_back()
+                getattr(self.work, name)[:] = values
+        self.give_back()
         pairs = list(zip(self._runs, keys, strict=True))
         groups = [
             [run for run, other in pairs if other == key and not run.ended]
@@ -397,19 +433,20 @@ class _Convoy:
         ]
         return [group for group in groups if group]
 
-    def _give_back(self) -> None:
+    def give_back(self) -> None:
         """Let the runs have their states and counts."""
-        for run, part in zip(self._runs, self._ensemble.parts, strict=True):
-            run.state = self._state[part.state]
-            run.fresh, run.due = self._fresh, self._due
-            run.events += self._work.events[part.wheelsets][:, [0, 1, 4]].sum(axis=0)
-            _take_extremes(run.extremes, self._work.extremes[:, part.wheelsets])
-            if self._evaluates:
-                _take_extremes(run.evaluated, self._work.extremes[:, part.wheelsets])
-            run.unloaded += self._work.unloaded[part.wheelsets]
-            run.parts += self._work.parts
-            run.again += int(self._work.events[part.wheelsets, AGAIN].sum())
-            run.vibration = self._work.vibration[part.wheelsets].copy()
+        for run, part in zip(self._runs, self.ensemble.parts, strict=True):
+            run.state = self.state[part.state]
+            run.fresh, run.due = self.fresh, self.due
+            run.events += self.work.events[part.wheelsets][:, [0, 1, 4]].sum(axis=0)
+            _take_extremes(run.extremes, self.work.extremes[:, part.wheelsets])
+            if self.evaluates:
+                _take_extremes(run.evaluated, self.work.extremes[:, part.wheelsets])
+            run.unloaded += self.work.unloaded[part.wheelsets]
+            run.parts += self.work.parts
+            run.again += int(self.work.events[part.wheelsets, AGAIN].sum())
+            run.vibration = self.work.vibration[part.wheelsets].copy()
+            run.memory = self.work.memory.copy()
 
 
 def _take_extremes(before: Floats, later: Floats) -> None:

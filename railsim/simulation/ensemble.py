@@ -190,6 +190,10 @@ def joined_system(models: Sequence[Model]) -> System:
         ),
         drive=first.drive,
         gravity=first.gravity,
+        actuators=first.actuators,  # vehicles with any run alone
+        signals=first.signals,
+        controllers=first.controllers,
+        own=first.own,
     )
 
 

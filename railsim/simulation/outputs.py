@@ -27,6 +27,7 @@ from railsim.kernels.contact_columns import (
     W_XI_Y,
     W_Y,
 )
+from railsim.kernels.controllers import ACTUATOR
 from railsim.kernels.driving import recorded_axle_torques
 from railsim.kernels.rails import RAIL_SIZE, recorded_against_rails
 from railsim.kernels.recording import Recorder
@@ -270,6 +271,7 @@ class OutputPlan:
             for group, names in (
                 (element.LINK, model.index.links),
                 (element.MOUNT, model.index.mounts),
+                (ACTUATOR, model.index.actuators),
             )
             for index, name in enumerate(names)
         }

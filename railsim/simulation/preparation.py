@@ -15,6 +15,7 @@ from railsim.definitions.vehicle import Vehicle
 from railsim.errors import InputError, argument_fault
 from railsim.kernels.system import TIME
 from railsim.model.assembly import Model, SharedTables, assemble
+from railsim.model.control import periods, with_control
 from railsim.model.equilibrium import stored_equilibrium
 from railsim.model.plausibility import vehicle_remarks
 from railsim.model.time_step import SCHEMES
@@ -59,7 +60,13 @@ def prepare(
     balance = stored_equilibrium(model, speed, inputs)
     model = balance.model
     steps = StepChoice(
-        model, sampled(settings), track, {speed: balance.state}, inputs, on_judgement
+        model,
+        sampled(settings),
+        track,
+        {speed: balance.state},
+        inputs,
+        on_judgement,
+        periods(vehicle),
     )
     step, _ = steps.at(speed)
     unusual = [str(remark) for remark in vehicle_remarks(vehicle, model)]
@@ -79,7 +86,7 @@ def prepare(
     else:
         state = _taken_up(model, before)
     prepared = Preparation(
-        model,
+        with_control(model, vehicle, settings),
         balance,
         state,
         end_time=math.inf if duration is None else float(state[TIME]) + duration,

@@ -1,9 +1,10 @@
 """`simulate`: the course of a run on one page.
 
-Definitions are assembled to arrays, the vehicle finds its equilibrium on straight level track, the
-step is chosen (`railsim.simulation.preparation`), and the time loop runs in chunks
-(`railsim.simulation.advance`).  The outcome goes chunk by chunk to a sink; the facts about the run
-follow (`railsim.simulation.ending`).
+It is a `railsim.simulation.stepping.Simulation` that is taken to its end at once: definitions are
+assembled to arrays, the vehicle finds its equilibrium on straight level track, the step is chosen
+(`railsim.simulation.preparation`), and the time loop runs in chunks (`railsim.simulation.advance`).
+The outcome goes chunk by chunk to a sink; the facts about the run follow
+(`railsim.simulation.ending`).
 """
 
 from collections.abc import Mapping
@@ -11,21 +12,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from railsim.definitions.loading import check_types
 from railsim.definitions.settings import Settings
 from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
-from railsim.errors import InputError, argument_fault
-from railsim.model.assembly import SharedTables
 from railsim.profiles import Profile
-from railsim.result import MemorySink, Result, Sink
-from railsim.simulation.advance import advance
-from railsim.simulation.auxiliary_track import DOING
-from railsim.simulation.conditions import Inputs, state_before
-from railsim.simulation.ending import end
-from railsim.simulation.preparation import begin
-from railsim.simulation.run_progress import Progress, RunProgress
-from railsim.units import speed_in_si
+from railsim.result import Result, Sink
+from railsim.simulation.run_progress import Progress
+from railsim.simulation.stepping import Simulation
 
 Floats = NDArray[np.float64]
 
@@ -92,24 +85,18 @@ def simulate(
     >>> result.status
     'complete'
     """
-    check_types([vehicle], track)
-    settings = settings or Settings()
-    before = None if resume is None else state_before(vehicle, track, settings, resume)
-    if before is not None:
-        own = {"speed": float(before[-1]), "start": float(before[-2])}
-        for name, value in (("speed", speed_in_si(speed)), ("start", start or None)):
-            if value is not None and value != own[name]:
-                found, allowed = "given together with `resume`", "the state's own is used"
-                raise InputError([argument_fault(name, "", found, allowed)])
-        speed, start = own["speed"], own["start"]
-    inputs = Inputs.checked(track, settings, speed, start, duration, until)
-    fraction = RunProgress(progress, 1, inputs)
-    fraction.next_run()
-    sink = MemorySink() if sink is None else sink
-    run = begin(vehicle, inputs, sink, profiles, before, SharedTables(), fraction)
-    DOING.info("")
-    for _ in advance([run], settings, fraction.of_runs):
-        pass
-    if run.error is not None:
-        raise run.error
-    return end(run, vehicle, inputs, before)
+    run = Simulation(
+        vehicle,
+        track,
+        speed=speed,
+        start=start,
+        duration=duration,
+        until=until,
+        settings=settings,
+        sink=sink,
+        progress=progress,
+        profiles=profiles,
+        resume=resume,
+    )
+    run.run()
+    return run.result()

@@ -8,6 +8,7 @@ are judged.  Either way the step depends on the inputs of the run alone, not on 
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +53,8 @@ class StepChoice:
         Hash of all that the model was made of, friction apart, see `inputs_hash`.
     progress : callable, optional
         Called while a step is judged, as in `railsim.simulation.flange.in_flange_contact`.
+    periods : sequence of float
+        Of controllers and samples: no step is longer, and one that divides them is preferred [s].
     """
 
     def __init__(
@@ -62,12 +65,14 @@ class StepChoice:
         states: dict[float, Floats],
         inputs: str,
         progress: Progress | None = None,
+        periods: Sequence[float] = (),
     ) -> None:
         self._model = model
         self._track = track
         self._settings = settings
         self._progress = progress
         self._inputs = inputs
+        self._periods = periods
         self._known: dict[float, float] = {}
         self._states = states
         self.varies = settings.drive.mode != "constant"
@@ -83,7 +88,13 @@ class StepChoice:
         self._known[key] = longest
         if self._settings.step is None:
             longest = min(longest, self._model.wheels.longest_step(speed))
+        longest = min(longest, *self._periods, longest)
         every = max(1, math.ceil(interval / longest * (1.0 - 1e-9)))
+        for finer in range(every, 2 * every + 1) if self._periods else ():
+            shares = [every_period / interval * finer for every_period in self._periods]
+            if all(abs(share - round(share)) < WRITTEN for share in shares):
+                every = finer
+                break
         self.smallest = min(self.smallest, interval / every)
         return interval / every, every
 

@@ -1,12 +1,14 @@
 """What force elements become in the arrays of the model: columns by name, laws by name.
 
 A `Link` acts along the line between two points, a `Mount` along the axes of body 1 at one point and
-about them, a `Load` is a given force or torque on one body, a `Drive` a torque on a wheelset.  The
-names of columns are those of `railsim.kernels.element_columns`, those of the laws of internal
-states those of `railsim.kernels.internal`; the forces are in `railsim.kernels.elements`.
+about them, a `Load` is a given force or torque on one body, a `Drive` a torque on a wheelset, an
+`Act` a force that follows a command or a law of one's own.  The names of columns are those of
+`railsim.kernels.element_columns`, those of the laws of internal states those of
+`railsim.kernels.internal`; the forces are in `railsim.kernels.elements` and `.actuators`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 Rows = tuple[tuple[float, float], ...]
@@ -22,14 +24,15 @@ class State:
     ----------
     law : str
         ``maxwell`` damper with a spring in series; ``maxwell_curve`` the same with a table;
-        ``pad`` that sticks and slides; ``air`` of a reservoir.
+        ``pad`` that sticks and slides; ``air`` of a reservoir; ``lag`` of a command; ``own`` of a
+        law of one's own.
     parameter : tuple of 3 floats
         As in `railsim.kernels.internal.Internal`.
     table : rows, optional
         Force over velocity of ``maxwell_curve``.
     """
 
-    law: Literal["maxwell", "maxwell_curve", "pad", "air"]
+    law: Literal["maxwell", "maxwell_curve", "pad", "air", "lag", "own"]
     parameter: Triple
     table: Rows | None = None
 
@@ -125,7 +128,45 @@ class Drive:
     over_distance: bool = False
 
 
-Row = Link | Mount | Load | Drive
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Act:
+    """A force that follows a command or a law of one's own.
+
+    Attributes
+    ----------
+    action : str
+        ``line``, or one of `AXES` of body 1.
+    mode : str
+        What the command is: ``force``, ``damper``, ``position``; ``law``: an argument of the law.
+    sense : float
+        -1 where the axis is reversed.
+    lag, delay, stiffness, damping : float
+        [s], [s], [N/m or N m/rad], [N s/m or N m s].
+    rate_limit, force_limit, power_limit, stroke : float, optional
+        Of the command per second, [N or N m], [W], [m or rad].
+    law, parameters : str, mapping
+        Name of the law and values of its further arguments.
+    """
+
+    action: str
+    mode: Literal["force", "damper", "position", "law"]
+    sense: float = 1.0
+    lag: float = 0.0
+    delay: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rate_limit: float | None = None
+    force_limit: float | None = None
+    power_limit: float | None = None
+    stroke: float | None = None
+    law: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+Row = Link | Mount | Load | Drive | Act
 
 
 def pads(

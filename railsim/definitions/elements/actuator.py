@@ -1,0 +1,89 @@
+"""Forces that follow a command, and what they share with forces by laws of one's own."""
+
+from typing import Literal, Self
+
+from pydantic import PrivateAttr, model_validator
+
+from railsim.definitions.base import NonNegative, Positive
+from railsim.definitions.elements.base import PointElement, Signs
+from railsim.definitions.elements.rows import AXES, Act
+
+Action = Literal["line", "x", "y", "z", "roll", "pitch", "yaw"]
+
+
+class CommandedElement(PointElement):
+    """An element that acts along a line, along an axis of body 1 or about one."""
+
+    acts: Action = "line"
+    """Along the `line` between the points, along `x`, `y`, `z` of body 1, or as a moment about them
+    (`roll`, `pitch`, `yaw`); positive: tension, body 1 pushed along the axis, body 2 against it"""
+    lag: NonNegative = 0.0
+    """Time constant of the first-order lag between command and effect [s]"""
+    delay: NonNegative = 0.0
+    """Time after which a command arrives [s]"""
+    rate_limit: Positive | None = None
+    """Largest rate of the command behind the lag [unit of the command per s]; needs `lag`"""
+    force_limit: Positive | None = None
+    """Largest force or moment [N or N m]"""
+    power_limit: Positive | None = None
+    """Largest power |force x rate| [W]"""
+    stroke: Positive | None = None
+    """Deflection to either side at which the force that pushes on outwards is gone [m or rad]"""
+    _sense: float = PrivateAttr(1.0)
+
+    @model_validator(mode="after")
+    def _what_belongs_together(self) -> Self:
+        if self.rate_limit is not None and self.lag == 0.0:
+            raise ValueError("'rate_limit' needs 'lag'")
+        if self.acts == "line" and (self.points is None or self.points[0] == self.points[1]):
+            raise ValueError("acts = \"line\" needs two different 'points'")
+        return self
+
+    def mirrored(self, signs: Signs) -> Self:
+        """Return the element in a mirrored placement, where one command has the mirrored effect."""
+        if self.acts == "line":
+            return self
+        k = AXES.index(self.acts)
+        handed = signs[0] * signs[1] * signs[2] if k >= 3 else 1.0
+        mirrored = self.model_copy()
+        mirrored._sense = handed * signs[k % 3]
+        return mirrored
+
+    def act(self, **values: object) -> Act:
+        """Return what it becomes, with the values of its kind."""
+        return Act(
+            action=self.acts,
+            sense=self._sense,
+            lag=self.lag,
+            delay=self.delay,
+            rate_limit=self.rate_limit,
+            force_limit=self.force_limit,
+            power_limit=self.power_limit,
+            stroke=self.stroke,
+            **values,  # type: ignore[arg-type]
+        )
+
+
+class Actuator(CommandedElement):
+    """A force, a damper or a position that follows a command during the run."""
+
+    kind: Literal["actuator"]
+    command: Literal["force", "damper", "position"] = "force"
+    """What is commanded: the `force` [N or N m]; the constant of a `damper` [N s/m or N m s]; the
+    deflection that spring and damper hold, `position` [m or rad]"""
+    stiffness: NonNegative = 0.0
+    """Stiffness with which a position is held [N/m or N m/rad]"""
+    damping: NonNegative = 0.0
+    """Damping beside it [N s/m or N m s]"""
+
+    @model_validator(mode="after")
+    def _a_position_is_held(self) -> Self:
+        if (self.command == "position") != (self.stiffness > 0.0):
+            raise ValueError("'stiffness' belongs to command = \"position\" and only to it")
+        if self.damping > 0.0 and self.command != "position":
+            raise ValueError("'damping' belongs to command = \"position\"")
+        return self
+
+    def rows(self) -> list[Act]:
+        """One actuator."""
+        return [self.act(mode=self.command, stiffness=self.stiffness, damping=self.damping)]

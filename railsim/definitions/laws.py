@@ -1,0 +1,137 @@
+"""Laws of one's own, signals and controllers, as vehicle files name them.
+
+A law's file is read and kept with the definition as its source: results carry it, their inputs are
+told apart by it, and workers get it.  Nothing is executed here (see `railsim.laws`).
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from railsim.definitions.base import (
+    Count,
+    Definition,
+    Finite,
+    Name,
+    NonNegative,
+    Positive,
+    Text,
+    Vector,
+)
+from railsim.errors import Fault, InputError
+from railsim.files import DEFINITION_BYTES, read_text
+
+
+class Law(Definition):
+    """A Python function that is compiled when a run begins, by permission of the user alone."""
+
+    file: Text | None = None
+    """Python file with the function"""
+    function: Name | None = None
+    """Name of the function; by default that of the law"""
+    source: Text | None = None
+    """Text of the file, as results carry it"""
+    compiled: Annotated[bool, Field(strict=True)] = True
+    """`false`: called as Python, slowly"""
+
+    @model_validator(mode="after")
+    def _has_a_source(self) -> Self:
+        if self.file is None and self.source is None:
+            raise ValueError("'file' is needed")
+        return self
+
+
+BODY_SIGNALS = ("displacement", "velocity", "acceleration", "angle", "angular_velocity")
+ELEMENT_SIGNALS = ("deflection", "rate", "force", "power")
+WHEEL_SIGNALS = ("wheel_speed", "Q", "Y")
+TRACK_SIGNALS = ("curvature", "cant_angle")
+
+
+class Signal(Definition):
+    """Something that is measured during a run."""
+
+    quantity: Literal[
+        "displacement", "velocity", "acceleration", "angle", "angular_velocity",
+        "deflection", "rate", "force", "power", "wheel_speed", "Q", "Y",
+        "curvature", "cant_angle", "speed", "speed_change", "distance", "time",
+    ]  # fmt: skip
+    """Of a `body`: displacement and velocity of a point against the track, what an accelerometer
+    reads there, angle against the track, absolute angular velocity; of an `element`: deflection,
+    its rate, force, power; of a `wheelset`: speed of its circumference, wheel loads; of the track:
+    curvature, cant angle; of the run: speed, its change, distance, time [SI]"""
+    body: Text | None = None
+    """Full name of the body"""
+    position: Vector | None = None
+    """Point of the body in the nominal vehicle [m]; by default its centre of gravity"""
+    element: Text | None = None
+    """Full name of the element"""
+    wheelset: Text | None = None
+    """Full name of the wheelset"""
+    side: Literal["left", "right"] | None = None
+    """Side of the wheel, of `Q` and `Y`"""
+    axis: Literal["x", "y", "z", "roll", "pitch", "yaw"] | None = None
+    """Axis; of a link its line, by default"""
+    ahead: Finite = 0.0
+    """Position on the track, ahead of the reference body [m]"""
+    rate: Positive | None = None
+    """Samples per second [1/s]; by default one each step of the loop"""
+    delay: NonNegative = 0.0
+    """Time after which a sample is known [s]; needs `rate`"""
+    noise: NonNegative = 0.0
+    """Standard deviation of normal noise of each sample [unit of the quantity]; needs `rate`"""
+    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+    """Seed of the noise"""
+    resolution: NonNegative = 0.0
+    """Smallest difference of two values [unit of the quantity]; 0: as fine as numbers are"""
+
+    @model_validator(mode="after")
+    def _what_belongs_together(self) -> Self:
+        needs = {"body": BODY_SIGNALS, "element": ELEMENT_SIGNALS, "wheelset": WHEEL_SIGNALS}
+        for key, quantities in needs.items():
+            if (self.quantity in quantities) != (getattr(self, key) is not None):
+                raise ValueError(f"'{key}' belongs to {', '.join(quantities)} and only to them")
+        if (self.quantity in ("Q", "Y")) != (self.side is not None):
+            raise ValueError("'side' belongs to Q and Y and only to them")
+        if self.quantity in BODY_SIGNALS and self.axis is None:
+            raise ValueError(f"{self.quantity} needs 'axis'")
+        linear = self.quantity in BODY_SIGNALS[:3]
+        if linear and self.axis in ("roll", "pitch", "yaw"):
+            raise ValueError(f"the axis of {self.quantity} is x, y or z")
+        if not linear and self.quantity in BODY_SIGNALS and self.axis in ("x", "y", "z"):
+            raise ValueError(f"the axis of {self.quantity} is roll, pitch or yaw")
+        if self.rate is None and (self.delay > 0.0 or self.noise > 0.0):
+            raise ValueError("'delay' and 'noise' need 'rate'")
+        return self
+
+
+class Controller(Definition):
+    """A law of one's own that reads signals and commands actuators, at equal times."""
+
+    law: Name
+    """Name of the law in the table `laws`"""
+    period: Positive
+    """Time between two calls [s]"""
+    inputs: dict[Name, Name] = Field(default_factory=dict)
+    """Signals by the arguments of the function that take them"""
+    outputs: tuple[Text, ...] = Field(min_length=1)
+    """Full names of the actuators, in the order of what the function returns"""
+    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    """Values of the function's further arguments, by name"""
+    memory: Count | None = None
+    """How many numbers its argument `memory` keeps from call to call, 0 at the begin"""
+
+
+def with_sources(tables: dict[str, Any]) -> list[Fault]:
+    """Put the texts of laws' files into the plain tables; the faults of reading them."""
+    faults: list[Fault] = []
+    laws = tables.get("laws")
+    for name, law in laws.items() if isinstance(laws, Mapping) else ():
+        if not isinstance(law, dict) or not isinstance(law.get("file"), str) or "source" in law:
+            continue
+        try:
+            law["source"] = read_text(Path(law["file"]), DEFINITION_BYTES)
+        except InputError as error:
+            faults += [Fault("", f"laws.{name}.file", f"{f}", "") for f in error.faults]
+    return faults

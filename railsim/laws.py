@@ -1,0 +1,442 @@
+"""Laws of one's own: Python functions of floats, compiled alone and called by the time loop.
+
+A law is executed only with permission: `allow` or `allowed` (`allow_code=True`, ``--allow-code``,
+``--law FILE``).  What it is compiled to stands at an address that the time loop calls; the loop
+itself is not compiled again.
+"""
+
+import ast
+import ctypes
+import hashlib
+import inspect
+import linecache
+import logging
+import math
+import os
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FunctionType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from railsim.definitions.laws import Law
+from railsim.errors import Fault, InputError
+
+F = TypeVar("F", bound=Callable[..., Any])
+PERMITTED = "RAILSIM_LAWS"
+"""Environment variable with the hashes of permitted sources, for worker processes."""
+ALL = "all"
+MEMORY = "memory"
+KIND = "railsim_law"
+_LOG = logging.getLogger(__name__)
+_bound: dict[tuple[str, ...], "Bound"] = {}
+
+
+def force_element(function: F) -> F:
+    """Mark a function as the law of a force element."""
+    return _marked(function, "force_element")
+
+
+def creep_law(function: F) -> F:
+    """Mark a function as a creep law."""
+    return _marked(function, "creep_law")
+
+
+def friction_law(function: F) -> F:
+    """Mark a function as a law of friction over the slip velocity."""
+    return _marked(function, "friction_law")
+
+
+def controller(function: F) -> F:
+    """Mark a function as a controller."""
+    return _marked(function, "controller")
+
+
+def _marked(function: F, kind: str) -> F:
+    setattr(function, KIND, kind)
+    return function
+
+
+# permission ---------------------------------------------------------------------------------------
+
+
+def digest(source: str) -> str:
+    """Return the hash by which a source is known."""
+    return hashlib.sha256(source.encode()).hexdigest()
+
+
+def allow(*sources: str) -> None:
+    """Permit these sources, or all without any, in this process and those that it starts."""
+    known = [digest(source) for source in sources] or [ALL]
+    present = [one for one in os.environ.get(PERMITTED, "").split(",") if one]
+    os.environ[PERMITTED] = ",".join(dict.fromkeys([*present, *known]))
+
+
+@contextmanager
+def allowed(everything: bool) -> Iterator[None]:
+    """Permit all sources within a block, or change nothing."""
+    before = os.environ.get(PERMITTED)
+    if everything:
+        allow()
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(PERMITTED, None)
+        else:
+            os.environ[PERMITTED] = before
+
+
+def is_allowed(source: str) -> bool:
+    """Whether a source may be executed."""
+    known = os.environ.get(PERMITTED, "").split(",")
+    return ALL in known or digest(source) in known
+
+
+def law(function: Callable[..., Any], *, compiled: bool = True) -> Law:
+    """Return the law of a function that is written in Python, permitted as it is given here.
+
+    Parameters
+    ----------
+    function : callable
+        Its source has to be readable: of a module, a script or a notebook.  What it needs beside
+        it stands in its body, as ``from math import exp``.
+    compiled : bool
+        Whether it is compiled; called as Python it is slower by far.
+    """
+    lines = textwrap.dedent(inspect.getsource(function))
+    tree = ast.parse(lines)
+    definition = tree.body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    definition.decorator_list = []
+    source = ast.unparse(tree) + "\n"
+    allow(source)
+    return Law(function=definition.name, source=source, compiled=compiled)
+
+
+# binding ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Takes:
+    """What a law is given and gives.
+
+    Attributes
+    ----------
+    words : str
+        What it is: ``a force element``.
+    given : tuple of str
+        Names of the arguments that the loop gives, in the order of the block.
+    named : tuple of str
+        Further arguments that have to be there: the inputs of a controller.
+    gives : tuple of int
+        How many numbers it may return.
+    states : bool
+        Whether arguments ``state_1``, ... are states whose rates it returns.
+    """
+
+    words: str
+    given: tuple[str, ...]
+    named: tuple[str, ...] = ()
+    gives: tuple[int, ...] = (1,)
+    states: bool = False
+
+
+FORCE_ELEMENT = Takes("a force element", ("deflection", "rate", "time", "command"), states=True)
+CREEP_LAW = Takes(
+    "a creep law",
+    ("xi_x", "xi_y", "phi", "a", "b", "mu_N", "c11", "c22", "c23", "c33", "G"),
+    gives=(2, 3),
+)
+FRICTION_LAW = Takes("a friction law", ("slip", "speed"))
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A law that the time loop can call.
+
+    Attributes
+    ----------
+    name : str
+        Name of the law.
+    address : int
+        Where it stands.
+    states : int
+        Number of its states.
+    further : tuple of str
+        Names of its parameters, in the order of the block.
+    defaults : mapping of str to float
+        Values of parameters that need not be given.
+    kept : tuple
+        What has to live as long as the address is called.
+    """
+
+    name: str
+    address: int
+    states: int
+    further: tuple[str, ...]
+    defaults: Mapping[str, float]
+    kept: tuple[Any, ...]
+
+    def parameters(self, key: str, given: Mapping[str, float]) -> list[float]:
+        """Values of its parameters in their order.
+
+        Raises
+        ------
+        InputError
+            One is missing, or one too many is given.
+        """
+        own = {**self.defaults, **given}
+        wrong = [n for n in given if n not in self.further]
+        missing = [n for n in self.further if n not in own]
+        if wrong or missing:
+            found = (
+                f"the law '{self.name}' has no argument '{wrong[0]}'"
+                if wrong
+                else (f"no value for '{missing[0]}', an argument of the law '{self.name}'")
+            )
+            raise InputError([Fault("vehicle", key, found, _listed(self.further))])
+        return [float(own[name]) for name in self.further]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"allowed: {', '.join(names)}" if names else "it has no parameters"
+
+
+def bind(name: str, law: Law, takes: Takes, gives: int | None = None, memory: int = 0) -> Bound:
+    """Compile a law, or take it as it was compiled before.
+
+    Parameters
+    ----------
+    name : str
+        Name of the law in the file.
+    takes : Takes
+        What the loop gives and what it needs.
+    gives : int, optional
+        How many numbers it has to return; by default what `takes` allows.
+    memory : int
+        Length of its memory.
+
+    Raises
+    ------
+    InputError
+        It is not permitted, raises errors, has wrong arguments or cannot be compiled.
+    """
+    source = law.source or ""
+    if not is_allowed(source):
+        found = f"'{name}' is code of {law.file or 'a result'}, which is not executed"
+        allowed = "--allow-code, or --law FILE with this file; in Python allow_code=True"
+        raise InputError([Fault("laws", name, found, allowed)])
+    kept = (
+        name,
+        digest(source),
+        str(law.function),
+        str(law.compiled),
+        repr((takes, gives, memory)),
+    )
+    if kept not in _bound:
+        _bound[kept] = _Binding(name, law, takes, gives, memory).bound()
+    return _bound[kept]
+
+
+class _Binding:
+    """One law on its way from text to address."""
+
+    def __init__(self, name: str, law: Law, takes: Takes, gives: int | None, memory: int) -> None:
+        self.name, self.law, self.takes, self.gives, self.memory = name, law, takes, gives, memory
+        self.file = law.file or f"<law {name}>"
+        self.source = law.source or ""
+
+    def bound(self) -> Bound:
+        function = self._function()
+        arguments = inspect.signature(function).parameters
+        names = list(arguments)
+        states = [n for n in names if self.takes.states and n.startswith("state")]
+        taken = [n for n in names if n in self.takes.given]
+        special = {*states, *taken, *self.takes.named, MEMORY}
+        further = [n for n in names if n not in special]
+        missing = [n for n in self.takes.named if n not in names]
+        if missing:
+            self._refuse(f"has no argument '{missing[0]}'", f"arguments: {', '.join(names)}")
+        if (MEMORY in names) != (self.memory > 0):
+            self._refuse("an argument 'memory' and the key 'memory' belong together", "")
+        defaults = {
+            n: float(arguments[n].default)
+            for n in further
+            if arguments[n].default is not inspect.Parameter.empty
+        }
+        allowed = (1 + len(states),) if states else self.takes.gives
+        allowed = allowed if self.gives is None else (self.gives,)
+        place = self._places(allowed[-1], states, further)
+        if self.law.compiled and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
+            address, kept = self._compiled(function, names, place, allowed)
+        else:
+            address, kept = self._plain(function, names, place, allowed)
+        return Bound(self.name, address, len(states), tuple(further), defaults, kept)
+
+    def _places(self, gives: int, states: Sequence[str], further: Sequence[str]) -> dict[str, int]:
+        """Where each argument stands in the block."""
+        named = [n for n in self.takes.named if n not in self.takes.given]
+        order = [*self.takes.given, *named, *states, *further]
+        return {name: gives + k for k, name in enumerate(order)} | {MEMORY: gives + len(order)}
+
+    def _refuse(self, found: str, allowed: str, line: int | None = None) -> None:
+        where = f"line {line}" if line else self.name
+        raise InputError([Fault(self.file, where, f"the law '{self.name}' {found}", allowed)])
+
+    def _function(self) -> FunctionType:
+        """Execute the text and take the function out of it."""
+        name = self.law.function or self.name
+        try:
+            tree = ast.parse(self.source, self.file)
+        except SyntaxError as error:
+            self._refuse(f"is no Python: {error.msg}", "", error.lineno)
+        self._check_raises(tree, name)
+        linecache.cache[self.file] = (
+            len(self.source),
+            None,
+            self.source.splitlines(True),
+            self.file,
+        )
+        space: dict[str, Any] = {"__name__": f"railsim_law_{self.name}"}
+        try:
+            exec(compile(tree, self.file, "exec"), space)
+        except Exception as error:
+            line = _line_of(error, self.file)
+            self._refuse(f"fails when it is read: {type(error).__name__}: {error}", "", line)
+        function = space.get(name)
+        if not isinstance(function, FunctionType):
+            known = [n for n, f in space.items() if isinstance(f, FunctionType)]
+            self._refuse(f"is no function '{name}' of this file", _listed(known))
+        marked = getattr(function, KIND, None)
+        if marked is not None and marked.replace("_", " ") not in self.takes.words:
+            self._refuse(f"is marked as {marked}", f"{self.takes.words} is needed here")
+        return function
+
+    def _check_raises(self, tree: ast.Module, name: str) -> None:
+        """Refuse what a compiled law cannot do: raise errors."""
+        functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
+        waiting, seen = [name], set()
+        while waiting:
+            one = waiting.pop()
+            if one in seen or one not in functions:
+                continue
+            seen.add(one)
+            for node in ast.walk(functions[one]):
+                if isinstance(node, ast.Raise | ast.Assert):
+                    word = "raise" if isinstance(node, ast.Raise) else "assert"
+                    allowed = "return math.nan instead: the run ends there"
+                    self._refuse(f"cannot '{word}' an error in the loop", allowed, node.lineno)
+                if isinstance(node, ast.Name):
+                    waiting.append(node.id)
+
+    def _compiled(
+        self,
+        function: FunctionType,
+        names: list[str],
+        place: dict[str, int],
+        allowed: tuple[int, ...],
+    ) -> tuple[int, tuple[Any, ...]]:
+        """Compile it with an entry that takes its block apart."""
+        import numba
+        from numba import types
+
+        space = function.__globals__
+        for other, helper in list(space.items()):
+            own = isinstance(helper, FunctionType) and helper.__code__.co_filename == self.file
+            if own and helper is not function:
+                space[other] = numba.njit(error_model="numpy")(helper)
+        compiled = numba.njit(error_model="numpy")(function)
+        kinds = [types.float64[::1] if n == MEMORY else types.float64 for n in names]
+        try:
+            compiled.compile(tuple(kinds))
+            given = compiled.overloads[tuple(kinds)].signature.return_type
+            number = self._returned(given, types)
+            self._check_number(number, allowed)
+            text = _entry_text(names, place, number, self.memory, allowed[-1])
+            scope = {"law": compiled, "carray": numba.carray}
+            exec(text, scope)
+            entry = numba.cfunc(types.void(types.CPointer(types.float64)), error_model="numpy")(
+                scope["entry"]
+            )
+        except numba.core.errors.NumbaError as error:
+            line = getattr(getattr(error, "loc", None), "line", None)
+            self._refuse(f"cannot be compiled: {_short(error)}", "floats, math, if and for", line)
+        return int(entry.address), (entry, compiled)
+
+    def _returned(self, given: Any, types: Any) -> int:
+        members = list(given.types) if isinstance(given, types.BaseTuple) else [given]
+        if not all(isinstance(m, types.Number | types.Boolean) for m in members):
+            self._refuse(f"returns {given}", "a number, or several as a tuple")
+        return len(members)
+
+    def _check_number(self, number: int, allowed: tuple[int, ...]) -> None:
+        if number not in allowed:
+            words = " or ".join(str(n) for n in allowed)
+            self._refuse(f"returns {number} values", f"{words} as {self.takes.words}")
+
+    def _plain(
+        self,
+        function: FunctionType,
+        names: list[str],
+        place: dict[str, int],
+        allowed: tuple[int, ...],
+    ) -> tuple[int, tuple[Any, ...]]:
+        """Python itself, called back from the loop; an error ends the run as not finite."""
+        length = place[MEMORY] + self.memory
+
+        def entry(address: int) -> None:
+            x = np.ctypeslib.as_array((ctypes.c_double * length).from_address(address))
+            try:
+                values = [x[place[MEMORY] :] if n == MEMORY else float(x[place[n]]) for n in names]
+                given = function(*values)
+                members = given if isinstance(given, tuple) else (given,)
+                if len(members) not in allowed:
+                    raise TypeError(f"it returns {len(members)} values")
+                x[: allowed[-1]] = 0.0
+                x[: len(members)] = members
+            except Exception as error:
+                _LOG.error(f"law '{self.name}': {type(error).__name__}: {error}")
+                x[: allowed[-1]] = math.nan
+
+        callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(entry)
+        return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), (callback,)
+
+
+def _entry_text(
+    names: Sequence[str], place: Mapping[str, int], number: int, memory: int, most: int
+) -> str:
+    """Source of the function that takes a block apart and calls the law."""
+    first = place[MEMORY]
+    view = f"v[{first}:{first + memory}]"
+    given = ", ".join(view if n == MEMORY else f"x[{place[n]}]" for n in names)
+    lines = ["def entry(x):"]
+    if memory:
+        lines.append(f"    v = carray(x, ({first + memory},))")
+    results = ", ".join(f"y{k}" for k in range(number))
+    lines.append(f"    {results} = law({given})")
+    lines += [f"    x[{k}] = y{k}" for k in range(number)]
+    lines += [f"    x[{k}] = 0.0" for k in range(number, most)]
+    return "\n".join(lines) + "\n"
+
+
+def _line_of(error: BaseException, file: str) -> int | None:
+    """Return the line of a file in which an error came up."""
+    line, trace = None, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == file:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+def _short(error: Exception) -> str:
+    """Return the first sentence of numba's report that says something."""
+    for line in str(error).splitlines():
+        text = line.strip()
+        if text and not text.startswith(("Failed in", "File", "[", "During", "Overload", "-", "*")):
+            return text[:200]
+    return type(error).__name__

@@ -1,0 +1,181 @@
+"""Signals and controllers of a vehicle as the arrays of its model, for runs alone.
+
+Analyses know the vehicle without them, its actuators without commands; what a run adds is added
+here, when everything else is prepared.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from railsim.definitions.laws import BODY_SIGNALS, Controller, Signal
+from railsim.definitions.settings import Settings
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import Fault, InputError, nearest
+from railsim.kernels import controllers as kernel
+from railsim.kernels import element_outputs as element
+from railsim.kernels.commands import Controllers, Signals
+from railsim.kernels.contact_columns import W_Q, W_Y
+from railsim.laws import Takes, bind
+from railsim.model.assembly import Model
+from railsim.model.element_arrays import LawBlocks
+
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+OF_BODY = dict(
+    zip(
+        BODY_SIGNALS,
+        (
+            kernel.POINT_POSITION,
+            kernel.POINT_VELOCITY,
+            kernel.POINT_ACCELERATION,
+            kernel.BODY_ANGLE,
+            kernel.BODY_RATE,
+        ),
+        strict=True,
+    )
+)
+OF_RUN = {
+    "speed": kernel.OF_SPEED,
+    "distance": kernel.OF_DISTANCE,
+    "time": kernel.OF_TIME,
+    "speed_change": kernel.OF_CHANGE,
+}
+OF_ELEMENT = {
+    "deflection": element.DEFLECTION,
+    "rate": element.RATE,
+    "force": element.FORCE,
+    "power": element.POWER,
+}
+
+
+def periods(vehicle: Vehicle) -> list[float]:
+    """Periods of all controllers and signals [s]."""
+    return [c.period for c in (vehicle.controllers or {}).values()] + [
+        1.0 / s.rate for s in (vehicle.signals or {}).values() if s.rate is not None
+    ]
+
+
+def with_control(model: Model, vehicle: Vehicle, settings: Settings) -> Model:
+    """Return the model with the vehicle's signals and controllers.
+
+    Raises
+    ------
+    InputError
+        Names that mean nothing; a law that is not permitted or cannot be compiled; a step of the
+        settings that is longer than a controller's period.
+    """
+    if not vehicle.signals and not vehicle.controllers:
+        return model
+    wiring = _Wiring(model, vehicle)
+    for name, controller in (vehicle.controllers or {}).items():
+        if settings.step is not None and controller.period < settings.step * (1.0 - 1e-9):
+            found = f"found {controller.period:g} s, shorter than the step of the settings"
+            wiring.fault(f"controllers.{name}.period", found, f"{settings.step:g} s at least")
+    return wiring.model()
+
+
+class _Wiring:
+    """Signals and controllers on their way to arrays; faults are gathered."""
+
+    def __init__(self, model: Model, vehicle: Vehicle) -> None:
+        self._model, self._vehicle = model, vehicle
+        self._blocks = LawBlocks()
+        self._blocks.memory = model.system.own.memory.tolist()
+        self._blocks.address = model.system.own.places.tolist()
+        self._faults: list[Fault] = []
+        self._wires: list[int] = []
+
+    def fault(self, key: str, found: str, allowed: str) -> None:
+        """Take note of what is wrong at a key of the vehicle."""
+        self._faults.append(Fault(f"vehicle '{self._vehicle.name}'", key, found, allowed))
+
+    def model(self) -> Model:
+        """Return the model with all of it."""
+        signals, controllers = self._vehicle.signals or {}, self._vehicle.controllers or {}
+        measured = [self._signal(name, signal) for name, signal in signals.items()]
+        which = [self._controller(name, one) for name, one in controllers.items()]
+        if self._faults:
+            raise InputError(self._faults)
+        system = self._model.system._replace(
+            signals=Signals(
+                np.array([row for row, _ in measured], np.int64).reshape(-1, kernel.SIGNAL_WHICH),
+                np.array([row for _, row in measured], float).reshape(-1, kernel.SIGNAL_ROW),
+            ),
+            controllers=Controllers(
+                np.array(which, np.int64).reshape(-1, kernel.CONTROLLER_WHICH),
+                np.array([one.period for one in controllers.values()], float),
+                np.array(self._wires, np.int64),
+            ),
+            own=self._blocks.own(),
+        )
+        index = replace(self._model.index, signals=tuple(signals), controllers=tuple(controllers))
+        return replace(self._model, system=system, index=index)
+
+    def _number(self, names: Sequence[str], name: str | None, key: str, kind: str) -> int:
+        if name in names:
+            return names.index(name)
+        allowed = nearest(str(name), names) if names else "there is none"
+        self.fault(key, f"no {kind} '{name}'", allowed)
+        return 0
+
+    def _signal(self, name: str, signal: Signal) -> tuple[list[int], list[float]]:
+        """Row of a signal: what it is, and how it is sampled."""
+        arm = (0.0, 0.0, 0.0)
+        kind, of, group, component = self._measured(f"signals.{name}", signal)
+        if signal.position is not None and signal.quantity in OF_BODY:
+            centre = self._model.flat.bodies[of].position
+            arm = tuple(np.subtract(signal.position, centre).tolist())
+        period = 1.0 / signal.rate if signal.rate else 0.0
+        slots = math.ceil(signal.delay / period - 1e-9) + 2 if period else 0
+        dice = np.random.default_rng(signal.seed).integers(1, 30000, 3).astype(float)
+        base = self._blocks.room([0.0, 0.0, *dice, *([0.0] * slots)])
+        how = (period, signal.delay, signal.noise, signal.resolution, signal.ahead)
+        return [kind, of, group, component, base, slots], [*arm, *how]
+
+    def _measured(self, key: str, signal: Signal) -> tuple[int, int, int, int]:
+        """Kind, body or element or wheelset, group or side, and component of a signal."""
+        index, quantity = self._model.index, signal.quantity
+        axis = AXES.index(signal.axis) if signal.axis else 0
+        if quantity in OF_BODY:
+            body = self._number(index.bodies, signal.body, f"{key}.body", "body")
+            return OF_BODY[quantity], body, 0, axis % 3
+        if quantity in OF_ELEMENT:
+            groups = (index.links, index.mounts, index.actuators)
+            known = [name for names in groups for name in names]
+            self._number(known, signal.element, f"{key}.element", "element")
+            component = OF_ELEMENT[quantity] + (0 if quantity == "power" else axis)
+            for group, names in enumerate(groups):
+                if signal.element in names:
+                    return kernel.ELEMENT, names.index(signal.element), group, component
+        if signal.wheelset is not None:
+            w = self._number(index.wheelsets, signal.wheelset, f"{key}.wheelset", "wheelset")
+            if quantity == "wheel_speed":
+                return kernel.WHEEL_SPEED, int(self._model.system.contact.body[w]), 0, 0
+            column = W_Q if quantity == "Q" else W_Y
+            return kernel.WHEEL, w, int(signal.side == "right"), column
+        if quantity in OF_RUN:
+            return kernel.TRAVEL, 0, 0, OF_RUN[quantity]
+        return (kernel.CURVATURE if quantity == "curvature" else kernel.CANT), 0, 0, 0
+
+    def _controller(self, name: str, controller: Controller) -> list[int]:
+        """Row of a controller."""
+        key, begin, laws = f"controllers.{name}", len(self._wires), self._vehicle.laws or {}
+        for output in controller.outputs:
+            actuators = self._model.index.actuators
+            self._wires.append(self._number(actuators, output, f"{key}.outputs", "actuator"))
+        for argument, signal in controller.inputs.items():
+            signals = tuple(self._vehicle.signals or {})
+            where = f"{key}.inputs.{argument}"
+            self._wires.append(self._number(signals, signal, where, "signal"))
+        if controller.law not in laws:
+            self._number(tuple(laws), controller.law, f"{key}.law", "law")
+        if self._faults:
+            return [0] * kernel.CONTROLLER_WHICH
+        gives, takes, kept = len(controller.outputs), len(controller.inputs), controller.memory or 0
+        given = Takes("a controller", ("time",), tuple(controller.inputs))
+        bound = bind(controller.law, laws[controller.law], given, gives, kept)
+        values = bound.parameters(f"{key}.parameters", controller.parameters)
+        block = self._blocks.room([0.0] * (gives + 1 + takes) + values + [0.0] * kept)
+        return [self._blocks.law(bound), block, gives, takes, begin, self._blocks.room([0.0])]

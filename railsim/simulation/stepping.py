@@ -1,0 +1,500 @@
+"""`Simulation`: a run that is taken step by step, read and acted on in between.
+
+It is the loop of `simulate` on the same grid of steps: what ends within a step of the grid divides
+that one, and the next call begins with what is left of it.
+"""
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.definitions.loading import check_types
+from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
+from railsim.definitions.vehicle import Vehicle
+from railsim.errors import InputError, argument_fault, nearest
+from railsim.kernels.actuators import send
+from railsim.kernels.compiler import entry
+from railsim.kernels.controllers import BASE, VALUE
+from railsim.kernels.recording import Recorder
+from railsim.kernels.status import RUNNING
+from railsim.kernels.system import ARC_LENGTH, SPEED, TIME, Work
+from railsim.kernels.time_loop import Chunk, time_loop
+from railsim.model.assembly import SharedTables
+from railsim.model.time_step import divide_strikes
+from railsim.model.uneven_wheels import longest_part
+from railsim.model.work import work_arrays
+from railsim.notation import QUANTITIES, REQUESTED
+from railsim.profiles import Profile
+from railsim.result import Hdf5Sink, MemorySink, Result, Sink
+from railsim.simulation.advance import COUNTED, ROUND_OFF, ROWS, STEPS, Convoy, SavedState
+from railsim.simulation.auxiliary_track import DOING
+from railsim.simulation.conditions import Inputs, check_numbers, own_speed, state_before
+from railsim.simulation.ending import end, verdict
+from railsim.simulation.preparation import begin
+from railsim.simulation.run_progress import Progress, RunProgress
+from railsim.simulation.step_choice import duration as time_for
+
+Floats = NDArray[np.float64]
+NEVER = 1 << 40
+SHORTEST = 1e-12  # s
+SHARE = 1e-3  # of a step: what is shorter is made up for by the next one
+
+
+@dataclass(frozen=True, eq=False)
+class _Probe:
+    """Where a state is evaluated beside the loop."""
+
+    work: Work
+    recorder: Recorder
+
+
+class Simulation:
+    """A run that is taken step by step.
+
+    Parameters
+    ----------
+    vehicle, track, speed, start, duration, until, settings, sink, profiles, resume, progress
+        As in `railsim.simulate`; `duration` and `until` end the run.
+    record : bool or str or Path
+        Whether the quantities are kept at the rate of the settings: in memory, or in a file of
+        this name.  Without a record the memory stays as it is however long the run, and `result`
+        holds the peaks over all steps alone.
+
+    Raises
+    ------
+    InputError, ModelError
+        As `railsim.simulate`.
+
+    Examples
+    --------
+    >>> import railsim
+    >>> vehicle = railsim.load_vehicle("coach_manchester")
+    >>> track = railsim.load_track("curve_r250")
+    >>> with railsim.Simulation(vehicle, track, speed=20.0, until=10.0) as sim:
+    ...     while sim.step(0.1):
+    ...         Q = sim.read("Q")
+    ...     result = sim.result()
+    >>> result.status, Q.shape
+    ('complete', (4, 2))
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        track: Track,
+        *,
+        speed: float | None = None,
+        start: float = 0.0,
+        duration: float | None = None,
+        until: float | None = None,
+        settings: Settings | None = None,
+        record: bool | str | Path = True,
+        sink: Sink | None = None,
+        progress: Progress | None = None,
+        profiles: Mapping[str, Profile] | None = None,
+        resume: Result | Floats | None = None,
+    ) -> None:
+        check_types([vehicle], track)
+        settings = settings or Settings()
+        before = None if resume is None else state_before(vehicle, track, settings, resume)
+        if before is not None:
+            speed, start = own_speed(before, speed, start)
+        inputs = Inputs.checked(track, settings, speed, start, duration, until)
+        self._fraction = RunProgress(progress, 1, inputs)
+        self._fraction.next_run()
+        self._sink = sink or (MemorySink() if isinstance(record, bool) else Hdf5Sink(record))
+        try:
+            run = begin(
+                vehicle, inputs, self._sink, profiles, before, SharedTables(), self._fraction
+            )
+        except BaseException:
+            self._sink.abort()
+            raise
+        DOING.info("")
+        self._vehicle, self._inputs, self._before, self._run = vehicle, inputs, before, run
+        self._records = record is not False
+        self._convoy = Convoy([run], settings)
+        self._whole = max(run.prepared.left(run.state), SHORTEST)
+        self._phase, self._missing, self._behind, self._rows = 0, 0.0, 0.0, 0
+        self._written = -math.inf
+        self._length, self._every, self._goal = 0.0, 1, 0.0
+        self._prepared_for, self._longest = math.nan, math.inf
+        self._closed: Result | None = None
+        self._loop: Any = None
+        self._seen: Mapping[str, Floats] | None = None
+        self._probe: Any = None
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return float(self._convoy.state[TIME])
+
+    @property
+    def distance(self) -> float:
+        """Arc length of the reference body [m]."""
+        return float(self._convoy.state[ARC_LENGTH])
+
+    @property
+    def speed(self) -> float:
+        """Speed of the reference body [m/s]."""
+        return float(self._convoy.state[SPEED])
+
+    @property
+    def step_length(self) -> float:
+        """Step of the loop at the present speed [s]."""
+        if self._length == 0.0:
+            self._begin_interval()
+        return self._length
+
+    @property
+    def running(self) -> bool:
+        """Whether the run goes on."""
+        return self._run.status == RUNNING and not self._run.ended and self._left() > ROUND_OFF
+
+    @property
+    def status(self) -> str:
+        """How the run stands: ``running``, or the status of its result."""
+        return "running" if self.running else verdict(self._run)["status"]
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names of what takes commands."""
+        return self._run.prepared.model.index.actuators
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """Names of what can be read: signals of the vehicle, quantities of its results."""
+        known = self._run.plan.quantities
+        return (*self._run.prepared.model.index.signals, *(q.name for q in known if q.dims))
+
+    def step(self, dt: float | None = None) -> bool:
+        """Advance by a time, by default one step of the loop; whether the run goes on.
+
+        The end of the run shortens the last call; a step that would begin beyond it is an error.
+
+        Raises
+        ------
+        InputError
+            The run has ended, or `dt` is no positive time.
+        """
+        if not self.running:
+            raise InputError(
+                [argument_fault("step", "", self._ended_because(), "a new Simulation")]
+            )
+        if dt is None:
+            dt = self._missing or self._next()
+        elif not 0.0 < dt < math.inf:  # NaN is not
+            raise InputError([argument_fault("dt", "", f"found {dt} s", "a positive time")])
+        begin = time.thread_time()
+        self._seen = None
+        left = float(dt) + self._behind
+        while left > SHARE * self._length and self.running:
+            whole = self._next()
+            if self._run.ended:
+                break
+            left -= self._part(left, whole)
+        self._behind = left if self.running else 0.0
+        self._run.cpu_time += time.thread_time() - begin
+        self._raise_error()
+        return self.running
+
+    def run(self, until: float | None = None, *, duration: float | None = None) -> bool:
+        """Advance to an arc length [m] or by a time [s], else to the end; whether it goes on."""
+        check_numbers(until=until, duration=duration)
+        if until is None and duration is None:
+            if self._phase == 0 and self._missing == 0.0 and self.running and self._records:
+                self._to_the_end()
+            while self.running:
+                self.step(self._ahead())
+        elif until is None:
+            return self.step(duration)
+        else:
+            while self.running and until - self.distance > ROUND_OFF * self.speed:
+                self.step(min(self._ahead(), (until - self.distance) / self.speed))
+        return self.running
+
+    def _ahead(self) -> float:
+        """Time of a good number of whole steps, fewer where the speed changes."""
+        return self._missing + self.step_length * (1 if self._convoy.varies else STEPS)
+
+    def _to_the_end(self) -> None:
+        """Advance to the end by the chunks of `simulate`."""
+        self._flush()
+        self._seen = None
+
+        def moved(_: object, state: Floats) -> None:
+            left = self._run.prepared.left(state)
+            self._fraction.of_runs(min(1.0, 1.0 - left / self._whole))
+
+        self._convoy.chunks(moved)
+        self._raise_error()
+
+    def _left(self) -> float:
+        return self._run.prepared.left(self._convoy.state)
+
+    def _begin_interval(self) -> None:
+        """Choose step and number of steps to the next output where the speed changes."""
+        convoy = self._convoy
+        if self._length == 0.0 or convoy.varies:
+            ((self._length, self._every),) = convoy.choices()
+            self._longest = longest_part(convoy.system, convoy.state[SPEED])
+            self._prepared_for = math.nan
+            self._goal = convoy.state[ARC_LENGTH] + (convoy.spacing or 0.0)
+
+    def _next(self) -> float:
+        """Length of the next step of the grid [s]."""
+        convoy = self._convoy
+        if self._phase == 0 and self._missing == 0.0:
+            self._begin_interval()
+        if convoy.spacing is None or self._phase < self._every - 1 or self._run.ended:
+            return self._length
+        # the last step of an interval of distance ends where the interval ends
+        s, v = convoy.state[ARC_LENGTH], convoy.state[SPEED]
+        return time_for(self._goal - s, v, convoy.derivative[SPEED])
+
+    def _part(self, most: float, whole: float) -> float:
+        """Take whole steps, or a part of one, within a time `most` [s]; the time taken."""
+        convoy, every = self._convoy, self._every
+        if self._missing > 0.0:
+            taken = self._missing if self._missing <= most + SHARE * whole else most
+            self._call(taken, 1, 1, NEVER)
+            self._missing -= taken
+            self._on_grid(int(self._missing <= SHORTEST))
+            return taken
+        steps = int(most / whole * (1.0 + ROUND_OFF) + SHARE)
+        if steps == 0:
+            self._call(most, self._phase, 1, every)
+            self._missing, convoy.due = whole - most, False
+            return most
+        steps = min(steps, STEPS, max(1, math.ceil(self._left() / whole * (1.0 - 1e-9))))
+        if convoy.varies:  # the last step of an interval of distance has its own length
+            one = int(convoy.spacing is not None and self._phase < every - 1)
+            steps = min(steps, every - self._phase - one)
+        elif self._records:
+            steps = min(steps, (ROWS - self._rows) * every - self._phase)
+        if not convoy.evaluates:
+            steps = min(steps, every - self._phase)
+        taken = self._call(whole, self._phase, steps, every)
+        self._on_grid(taken)
+        return whole * steps
+
+    def _on_grid(self, steps: int) -> None:
+        """Take note of whole steps that have been taken."""
+        if steps:
+            self._missing = 0.0
+            self._phase = (self._phase + steps) % self._every
+            if self._phase == 0:
+                self._convoy.due = True
+                self._convoy.begin_evaluation()
+                if self._rows >= ROWS:
+                    self._flush()
+            else:
+                self._convoy.due = False
+
+    def _call(self, length: float, first: int, steps: int, every: int) -> int:
+        """Call the time loop; the number of steps that it has taken."""
+        convoy, run = self._convoy, self._run
+        if length != self._prepared_for:
+            divide_strikes(convoy.work, convoy.scheme, length, self._longest)
+            self._prepared_for = length
+        kept = convoy.work.vibration.copy() if length < self._length else 0.0  # of whole steps
+        arrays = (convoy.system, convoy.work, convoy.state, convoy.derivative, convoy.stages)
+        if self._loop is None:
+            nothing = (convoy.ensemble.recorder, convoy.scheme, length, Chunk(1, 0, NEVER))
+            time_loop(*arrays, *nothing)
+            self._loop = entry(time_loop, *arrays, *nothing)  # type: ignore[no-untyped-call]
+        if not self._records:
+            first, every = first + 1, NEVER
+        chunk = Chunk(first, steps, every, int(convoy.fresh), 0, self._rows)
+        run.status, run.where, taken, self._rows = self._loop(
+            *arrays, convoy.ensemble.recorder, convoy.scheme, length, chunk
+        )
+        convoy.fresh = convoy.fresh and taken == 0
+        if length < self._length:
+            convoy.work.vibration[:] = kept
+        if run.status != RUNNING:
+            self._flush()
+        return int(taken)
+
+    def _flush(self) -> None:
+        """Hand what has been recorded to the sink."""
+        if self._rows:
+            self._written = float(self._convoy.ensemble.recorder.state[self._rows - 1, TIME])
+        self._convoy.write(self._rows)
+        self._rows = 0
+
+    def _raise_error(self) -> None:
+        if self._run.error is not None:
+            raise self._run.error
+
+    def _ended_because(self) -> str:
+        if self._closed is not None:
+            return "the run has ended: its result has been taken"
+        facts = verdict(self._run)
+        return f"the run has ended at {self.time:.6g} s: {facts['status_reason']}"
+
+    # commands and what is read
+
+    def set(self, actuator: str, value: float) -> None:
+        """Give a command to an actuator; it stays until the next one.
+
+        Raises
+        ------
+        InputError
+            There is no such actuator, the value is not finite, or too many commands are on their
+            way to one with a delay.
+        """
+        names = self.actuators
+        if actuator not in names:
+            allowed = nearest(actuator, names) if names else "the vehicle has none"
+            fault = argument_fault("actuator", "", f"no actuator '{actuator}'", allowed)
+            raise InputError([fault])
+        if not math.isfinite(value):
+            raise InputError([argument_fault("value", "", f"found {value}", "a finite number")])
+        convoy, number = self._convoy, names.index(actuator)
+        memory = convoy.work.memory
+        plain = getattr(send, "py_func", send)
+        if not plain(convoy.system.actuators, memory, number, float(value), self.time):
+            found = "more commands than one every 0.25 ms are on their way"
+            raise InputError([argument_fault("actuator", actuator, found, "fewer commands")])
+        self._seen = None
+
+    def set_rails(self, displacement: Floats, velocity: Floats) -> None:
+        """Displace the rails under the wheels, as another program's bridge or track does.
+
+        They stay so until the next call; on rigid rails only, which they add to.
+
+        Parameters
+        ----------
+        displacement, velocity : float64[wheelset, side, 2]
+            Of the rail heads, lateral (right positive) and vertical (down positive) [m], [m/s].
+        """
+        if self._convoy.system.support.elastic:
+            fault = argument_fault("set_rails", "", "a track with a support", "rigid rails")
+            raise InputError([fault])
+        motion = self._convoy.work.rail_motion
+        motion[..., :2], motion[..., 2:] = displacement, velocity
+        self._seen = None
+
+    def read(self, name: str) -> Any:
+        """Return the present value of a signal, or of a quantity of the result [SI].
+
+        Quantities are arrays without the dimension of time, such as ``Q`` by wheelset and side.
+
+        Raises
+        ------
+        InputError
+            There is nothing of this name.
+        """
+        index = self._run.prepared.model.index
+        values = self._present()
+        if name in index.signals:
+            base = self._convoy.system.signals.which[index.signals.index(name), BASE]
+            return float(self._probe.work.memory[base + VALUE])
+        if name in QUANTITIES or name in REQUESTED:
+            try:
+                value = np.asarray(values[name])
+            except KeyError:
+                fault = argument_fault(
+                    "name", "", f"'{name}' is not output", "ask for it in settings.outputs"
+                )
+                raise InputError([fault]) from None
+            return float(value[0]) if value.ndim == 1 else value[0].copy()
+        allowed = nearest(name, self.readable)
+        raise InputError([argument_fault("name", "", f"nothing is called '{name}'", allowed)])
+
+    def _present(self) -> Mapping[str, Floats]:
+        """Quantities at the present state, evaluated beside the loop."""
+        if self._seen is not None:
+            return self._seen
+        convoy, run, length = self._convoy, self._run, self.step_length
+        if self._probe is None:
+            self._probe = _Probe(work_arrays(convoy.system), run.plan.recorder(1))
+        probe, state = self._probe, convoy.state.copy()
+        probe.work.memory[:] = convoy.work.memory
+        probe.work.rail_motion[:] = convoy.work.rail_motion
+        divide_strikes(probe.work, convoy.scheme, length, self._longest)
+        status, where, _, _ = time_loop(
+            convoy.system,
+            probe.work,
+            state,
+            np.zeros_like(state),
+            convoy.stages,
+            probe.recorder,
+            convoy.scheme,
+            length,
+            Chunk(0, 0, 1, int(convoy.fresh), 1),
+        )
+        if status != RUNNING:
+            run.status, run.where = status, where
+            raise InputError([argument_fault("read", "", self._ended_because(), "")])
+        self._seen = run.plan.chunk(probe.recorder, 1, run.prepared.balance.Q0)
+        return self._seen
+
+    # states
+
+    @property
+    def state(self) -> SavedState:
+        """All that the run goes on from, a copy."""
+        convoy = self._convoy
+        grid = (self._phase, self._missing, self._behind, self._length, self._every, self._goal)
+        return SavedState(
+            convoy.state.copy(),
+            tuple(getattr(convoy.work, name).copy() for name in (*COUNTED, "rail_motion")),
+            (*grid, convoy.fresh, convoy.due, convoy.evaluates, self._run.status, self._run.where),
+        )
+
+    @state.setter
+    def state(self, saved: SavedState) -> None:
+        convoy = self._convoy
+        if saved.motion.shape != convoy.state.shape:
+            found = f"a state of {saved.motion.size} values"
+            allowed = f"{convoy.state.size} values, those of this vehicle and track"
+            raise InputError([argument_fault("state", "", found, allowed)])
+        kept = convoy.ensemble.recorder.state[: self._rows, TIME]
+        rows = int(np.searchsorted(kept, saved.motion[TIME] - SHORTEST))
+        if self._records and saved.motion[TIME] < self._written + SHORTEST:
+            found = "an instant before what is recorded already"
+            raise InputError([argument_fault("state", "", found, "record=False")])
+        self._rows = min(rows, self._rows)
+        convoy.state[:] = saved.motion
+        for name, values in zip((*COUNTED, "rail_motion"), saved.counted, strict=True):
+            getattr(convoy.work, name)[...] = values
+        *grid, convoy.fresh, convoy.due, convoy.evaluates = saved.grid[:9]
+        self._phase, self._missing, self._behind, self._length, self._every, self._goal = grid
+        self._run.status, self._run.where = saved.grid[9:]
+        self._seen = None
+
+    # the end
+
+    def result(self) -> Result:
+        """End the run where it is, and return its result."""
+        if self._closed is None:
+            convoy = self._convoy
+            due = self._phase == 0 and self._missing == 0.0 and convoy.due
+            if due and self._records and self._run.status == RUNNING:
+                self._flush()
+                self._run.status, self._run.where, self._rows = convoy.last_record()
+            self._flush()
+            self._raise_error()
+            convoy.give_back()
+            self._closed = end(self._run, self._vehicle, self._inputs, self._before)
+        return self._closed
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: object, trace: TracebackType | None
+    ) -> None:
+        if kind is None and self._closed is None:
+            self.result()
+        self._sink.abort()

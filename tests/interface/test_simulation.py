@@ -1,0 +1,220 @@
+"""`railsim.Simulation`: the run of `simulate`, step by step; actuators, states, faults."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim.errors import InputError
+
+STEP = 1.0 / 600.0
+ACTUATOR = {
+    "kind": "actuator",
+    "bodies": ["carbody", "front.frame"],
+    "points": [[9.5, 0.0, -0.9], [9.5, 0.9, -0.9]],
+    "lag": 0.05,
+}
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return railsim.load_vehicle("coach_manchester")
+
+
+@pytest.fixture(scope="module")
+def track():
+    return railsim.load_track("curve_r250").with_values({"friction": 0.3})
+
+
+def commanded(coach, **more):
+    """The coach with a lateral actuator between car body and front frame."""
+    elements = {**dict(coach.elements), "push": {**ACTUATOR, **more}}
+    return coach.replace(elements=elements)
+
+
+PUSHED = {"carbody": {"vy": 0.3, "vroll": 0.1}, "front.inner.wheelset": {"y": 2e-3}}
+"""Initial motion: the vehicle sways, and its wheelsets run from side to side."""
+DISTURBED = railsim.Settings(initial=PUSHED)
+SETTINGS = railsim.Settings(initial=PUSHED, outputs={"elements": ["push"]})
+
+
+def equal(one, other):
+    return [q for q in one if not np.array_equal(one[q], other[q], equal_nan=True)]
+
+
+@pytest.mark.parametrize("dt", [None, STEP, 7 * STEP, 0.05, 1.7])
+def test_the_bits_of_simulate(coach, track, dt):
+    way = {"speed": 20.0, "until": 40.0, "settings": DISTURBED}
+    whole = railsim.simulate(coach, track, **way)
+    with railsim.Simulation(coach, track, **way) as sim:
+        while sim.step(dt):
+            pass
+        stepped = sim.result()
+    assert equal(whole, stepped) == []
+    peaks, others = whole.groups["peaks"], stepped.groups["peaks"]
+    assert [n for n in peaks if not np.array_equal(peaks[n], others[n], equal_nan=True)] == []
+    assert stepped.status == "complete"
+    assert stepped.attributes["steps"] == whole.attributes["steps"]
+
+
+@pytest.mark.parametrize(
+    ("dt", "share"),
+    [(0.2101, 1e-6), (0.05000001, 1e-6), (0.04999999, 1e-6), (0.00213, 3e-5), (0.05003, 3e-5)],
+)
+def test_shortened_steps_change_the_peaks_by_little(coach, track, dt, share):
+    """Instants of output stay where they are; where every step is divided, as half the step."""
+    way = {"speed": 20.0, "until": 20.0, "settings": DISTURBED}
+    whole = railsim.simulate(coach, track, **way)
+    with railsim.Simulation(coach, track, **way) as sim:
+        while sim.step(dt):
+            pass
+        stepped = sim.result()
+    assert np.allclose(whole["time"], stepped["time"], rtol=0.0, atol=1e-11)
+    largest = np.max(np.abs(whole.groups["peaks"]["Q"]))
+    for name in ("Q", "Y", "sum_Y"):
+        one, other = whole.groups["peaks"][name], stepped.groups["peaks"][name]
+        assert np.max(np.abs(one - other)) < share * largest
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"mode": "table", "speed_table": [[0.0, 15.0], [100.0, 20.0]]},
+        {"mode": "free", "resistance": [20e3, 0.0, 0.0]},
+    ],
+)
+@pytest.mark.parametrize("spacing", [None, 0.25])
+def test_changing_speed_has_the_same_bits(coach, track, drive, spacing):
+    settings = railsim.Settings(drive=drive, output_spacing=spacing, initial=PUSHED)
+    way = {"speed": 15.0, "until": 6.0, "settings": settings}
+    whole = railsim.simulate(coach, track, **way)
+    with railsim.Simulation(coach, track, **way) as sim:
+        while sim.step():
+            pass
+        stepped = sim.result()
+    assert equal(whole, stepped) == []
+
+
+def test_what_is_read_is_what_is_recorded(coach, track):
+    with railsim.Simulation(coach, track, speed=20.0, settings=DISTURBED) as sim:
+        sim.step(0.5)
+        seen = {name: sim.read(name) for name in ("time", "Q", "Y", "body_acceleration")}
+        sim.step(0.5)
+        result = sim.result()
+    at = int(np.argmin(np.abs(result["time"] - seen["time"])))
+    for name, value in seen.items():
+        assert np.array_equal(result[name][at], value)
+
+
+def test_a_state_restored_has_the_same_bits(coach, track):
+    vehicle = commanded(coach, delay=0.03)
+    sim = railsim.Simulation(vehicle, track, speed=20.0, settings=DISTURBED, record=False)
+    sim.step(0.1)
+    sim.set("push", 5e3)
+    sim.step(0.0107)
+    saved = pickle.loads(pickle.dumps(sim.state))
+
+    def onwards():
+        for k in range(20):
+            sim.set("push", 1e3 * k)
+            sim.step(0.0113)
+        return sim.state
+
+    first = onwards()
+    sim.state = saved
+    second = onwards()
+    assert pickle.dumps(first) == pickle.dumps(second)
+    other = railsim.Simulation(vehicle, track, speed=20.0, settings=DISTURBED, record=False)
+    other.state = saved
+    sim = other
+    assert np.array_equal(onwards().motion, first.motion)
+
+
+def test_lag_and_delay_of_an_actuator(coach, track):
+    """F = F_0 (1 - exp(-(t - t_0 - delay)/lag)), exactly: the command is constant."""
+    vehicle = commanded(coach, delay=0.035)
+    with railsim.Simulation(vehicle, track, speed=20.0, duration=0.5, settings=SETTINGS) as sim:
+        sim.step(0.1)
+        sim.set("push", 4e3)
+        while sim.step(0.05):
+            pass
+        result = sim.result()
+    late = np.maximum(0.0, result["time"] - 0.1 - 0.035)
+    force = result["element_force"][:, 0, 0]
+    assert np.allclose(force, 4e3 * (1.0 - np.exp(-late / 0.05)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"), [({"rate_limit": 20e3}, 20e3 * 0.1), ({"force_limit": 1.5e3}, 1.5e3)]
+)
+def test_limits_of_an_actuator(coach, track, limit, expected):
+    vehicle = commanded(coach, **({"lag": 1e-3} | limit))
+    with railsim.Simulation(vehicle, track, speed=20.0, duration=0.2, settings=SETTINGS) as sim:
+        sim.step(0.1)
+        sim.set("push", 4e3)
+        sim.run()
+        force = sim.result()["element_force"][-1, 0, 0]
+    assert force == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_commanded_damper_is_a_damper(coach, track):
+    """One command, one damper of the same constant: within what the lag's absence leaves."""
+    damper = {**ACTUATOR, "kind": "spring_damper", "damping": 30e3}
+    del damper["lag"]
+    passive = coach.replace(elements={**dict(coach.elements), "push": damper})
+    way = {"speed": 20.0, "until": 30.0, "settings": SETTINGS}
+    expected = railsim.simulate(passive, track, **way)
+    with railsim.Simulation(commanded(coach, lag=0.0, command="damper"), track, **way) as sim:
+        sim.set("push", 30e3)
+        sim.run()
+        found = sim.result()
+    scale = np.max(np.abs(expected["element_force"]))
+    assert scale > 100.0
+    assert np.allclose(expected["element_force"], found["element_force"], atol=1e-6 * scale)
+
+
+def test_mirrored_commands_have_the_mirrored_effect(coach, track):
+    """An actuator along y on both sides: one command each, opposite motions of the car body."""
+    across = {**ACTUATOR, "acts": "y", "sides": "both", "lag": 0.0}
+    vehicle = coach.replace(elements={**dict(coach.elements), "push": across})
+    found = []
+    for side in ("left", "right"):
+        sim = railsim.Simulation(vehicle, track, speed=20.0, record=False)
+        sim.set(f"push.{side}", 10e3)
+        sim.step(0.3)
+        found.append(sim.read("body_position")[0])
+    signs = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    assert abs(found[0][1]) > 1e-5
+    assert np.allclose(found[0], signs * found[1], atol=1e-9)
+
+
+def test_faults_are_one_line_each(coach, track):
+    vehicle = commanded(coach)
+    sim = railsim.Simulation(vehicle, track, speed=20.0, duration=0.1)
+    for wrong, words in (
+        (lambda: sim.set("pusch", 1.0), "no actuator 'pusch'.*push"),
+        (lambda: sim.set("push", float("nan")), "value: found nan"),
+        (lambda: sim.step(-1.0), "dt: found -1.0 s"),
+        (lambda: sim.read("R"), "nothing is called 'R'"),
+        (lambda: sim.read("element_force"), "settings.outputs"),
+    ):
+        with pytest.raises(InputError, match=words):
+            wrong()
+    sim.run()
+    with pytest.raises(InputError, match=r"the run has ended at 0\.1"):
+        sim.step()
+    passive = railsim.Simulation(coach, track, speed=20.0, duration=0.1)
+    with pytest.raises(InputError, match="the vehicle has none"):
+        passive.set("push", 1.0)
+
+
+def test_a_file_is_there_when_whole(coach, track, tmp_path):
+    path = tmp_path / "run.h5"
+    way = {"speed": 20.0, "duration": 0.1, "record": path}
+    with pytest.raises(KeyboardInterrupt), railsim.Simulation(coach, track, **way):
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+    with railsim.Simulation(coach, track, **way) as sim:
+        sim.run()
+    assert railsim.open_result(path).status == "complete"
