@@ -287,7 +287,7 @@ class _Binding:
         where = f"line {line}" if line else self.name
         raise InputError([Fault(self.file, where, f"the law '{self.name}' {found}", allowed)])
 
-    def _function(self) -> FunctionType:
+    def _function(self) -> Any:
         """Execute the text and take the function out of it."""
         name = self.law.function or self.name
         try:
@@ -341,8 +341,10 @@ class _Binding:
         allowed: tuple[int, ...],
     ) -> tuple[int, tuple[Any, ...]]:
         """Compile it with an entry that takes its block apart."""
-        import numba
-        from numba import types
+        import numba as compiler
+
+        numba: Any = compiler
+        types = numba.types
 
         space = function.__globals__
         for other, helper in list(space.items()):
@@ -357,7 +359,7 @@ class _Binding:
             number = self._returned(given, types)
             self._check_number(number, allowed)
             text = _entry_text(names, place, number, self.memory, allowed[-1])
-            scope = {"law": compiled, "carray": numba.carray}
+            scope: dict[str, Any] = {"law": compiled, "carray": numba.carray}
             exec(text, scope)
             entry = numba.cfunc(types.void(types.CPointer(types.float64)), error_model="numpy")(
                 scope["entry"]
@@ -365,7 +367,7 @@ class _Binding:
         except numba.core.errors.NumbaError as error:
             line = getattr(getattr(error, "loc", None), "line", None)
             self._refuse(f"cannot be compiled: {_short(error)}", "floats, math, if and for", line)
-        return int(entry.address), (entry, compiled)
+        return entry.address, (entry, compiled)
 
     def _returned(self, given: Any, types: Any) -> int:
         members = list(given.types) if isinstance(given, types.BaseTuple) else [given]

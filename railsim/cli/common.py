@@ -117,6 +117,41 @@ load_option = click.option(
 )
 
 
+def _allow_code(ctx: click.Context, param: click.Parameter, given: bool) -> None:
+    if given:
+        from railsim.laws import allow
+
+        allow()
+
+
+def _allow_files(ctx: click.Context, param: click.Parameter, files: tuple[str, ...]) -> None:
+    if files:
+        from railsim.files import DEFINITION_BYTES, read_text
+        from railsim.laws import allow
+
+        allow(*(read_text(file, DEFINITION_BYTES) for file in files))
+
+
+def code_options(function: F) -> F:
+    """Add ``--allow-code`` and ``--law``, which permit laws of one's own."""
+    everything = click.option(
+        "--allow-code",
+        is_flag=True,
+        expose_value=False,
+        callback=_allow_code,
+        help="Execute the Python code of laws that the files name.",
+    )
+    files = click.option(
+        "--law",
+        multiple=True,
+        metavar="FILE",
+        expose_value=False,
+        callback=_allow_files,
+        help="Execute the laws of this file; may be given several times.",
+    )
+    return everything(files(function))
+
+
 def output_options(function: F) -> F:
     """Add ``--overwrite``, ``--json``, ``--quiet``."""
     return overwrite_option(json_option(quiet_option(function)))

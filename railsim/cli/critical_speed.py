@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.analysis import Folder, InputFiles, Inputs, Output, analysis_options, values_of
-from railsim.cli.common import Speed, echo, linearisation_options, names_of
+from railsim.cli.common import Speed, code_options, echo, linearisation_options, names_of
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -77,6 +77,7 @@ FILES = ("critical_speed.json", "critical_speed.png")
 @analysis_options(
     "critical_speed.json and .png; an interrupted map is continued", "scheme, creep law, contact"
 )
+@code_options
 def command(
     files: InputFiles,
     output: Output,

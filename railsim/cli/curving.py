@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from railsim.cli.analysis import Folder, InputFiles, Output, analysis_options, values_of
-from railsim.cli.common import names_of
+from railsim.cli.common import code_options, names_of
 from railsim.cli.progress import progress_bar
 
 FILES = ("curving.json", "curving.png")
@@ -27,6 +27,7 @@ FILES = ("curving.json", "curving.png")
 @click.option("--friction", metavar="MU,MU,... or A:B:N", help="Default: the track's.")
 @click.option("--track", metavar="F", help="Rails, gauge, inclination, support; default straight.")
 @analysis_options("curving.json and curving.png")
+@code_options
 def command(
     files: InputFiles,
     output: Output,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.analysis import Folder, InputFiles, Output, analysis_options, values_of
-from railsim.cli.common import Speed, linearisation_options, names_of
+from railsim.cli.common import Speed, code_options, linearisation_options, names_of
 from railsim.cli.progress import progress_bar
 from railsim.errors import Fault, InputError
 
@@ -61,6 +61,7 @@ CYCLE = {"frames": 40, "cycles": 1}
     help="Begin the animated page of --out with this mode, and call it mode.html.",
 )
 @analysis_options("modes.json, modes.png and, at one speed, modes.html with all modes animated")
+@code_options
 def command(
     files: InputFiles,
     output: Output,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import echo, names_of, output_options, print_json, show
+from railsim.cli.common import code_options, echo, names_of, output_options, print_json, show
 from railsim.cli.progress import progress_bar
 from railsim.processes import begin_server
 
@@ -44,6 +44,7 @@ MOST_ROWS = 15
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler to run on.")
 @click.option("--resume", is_flag=True, help="Continue in DIR although STUDY has changed.")
 @output_options
+@code_options
 def command(
     study: str,
     out: str,

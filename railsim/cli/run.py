@@ -8,6 +8,7 @@ import click
 
 from railsim.cli.common import (
     Speed,
+    code_options,
     json_option,
     load_option,
     names_of,
@@ -55,6 +56,7 @@ MOST_CURVES = 3  # with a table each; more are listed, one line each
 @click.option("--check-step", is_flag=True, help="Run again at half the step and compare peaks.")
 @json_option
 @quiet_option
+@code_options
 def command(
     vehicle: str,
     track: str,

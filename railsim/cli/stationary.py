@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from railsim.cli.common import load_option, output_options, set_option
+from railsim.cli.common import code_options, load_option, output_options, set_option
 
 if TYPE_CHECKING:
     from railsim.studies.stationary import Stationary
@@ -28,6 +28,7 @@ FILES = ("stationary.json", "stationary.png")
 @load_option
 @set_option
 @output_options
+@code_options
 def command(
     vehicle: str,
     cant: float | None,

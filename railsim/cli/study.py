@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from railsim.cli.common import (
+    code_options,
     echo,
     json_option,
     load_option,
@@ -144,6 +145,7 @@ def _is_number(text: str) -> bool:
 @click.option("--report", is_flag=True, help="Write report.html into DIR, see `railsim report`.")
 @json_option
 @quiet_option
+@code_options
 def command(
     file: str | None,
     vehicles: tuple[str, ...],

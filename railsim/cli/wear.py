@@ -9,6 +9,7 @@ import click
 
 from railsim.cli.common import (
     Speed,
+    code_options,
     echo,
     load_option,
     names_of,
@@ -60,6 +61,7 @@ settings_option = click.option(
 @load_option
 @set_option
 @output_options
+@code_options
 def command(
     vehicle: str,
     routes: tuple[tuple[str, float, float], ...],

@@ -43,6 +43,15 @@ class Law(Definition):
         return self
 
 
+class LawUse(Definition):
+    """A law with the values of its parameters."""
+
+    law: Name
+    """Name of the law in the table `laws`"""
+    parameters: dict[Name, Finite] = Field(default_factory=dict)
+    """Values of the function's further arguments, by name"""
+
+
 BODY_SIGNALS = ("displacement", "velocity", "acceleration", "angle", "angular_velocity")
 ELEMENT_SIGNALS = ("deflection", "rate", "force", "power")
 WHEEL_SIGNALS = ("wheel_speed", "Q", "Y")

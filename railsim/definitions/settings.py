@@ -1,6 +1,6 @@
 """Settings files, `railsim-settings/1`: how a run is computed and what it outputs."""
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -8,6 +8,7 @@ from railsim.definitions.base import (
     Definition,
     Finite,
     Flag,
+    Name,
     NonNegative,
     Positive,
     Speed,
@@ -16,6 +17,8 @@ from railsim.definitions.base import (
 )
 from railsim.definitions.creep_law import CreepLawName
 from railsim.definitions.file_definition import FileDefinition
+from railsim.definitions.laws import Law, LawUse, with_sources
+from railsim.errors import Fault
 
 SpeedRows = Annotated[tuple[tuple[Finite, Speed], ...], Field(min_length=1), rises("first column")]
 Step = Annotated[Finite, Field(ge=1e-6, le=0.1)]
@@ -154,6 +157,13 @@ class Settings(FileDefinition):
     """Cells of a contact patch along and across"""
     creep_law: CreepLawName = "fastsim"
     """Law of the creep forces; `table` is the full theory, tabulated"""
+    laws: dict[Name, Law] | None = None
+    """Laws of one's own by name: Python functions, executed by permission alone"""
+    own_creep_law: LawUse | None = None
+    """Creep law of one's own, instead of `creep_law`"""
+    own_friction: LawUse | None = None
+    """Factor of the friction over the slip velocity by a law of one's own, instead of the track's
+    `friction_falling`"""
     adhesion_curve: AdhesionRows | None = None
     """Measured curve of the law `adhesion_curve`: rows [creepage, T/(mu N)] from [0, 0] on, linear
     in between, constant beyond [1]"""
@@ -174,6 +184,11 @@ class Settings(FileDefinition):
     """Further quantities in the result"""
     initial: dict[str, InitialState] = Field(default_factory=dict)
     """Disturbance at the start by the body's full name"""
+
+    @classmethod
+    def complete(cls, tables: dict[str, Any]) -> list[Fault]:
+        """Put the sources of laws into the tables."""
+        return with_sources(tables)
 
     @model_validator(mode="after")
     def _physical(self) -> Self:

@@ -46,6 +46,7 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails
+from railsim.model.contact_laws import with_own_laws
 from railsim.model.element_arrays import ElementArrays, LawBlocks
 from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
 from railsim.model.work import CONSTANT_SPEED, NO_CONTROLLERS, NO_SIGNALS
@@ -67,10 +68,8 @@ class Index:
         All bodies: rigid ones, wheelsets from the leading end, axleboxes.
     wheelsets : tuple of str
         Names of the wheelsets.
-    links, mounts, actuators : tuple of str
-        Names of the elements in `System.links`, `System.mounts` and `System.actuators`.
-    signals, controllers : tuple of str
-        Names of what is measured in a run, and of what follows from it.
+    links, mounts, actuators, signals, controllers : tuple of str
+        Names of the rows of these parts of the system.
     """
 
     bodies: tuple[str, ...]
@@ -151,7 +150,7 @@ def assemble(
     shared : SharedTables, optional
         Tables of other models with the same track, settings and profiles; takes those made now.
     execute : bool
-        Compile laws of one's own, which needs permission; without, their elements are left out.
+        Compile laws of one's own, by permission; without, elements with laws are left out.
 
     Returns
     -------
@@ -159,12 +158,9 @@ def assemble(
 
     Raises
     ------
-    InputError
-        A profile cannot be read.
-    TypeError
-        Something else than a vehicle, a track, profiles by name.
-    ModelError
-        The wheels do not fit on the rails.
+    InputError : a profile cannot be read, a law is not permitted or cannot be compiled.
+    TypeError : something else than a vehicle, a track, profiles by name.
+    ModelError : the wheels do not fit on the rails.
     """
     check_types([vehicle], track)
     flat = flatten(vehicle)
@@ -174,6 +170,7 @@ def assemble(
     if shared.track is None:
         shared.track = track_tables(track)
     contact, tables = _contact(flat, track, settings, book, shared.contact)
+    contact = with_own_laws(contact, settings) if execute else contact
     system, index = _suspension(flat, (vehicle.laws or {}) if execute else None)
     system = system._replace(
         track=shared.track,

@@ -168,10 +168,10 @@ def state_before(
     return np.array(resume.groups["state"]["end"])
 
 
-def own_speed(before: Floats, speed: float | None, start: float) -> tuple[float, float]:
+def own_speed(before: Floats, speed: float | str | None, start: float) -> tuple[float, float]:
     """Speed and position of a state in which a run goes on, which gives them alone."""
     own = {"speed": float(before[-1]), "start": float(before[-2])}
-    for name, given in (("speed", speed), ("start", start or None)):
+    for name, given in (("speed", speed_in_si(speed)), ("start", start or None)):
         if given is not None and given != own[name]:
             found, allowed = "given together with `resume`", "the state's own is used"
             raise InputError([argument_fault(name, "", found, allowed)])

@@ -91,7 +91,7 @@ class Simulation:
         vehicle: Vehicle,
         track: Track,
         *,
-        speed: float | None = None,
+        speed: float | str | None = None,
         start: float = 0.0,
         duration: float | None = None,
         until: float | None = None,

@@ -1,0 +1,40 @@
+"""Creep and friction laws of one's own as the arrays of a contact."""
+
+import numpy as np
+
+from railsim.definitions.laws import LawUse
+from railsim.definitions.settings import Settings
+from railsim.errors import Fault, InputError, nearest
+from railsim.kernels.creep import OWN
+from railsim.kernels.own_laws import CREEP_GIVES, CREEP_TAKES, FRICTION_GIVES, FRICTION_TAKES
+from railsim.kernels.system import Contact
+from railsim.laws import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
+
+
+def with_own_laws(contact: Contact, settings: Settings) -> Contact:
+    """Return the contact with the laws of one's own that the settings name.
+
+    Raises
+    ------
+    InputError
+        A name that means nothing; a law that is not permitted or cannot be compiled.
+    """
+    if settings.own_creep_law is not None:
+        bound, values = _bound(settings, settings.own_creep_law, "own_creep_law", CREEP_LAW)
+        block = np.array([0.0] * (CREEP_GIVES + CREEP_TAKES) + values)
+        law = contact.law._replace(number=OWN, own=bound.address, block=block)
+        contact = contact._replace(law=law)
+    if settings.own_friction is not None:
+        bound, values = _bound(settings, settings.own_friction, "own_friction", FRICTION_LAW)
+        block = np.array([0.0] * (FRICTION_GIVES + FRICTION_TAKES) + values)
+        contact = contact._replace(friction_law=bound.address, friction_block=block)
+    return contact
+
+
+def _bound(settings: Settings, use: LawUse, key: str, takes: Takes) -> tuple[Bound, list[float]]:
+    laws = settings.laws or {}
+    if use.law not in laws:
+        allowed = nearest(use.law, laws) if laws else "there is none"
+        raise InputError([Fault("settings", f"{key}.law", f"no law '{use.law}'", allowed)])
+    bound = bind(use.law, laws[use.law], takes)
+    return bound, bound.parameters(f"{key}.parameters", use.parameters)

@@ -1,0 +1,228 @@
+"""Laws of one's own: what they compute, when they are executed, how they fail."""
+
+import os
+
+import numpy as np
+import pytest
+
+import railsim
+from railsim import laws
+from railsim.errors import InputError
+
+SOURCE = """
+from math import nan
+
+
+def half(x):
+    return 0.5 * x
+
+
+def damper(deflection, rate, c=30e3):
+    return 2.0 * half(c * rate)
+
+
+def maxwell(deflection, rate, state_f, c, k):
+    return state_f, k * (rate - state_f / c)
+
+
+def late(deflection, rate, time):
+    return nan if time > 0.1 else 0.0
+
+
+def raises(deflection, rate):
+    if rate > 1.0:
+        raise ValueError("too fast")
+    return 0.0
+
+
+def two(deflection, rate):
+    return 0.0, 1.0
+
+
+def words(deflection, rate):
+    return str(rate)
+
+
+def sky(time, v, c, memory):
+    memory[0] += 1.0
+    return -c * v
+
+
+print("executed")
+"""
+PUSHED = {"carbody": {"vy": 0.3, "vroll": 0.1}, "front.inner.wheelset": {"y": 2e-3}}
+SETTINGS = railsim.Settings(initial=PUSHED, outputs={"elements": ["push"]})
+ENDS = {"bodies": ["carbody", "front.frame"], "points": [[9.5, 0.0, -0.9], [9.5, 0.9, -0.9]]}
+WAY = {"speed": 20.0, "until": 10.0, "settings": SETTINGS}
+SWAY = {"quantity": "velocity", "body": "carbody", "axis": "y"}
+NAMES = ("damper", "maxwell", "late", "raises", "two", "words", "sky")
+
+
+@pytest.fixture(autouse=True)
+def nothing_permitted(monkeypatch):
+    monkeypatch.delenv(laws.PERMITTED, raising=False)
+
+
+@pytest.fixture(scope="module")
+def coach():
+    return railsim.load_vehicle("coach_manchester")
+
+
+@pytest.fixture(scope="module")
+def track():
+    return railsim.load_track("curve_r250").with_values({"friction": 0.3})
+
+
+def with_element(coach, element, **tables):
+    known = {name: {"source": SOURCE, "file": "mine.py"} for name in NAMES}
+    elements = {**dict(coach.elements), "push": {**ENDS, **element}}
+    return coach.replace(elements=elements, laws=known, **tables)
+
+
+def law(name, **parameters):
+    return {"kind": "law", "law": name, "parameters": parameters}
+
+
+def test_a_law_is_the_built_in_element(coach, track):
+    """F = c v, as a spring_damper: to round-off."""
+    laws.allow()
+    own = railsim.simulate(with_element(coach, law("damper")), track, **WAY)
+    damper = {"kind": "spring_damper", "damping": 30e3}
+    built_in = railsim.simulate(with_element(coach, damper), track, **WAY)
+    scale = np.max(np.abs(built_in["element_force"]))
+    assert scale > 1e3
+    assert np.allclose(own["element_force"], built_in["element_force"], atol=1e-9 * scale)
+
+
+def test_states_of_a_law_are_integrated(coach, track):
+    """A Maxwell damper by its differential equation; the reference scheme, order 4."""
+    laws.allow()
+    way = WAY | {"settings": SETTINGS.with_values({"scheme": "rk4"}), "until": 4.0}
+    own = railsim.simulate(with_element(coach, law("maxwell", c=30e3, k=3e6)), track, **way)
+    element = {"kind": "spring_damper", "damping": 30e3, "series_stiffness": 3e6}
+    built_in = railsim.simulate(with_element(coach, element), track, **way)
+    scale = np.max(np.abs(built_in["element_force"]))
+    assert np.allclose(own["element_force"], built_in["element_force"], atol=1e-6 * scale)
+
+
+def skyhook(coach, **signal):
+    signals = {"sway": {**SWAY, **signal}}
+    controllers = {
+        "sky": {
+            "law": "sky",
+            "period": 0.005,
+            "inputs": {"v": "sway"},
+            "outputs": ["push"],
+            "parameters": {"c": 20e3},
+            "memory": 1,
+        }
+    }
+    actuator = {"kind": "actuator"}
+    return with_element(coach, actuator, signals=signals, controllers=controllers)
+
+
+def test_a_controller_holds_what_it_read(coach, track):
+    """Each command is the law of what the signal was, from the next step on."""
+    laws.allow()
+    settings = SETTINGS.with_values({"output_rate": 200.0})
+    result = railsim.simulate(skyhook(coach), track, **WAY | {"settings": settings})
+    body = result["body_velocity"][:, 0, 1]
+    force = result["element_force"][:, 0, 0]
+    assert result.attributes["step"] == pytest.approx(0.005 / 3)
+    # an output stands at the begin of its step, before the command that follows from it
+    assert np.allclose(force[1:], -20e3 * body[:-1], rtol=1e-12)
+
+
+def test_a_controller_steps_as_it_runs(coach, track):
+    laws.allow()
+    vehicle = skyhook(coach, rate=100.0, delay=0.015, noise=0.01, resolution=1e-4)
+    whole = railsim.simulate(vehicle, track, **WAY)
+    with railsim.Simulation(vehicle, track, **WAY) as sim:
+        sim.step(0.1)
+        saved = sim.state
+        while sim.step(0.05):
+            pass
+        stepped = sim.result()
+    assert np.array_equal(whole["element_force"], stepped["element_force"])
+    again = railsim.Simulation(vehicle, track, **WAY | {"until": 9.0}, record=False)
+    again.state = saved
+    again.step(0.1)
+    at = int(np.argmin(np.abs(whole["time"] - again.time)))
+    assert np.array_equal(again.read("element_force"), whole["element_force"][at])
+
+
+def test_signals_are_sampled_late_and_in_steps(coach, track):
+    """Sample k is the value at k T, known after the delay; noise has its deviation."""
+    plain = skyhook(coach)
+    signals = {
+        "now": SWAY,
+        "late": {**SWAY, "rate": 100.0, "delay": 0.03},
+        "coarse": {**SWAY, "resolution": 0.01},
+        "loud": {"quantity": "time", "rate": 500.0, "noise": 2.0, "seed": 3},
+    }
+    vehicle = plain.replace(signals=signals, controllers=None)
+    sim = railsim.Simulation(vehicle, track, **WAY | {"until": 60.0}, record=False)
+    seen = []
+    while sim.time < 2.4:
+        sim.step(0.005)
+        seen.append([sim.time, *(sim.read(name) for name in signals)])
+    time, now, late, coarse, loud = np.array(seen).T
+    assert np.allclose(coarse, 0.01 * np.round(now / 0.01), atol=1e-9)
+    whole = np.isclose(time * 100.0, np.round(time * 100.0), atol=1e-6)
+    assert np.allclose(late[whole][3:], now[whole][:-3], atol=1e-12)
+    noise = loud - time
+    assert abs(np.std(noise) - 2.0) < 0.25
+    assert abs(np.mean(noise)) < 0.3
+
+
+def test_values_that_are_not_finite_end_the_run(coach, track):
+    laws.allow()
+    result = railsim.simulate(with_element(coach, law("late")), track, **WAY)
+    assert result.status == "stopped"
+    reason = result.attributes["status_reason"]
+    assert reason.startswith("the law of element push gave a value that is not finite at 0.10")
+    assert len(result["time"]) > 10
+
+
+@pytest.mark.parametrize(
+    ("element", "words"),
+    [
+        (law("raises"), r"mine.py: line 23: the law 'raises' cannot 'raise' an error"),
+        (law("two"), "the law 'two' returns 2 values; 1 as a force element"),
+        (law("words"), "the law 'words' (returns|cannot be compiled)"),
+        (law("maxwell", c=1.0), "no value for 'k', an argument of the law 'maxwell'"),
+        (law("damper", d=1.0), "the law 'damper' has no argument 'd'; allowed: c"),
+        (law("demper"), "no law 'demper'"),
+    ],
+)
+def test_faults_are_one_line(coach, track, element, words):
+    laws.allow()
+    with pytest.raises(InputError, match=words) as raised:
+        railsim.simulate(with_element(coach, element), track, **WAY)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_nothing_is_executed_without_permission(coach, track, capsys):
+    vehicle = with_element(coach, law("damper"))
+    assert vehicle.to_toml().count("executed") == len(NAMES)
+    railsim.describe(vehicle)
+    railsim.static_loads(vehicle)
+    with pytest.raises(InputError, match=r"'damper' is code of mine.py.*--allow-code"):
+        railsim.simulate(vehicle, track, **WAY)
+    assert "executed" not in capsys.readouterr().out
+    laws._bound.clear()
+    laws.allow(SOURCE)
+    railsim.Simulation(vehicle, track, **WAY)
+    assert "executed" in capsys.readouterr().out
+    laws.allow("other")
+    assert os.environ[laws.PERMITTED].count(",") == 1
+
+
+def test_a_controller_faster_than_the_step_of_the_settings(coach, track):
+    laws.allow()
+    settings = SETTINGS.with_values({"step": 0.00125, "output_rate": 100.0})
+    vehicle = skyhook(coach).with_values({"controllers.sky.period": 0.001})
+    with pytest.raises(InputError, match=r"controllers.sky.period: found 0.001 s, shorter"):
+        railsim.simulate(vehicle, track, **WAY | {"settings": settings})
+    free = railsim.Simulation(vehicle, track, **WAY)
+    assert free.step_length == pytest.approx(0.001)
