@@ -132,15 +132,17 @@ def _allow_files(ctx: click.Context, param: click.Parameter, files: tuple[str, .
         allow(*(read_text(file, DEFINITION_BYTES) for file in files))
 
 
+allow_code_option = click.option(
+    "--allow-code",
+    is_flag=True,
+    expose_value=False,
+    callback=_allow_code,
+    help="Execute the Python code of laws that the files name.",
+)
+
+
 def code_options(function: F) -> F:
     """Add ``--allow-code`` and ``--law``, which permit laws of one's own."""
-    everything = click.option(
-        "--allow-code",
-        is_flag=True,
-        expose_value=False,
-        callback=_allow_code,
-        help="Execute the Python code of laws that the files name.",
-    )
     files = click.option(
         "--law",
         multiple=True,
@@ -149,7 +151,7 @@ def code_options(function: F) -> F:
         callback=_allow_files,
         help="Execute the laws of this file; may be given several times.",
     )
-    return everything(files(function))
+    return allow_code_option(files(function))
 
 
 def output_options(function: F) -> F:

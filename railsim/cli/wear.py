@@ -9,7 +9,7 @@ import click
 
 from railsim.cli.common import (
     Speed,
-    code_options,
+    allow_code_option,
     echo,
     load_option,
     names_of,
@@ -61,7 +61,7 @@ settings_option = click.option(
 @load_option
 @set_option
 @output_options
-@code_options
+@allow_code_option
 def command(
     vehicle: str,
     routes: tuple[tuple[str, float, float], ...],

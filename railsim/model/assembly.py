@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from railsim.constants import CANT_BASE, GRAVITY
 from railsim.contact.coupling import coupling
-from railsim.contact.creep import creep_law
 from railsim.contact.kalker import creep_tables
 from railsim.contact.stored_table import cached_contact_table
 from railsim.contact.table import ContactTable
@@ -28,7 +27,6 @@ from railsim.definitions.track import Track
 from railsim.definitions.vehicle import Vehicle
 from railsim.errors import Fault, InputError, ModelError
 from railsim.kernels.aligned import CACHE_LINE, aligned
-from railsim.kernels.patches import CreepLaw
 from railsim.kernels.support import SUPPORT_ROW, SUPPORT_SIZE
 from railsim.kernels.system import (
     AXLEBOX,
@@ -46,7 +44,7 @@ from railsim.kernels.system import (
 )
 from railsim.kernels.track_frame import TrackTables
 from railsim.model.check_rails import NONE, CheckRails, check_rails
-from railsim.model.contact_laws import with_own_laws
+from railsim.model.contact_laws import settings_creep_law, with_own_laws
 from railsim.model.element_arrays import ElementArrays, LawBlocks
 from railsim.model.uneven_wheels import ROUND, UnevenWheels, uneven_wheels
 from railsim.model.work import CONSTANT_SPEED, NO_CONTROLLERS, NO_SIGNALS
@@ -472,7 +470,7 @@ def _contact(
         w=first.w,
         damping=settings.contact_damping,
         kalker=creep_tables(settings.poisson),
-        law=_creep_law(settings, track),
+        law=settings_creep_law(settings, track),
         friction_rest=falling.rest if falling else 1.0,
         friction_decay=falling.decay if falling else 0.0,
         **ROUND._asdict(),
@@ -481,26 +479,3 @@ def _contact(
         friction_block=np.zeros(0),
     )
     return contact, tuple(tables)
-
-
-def _creep_law(settings: Settings, track: Track) -> CreepLaw:
-    """Creep law of the settings with the third body of the track."""
-    if settings.adhesion_curve is not None and track.third_body != (1.0, 1.0):
-        raise InputError(
-            [
-                Fault(
-                    "track",
-                    "third_body",
-                    f"found {list(track.third_body)} together with settings.adhesion_curve",
-                    "[1.0, 1.0]: a measured curve holds the third body",
-                )
-            ]
-        )
-    return creep_law(
-        settings.creep_law,
-        settings.fastsim_grid,
-        settings.shear_modulus,
-        settings.poisson,
-        track.third_body,
-        settings.adhesion_curve,
-    )

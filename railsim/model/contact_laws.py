@@ -1,14 +1,40 @@
-"""Creep and friction laws of one's own as the arrays of a contact."""
+"""Creep and friction laws of the settings, one's own too, as the arrays of a contact."""
 
 import numpy as np
 
+from railsim.contact.creep import creep_law
 from railsim.definitions.laws import LawUse
 from railsim.definitions.settings import Settings
+from railsim.definitions.track import Track
 from railsim.errors import Fault, InputError, nearest
 from railsim.kernels.creep import OWN
 from railsim.kernels.own_laws import CREEP_GIVES, CREEP_TAKES, FRICTION_GIVES, FRICTION_TAKES
+from railsim.kernels.patches import CreepLaw
 from railsim.kernels.system import Contact
 from railsim.laws import CREEP_LAW, FRICTION_LAW, Bound, Takes, bind
+
+
+def settings_creep_law(settings: Settings, track: Track) -> CreepLaw:
+    """Creep law of the settings with the third body of the track."""
+    if settings.adhesion_curve is not None and track.third_body != (1.0, 1.0):
+        raise InputError(
+            [
+                Fault(
+                    "track",
+                    "third_body",
+                    f"found {list(track.third_body)} together with settings.adhesion_curve",
+                    "[1.0, 1.0]: a measured curve holds the third body",
+                )
+            ]
+        )
+    return creep_law(
+        settings.creep_law,
+        settings.fastsim_grid,
+        settings.shear_modulus,
+        settings.poisson,
+        track.third_body,
+        settings.adhesion_curve,
+    )
 
 
 def with_own_laws(contact: Contact, settings: Settings) -> Contact:
