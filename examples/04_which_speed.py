@@ -26,11 +26,12 @@ for row in zip(kmh, forces / 1e3, quotient, 100.0 * unloading, strict=True):
 with styled():
     figure, axes = plt.subplots(1, 3, figsize=(10.0, 3.2), layout="constrained", sharex=True)
     for one, values, limit, label in (
-        (axes[0], forces / 1e3, prudhomme / 1e3, r"$|\Sigma Y|$, largest (kN)"),
-        (axes[1], quotient, 0.8, "$Y/Q$, largest"),
-        (axes[2], -100.0 * unloading, 60.0, r"unloading $-\Delta Q/Q_0$, largest (%)"),
+        (axes[0], forces / 1e3, prudhomme / 1e3, r"largest $|\Sigma Y|$ (kN)"),
+        (axes[1], quotient, 0.8, "largest $Y/Q$"),
+        (axes[2], -100.0 * unloading, 60.0, r"largest $-\Delta Q/Q_0$ (%)"),
     ):
         one.plot(kmh, values, marker="o")
         one.axhline(limit, color=LIMIT, ls="--")
-        one.set(xlabel="speed (km/h)", title=label, ylim=(0.0, None))
+        one.set(xlabel="$V$ (km/h)", ylabel=label, ylim=(0.0, None))
+    figure.suptitle("Manchester coach, R 250 m, cant 150 mm; dashed: limits")
     figure.savefig("04_which_speed.png")

@@ -32,6 +32,7 @@ with styled():
             print(f"{label}: stable up to {speeds[-1]:g} m/s")
         axes.plot(speeds, 100.0 * damping, marker="o", label=label)
     axes.axhline(0.0, color=LIMIT, ls="--")
-    axes.set(xlabel="speed (m/s)", ylabel="least damping ratio (%)", title="Manchester coach")
+    axes.set(xlabel="$V$ (m/s)", ylabel=r"least damping ratio $\zeta$ (%)")
+    axes.set_title("Manchester coach, straight track")
     axes.legend()
     figure.savefig("05_when_does_it_hunt.png")

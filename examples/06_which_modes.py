@@ -13,4 +13,6 @@ modes = railsim.modes(coach, speed=30.0)
 for mode in modes.oscillations[:12]:
     print(f"{mode.name:28} {mode.frequency:6.3f} Hz   damping {100.0 * mode.damping_ratio:5.1f} %")
 
-figure = modes.plot("06_which_modes.png", title="Manchester coach at 30 m/s", overwrite=True)
+figure = modes.plot(
+    "06_which_modes.png", title="Manchester coach, straight track, 30 m/s", overwrite=True
+)

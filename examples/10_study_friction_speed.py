@@ -31,6 +31,7 @@ with styled():
         quotients = [railsim.peaks(run, ["Y_over_Q"])[0].value for run in runs]
         print(f"friction {friction}: Y/Q", [round(value, 3) for value in quotients])
         axes.plot([run.speed for run in runs], quotients, marker="o", label=rf"$\mu$ = {friction}")
-    axes.set(xlabel="speed (m/s)", ylabel="$Y/Q$, largest", ylim=(0.0, None))
+    axes.set(xlabel="$V$ (m/s)", ylabel="largest $Y/Q$", ylim=(0.0, None))
+    axes.set_title("Manchester coach, R 250 m, cant 150 mm")
     axes.legend()
     figure.savefig("10_study_friction_speed.png")

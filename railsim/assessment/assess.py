@@ -57,7 +57,7 @@ class Assessment:
     comfort : dict
         Comfort at the measuring points, by run.
     driven : dict
-        Speed [m/s] and rails in words, by run, for comfort.
+        Speed [m/s], track and what displaces its rails in words, by run, for comfort.
     wear : dict
         Wear of the wheels, by run.
     safety : dict
@@ -78,7 +78,7 @@ class Assessment:
     hunting_frequency: float | None = None
     influences: tuple[Influence, ...] = ()
     comfort: Mapping[str, Sequence[PointComfort]] = field(default_factory=dict)
-    driven: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    driven: Mapping[str, tuple[float, str, str]] = field(default_factory=dict)
     wear: Mapping[str, Sequence[WheelWear]] = field(default_factory=dict)
     safety: Mapping[str, SafetyReport] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
@@ -267,12 +267,12 @@ def _other(
         remarks.append(f"classes of {classes.edition} not checked against the printed standard")
     return Assessment(
         vehicle, standard, names, comfort=comfort, remarks=tuple(dict.fromkeys(remarks)),
-        limits=classes, driven={name: (r.speed, _rails(r)) for name, r in runs.items()},
+        limits=classes, driven={name: (r.speed, *_rails(r)) for name, r in runs.items()},
     )  # fmt: skip
 
 
-def _rails(result: Result) -> str:
+def _rails(result: Result) -> tuple[str, str]:
     """Track and what displaces its rails, in words."""
     track = result.track()
     words = "; ".join(part.summary() for part in track.irregularities[:2])
-    return f"{track.name}, {words or 'smooth rails'}"
+    return track.name, words or "smooth rails"

@@ -42,7 +42,7 @@ def run_campaign(
         from railsim.cli.report import write_report
 
         page = Path(out) / "report.html"
-        write_report([out], page)
+        write_report([out], page, assessments=done.assessments)
         written.append(page)
     if as_json:
         print_json({

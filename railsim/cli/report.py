@@ -11,6 +11,7 @@ from railsim.cli.common import output_options, report_file
 from railsim.files import check_file, whole_file
 
 if TYPE_CHECKING:
+    from railsim.assessment import Assessment
     from railsim.report.inputs import Used
 
 ENDINGS = (".html", ".htm")
@@ -56,9 +57,14 @@ def command(
 
 
 def write_report(
-    files: Sequence[str], path: Path, *, title: str | None = None, curves: int = 8
+    files: Sequence[str],
+    path: Path,
+    *,
+    title: str | None = None,
+    curves: int = 8,
+    assessments: "Sequence[Assessment]" = (),
 ) -> None:
-    """Write the page about result files and folders of studies."""
+    """Write the page about result files and folders of studies, and assessments of a scenario."""
     from railsim.cli.gathered import folder_of, gather
     from railsim.report.runs import page
     from railsim.report.spread import worst_runs
@@ -76,7 +82,14 @@ def write_report(
     every = found.results([record["name"] for record in with_files])
     used = [] if results or not found.inputs else _used(folder_of(files[0]))
     text = page(
-        title or names + more, found.records, results, found.remarks, every, found.inputs, used
+        title or names + more,
+        found.records,
+        results,
+        found.remarks,
+        every,
+        found.inputs,
+        used,
+        assessments,
     )
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")

@@ -30,7 +30,7 @@ def assessment_figure(assessments: Sequence[Assessment]) -> Figure | None:
         if any(a.zones for a in assessments):
             return _limits_figure(assessments)
         if any(a.comfort for a in assessments):
-            speeds = {speed for a in assessments for speed, _ in a.driven.values()}
+            speeds = {speed for a in assessments for speed, _, _ in a.driven.values()}
             over = _comfort_over_speed if len(speeds) >= LEAST_SPEEDS else _comfort_figure
             return over(assessments)
         if any(a.wear for a in assessments):
@@ -217,17 +217,17 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
     """
     figure = Picture(figsize=(10.2, 4.4), layout="constrained")
     mean, index = figure.subplots(1, 2)
-    kinds: dict[tuple[str, str], list[tuple[float, Sequence[PointComfort]]]] = {}
+    kinds: dict[tuple[str, str, str], list[tuple[float, Sequence[PointComfort]]]] = {}
     for a in assessments:
         for run, points in a.comfort.items():
-            speed, rails = a.driven[run]
-            kinds.setdefault((a.vehicle, rails), []).append((3.6 * speed, points))
-    vehicles, tracks = ({key[k]: None for key in kinds} for k in (0, 1))
-    for number, ((vehicle, rails), runs) in enumerate(kinds.items()):
-        words = [vehicle] * (len(vehicles) > 1) + [rails] * (len(tracks) > 1)
+            speed, *where = a.driven[run]
+            kinds.setdefault((a.vehicle, *where), []).append((3.6 * speed, points))
+    several = [len({key[k] for key in kinds}) > 1 for k in range(3)]  # vehicles, tracks, rails
+    for number, (key, runs) in enumerate(kinds.items()):
+        words = [word for word, differs in zip(key, several, strict=True) if differs]
         colour = DISTINCT[number % len(DISTINCT)]
         runs.sort(key=lambda run: run[0])
-        label = ", ".join(words) or "middle of the car"
+        label = unformatted(", ".join(words)) or "middle of the car"
         _over_speed(mean, runs, lambda p: p.mean.N_MV, "-", color=colour, label=label)
         for way, line in (("lateral", "-"), ("vertical", "--")):
             _over_speed(index, runs, lambda p, way=way: p.sperling[way], line, color=colour)
@@ -242,7 +242,7 @@ def _comfort_over_speed(assessments: Sequence[Assessment]) -> Figure:
                Line2D([], [], label="$W_z$ lateral", **look),
                Line2D([], [], label="$W_z$ vertical", **look | {"ls": "--"})]  # fmt: skip
     figure.legend(handles=handles, loc="outside right upper")
-    title = [*vehicles, *tracks] if len(vehicles) == len(tracks) == 1 else list(vehicles)
+    title = list(dict.fromkeys(key[k] for k in (0, 1) for key in kinds))
     figure.suptitle("\n".join(map(unformatted, title[:4])), x=0.012, ha="left")
     return figure
 
@@ -304,7 +304,7 @@ def _comfort_figure(assessments: Sequence[Assessment]) -> Figure:
     handles = [handle for ax in (mean, index) for handle in ax.get_legend_handles_labels()[0]]
     figure.legend(handles=handles, loc="outside right upper")
     names = [a.vehicle for a in assessments]
-    names += [rails for a in assessments for _, rails in a.driven.values()]
+    names += [track for a in assessments for _, track, _ in a.driven.values()]
     figure.suptitle("\n".join(map(unformatted, list(dict.fromkeys(names))[:4])), x=0.012, ha="left")
     return figure
 

@@ -5,15 +5,20 @@ The page loads no other files; its plots are drawn by uPlot (`vendor/`).
 """
 
 import re
+from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from markupsafe import Markup
 
+from railsim.assessment.assess import RUNNING, Assessment
+from railsim.assessment.tables import tables
 from railsim.notation import QUANTITIES
 from railsim.page import rendered
+from railsim.plot.assessment import assessment_figure
 from railsim.report.curves import cells_of, curve_data, groups
+from railsim.report.document import as_png
 from railsim.report.inputs import Used, inputs_of, what_was_run
 from railsim.report.limits import assessed
 from railsim.report.published import beside_published
@@ -27,7 +32,7 @@ from railsim.report.spread import (
     spread_rows,
     worst_rows,
 )
-from railsim.report.tables import Cell, Section, Table, day, listed
+from railsim.report.tables import Cell, Drawing, Section, Table, day, listed, of_values
 from railsim.result import Result
 from railsim.text import printable
 from railsim.version import __version__
@@ -44,6 +49,7 @@ def page(
     assessable: Mapping[str, Result] | None = None,
     inputs: Mapping[str, Any] | None = None,
     used: Sequence[Used] = (),
+    assessments: Sequence[Assessment] = (),
 ) -> str:
     """Return the page as HTML.
 
@@ -64,16 +70,20 @@ def page(
         Inputs of the study whose runs these are, as in its ``study.json``.
     used : sequence of Used
         What runs without results used, as the files are now.
+    assessments : sequence of Assessment
+        Those of a scenario; comfort, wear and safety are shown in sections of their own.
     """
     found = groups(results)
     cells = cells_of(found)
     curves = [curve_data(group, cells) for group in found]
     data: dict[str, Any] = {"curves": [group for group in curves if group["quantities"]]}
     limits = assessed(results if assessable is None else assessable)
-    sections = [_peaks(records, results)] if results or len(records) < LEAST else []
+    peaks = any(record["name"] in results for record in _done(records))
+    sections = [_peaks(records, results)] if peaks or len(records) < LEAST else []
+    sections += [_assessed(one) for one in assessments if one.standard not in RUNNING]
     if len(_done(records)) > max(LEAST, len(results)):
         sections.append(_worst(records))
-    if found:
+    if found and (data["curves"] or peaks):
         sections.append(_curves(len(data["curves"]), records, results))
     if limits.tables or limits.details:
         title_of = "Comparison with limits"
@@ -176,6 +186,21 @@ def _worst(records: Sequence[Record]) -> Section:
         "has the rest, and the command of each."
     )
     return Section("worst", "Worst runs", [text], tables=[table])
+
+
+def _assessed(assessment: Assessment) -> Section:
+    """An assessment of comfort, wear or safety: its picture and its tables, folded."""
+    section = Section(assessment.standard, f"Assessment: {assessment.standard}")
+    figure = assessment_figure([assessment])
+    if figure is not None:
+        code = b64encode(as_png(figure)).decode()
+        image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format("assessment", code)
+        section.drawings.append(Drawing(printable(assessment.vehicle), "", image))
+    section.details = [of_values(one, str(one.columns[0].heading)) for one in tables(assessment)]
+    if assessment.remarks:
+        rows = [[printable(remark)] for remark in assessment.remarks]
+        section.details.append(Table(["remark"], rows, "Remarks on these values"))
+    return section
 
 
 def _curves(number: int, records: Sequence[Record], results: Mapping[str, Result]) -> Section:

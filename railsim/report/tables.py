@@ -77,7 +77,7 @@ def of_values(table: values.Table, subject: str) -> Table:
     return Table(
         [column.heading for column in table.columns],
         table.texts(),
-        printable(f"{subject}: {table.caption}"),
+        printable(f"{subject}: {table.caption}" if table.caption else subject),
         words=frozenset(k for k, column in enumerate(table.columns) if not column.format),
     )
 

@@ -418,7 +418,7 @@ def test_comfort_is_drawn_over_the_speed_with_classes_and_a_legend_beside():
                              {"lateral": n, "vertical": n}, (), {})
                 for place, x, n in (("middle", 0.0, factor * speed / 20), ("end", 9.0, speed / 5))
             ]  # fmt: skip
-            driven[name] = (speed, rails)
+            driven[name] = (speed, "Straight", rails)
     made = Assessment("A coach", "comfort", tuple(comfort), comfort=comfort, driven=driven,
                       limits=load_comfort_limits("comfort"))  # fmt: skip
     figure = assessment_figure([made])
@@ -428,7 +428,8 @@ def test_comfort_is_drawn_over_the_speed_with_classes_and_a_legend_beside():
     np.testing.assert_allclose(high.get_ydata(), [2.0, 3.0, 4.0])
     classes = [text.get_text() for text in mean.texts]
     assert classes[:2] == ["very comfortable", "comfortable"]
-    assert figure.get_suptitle() == "A coach"
+    assert figure.get_suptitle() == "A coach\nStraight"
+    assert [line.get_label() for line in mean.lines] == ["low", "high"]
     figure.draw_without_rendering()
     legend = figure.legends[0].get_window_extent()
     assert all(legend.x0 >= axes.get_window_extent().x1 for axes in figure.axes)  # hides nothing

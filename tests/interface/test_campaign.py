@@ -212,6 +212,15 @@ def simulated(monkeypatch):
     return left
 
 
+def test_report_of_a_scenario_is_titled_by_its_name(tmp_path, simulated):
+    out = tmp_path / "comfort"
+    given = ["study", "--scenario", "comfort_speeds", "--vehicles", "coach_manchester", "--report"]
+    assert main([*given, "--out", str(out), "--workers", "1", "--quiet"]) == 0
+    text = (out / "report.html").read_text(encoding="utf-8")
+    assert "<h1>Comfort over speed</h1>" in text
+    assert "10 runs" in text
+
+
 def state(folder):
     return {run["name"]: run["status"] for run in json.loads(folder.read_text())["runs"]}
 
