@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse, Rectangle
 from numpy.typing import NDArray
 
 from railsim.contact.creep import creep_force
@@ -21,6 +22,9 @@ from railsim.plot.style import DISTINCT, Picture, styled
 Array = NDArray[np.float64]
 
 LAW_COLOURS = {name: DISTINCT[law.colour] for name, law in CREEP_LAWS.items()}
+STICK, HELD = "#2a6f97", "stick; elsewhere slip"
+DIRECTION = "direction of the traction on the rail"
+KEY = 0.3  # inch, for the key of the traction
 LARGEST = 5.0
 """End of the axis of normalised creepage."""
 
@@ -144,13 +148,13 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
     width = float(np.clip(3.2 * (reach_y / reach_x) ** 0.5, 1.6, 3.4))
     panel_height = width * reach_x / reach_y
     with styled():
-        height = rows * (panel_height + 0.75) + 0.25
+        height = rows * (panel_height + 0.75) + 0.25 + KEY
         figure = Picture(figsize=(columns * (width + 0.3) + 1.5, height))
         axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
         figure.subplots_adjust(
             left=0.55 / figure.get_figwidth(),
             right=1.0 - 0.95 / figure.get_figwidth(),
-            bottom=0.45 / height,
+            bottom=(0.45 + KEY) / height,
             top=1.0 - 0.45 / height,
             wspace=0.3 / width,
             hspace=0.75 / panel_height,
@@ -174,6 +178,12 @@ def traction_figure(solutions: Mapping[str, ExactCreepForce], friction_force: fl
             panel.set_ylabel("forward (mm)")
         bar = figure.add_axes((1.0 - 0.8 / figure.get_figwidth(), 0.2, 0.12 / width * 0.3, 0.6))
         figure.colorbar(image, cax=bar, label="traction on the rail (MPa)")
+        handles = [
+            Rectangle((0, 0), 1, 1, fc="none", ec=STICK, hatch="////", lw=0.0, label=HELD),
+            Line2D([], [], color="0.1", marker=r"$\rightarrow$", ms=14, ls="", label=DIRECTION),
+            Line2D([], [], color="0.2", lw=1.0, label="edge of the contact; leading edge above"),
+        ]  # fmt: skip
+        figure.legend(handles=handles, loc="lower left", ncols=3 if columns > 2 else 1, fontsize=8)
     return figure
 
 
@@ -203,7 +213,7 @@ def _draw_traction(panel: Axes, solution: ExactCreepForce, top: float) -> QuadMe
                 1e3 * border[held[-1] + 1],
                 1e3 * border[held[0]],
                 facecolor="none",
-                edgecolor="#2a6f97",
+                edgecolor=STICK,
                 hatch="////",
                 lw=0.0,
                 alpha=0.6,
