@@ -24,8 +24,11 @@ ARC_STEP = 1.5  # units of the arc length, about 1 mm or 1 m/s
 MOST_MOTIONS = 20  # of one branch
 FIRST = 0.2e-3  # m, amplitude at which a branch's first shape is taken
 FROM_END = 1.0  # m/s above the slow end of a branch of runs, where its motion is taken
+OBSERVED = 10.0  # s of a run that tells why none is periodic
 RUNS = ("up", "down", "further")  # branches of runs
-COVERED = 0.2  # relative difference of amplitudes within which a motion is on a known line
+COVERED = 0.2  # relative difference of amplitudes within which a motion is on a known line ...
+SAME = 0.03, 0.005  # ... and of amplitude and frequency within which it is the same motion
+APART = 0.01  # relative difference of frequencies with which two bogies hunt each for itself
 
 
 @dataclass
@@ -96,13 +99,24 @@ def followed_branches(
 
 
 def settled_to(branch: Branch, pieces: Sequence[Sequence[Point]]) -> Branch:
-    """The branch with the motions stable that runs settle to, whatever their multipliers."""
+    """The branch with the motions stable that runs settle to, whatever their multipliers.
+
+    Of contacts that come and go within a step difference quotients give no multipliers.  Amplitude
+    and frequency have to be those of the run: with the bogies in another phase a motion is another
+    one, and unstable as its multipliers say.
+    """
+
+    def settled(point: Point) -> bool:
+        return any(
+            abs(amplitude - point.amplitude) < SAME[0] * point.amplitude
+            and abs(frequency - point.frequency) < SAME[1] * point.frequency
+            for piece in pieces
+            for amplitude, frequency in _passed_at(piece, point.speed)
+        )
+
     return Branch(
         branch.direction,
-        [
-            replace(point, stable=point.stable or _is_covered(point, pieces))
-            for point in branch.points
-        ],
+        [replace(point, stable=point.stable or settled(point)) for point in branch.points],
     )
 
 
@@ -153,16 +167,19 @@ def _is_covered(point: Point, lines: Sequence[Sequence[Point]]) -> bool:
     return any(
         abs(amplitude - point.amplitude) < COVERED * point.amplitude
         for line in lines
-        for amplitude in _amplitudes_at(line, point.speed)
+        for amplitude, _ in _passed_at(line, point.speed)
     )
 
 
-def _amplitudes_at(line: Sequence[Point], speed: float) -> Iterator[float]:
-    """Amplitudes with which a line, which may turn back, passes a speed."""
+def _passed_at(line: Sequence[Point], speed: float) -> Iterator[tuple[float, float]]:
+    """Amplitudes and frequencies with which a line, which may turn back, passes a speed."""
     for before, after in pairwise(line):
         share = (speed - before.speed) / ((after.speed - before.speed) or np.inf)
         if 0.0 <= share <= 1.0:
-            yield before.amplitude + share * (after.amplitude - before.amplitude)
+            yield (
+                before.amplitude + share * (after.amplitude - before.amplitude),
+                before.frequency + share * (after.frequency - before.frequency),
+            )
 
 
 def _at(motion: VehicleMotion, seed: Point) -> tuple[Shooting, PeriodicMotion]:
@@ -176,9 +193,21 @@ def _at(motion: VehicleMotion, seed: Point) -> tuple[Shooting, PeriodicMotion]:
     try:
         return shooting, shooting.nearest(state, period, seed.speed)
     except ModelError:
-        raise ModelError(
-            "its motion is not periodic to the accuracy of shooting; its ends are those of the runs"
-        ) from None
+        raise ModelError(f"{_why(motion, seed)}; its ends are those of the runs") from None
+
+
+def _why(motion: VehicleMotion, seed: Point) -> str:
+    """Why no periodic motion was found near to that of a run."""
+    seen = motion.stretch(seed.state, seed.speed, seed.speed, OBSERVED)
+    travel = 0.5 * np.ptp(seen.lateral, axis=0)
+    rates = [
+        replace(seen, lateral=seen.lateral[:, [w]]).frequency
+        for w in np.flatnonzero(travel > FIRST)
+    ]
+    if np.ptp(rates) > APART * np.max(rates):
+        words = ", ".join(f"{rate:.2f}" for rate in rates)
+        return f"its motion is not periodic: the wheelsets hunt with {words} Hz"
+    return "its motion is not periodic to the accuracy of shooting"
 
 
 def _birth(motion: VehicleMotion, lost: LossOfStability) -> tuple[Shooting, PeriodicMotion]:

@@ -224,5 +224,8 @@ def test_pieces_of_a_branch_end_at_its_jumps():
     assert (slow[0].speed, slow[-1].speed, fast[0].speed) == (68.6, 71.0, 71.1)
     shot = Branch("continuation", [Point(69.0, 1.14e-3, 5.8, stable=False)])
     assert settled_to(shot, [slow, fast]).points[0].stable
+    # with the bogies in another phase: its own frequency, 10 % more amplitude, and unstable
+    other = [Point(69.0, 1.14e-3, 5.7, stable=False), Point(69.0, 1.25e-3, 5.8, stable=False)]
+    assert not any(p.stable for p in settled_to(Branch("continuation", other), [slow, fast]).points)
     shot = Branch("continuation", [Point(75.0, 4e-3, 5.0, stable=False)])
     assert not settled_to(shot, [slow, fast]).points[0].stable
