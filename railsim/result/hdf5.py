@@ -225,7 +225,7 @@ class Hdf5Sink(SinkContext):
                 _describe(_stored(self._file, name, frozen(statics[name])), quantity)
         for name, profile in profiles.items():
             _write_profile(self._file, name, profile)
-        for group, arrays in groups.items():
+        for group, arrays in _of_quantities(groups, self._quantities).items():
             for name, array in arrays.items():
                 _stored(self._file, f"{group}/{name}", frozen(array))
             if group == PEAKS:
@@ -271,23 +271,25 @@ def write(
         sink.begin(result.coordinates, selected.values())
         sink.append({name: result[name] for name in timed(selected)})
         statics = {name: result[name] for name in selected if "time" not in selected[name].dims}
-        sink.close(result.attributes, statics, result.profiles, _groups_of(result, selected))
+        sink.close(result.attributes, statics, result.profiles, result.groups)
     return sink.path
 
 
 register_writer("hdf5", lambda result, path, overwrite: write(result, path, overwrite=overwrite))
 
 
-def _groups_of(result: Result, selected: Mapping[str, Quantity]) -> dict[str, Mapping[str, Any]]:
-    """Return the groups of a result, with the peaks of selected quantities only."""
-    groups: dict[str, Mapping[str, Any]] = dict(result.groups)
-    if PEAKS in groups:
-        groups[PEAKS] = {
+def _of_quantities(
+    groups: Mapping[str, Mapping[str, Any]], quantities: Mapping[str, Quantity]
+) -> dict[str, Mapping[str, Any]]:
+    """Groups of a result, with the peaks of the quantities that it keeps only."""
+    kept: dict[str, Mapping[str, Any]] = dict(groups)
+    if PEAKS in kept:
+        kept[PEAKS] = {
             name: array
-            for name, array in groups[PEAKS].items()
-            if name.removesuffix("_time").removesuffix("_distance") in selected
+            for name, array in kept[PEAKS].items()
+            if name.removesuffix("_time").removesuffix("_distance") in quantities
         }
-    return {group: arrays for group, arrays in groups.items() if arrays}
+    return {group: arrays for group, arrays in kept.items() if arrays}
 
 
 def _stored(file: h5py.File, name: str, array: Any) -> h5py.Dataset:

@@ -6,6 +6,7 @@ import pytest
 import railsim
 from railsim.definitions.settings import Settings
 from railsim.errors import InputError
+from railsim.result.hdf5 import Hdf5Sink
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +93,16 @@ def test_requested_outputs_reach_the_file(result, tmp_path):
     stored = railsim.open_result(result.to_hdf5(tmp_path / "r.h5"))
     np.testing.assert_array_equal(stored.element_power, result.element_power)
     assert stored.coordinates["patch"] == ("tread", "flange root", "flange")
+
+
+def test_file_of_some_quantities_can_be_read_again(tmp_path):
+    """Written by the run itself: peaks of the quantities that it keeps, and of no others."""
+    outputs = {"outputs": {"quantities": ["Q", "Y"]}}
+    sink = Hdf5Sink(tmp_path / "kept.h5")
+    railsim.simulate(
+        railsim.load_vehicle("coach_manchester"), railsim.load_track("straight"), speed=20.0,
+        duration=1.0, settings=Settings.model_validate(outputs), sink=sink,
+    )  # fmt: skip
+    found = railsim.open_result(tmp_path / "kept.h5")
+    assert {"Q", "Y", "Q0"} <= set(found.quantities)
+    assert {name.split("_")[0] for name in found.groups["peaks"]} == {"Q", "Y"}
