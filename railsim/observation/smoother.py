@@ -1,0 +1,135 @@
+"""Smoother of stationary Gaussian fields seen through filters: gaps, noise, bias, ends.
+
+Fields r_q (here a track's irregularities) are observed by channels y_c = sum_q h_cq * r_q + e_c,
+both fields and errors e stationary and Gaussian.  On a grid of M points with period M the discrete
+Fourier transform makes all covariances block-diagonal: per wave number, with P = diag of the
+fields' power, N = diag of the errors' and H the frequency responses,
+
+    E[r | y] = P H* G^-1 y,   G = H P H* + N,   Cov[r | y] = (1 + P H* N^-1 H)^-1 P        (1)
+
+(Wiener 1949).  Both are the mean and covariance that the smoother of Rauch, Tung and Striebel
+(1965) has in the inside of a long record, whose gains do not change there: both condition one
+Gaussian model on all data.  A record has ends, and it may have gaps.  With E that takes the samples
+that exist, the mean is still exact,
+
+    E[r | y] = P H* E' w,   (E G E') w = y,                                                 (2)
+
+and (2) is solved by conjugate gradients (Hestenes and Stiefel 1952) with E G^-1 E' before it.  The
+period is longer than the record by samples that do not exist.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from railsim.errors import ModelError
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Complex = NDArray[np.complex128]
+
+RESIDUAL = 1e-9  # of the linear equations, over the norm of the data
+MOST_ITERATIONS = 2000
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Gaussian fields on a periodic grid, and how channels see them.
+
+    Attributes
+    ----------
+    points : int
+        M, points of the grid.
+    power : float64[bin, field]
+        Two-sided power: M times the share of each of the bins of `numpy.fft.rfft` in the variance
+        of a field.
+    response : complex128[bin, channel, field]
+        H.
+    errors : float64[bin, channel]
+        Power of the channels' errors; of white noise its variance in every bin.
+    """
+
+    points: int
+    power: Floats
+    response: Complex
+    errors: Floats
+
+    def covariance(self) -> Complex:
+        """Cov[r | y] of (1) per bin, complex128[bin, field, field]."""
+        N = 1.0 / self.errors
+        seen = np.einsum("kcp,kc,kcq->kpq", self.response.conj(), N, self.response, optimize=True)
+        one = np.eye(self.power.shape[1])
+        return np.asarray(
+            np.linalg.solve(one + self.power[:, :, None] * seen, self.power[:, :, None] * one)
+        )
+
+    def mean(self, data: Floats, there: Bools | None = None) -> Floats:
+        """E[r | y] of (2), float64[field, points].
+
+        Parameters
+        ----------
+        data : float64[channel, points]
+            Samples; those that do not exist do not count.
+        there : bool[channel, points], optional
+            Which samples exist; all by default.
+
+        Raises
+        ------
+        ModelError
+            The equations are not solved after `MOST_ITERATIONS`.
+        """
+        weights = self._weights(data, np.ones_like(data, dtype=bool) if there is None else there)
+        back = np.einsum(
+            "kcq,ck->qk", self.response.conj(), np.fft.rfft(weights, axis=1), optimize=True
+        )
+        return np.asarray(np.fft.irfft(self.power.T * back, self.points, axis=1))
+
+    def seen(self, fields: Floats) -> Floats:
+        """What the channels read of fields, float64[channel, points]."""
+        spectra = np.fft.rfft(fields, axis=1)
+        read = np.einsum("kcq,qk->ck", self.response, spectra, optimize=True)
+        return np.asarray(np.fft.irfft(read, self.points, axis=1))
+
+    def _weights(self, data: Floats, there: Bools) -> Floats:
+        """w of (2), zero where no sample exists."""
+        forth, back = self._data_covariance()
+
+        def applied(matrix: Complex, values: Floats) -> Floats:
+            spectra = np.fft.rfft(values, axis=1)
+            spectra = np.einsum("kcd,dk->ck", matrix, spectra, optimize=True)
+            return np.where(there, np.fft.irfft(spectra, self.points, axis=1), 0.0)
+
+        data = np.where(there, data, 0.0)
+        if there.all():
+            return applied(back, data)
+        scale = 1.0 / np.sqrt(np.mean(self.errors, axis=0))[:, None]
+        w = applied(back, data)
+        rest = data - applied(forth, w)
+        goal = RESIDUAL * np.linalg.norm(scale * data)
+        z = applied(back, rest)
+        along, size = z, np.vdot(rest, z)
+        for _ in range(MOST_ITERATIONS):
+            if np.linalg.norm(scale * rest) <= goal:
+                return w
+            image = applied(forth, along)
+            step = size / np.vdot(along, image)
+            w, rest = w + step * along, rest - step * image
+            z = applied(back, rest)
+            before, size = size, np.vdot(rest, z)
+            along = z + (size / before) * along
+        raise ModelError(
+            f"the smoother's equations are not solved after {MOST_ITERATIONS} iterations"
+        )
+
+    def _data_covariance(self) -> tuple[Complex, Complex]:
+        """G and G^-1, complex128[bin, channel, channel]."""
+        H, P, N = self.response, self.power, self.errors
+        channels = np.arange(N.shape[1])
+        forth = np.einsum("kcq,kq,kdq->kcd", H, P, H.conj(), optimize=True)
+        forth[:, channels, channels] += N
+        # Woodbury: G^-1 = N^-1 - N^-1 H Cov H* N^-1
+        gain = H / N[:, :, None]
+        back = -np.einsum("kcp,kpq,kdq->kcd", gain, self.covariance(), gain.conj(), optimize=True)
+        back[:, channels, channels] += 1.0 / N
+        return forth, back
